@@ -1,4 +1,4 @@
-//! What a scene says of an aurora. Symbols and equation numbers are those of Sekiguchi's thesis.
+//! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
 use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
 use crate::physics::atmosphere::atmosphere;
@@ -242,7 +242,7 @@ impl AuroraParameters {
         self.extent_km / self.field.cells as f64
     }
 
-    /// L_thr, km: how far from the line a sheet reaches to each side.
+    /// L_thr, km: half the thickness of a sheet.
     #[must_use]
     pub fn half_thickness_km(&self) -> f64 {
         match self.thickness_km {
@@ -263,7 +263,7 @@ bansho_base::choice! {
 }
 
 impl TrackModel {
-    /// The light that it gives for a spectrum.
+    /// The emission table for a spectrum.
     #[must_use]
     pub fn emission(self, spectrum: Spectrum) -> Emission {
         match self {
@@ -272,7 +272,7 @@ impl TrackModel {
         }
     }
 
-    /// The same for a spectrum that a scene may state, made once for all auroras.
+    /// The table for a spectrum that a scene can select, computed once per process.
     pub(crate) fn shared_emission(self, shape: SpectrumShape) -> &'static Emission {
         static TABLES: [OnceLock<Emission>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
             [const { OnceLock::new() }; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
@@ -305,8 +305,8 @@ bansho_base::parameters! {
     }
 }
 
-/// Most that a collision may turn an electron. Collisions are spread about their line by a few far steps from high up, the mean light by a patch
-/// that is as wide; where either is wider than a few km, pictures of both are no longer alike.
+/// Maximum deflection by a collision. Collisions spread by a few long steps at high altitude, the mean profile by a
+/// Gaussian patch of the same width; where it exceeds a few km the two pictures differ.
 pub(crate) const MAX_WOBBLE: f64 = 0.05;
 
 bansho_base::parameters! {
@@ -329,13 +329,14 @@ bansho_base::parameters! {
     }
 }
 
-/// Rounding that is forgiven.
+/// Relative rounding error that is accepted.
 const RELATIVE_ROUNDING: f64 = 1e-9;
 
-/// Looks at the energy of every point of every sheet's curve.
+/// Checks the energy at every point of every sheet's curve against the range of the tables.
 ///
 /// # Errors
-/// The first point where the factor of a sheet takes the aurora's energy out of the tables.
+///
+/// The first point where a sheet's factor takes the aurora's energy out of the range.
 pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeError> {
     let energy_ev = parameters.energy_ev.bounds();
     for (shape, of) in parameters.shapes.iter().enumerate() {
@@ -348,7 +349,7 @@ pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeE
     Ok(())
 }
 
-/// The first point of a sheet's curve of energy that is no energy of the tables; the curve stays between its points.
+/// The first point of a sheet's energy curve outside the tables. The curve does not overshoot its points.
 fn outside(sheet: &SheetParameters, number: usize, [low, high]: [f64; 2]) -> Option<(usize, ShapeErrorKind)> {
     let of_point = |(point, [at, factor]): (usize, &[f64; 2])| {
         let (least, greatest) = (low * factor, high * factor);

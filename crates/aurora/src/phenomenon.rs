@@ -183,7 +183,7 @@ impl Aurora {
         &self.working().profiles
     }
 
-    /// Red light alone, by its heights in place of the emitters.
+    /// Red light alone, by its heights in position of the emitters.
     pub(super) fn red_profiles(&self) -> &EmissionProfiles {
         &self.working().red_profiles
     }
@@ -197,7 +197,7 @@ impl Aurora {
         self.working().collisions.as_ref()
     }
 
-    /// The magnetic field about an observer at a place in m.
+    /// The magnetic field about an observer at a position in m.
     pub(super) fn field_lines(&self, place: DVec3) -> FieldLines {
         FieldLines::new(self.parameters.dip_deg, self.parameters.declination_deg, place)
     }

@@ -1,4 +1,5 @@
-//! The light held against what is observed: figures that a command can print and a test can check.
+//! Calibration: compares the model's brightness, line ratios and peak altitudes with observations. `bansho calibrate`
+//! prints it and tests check it.
 
 use std::fmt;
 
@@ -9,21 +10,22 @@ use super::{
 };
 use crate::physics::precipitation::spectrum::ARC;
 
-/// Share of N2+ ions, band and pairs in the column of Fang et al.: rayleighs of 427.8 nm per mW m^-2, by energy in keV.
+/// 427.8 nm brightness for the column ionization of Fang et al., R per mW m^-2, by energy in keV: pairs times the
+/// fraction of N2+(B) times the band's branching ratio.
 const FANG_427_RAYLEIGH: [(f64, f64); 4] = [(1.0, 250.0), (3.0, 294.0), (10.0, 307.0), (30.0, 304.0)];
-/// Altitude of the greatest deposition of Fang et al., km, by energy in keV.
+/// Altitude of the deposition peak of Fang et al., km, by energy in keV.
 const FANG_PEAK_KM: [(f64, f64); 4] = [(1.0, 158.35), (3.0, 122.23), (10.0, 104.68), (30.0, 95.194)];
-/// Energies of the figures, keV.
+/// Energies of the table rows, keV.
 const ENERGIES_KEV: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0];
 
-/// Figures of one energy.
+/// Column quantities for one energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColumnMetrics {
     /// The energy that names the spectrum: its central or characteristic one, keV.
     pub energy_kev: f64,
-    /// Altitude of the greatest deposition, km.
+    /// Altitude of the deposition peak, km.
     pub deposition_peak_km: f64,
-    /// Altitude of the greatest emission by emitter, km.
+    /// Altitude of the emission peak of each emitter, km.
     pub peaks_km: [f64; 4],
     /// I(427.8), R per mW m^-2.
     pub blue_rayleigh: f64,
@@ -31,66 +33,66 @@ pub struct ColumnMetrics {
     pub green_to_blue: f64,
     /// I(630.0) / I(427.8).
     pub red_to_blue: f64,
-    /// Share of the red light from above 200 km.
+    /// Fraction of the red light from above 200 km.
     pub red_above_200_km: f64,
-    /// Photons of the whole first positive system to those of 557.7 nm.
+    /// Ratio of the photons of the whole first positive system to those of 557.7 nm.
     pub first_positive_to_green: f64,
-    /// Mean lifetime of the red light, s.
+    /// Emission-weighted mean lifetime of the red light, s.
     pub red_lifetime: f64,
 }
 
-/// One demand on the light.
+/// One requirement and the value that was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationCheck {
-    /// What is demanded.
+    /// What is required.
     pub requirement: String,
-    /// What was found.
+    /// The value that was found.
     pub found: f64,
-    /// Least and greatest that is allowed.
+    /// Allowed minimum and maximum.
     pub allowed: [f64; 2],
 }
 
 impl CalibrationCheck {
-    /// Whether the demand is met.
+    /// Whether the value is within the allowed range.
     #[must_use]
     pub fn holds(&self) -> bool {
         (self.allowed[0]..=self.allowed[1]).contains(&self.found)
     }
 }
 
-/// Figures of a spectrum by energy, rising.
+/// Column quantities of one spectrum, by ascending energy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpectrumMetrics {
-    /// What scenes call the spectrum.
+    /// Name of the spectrum in scene files.
     pub spectrum: &'static str,
-    /// Figures of each energy.
+    /// One row per energy.
     pub metrics: Vec<ColumnMetrics>,
 }
 
-/// Figures and demands. `Display` prints both as tables.
+/// All tables and checks. `Display` prints them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Figures of each spectrum, the default one first.
+    /// Tables of each spectrum, the default first.
     pub spectra: Vec<SpectrumMetrics>,
-    /// All demands.
+    /// All checks.
     pub checks: Vec<CalibrationCheck>,
 }
 
-/// A spectrum, and at which of its energies it is held against what is observed.
+/// A spectrum and the energies at which it is compared with observations.
 struct SpectrumBounds {
     name: &'static str,
     spectrum: Spectrum,
-    /// Mean energy beside the one that names it: brightness and colors are observed by mean energy.
+    /// Ratio of the mean energy to the nominal one: observed brightness and colors are given by mean energy.
     mean_ratio: f64,
-    /// The energy that carries most of the flux beside the one that names it.
+    /// Ratio of the energy at the peak of the energy flux to the nominal one.
     peak_flux_ratio: f64,
-    /// Least mean energy at which green light peaks below 120 km, keV.
+    /// Minimum mean energy at which the green emission peaks below 120 km, keV.
     low_green_kev: f64,
 }
 
 const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
     SpectrumBounds { name: "arc", spectrum: ARC, mean_ratio: 1.0, peak_flux_ratio: 1.0, low_green_kev: 3.0 },
-    // 3 keV alone deposits at 122 km; only a spread of energies brings the green peak below 120 km.
+    // 3 keV alone peaks at 122 km; only a spread of energies moves the green peak below 120 km.
     SpectrumBounds {
         name: "single",
         spectrum: Spectrum::Monoenergetic,
@@ -98,7 +100,7 @@ const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
         peak_flux_ratio: 1.0,
         low_green_kev: 5.0,
     },
-    // Energy flux E^2 exp(-E / E_0), on a logarithmic scale E^3 exp(-E / E_0).
+    // Energy flux is E^2 exp(-E / E_0), per logarithmic interval E^3 exp(-E / E_0).
     SpectrumBounds {
         name: "maxwellian",
         spectrum: Spectrum::Maxwellian,
@@ -108,7 +110,7 @@ const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
     },
 ];
 
-/// Measures the light of all spectra.
+/// Computes and checks all spectra.
 #[must_use]
 pub fn calibrate(air: &Atmosphere) -> Calibration {
     let (mut spectra, mut checks) = (Vec::new(), check_violet());
@@ -122,7 +124,7 @@ pub fn calibrate(air: &Atmosphere) -> Calibration {
     Calibration { spectra, checks }
 }
 
-/// The figures of a spectrum.
+/// Column quantities of a spectrum.
 #[must_use]
 pub fn measure(air: &Atmosphere, spectrum: Spectrum) -> Vec<ColumnMetrics> {
     let table = Emission::new(air, spectrum);
@@ -148,7 +150,7 @@ fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
     }
 }
 
-/// Altitude of the level with the greatest value, km.
+/// Altitude of the level with the maximum value, km.
 fn peak_km(value: impl Fn(usize) -> f64) -> f64 {
     let values: Vec<f64> = (0..LEVELS).map(value).collect();
     let greatest = (0..LEVELS).fold(0, |best, level| if values[level] > values[best] { level } else { best });
@@ -159,7 +161,7 @@ fn requirement(requirement: String, found: f64, allowed: [f64; 2]) -> Calibratio
     CalibrationCheck { requirement, found, allowed }
 }
 
-/// Ratio of the bands of N2+, whatever the spectrum.
+/// Ratio of the N2+ bands, which does not depend on the spectrum.
 fn check_violet() -> Vec<CalibrationCheck> {
     let violet = LINES.iter().find(|line| line.name.contains("391.4"));
     violet
@@ -168,7 +170,7 @@ fn check_violet() -> Vec<CalibrationCheck> {
         .collect()
 }
 
-/// Demands on the column of one energy.
+/// Checks of the column for one energy.
 fn check_colors(bounds: &SpectrumBounds, metrics_row: &ColumnMetrics) -> Vec<CalibrationCheck> {
     let (kev, mean_kev) = (metrics_row.energy_kev, bounds.mean_ratio * metrics_row.energy_kev);
     let of = |what: &str| format!("{}: {what} at {kev} keV", bounds.name);
@@ -210,7 +212,7 @@ fn check_peaks(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<Calibr
     green.chain(deposited).collect()
 }
 
-/// Both ratios fall from each energy to the next above a mean of 1 keV.
+/// Both ratios decrease with energy above a mean of 1 keV.
 fn check_slopes(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
     let pairs = metrics.windows(2).filter(|pair| bounds.mean_ratio * pair[0].energy_kev >= 1.0);
     let falls = pairs.flat_map(|pair| {
@@ -276,7 +278,7 @@ mod tests {
     #[test]
     fn every_demand_holds() {
         let calibration = calibrate(atmosphere());
-        // Red heights, green and red ratios, brightness, green and deposition peaks, slopes; and the ratio of the bands.
+        // Red altitudes, green and red ratios, brightness, green and deposition peaks, slopes; and the ratio of the bands.
         let (arc, single) = (8 + 7 + 2 + 3 + 4 + 3 + 4 + 12, 8 + 7 + 2 + 3 + 4 + 2 + 4 + 12);
         let maxwellian = 8 + 6 + 1 + 4 + 4 + 3 + 2 + 14;
         assert_eq!(calibration.checks.len(), arc + single + maxwellian + 1, "{calibration}");

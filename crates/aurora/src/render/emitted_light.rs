@@ -1,4 +1,4 @@
-//! The aurora as a light: what it shines on ground and rain.
+//! Illumination of ground and rain by the aurora, as one directional light.
 
 use bansho_base::{
     math::{self, DVec2, DVec3},
@@ -13,14 +13,15 @@ use crate::render::{
 
 use fearless_simd::{Level, dispatch};
 
-/// Particles that are asked for their light, about.
+/// Approximate number of particles that are sampled.
 const MAX_SAMPLED_PARTICLES: usize = 2048;
-/// Altitude from which the light of all heights seems to come, km.
+/// Effective altitude of the emission, km.
 const ALTITUDE_KM: f64 = 125.0;
 /// Power of one mW/m^2 on one km^2, W.
 const W_PER_UNIT: f64 = 1e3;
 
-/// Where the light above a place of the drawn plane seems to come from, km: over a round Earth, that far along the shell at 100 km.
+/// Apparent position of the light above a position of the drawn plane, km: along the shell at 100 km of a spherical
+/// Earth.
 fn toward_km(position: DVec2) -> DVec3 {
     let (sin, cos) = math::sin_cos(position.length() / (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM));
     let level = position.normalize_or_zero() * sin;
@@ -28,9 +29,9 @@ fn toward_km(position: DVec2) -> DVec3 {
 }
 
 impl Aurora {
-    /// One light from where most of it comes, as bright as all of it on a plane that faces it, for what stands on the ground below the
-    /// drawn square's middle; none where nothing shines. Each place has the color of its own electrons, and what lies below the horizon
-    /// lights nothing.
+    /// One directional light from the weighted mean direction, with the irradiance of the whole aurora on a plane that
+    /// faces it, for receivers on the ground below the drawn square's center; `None` where nothing shines. Each
+    /// particle has the color of its own electron energy; particles below the horizon are skipped.
     pub(crate) fn directional_light(&self) -> Option<Light> {
         let (emission, particles) = (self.simulation().emission(), self.simulation().particles());
         let level = Level::new();
@@ -46,7 +47,7 @@ impl Aurora {
             }
             let column =
                 emission.column(f64::from(particles.energies_ev[index])).kilorayleigh.map(|value| value as f32);
-            // A patch of 1 mW/m^2 over 1 km^2 at 1 km has 1 sr and the column's brightness.
+            // A patch of 1 mW/m^2 over 1 km^2 at 1 km subtends 1 sr and has the column's brightness.
             let solid_angle = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
             let color: [f32; 4] = dispatch!(level, simd => self.emitter_colors().attenuated(simd, &column, EmitterColors::table_coordinate(elevation)).into());
             let [red, green, blue, _] = color.map(f64::from);

@@ -1,10 +1,10 @@
-//! The picture of an aurora: absolute light of particles and afterglow, through any lens.
+//! Rendering of the aurora in absolute luminance, through any lens.
 //!
-//! Field lines are seen as meridians about the magnetic zenith (`geometry`), so that an aurora is drawn on a `chart` of
-//! the sky in longitude and colatitude about that point. Precipitation is summed up by longitude and distance
-//! (`source_bins`); then the light of every field line runs along its meridian (`meridians`), its altitudes from tables
-//! (`profile`). The chart is dimmed and colored by the air below (`emitter_colors`, `seen`), and what a pixel of any lens shows
-//! is looked up on it (`prepared`). The cost grows with pixels and particles, not with shapes.
+//! Field lines of a uniform field appear as meridians about the magnetic zenith ([`project`]: `field_lines`), so the
+//! aurora is drawn on a chart of the sky in longitude and colatitude about that point (`chart`). Precipitation is
+//! binned by longitude and distance ([`bin`]); the emission profile of every field line is integrated along its
+//! meridian ([`integrate`]). Extinction and color are applied to the chart ([`shade`]), and the pixels of any lens
+//! sample it ([`prepared`]). The cost is linear in pixels and particles and independent of the shapes.
 
 pub(crate) mod bin;
 mod emitted_light;

@@ -1,4 +1,4 @@
-//! One frame of an aurora: from its chart to pixels.
+//! A prepared frame: builds the charts and samples them for pixels.
 
 use std::{ops::Range, sync::OnceLock};
 
@@ -31,19 +31,19 @@ use crate::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-/// Pixels that are worked on at once.
+/// Pixels per batch.
 pub(crate) const PIXEL_BATCH: usize = 16;
-/// Altitude whose distance is an aurora's depth, km.
+/// Altitude that defines the aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
-/// Fainter than this is no aurora to a depth, kR.
+/// Minimum brightness for a depth value, kR.
 const FAINTEST: f32 = 0.05;
 
 const TAU: f32 = std::f32::consts::TAU;
 
-/// The depths at which auroras are drawn, m: behind the highest mountain, before the sky.
+/// Depth range of auroras, m: behind terrain, in front of the sky.
 pub(crate) const DEPTHS: DepthInterval = DepthInterval { near: 2e4, far: 1e10 };
 
-/// A frame, ready to draw in strips.
+/// A frame that is ready to be drawn in strips.
 pub(crate) struct PreparedAurora<'a> {
     aurora: &'a Aurora,
     view: &'a View,
@@ -52,23 +52,23 @@ pub(crate) struct PreparedAurora<'a> {
     field: FieldLines,
     /// Sine of the horizon's elevation.
     horizon: f32,
-    /// Distance of the observer from the Earth's middle, km.
+    /// Distance of the observer from the Earth's center, km.
     from_middle: f32,
-    /// What pixels look up.
+    /// Image that pixels sample.
     displayed: DisplayedLight,
-    /// Light by emitter on a sharp and a coarser chart, where it is measured.
+    /// Brightness by emitter on the sharp and the soft chart, kept if AOVs are requested.
     measured: Option<[ColumnBuffer; 2]>,
-    /// What radiates each brightness that is measured, and its photons for each counted one.
+    /// Emitter of each brightness AOV, and its photons per counted photon.
     brightnesses: Vec<(Emitter, f64)>,
-    /// Made where they are asked for.
+    /// Created on first use.
     maps: OnceLock<CellMaps<'a>>,
 }
 
-/// An aurora's light as pixels look it up.
+/// Light in the form that pixels sample.
 enum DisplayedLight {
     /// A chart of colors.
     Chart(ColumnBuffer),
-    /// Light by emitter, where the blur is one of the picture.
+    /// Brightness by emitter, blurred in the picture.
     BlurredImage(BlurredImage),
 }
 
@@ -88,7 +88,7 @@ impl<'a> PreparedAurora<'a> {
         } else {
             DisplayedLight::Chart(sharp.composite(&soft, &field, aurora.emitter_colors()))
         };
-        // What is blurred in the picture is blurred at one instant.
+        // A blur in the picture is computed at one instant.
         let cameras =
             if matches!(displayed, DisplayedLight::BlurredImage(_)) { vec![view.camera] } else { view.cameras() };
         Ok(Self {
@@ -107,7 +107,7 @@ impl<'a> PreparedAurora<'a> {
     }
 }
 
-/// What the charts of a frame have in common.
+/// Shared inputs of the charts of a frame.
 pub(super) struct ChartBuilder<'a> {
     pub(super) aurora: &'a Aurora,
     pub(super) field: &'a FieldLines,
@@ -118,7 +118,7 @@ impl ChartBuilder<'_> {
     /// The chart of light with fine detail.
     pub(super) fn sharp(&self, sources: &Sources) -> ColumnBuffer {
         let (pixel, [spread_km, _]) = (self.coverage.pixel, sources.spread_km);
-        // The angle at which the spread is seen from the nearest place where such light is.
+        // The angle of the spread at the minimum distance of such light.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
         let sorted = |strip| SourceBins::new(&sources.sharp, (&chart, strip), self.field, spread_km);
@@ -131,21 +131,21 @@ impl ChartBuilder<'_> {
         collisions.draw(chart, self.field, &source_bins, step)
     }
 
-    /// The coarser chart of light that lingers and spreads.
+    /// The coarser chart of the red afterglow.
     pub(super) fn soft(&self, sources: &Sources) -> ColumnBuffer {
         let (pixel, [_, spread_km]) = (self.coverage.pixel, sources.spread_km);
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
-        // To the side it is as smooth as its sources, but upward it changes with the air.
+        // Laterally it is as smooth as its sources, vertically it follows the atmosphere.
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
         let source_bins = SourceBins::new(&sources.soft, (&chart, STRIP_COLUMNS), self.field, spread_km);
-        // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
+        // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
         let mut picture = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &source_bins);
         picture.sum_red_altitudes();
         picture
     }
 }
 
-/// Directions of a batch of pixels in the field's frame, and what is needed of them.
+/// Directions of a batch of pixels in the field frame.
 #[derive(Default)]
 pub(crate) struct PixelBatch {
     /// Colatitude and longitude about the magnetic zenith.
@@ -155,7 +155,7 @@ pub(crate) struct PixelBatch {
     sine: [f32; PIXEL_BATCH],
     /// Length of the direction that [`Camera::direction`] gives.
     length: [f32; PIXEL_BATCH],
-    /// Whether the lens sees anything there.
+    /// Whether the lens maps the pixel to a direction.
     in_view: [bool; PIXEL_BATCH],
 }
 
@@ -186,8 +186,8 @@ impl PreparedAurora<'_> {
             DisplayedLight::BlurredImage(_) => None,
         };
         let rect = strip.rect;
-        // Batches lie on the picture's own grid, so that a crop changes no pixel; those of one column follow each
-        // other, since they look up the same part of the chart.
+        // Batches are aligned to the picture's grid, so that crops are identical; batches of a column are consecutive
+        // because they sample nearby parts of the chart.
         let mut x = rect.x / PIXEL_BATCH * PIXEL_BATCH;
         while x < rect.right() {
             let measured = !strip.aovs.is_empty();
@@ -200,8 +200,8 @@ impl PreparedAurora<'_> {
         }
     }
 
-    /// Whether there is surely no light in the batches from `x` on between two rows, by the sky between their corners and as far again as that
-    /// may bend.
+    /// Conservative test whether the batches at `x` between two rows are dark, from the chart bounds of their corners
+    /// plus the maximum curvature.
     fn is_dark(&self, sampler: &ChartSampler, x: usize, rows: [usize; 2]) -> bool {
         if self.cameras.len() > 1 {
             return false;
@@ -215,7 +215,7 @@ impl PreparedAurora<'_> {
                 let [along, first, second] = self.field.to_field_frame(direction);
                 let colatitude = math::atan2(math::hypot(first, second), along) as f32;
                 let longitude = math::atan2(second, first) as f32;
-                // About the first one's, so that no part is torn where longitudes begin anew.
+                // Relative to the first corner, so that the region is not split at the seam of longitude.
                 let about = *middle.get_or_insert(longitude);
                 let turned = longitude - about;
                 let longitude = longitude - (turned * (1.0 / TAU)).round() * TAU;
@@ -225,7 +225,7 @@ impl PreparedAurora<'_> {
         }
         let size = ((longitudes[1] - longitudes[0]) * math::sin(f64::from(colatitudes[1])) as f32)
             .max(colatitudes[1] - colatitudes[0]);
-        // Near the magnetic zenith corners say little.
+        // Near the magnetic zenith the corners are not a bound.
         if colatitudes[0] < 4.0 * size || longitudes[1] - longitudes[0] > 0.5 {
             return false;
         }
@@ -301,7 +301,7 @@ impl PreparedAurora<'_> {
         colors
     }
 
-    /// How much of each pixel is sky, times `camera_weight`, and the depth of an aurora there, m.
+    /// Sky coverage of each pixel times `camera_weight`, and the depth of an aurora there, m.
     #[inline(always)]
     fn sky_coverage(&self, batch: &PixelBatch, camera_weight: f32) -> ([f32; PIXEL_BATCH], [f32; PIXEL_BATCH]) {
         let (mut sky, mut depths) = ([0.0; PIXEL_BATCH], [0.0; PIXEL_BATCH]);
@@ -314,7 +314,7 @@ impl PreparedAurora<'_> {
         (sky, depths)
     }
 
-    /// Adds what the AOVs tell of a batch, of which the pixels `inside` stand in the strip from number `first` on.
+    /// Accumulates the AOVs of a batch; its pixels `inside` start at index `first` of the strip.
     #[inline(always)]
     fn measure<S: Simd>(
         &self,
@@ -341,7 +341,7 @@ impl PreparedAurora<'_> {
         }
     }
 
-    /// Adds what the AOVs tell of a pixel.
+    /// Accumulates the AOVs of a pixel.
     #[inline(never)]
     fn measure_pixel(
         &self,
@@ -361,7 +361,7 @@ impl PreparedAurora<'_> {
         }
     }
 
-    /// Distance of the aurora in a direction of that elevation, m.
+    /// Distance of the aurora in a direction with this sine of elevation, m.
     #[inline(always)]
     fn depth(&self, sine: f32) -> f32 {
         const SHELL: f32 = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
@@ -371,8 +371,8 @@ impl PreparedAurora<'_> {
     }
 }
 
-/// Leaves no sky where an aurora at those depths lies outside the slice or behind the plate; pixels `inside` stand in the strip from number
-/// `first` on.
+/// Clears the sky coverage where the aurora's depth is outside the slice or behind the plate; pixels `inside` start at
+/// index `first` of the strip.
 #[inline(always)]
 fn mask_occluded(
     sky: &mut [f32; PIXEL_BATCH],

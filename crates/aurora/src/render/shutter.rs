@@ -1,4 +1,4 @@
-//! What shines while the shutter is open: one state of the simulation that is drawn out, or in a long exposure the mean of many.
+//! Motion blur: one extrapolated state of the simulation, or in a long exposure the mean of many states.
 
 use bansho_base::{
     math,
@@ -14,33 +14,33 @@ use crate::{
     simulate::AuroraSimulation,
 };
 
-/// Motion of particles while the shutter is open that one instant stands for, beside their own spread, and the most instants: what is left
-/// between two instants adds to that spread.
+/// Motion per instant in units of the particles' spread, and the maximum number of instants; the rest is added to the
+/// spread.
 const SPREADS_PER_INSTANT: f64 = 3.0;
 const MOST_INSTANTS: f64 = 16.0;
 /// Instants of a long exposure, each with its own particles and afterglow.
 const LONG_INSTANTS: usize = 16;
 
-/// Whether an exposure is so long that particles do not merely go straight on in it: more than a step on each side of a state.
+/// Whether an exposure is too long for linear extrapolation: more than a step on each side of a state.
 pub(crate) fn is_long(shutter: Shutter) -> bool {
     shutter.duration() > 2.0 * AuroraSimulation::STEP_S
 }
 
-/// Steps until the state is the last one not after a time, s.
+/// Steps to the last state not after time `t`, s.
 pub(crate) fn step_until(simulation: &mut AuroraSimulation, t: f64) {
-    // A millionth of a step forgives rounding.
+    // Tolerance for rounding, a millionth of a step.
     while simulation.time() + (1.0 - 1e-6) * AuroraSimulation::STEP_S <= t {
         simulation.step();
     }
 }
 
 impl Aurora {
-    /// What shines while the shutter of a view is open.
+    /// Sources while the shutter of a view is open.
     pub(super) fn sources(&self, view: &View, field: &FieldLines) -> Sources {
         if is_long(view.shutter) { self.long_exposure(view, field) } else { self.short_exposure(view, field) }
     }
 
-    /// The state's particles wherever they get while the shutter is open, and its afterglow.
+    /// Extrapolated particles of the current state, and its afterglow.
     fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
         let light = self.light(self.simulation(), view.shutter.middle());
         let distance_km = rms_speed(self.simulation()) * view.shutter.duration();
@@ -55,10 +55,10 @@ impl Aurora {
         )
     }
 
-    /// The mean of the states that come while the shutter is open.
+    /// Mean of the states during the exposure.
     ///
-    /// They begin with that of [`Phenomenon::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a loop, where two runs
-    /// are drawn at the time of the shutter's middle, with that one.
+    /// It starts at the state of [`Phenomenon::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a
+    /// loop, where two runs are drawn at the shutter's middle, with that one.
     fn long_exposure(&self, view: &View, field: &FieldLines) -> Sources {
         let mut simulation = self.simulation().clone();
         let (shutter, now) = (view.shutter, simulation.time());
@@ -87,7 +87,7 @@ fn rms_speed(simulation: &AuroraSimulation) -> f64 {
     math::sqrt(squares / particles.len().max(1) as f64)
 }
 
-/// Standard deviation of an even spread over a way, along each of the two directions.
+/// Standard deviation, per direction, of a uniform distribution over a distance in a random direction.
 fn smear_km(distance_km: f64) -> f64 {
     distance_km * math::sqrt(1.0 / 24.0)
 }

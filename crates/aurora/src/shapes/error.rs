@@ -159,7 +159,7 @@ pub enum ShapeErrorKind {
     NotAnEnd {
         /// The sheet.
         sheet: usize,
-        /// Share of its length.
+        /// Fraction of its length.
         at: f64,
     },
     /// Two merges of one end.
@@ -193,7 +193,7 @@ pub enum ShapeErrorKind {
     /// Linked points that change their order.
     #[error("two linked points of a sheet would pass each other; allowed: points in the order of the sheet")]
     LinksCross,
-    /// A link where nothing goes by place.
+    /// A link where nothing goes by position.
     #[error("sheets and points go in drawing order here; allowed with `correspondence = \"automatic\"`")]
     LinkInOrder,
     /// A sheet that is said in several ways.
@@ -220,7 +220,7 @@ pub enum ShapeErrorKind {
     EnergyOutside {
         /// The entry of the shape's list of sheets.
         sheet: usize,
-        /// Share of its length.
+        /// Fraction of its length.
         at: f64,
         /// The energy, eV.
         energy_ev: f64,

@@ -50,7 +50,7 @@ impl Form {
         }
     }
 
-    /// Heading at the share `s` of the length, in bends, 0 toward east, positive toward south.
+    /// Heading at the fraction `s` of the length, in bends, 0 toward east, positive toward south.
     fn heading(self, s: f64, count: f64) -> f64 {
         let wave = |turns: f64| math::sin(std::f64::consts::TAU * turns);
         match self {

@@ -64,7 +64,7 @@ impl<'a> ControlPointIds<'a> {
     }
 }
 
-/// A time among the shapes: at one of them, or at a share of the way from one to the next.
+/// A time among the shapes: at one of them, or at a fraction of the way from one to the next.
 enum SequencePosition {
     At(usize),
     Between(usize, f64),

@@ -5,7 +5,7 @@ use bansho_base::math::DVec2;
 /// One sheet: control points joined by segments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
-    /// Control points, km: x east, y south. At least two; neighbours may coincide while a split opens or a merge closes.
+    /// Control points, km: x east, y south. At least two; neighbors may coincide while a split opens or a merge closes.
     pub points: Vec<DVec2>,
     /// Factor of the aurora's flux at each control point.
     pub flux: Vec<f64>,

@@ -290,7 +290,7 @@ fn a_shape_that_returns_with_another_flux_is_another() {
     assert!((turn.at(4.0).sheets[0].points[0].y - 50.0).abs() < 1e-6, "round, not there and back");
 }
 
-/// Sheets that are told to exchange places pass through each other on the way to the second shape; those that stay do not.
+/// Sheets that are told to exchange positions pass through each other on the way to the second shape; those that stay do not.
 #[test]
 fn sheets_that_exchange_places_are_known_to_cross() {
     assert_eq!(linked(vec![]).unwrap().crossing(), None);

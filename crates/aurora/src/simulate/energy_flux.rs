@@ -1,4 +1,4 @@
-//! What each particle brings into the air: energy and power, by its place on the sheets.
+//! What each particle brings into the air: energy and power, by its position on the sheets.
 
 use bansho_base::{math::random::Key, noise::LANES};
 
@@ -28,7 +28,7 @@ const FINE: [f64; 2] = [32.0, 256.0];
 const PER_FINE: f64 = 64.0;
 /// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
 const MAX_CONCENTRATION: f64 = 6.0;
-/// The power of a particle comes this share nearer in a step to what it shall be.
+/// The power of a particle comes this fraction nearer in a step to what it shall be.
 const POWER_RELAXATION: f32 = 0.2;
 /// Least and most that all powers are changed by to make up for that delay: a flux that is keyed to jump is followed in some steps still.
 const BALANCE: [f64; 2] = [0.9, 1.1];
@@ -58,7 +58,7 @@ impl EnergyFlux {
         Self { parameters: parameters.clone(), rays: RayPattern::new(parameters, key) }
     }
 
-    /// The coarse and the fine stretches of sheets of those lengths.
+    /// The coarse and the fine intervals of sheets of those lengths.
     fn layouts(&self, lengths: &[f64]) -> [NodeLayout; 2] {
         let count = self.parameters.particles.count as f64;
         [(PER_COARSE, COARSE), (PER_FINE, FINE)].map(|(per, bounds)| NodeLayout::new(lengths, count / per, bounds))
@@ -69,7 +69,7 @@ impl EnergyFlux {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
         let mut wanted = NodeValues::new(layout);
-        // Parts as long as half of a stretch: sheets that bridge a gap have fewer pieces than nodes.
+        // Parts as long as half of an interval: sheets that bridge a gap have fewer pieces than nodes.
         refined.for_each_strip(|sheet| 0.5 / (layout.count(sheet) - 1) as f64).for_each(
             |(sheet, arc_fraction, factor, length)| {
                 wanted.add(sheet as u32, arc_fraction as f32, flux * factor * length)
@@ -83,10 +83,10 @@ impl EnergyFlux {
         self.rays.table(&refined.sheet_lengths(), |sheet, last| refined.arc_coordinates(sheet, last), time)
     }
 
-    /// Gives every particle its share of the power.
+    /// Gives every particle its fraction of the power.
     ///
-    /// All together have the power of the sheets, and those along a stretch that of the stretch, however many they are: no
-    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within a stretch each
+    /// All together have the power of the sheets, and those along an interval that of the stretch, however many they are: no
+    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within an interval each
     /// stands for the more of the sheet's length the fewer of them there are, and has the rays' pattern.
     pub(super) fn distribute_power(
         &self,
@@ -189,7 +189,7 @@ impl ParticleChunk<'_> {
             let (sheet, arc_fraction) = (self.sheets[index], self.arc_fractions[index]);
             let wanted = -*power * factors.at(sheet, arc_fraction) as f32;
             let full = &mut self.full_powers[index];
-            // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their share.
+            // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their fraction.
             let follows = *full > 0.0 || self.fades[index] < 1.0;
             *full = if follows { *full + POWER_RELAXATION * (wanted - *full) } else { wanted };
             *power = self.fades[index] * *full;
@@ -201,7 +201,7 @@ impl ParticleChunk<'_> {
 }
 
 /// Makes up for the delay with which powers follow, from the powers that parts of the particles shall have and those that they have: else all
-/// would be too bright while many are being born, for those that were there give up their share late.
+/// would be too bright while many are being born, for those that were there give up their fraction late.
 fn balance(particles: &mut AuroraParticles, given: &[[f64; 2]]) {
     let [wanted, found] = given.iter().fold([0.0; 2], |sum, chunk| [sum[0] + chunk[0], sum[1] + chunk[1]]);
     if found > 0.0 {

@@ -12,9 +12,9 @@ use rayon::prelude::*;
 const STIFFNESS: f64 = 0.1;
 /// Particles that a task of the thread pool moves.
 const TASK: usize = 4096;
-/// The support radius follows the density by this share each step.
+/// The support radius follows the density by this fraction each step.
 const FOLLOWING: f64 = 0.1;
-/// The support radius is at least this share of a cell and at most so many cells.
+/// The support radius is at least this fraction of a cell and at most so many cells.
 const SUPPORT_CELLS: [f64; 2] = [0.02, 2.0];
 /// Mass of a particle that is just appearing, beside 1 of one that is there: none is lighter.
 const LEAST_MASS: f32 = 0.05;
@@ -57,7 +57,7 @@ impl Repulsion {
         }
     }
 
-    /// The support radius h about which particles of that density have as many neighbours as is asked for, km.
+    /// The support radius h about which particles of that density have as many neighbors as is asked for, km.
     pub(super) fn support_km(&self, density_per_km2: f64) -> f64 {
         let [least, most] = self.bounds_km;
         (self.neighbors / (std::f64::consts::PI * density_per_km2.max(f64::MIN_POSITIVE))).sqrt().clamp(least, most)
@@ -108,7 +108,7 @@ fn add_missing_self_density(densities: &mut [f32], masses: &[f32], whole: f32) {
     }
 }
 
-/// Numbers of a step that all particles share.
+/// Numbers of a step that all particles fraction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Integrator {
     pull_weight: f32,

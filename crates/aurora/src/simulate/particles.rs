@@ -12,7 +12,7 @@ use rayon::prelude::*;
 pub struct AuroraParticles {
     /// Where they pass 100 km altitude, km: x east, z south.
     pub positions: [Vec<f32>; 2],
-    /// How fast that place moves, km/s: x east, z south.
+    /// How fast that position moves, km/s: x east, z south.
     pub velocities: [Vec<f32>; 2],
     /// Birth ids, no two alike.
     pub ids: Vec<u64>,
@@ -28,7 +28,7 @@ pub struct AuroraParticles {
     pub full_powers_w: Vec<f32>,
     /// The sheet that it is nearest to, as the shape's list has it; where it was last near one.
     pub sheets: Vec<u32>,
-    /// Share of that sheet's length before it, 0 to 1.
+    /// Fraction of that sheet's length before it, 0 to 1.
     pub arc_fractions: Vec<f32>,
 }
 
@@ -54,13 +54,13 @@ impl AuroraParticles {
         self.powers_w.iter().map(|power| f64::from(*power)).sum()
     }
 
-    /// Place of a particle, km.
+    /// Position of a particle, km.
     #[must_use]
     pub fn position(&self, index: usize) -> DVec2 {
         DVec2::new(f64::from(self.positions[0][index]), f64::from(self.positions[1][index]))
     }
 
-    /// All arrays of `f32`: positions, velocities, fades, energies, powers, full powers, shares.
+    /// All arrays of `f32`: positions, velocities, fades, energies, powers, full powers, fractions.
     pub(super) fn float_arrays(&self) -> [&Vec<f32>; FLOAT_ARRAYS] {
         let ([x, z], [u, w]) = (&self.positions, &self.velocities);
         [x, z, u, w, &self.fades, &self.energies_ev, &self.powers_w, &self.full_powers_w, &self.arc_fractions]

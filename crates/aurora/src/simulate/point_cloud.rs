@@ -30,7 +30,7 @@ pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64) -> PointCl
     }
 }
 
-/// A place of the drawn plane, km, on the shell that it is spread over, m: as far from the middle along it.
+/// A position of the drawn plane, km, on the shell that it is spread over, m: as far from the middle along it.
 fn on_shell(position_at: DVec2) -> DVec3 {
     const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM);
     let distance = position_at.length();

@@ -15,10 +15,10 @@ const THINNING: Purpose = Purpose::named("aurora thinning");
 const TABLE_COUNT: f64 = 75.0;
 /// Particles that a task of the thread pool finds the cells of, at least.
 const TASK: usize = 4096;
-/// By so much more is a stretch filled than the table says: until the next renewal it stretches by up to a half, and its particles move on.
+/// By so much more is an interval filled than the table says: until the next renewal it stretches by up to a half, and its particles move on.
 const AHEAD: f64 = 1.35;
 
-/// Place and velocity of a particle that is born, km and km/s.
+/// Position and velocity of a particle that is born, km and km/s.
 type Birth = (DVec2, [f32; 2]);
 
 /// Table 3.3 for a number of particles, and the random numbers of births.
@@ -119,7 +119,7 @@ impl Relocation {
         }
     }
 
-    /// In every near cell with too few, the deficit appears at random, with the mean velocity of the cells around: places and velocities, by
+    /// In every near cell with too few, the deficit appears at random, with the mean velocity of the cells around: positions and velocities, by
     /// the letter of the table.
     fn births_by_cell(
         &self,
@@ -151,7 +151,7 @@ impl Relocation {
         births
     }
 
-    /// Where a stretch of the sheets holds too few, the deficit appears among the places of its scattered particles, with the mean velocity
+    /// Where an interval of the sheets holds too few, the deficit appears among the positions of its scattered particles, with the mean velocity
     /// there. All together are as many as the table gives to all near cells at most; where they are born is where they lack. Cells would not
     /// see that: where sheets bend, a full limb passes through the cells of an empty one.
     fn births_by_interval(
@@ -193,7 +193,7 @@ impl Relocation {
         (MOST_PARTICLES * self.count - living as f64).max(0.0)
     }
 
-    /// Lets the surplus over the wanted count die, in the stretches that hold more than their share.
+    /// Lets the surplus over the wanted count die, in the stretches that hold more than their fraction.
     fn remove_surplus(&self, particles: &mut AuroraParticles, intervals: &mut ArcIntervals, renewal: u32) {
         let living: f64 = intervals.all().iter().map(|interval| interval.count).sum();
         let excess = |interval: &ArcInterval| (interval.count - interval.target_count).max(0.0);
@@ -223,7 +223,7 @@ pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) ->
     let (counts, potential) = (field.counts.values(), field.potential.values());
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (least, greatest) = (table.count * mean(counts), table.potential * mean(potential));
-    // An empty shape has no near cells, whatever the shares.
+    // An empty shape has no near cells, whatever the fractions.
     let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
     counts.iter().zip(potential).map(near).collect()
 }
@@ -275,9 +275,9 @@ fn cells_around(cell: usize, columns: usize, cells: usize) -> impl Iterator<Item
         .flat_map(move |row| across.clone().map(move |column| row * columns + column))
 }
 
-/// Stretches that all sheets together are cut into: half as long as those that must hold half their share.
+/// Stretches that all sheets together are cut into: half as long as those that must hold half their fraction.
 const INTERVALS: f64 = 100.0;
-/// Particles that a stretch shall hold at least: fewer would come and go by chance.
+/// Particles that an interval shall hold at least: fewer would come and go by chance.
 const MIN_INTERVAL_COUNT: f64 = 32.0;
 
 /// Stretches of the sheets about as long as each other, one sheet's after those of another.
@@ -288,7 +288,7 @@ pub(super) struct ArcIntervals {
     all: Vec<ArcInterval>,
 }
 
-/// What is known of a stretch.
+/// What is known of an interval.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ArcInterval {
     /// Particles that it shall hold: as much of them all as it is of the sheets' length, like the power that they bring.
@@ -301,7 +301,7 @@ pub(super) struct ArcInterval {
 }
 
 impl ArcIntervals {
-    /// The stretches of a shape for so many particles, and what was scattered about each.
+    /// The intervals of a shape for so many particles, and what was scattered about each.
     pub(super) fn new(refined: &RefinedShape, scattered: &[ScatteredParticle], count: f64) -> Self {
         let lengths = refined.sheet_lengths();
         let whole = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
@@ -333,7 +333,7 @@ impl ArcIntervals {
         }
     }
 
-    /// The stretch at a share of a sheet's length; none where there is no such sheet.
+    /// The stretch at a fraction of a sheet's length; none where there is no such sheet.
     pub(super) fn index(&self, sheet: u32, fraction: f32) -> Option<usize> {
         let (first, end) = (*self.starts.get(sheet as usize)?, *self.starts.get(sheet as usize + 1)?);
         let coordinate = f64::from(fraction) * (end - first) as f64;
@@ -345,7 +345,7 @@ impl ArcIntervals {
         &mut self.all
     }
 
-    /// Mean velocity of those in the stretch at that index and in those beside it on the sheet, km/s; rest where there is nobody.
+    /// Mean velocity of those in the interval at that index and in those beside it on the sheet, km/s; rest where there is nobody.
     pub(super) fn velocity(&self, index: usize) -> [f32; 2] {
         let sheet = self.starts.partition_point(|start| *start <= index);
         let beside = index.saturating_sub(1).max(self.starts[sheet - 1])..(index + 2).min(self.starts[sheet]);

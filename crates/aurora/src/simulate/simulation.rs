@@ -276,7 +276,7 @@ impl AuroraSimulation {
         &self.state.particles
     }
 
-    /// Mean distance of neighbouring particles, km: the side of a square that holds one.
+    /// Mean distance of neighboring particles, km: the side of a square that holds one.
     pub(crate) fn spacing_km(&self) -> f64 {
         (std::f64::consts::PI / self.targets.parameters.particles.neighbours).sqrt() * self.state.support_km
     }
@@ -300,7 +300,7 @@ impl AuroraSimulation {
         &self.target.field.counts
     }
 
-    /// What noise adds to the potential at a place, km^2/s^2 (thesis, figure 2.11).
+    /// What noise adds to the potential at a position, km^2/s^2 (thesis, figure 2.11).
     #[must_use]
     pub fn potential_noise(&self, position: DVec2) -> f64 {
         let noisy = self.target.field.sample(position.x as f32, position.y as f32).potential;

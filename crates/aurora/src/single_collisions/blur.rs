@@ -1,7 +1,7 @@
-//! The thesis's blur (2.28): in the picture, by Gaussians whose radii in pixels depend on the line alone.
+//! The thesis's blur (2.28): Gaussians in the picture whose radii in pixels depend on the line only.
 //!
-//! A sum of equal Gaussians is one blur of the sum of points. So the whole picture is looked up on the charts, with a
-//! margin, and every emitter's light is blurred along rows and then along columns.
+//! A sum of equal Gaussians is one blur of the sum of points. The whole picture with a margin is sampled from the
+//! charts, and each emitter is blurred separably along rows and columns.
 
 use bansho_base::{
     camera::Camera,
@@ -22,20 +22,20 @@ use crate::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Reach of a Gaussian beside its standard deviation.
+/// Support of the kernel in standard deviations.
 const KERNEL_SIGMAS: f64 = 3.0;
-/// Standard deviation that light on the charts has already, pixels: that of the smallest patch.
+/// Standard deviation that the charts already have, pixels: that of the smallest patch.
 const CHART_SIGMA: f64 = 0.6;
 
-/// A picture of light by emitter, kR.
+/// A picture of brightness by emitter, kR.
 pub(crate) struct BlurredImage {
     light: Vec<PerEmitter<f32>>,
-    /// Pixels in a row, those of the margin among them, and the margin.
+    /// Row length including margins, and the margin, pixels.
     width: usize,
     margin: usize,
 }
 
-/// Weights by emitter from the middle outward.
+/// Weights by emitter from the center outward.
 struct BlurKernel(Vec<PerEmitter<f32>>);
 
 impl BlurKernel {
@@ -56,7 +56,7 @@ impl BlurKernel {
         self.0.len() - 1
     }
 
-    /// The weighted sum about the middle of places that lie `stride` apart.
+    /// Convolution at an index, with elements `stride` apart.
     #[inline(always)]
     fn sum<S: Simd>(&self, simd: S, light: &[PerEmitter<f32>], middle: usize, stride: usize) -> PerEmitter<f32> {
         let mut sum = FourLanes::simd_from(simd, self.0[0]) * FourLanes::simd_from(simd, light[middle]);
@@ -97,7 +97,7 @@ impl BlurredImage {
         Self { light, width, margin }
     }
 
-    /// The light of pixels from `x` on in row `y`; that of the last where the picture ends.
+    /// Pixels from `x` on in row `y`; clamped at the picture's edge.
     #[inline(always)]
     pub(crate) fn batch(&self, x: usize, y: usize) -> [PerEmitter<f32>; PIXEL_BATCH] {
         let row = &self.light[y * self.width..(y + 1) * self.width];
@@ -109,7 +109,7 @@ impl BlurredImage {
     }
 }
 
-/// Light by emitter of a row as the charts have it.
+/// Brightness by emitter of a picture row, sampled from the charts.
 #[inline(always)]
 fn look_up<S: Simd>(
     simd: S,

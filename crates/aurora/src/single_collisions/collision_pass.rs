@@ -1,7 +1,7 @@
-//! The picture of single collisions, as in the thesis (2.4): every source sends random falls down its field line.
+//! Renders single collisions as in the thesis (2.4): each source sends random electron tracks down its field line.
 //!
-//! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so
-//! that rays are as sharp as those of the mean. That mean is [`ColumnBuffer`], but for the noise.
+//! Altitudes are random; laterally each point has the smooth kernel of its source, so rays are as sharp as in the mean
+//! profile. The expected value is [`ColumnBuffer::new`].
 
 use std::{
     ops::Range,
@@ -49,39 +49,39 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
-/// Batches of random deviations.
+/// Batches of random lateral deviations.
 const DEVIATIONS: usize = 256;
-/// Sources whose falls are looked up together: what is far away in memory is then waited for once.
+/// Sources whose tracks are looked up together, to overlap their cache misses.
 const LOOKAHEAD_SOURCES: usize = 32;
-/// Batches of a fall that are placed before any of them is added, for the processor finds no other work while sums wait.
+/// Batches of a track that are projected before any is accumulated, to hide the latency of the sums.
 const PIPELINED_BATCHES: usize = 8;
-/// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer
-/// than so many, each by its own root and divisions.
+/// Sources nearer to the observer's field line than this many kernel supports are projected for every column, and
+/// nearer than the second number exactly instead of by polynomials.
 const PER_COLUMN_REACHES: f32 = 4.0;
 const EXACT_REACHES: f32 = 16.0;
 
-/// What falls are drawn from.
+/// Precomputed tables for single collisions.
 #[derive(Clone, Debug)]
 pub(crate) struct CollisionRenderer {
     key: Key,
     tracks: TrackTable,
     deposition: Deposition,
-    /// Counting photons for each ion pair by source.
+    /// Counted photons per ion pair, by level.
     photons: Vec<PerEmitter<f32>>,
     descents: RowPolynomialBasis,
-    /// kR of ion pairs that a collision of a node's fall stands for, per mW/m^2.
+    /// Brightness of ion pairs per collision of a node's track, kR per mW/m^2.
     pairs: Vec<f32>,
-    /// Squared reach by which the collisions of a node's falls wander, km^2.
+    /// Squared support due to the deflections of a node's tracks, km^2.
     spread_squared: Vec<f32>,
-    /// Deviations with the density of a source's edge, in reaches.
+    /// Deviations with the density of a source's kernel, in units of its support.
     deviations: Vec<[f32; SPLAT_LANES]>,
 }
 
 impl CollisionRenderer {
-    /// Falls of electrons of all energies up to that of a node.
+    /// Tracks for all energies up to that of a node.
     pub(crate) fn new(emission: &Emission, drawing: &DrawingParameters, highest: usize, key: Key) -> Self {
         let deviation = |index: usize| {
-            // The sum of three uniforms nearly has that density; its variance is made the same, 1/7.
+            // The sum of three uniforms approximates that density; scaled to its variance, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
             (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt()
         };
@@ -114,13 +114,13 @@ impl CollisionRenderer {
         }
     }
 
-    /// The picture of sources that are sorted by [`BLOCK_COLUMNS`]s of columns, at a step of the simulation: other steps have other falls.
+    /// Renders sources that are sorted by [`BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
     pub(crate) fn draw(&self, chart: Chart, field: &FieldLines, source_bins: &SourceBins, step: u32) -> ColumnBuffer {
         let level = Level::new();
         let mut picture = ColumnBuffer::zeros(chart);
         let (chart, blocks) = picture.strips(BLOCK_COLUMNS);
         let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), source_bins, step };
-        // The fullest first, whichever thread is free: the last ones, for which others wait, are soon drawn.
+        // Largest block first (LPT scheduling), for load balance.
         let mut blocks: Vec<_> = blocks.map(|block| (source_bins.count(block.number), block)).collect();
         blocks.sort_by_key(|(count, _)| *count);
         let blocks = Mutex::new(blocks);
@@ -135,13 +135,13 @@ impl CollisionRenderer {
         picture
     }
 
-    /// The fall of a source.
+    /// The track of a source.
     #[inline(always)]
     fn track(&self, source: FieldLineSource, step: u32) -> SourceTrack<'_> {
         let [a, b, c, d] = self.key.words(u64::from(source.random_key), step, SOURCE);
         let below = (source.energy_node as usize).min(NODES - 2);
         let about = below + usize::from(uniform(a) < source.energy_node - below as f32);
-        // What is beyond the falls is drawn as the hardest of them: their number of collisions and the light of each belong together.
+        // Energies above the tables use the highest node: its collision count and weight belong together.
         let node = self.deposition.sample_node_around(about, uniform_f64(b, d)).min(self.tracks.highest_node());
         let batches = self.tracks.track(node, c);
         SourceTrack {
@@ -154,13 +154,13 @@ impl CollisionRenderer {
     }
 }
 
-/// Falls after Fang et al. up to those of the highest node.
+/// Tracks after Fang et al. up to the highest node.
 fn fang_tracks(tracks: &TrackSampler, highest: usize, key: Key) -> TrackTable {
     let library = TrackLibrary::new(tracks, 0..=highest, key);
     TrackTable::new(highest + 1, |node, variant| library.track(node, variant).iter().map(with_light).collect())
 }
 
-/// Falls through hard spheres for each node up to the highest.
+/// Hard-sphere tracks for each node up to the highest.
 fn hard_sphere_tracks(
     deposition: &Deposition,
     deflection: f64,
@@ -172,24 +172,24 @@ fn hard_sphere_tracks(
     (0..=highest).into_par_iter().map(|node| QuantileMatchedTracks::new(&spheres, &heights, node, key)).collect()
 }
 
-/// A collision and the mean light of its level.
+/// A collision and its photon row, its level.
 fn with_light(collision: &Collision) -> (Collision, u16) {
     (*collision, collision.level as u16)
 }
 
-/// The random fall of a source.
+/// The random track of a source.
 struct SourceTrack<'a> {
     source: FieldLineSource,
     batches: &'a [CollisionBatch],
-    /// kR of ion pairs that a collision stands for, per mW/m^2.
+    /// Brightness of ion pairs per collision, kR per mW/m^2.
     pairs: f32,
-    /// Squared reach by which its collisions wander, km^2.
+    /// Squared support due to its deflections, km^2.
     spread_squared: f32,
-    /// Number of its first batch of deviations, any.
+    /// Index of its first batch of deviations (modulo).
     first: usize,
 }
 
-/// What a thread keeps from source to source.
+/// Buffers that a thread reuses.
 struct CollisionScratch {
     block: ColumnBlock,
     rasterizer: TrackRasterizer,
@@ -206,14 +206,14 @@ impl CollisionScratch {
     }
 }
 
-/// A field line as it is seen.
+/// A field line's projection.
 enum LineProjection<'a> {
     Polynomial(&'a RowPolynomials),
     Exact(ProjectedFieldLine<'a>),
 }
 
 impl LineProjection<'_> {
-    /// Rows of collisions so far from the line in km, and how bright they are seen.
+    /// Rows of collisions at offsets from the line in km, and their brightness factors.
     #[inline(always)]
     fn points<S: Simd>(&self, batch: &CollisionBatch, offsets: Lanes<S>) -> [Lanes<S>; 2] {
         match self {
@@ -225,7 +225,7 @@ impl LineProjection<'_> {
     }
 }
 
-/// What the points of a strip have in common.
+/// Shared inputs of all blocks.
 struct CollisionPass<'a> {
     collisions: &'a CollisionRenderer,
     chart: &'a Chart,
@@ -235,7 +235,7 @@ struct CollisionPass<'a> {
 }
 
 impl CollisionPass<'_> {
-    /// Draws columns beside each other, every source once for all of them.
+    /// Rasterizes a block: each source once for all its columns.
     #[inline(always)]
     fn draw_block<S: Simd>(&self, simd: S, strip: ColumnStrip, field: &FieldLines, scratch: &mut CollisionScratch) {
         let entries = scratch.block.begin(strip.number, self.chart, self.source_bins, field);
@@ -269,7 +269,7 @@ impl CollisionPass<'_> {
         let [green, red, prompt] = source.power;
         let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let weights = powers * (track.pairs / self.chart.row_step as f32);
-        // Seen from afar its meridian is that of all columns.
+        // A distant source has nearly the same meridian in all columns.
         let shared = source.distance() >= PER_COLUMN_REACHES * source.reach;
         if shared {
             self.rasterize_at_column(simd, track, (columns.start + columns.end) / 2, scratch);
@@ -289,7 +289,7 @@ impl CollisionPass<'_> {
         }
     }
 
-    /// Places the collisions of a fall down a line, as a column sees it.
+    /// Projects and rasterizes a track for a column.
     #[inline(always)]
     fn rasterize_at_column<S: Simd>(
         &self,
@@ -314,8 +314,8 @@ impl CollisionPass<'_> {
         }
     }
 
-    /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is
-    /// given, km.
+    /// Rasterizes a track with half-width `reach` about a field line that is `distance_offset` km from the projected
+    /// line.
     #[inline(always)]
     fn add<S: Simd>(
         &self,
@@ -326,7 +326,7 @@ impl CollisionPass<'_> {
         (rasterizer, points): (&mut TrackRasterizer, &mut [SplatBatch; PIPELINED_BATCHES]),
     ) {
         let last = (self.chart.rows - 1) as f32;
-        // A source reaches as far as its collisions wander too, and those do so by themselves.
+        // The kernel's support includes the spread by deflections, which the collisions have already.
         let own_reach = reach.fma(reach, -track.spread_squared).max(0.0).sqrt();
         let mut row_range = RowRange::new(simd);
         let mut deviations = track.first;

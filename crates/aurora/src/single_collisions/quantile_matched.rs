@@ -1,4 +1,4 @@
-//! Falls through hard spheres, moved a little such that the few that are kept have the mean of them all.
+//! Hard-sphere tracks whose altitudes are quantile-matched, so that a few tracks have the mean of all.
 
 use bansho_base::math::random::Key;
 
@@ -8,30 +8,32 @@ use crate::physics::precipitation::{
     hard_sphere::HardSphereAtmosphere,
 };
 
-/// Falls of one energy.
+/// Tracks of one energy.
 ///
-/// Chance changes how many of their collisions lie high up by tens of percent, and by as much what shines only there. So each collision is
-/// moved to where, on average, as much of the energy has been spent above as it has collisions above. What wanders keeps its offsets.
+/// A sample of tracks has a sampling error of tens of percent at high altitudes, where lines such as 630.0 nm are
+/// emitted. So the pooled collisions are sorted and moved to the quantiles of the mean profile. Lateral displacements
+/// are kept.
 #[derive(Clone, Debug)]
 pub struct QuantileMatchedTracks {
     /// [`TRACKS_PER_ENERGY`] of them, each from its highest collision down.
     tracks: Vec<Vec<Collision>>,
-    /// Energy that each collision stands for beside the energy of a whole fall over its [`collision_count`]: more where some
-    /// leave the levels below.
+    /// Energy per collision relative to the energy over [`collision_count`]: more than 1 where some collisions lie
+    /// below the levels.
     pub energy_weight: f32,
 }
 
 impl QuantileMatchedTracks {
-    /// Falls of a node of the grid of energies, and their mean `heights`.
+    /// Tracks of a node of the energy grid, matched to the mean profile of `heights`.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
+    ///
+    /// If the node is not in the grid.
     #[must_use]
     pub fn new(spheres: &HardSphereAtmosphere, heights: &TrackSampler, node: usize, key: Key) -> Self {
         let track =
             |variant| spheres.track(node_energy_ev(node), key, (node as u64) << 32 | u64::from(variant)).collect();
         let mut tracks: Vec<Vec<Collision>> = (0..TRACKS_PER_ENERGY).map(track).collect();
-        // Stable, so that each fall keeps its order where altitudes are equal.
+        // A stable sort keeps the order within a track where altitudes are equal.
         let mut order: Vec<&mut Collision> = tracks.iter_mut().flatten().collect();
         order.sort_by(|a, b| b.altitude_km.total_cmp(&a.altitude_km));
         let count = order.len();
@@ -42,7 +44,7 @@ impl QuantileMatchedTracks {
         Self { tracks, energy_weight: energy_weight as f32 }
     }
 
-    /// One of them, any number.
+    /// One of them (any `variant`).
     #[must_use]
     pub fn track(&self, variant: u32) -> &[Collision] {
         &self.tracks[(variant % TRACKS_PER_ENERGY) as usize]

@@ -1,7 +1,7 @@
-//! The light of one fall along its meridian, row by row, and how it is added to columns.
+//! Rasterizes one electron track to rows of a meridian and adds it to columns.
 //!
-//! A fall has a hundred collisions on as many rows, out of hundreds. So it is kept which rows have any: only those are added to columns, and
-//! only those are cleared.
+//! A track has about a hundred collisions in hundreds of rows, so the touched rows are recorded: only those are added
+//! and cleared.
 
 use crate::physics::emission::PerEmitter;
 use bansho_base::math::simd::{FourLanes, HalfLanes, LANES, Lanes, Real, nearest_whole, ramp};
@@ -10,18 +10,18 @@ use fearless_simd::{Simd, u8x32, u16x16, u64x4, u64x8};
 
 /// Rows that are added to a column at once, two pairs.
 pub(crate) const QUAD_ROWS: usize = 4;
-/// Points in a row of code without a jump.
+/// Points per unrolled, branch-free block.
 const UNROLLED: usize = 4;
-/// Numbers for each pair of rows, and for each four.
+/// Floats per pair of rows, and per quad.
 const PAIR_LIGHT: usize = 2 * 4;
 const QUAD_LIGHT: usize = QUAD_ROWS * 4;
-/// Bytes of the first of two numbers for the four emitters of the upper row, those of the second for the lower one.
+/// Byte shuffle that broadcasts the first weight to the four emitters of the upper row and the second to the lower row.
 const SPREAD: [u8; 32] =
     [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7];
-/// Numbers of the first fours of rows, one a lane.
+/// Lane indices.
 const FIRST_QUADS: [u16; SPLAT_LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Light of [`QUAD_ROWS`] rows, in one line of the cache.
+/// Light of [`QUAD_ROWS`] rows, one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct RowQuad(pub(crate) [f32; QUAD_LIGHT]);
@@ -30,23 +30,23 @@ impl RowQuad {
     pub(crate) const DARK: Self = Self([0.0; QUAD_LIGHT]);
 }
 
-/// Photons of the collisions of one fall by row of the chart, and beyond them rows for points that are outside.
+/// Photons of one track by chart row, with extra rows below for points outside.
 ///
-/// A point adds to a pair of rows, one vector. Pairs whose upper row is even are kept apart from those where it is odd: any two are then the
-/// same place in memory or have none in common, and no sum waits for two others that hold a half of it each.
+/// A point adds to a pair of rows with one vector. Pairs with an even and an odd upper row have separate storage: two
+/// pairs are then identical or disjoint in memory, which avoids store-to-load forwarding stalls from partial overlap.
 pub(crate) struct TrackRasterizer {
-    /// Even pairs, rows from 0 on; after them odd ones, rows from -1 on.
+    /// Even pairs from row 0 on, then odd pairs from row -1 on.
     light: Vec<f32>,
-    /// Where they begin: at a line of the cache.
+    /// Offset to the first cache-line boundary.
     start: usize,
-    /// Whether each pair may have some: 0 or 1.
+    /// 1 if a pair was touched.
     touched: Vec<u8>,
-    /// Fours of rows.
+    /// Number of quads.
     height: usize,
-    /// The fours of rows that have light, and how many they are.
+    /// Quads with light, and their number.
     active: Vec<u16>,
     active_count: usize,
-    /// Their light, one after the other.
+    /// Their light, contiguous.
     merged: Vec<RowQuad>,
 }
 
@@ -66,19 +66,19 @@ impl TrackRasterizer {
         }
     }
 
-    /// Number of the first odd pair.
+    /// Index of the first odd pair.
     #[inline(always)]
     pub(super) fn odd_pairs(&self) -> u32 {
         2 * self.height as u32
     }
 
-    /// The fours of rows that have light, from the uppermost on.
+    /// Quads with light, from the top.
     #[inline(always)]
     pub(crate) fn active_quads(&self) -> &[u16] {
         &self.active[..self.active_count]
     }
 
-    /// Forgets the fall before.
+    /// Discards the previous track.
     #[inline(always)]
     pub(super) fn reset(&mut self) {
         self.active_count = 0;
@@ -95,7 +95,7 @@ impl TrackRasterizer {
     ) {
         let light = self.light[self.start..].as_chunks_mut().0;
         let pairs = light.len().min(self.touched.len());
-        // As locals they stay in registers: what is written might else be taken for where they are.
+        // Local references: else the compiler must assume that the stores alias the fields.
         let mut sums = RowPairSums { light: &mut light[..pairs], touched: &mut self.touched[..pairs], photons };
         if count < SPLAT_LANES {
             for lane in 0..count {
@@ -110,14 +110,14 @@ impl TrackRasterizer {
         }
     }
 
-    /// Finds what rows have light, within those that may have some, and readies all else for the next fall.
+    /// Finds the touched quads within the row range, merges them, and clears the storage for the next track.
     #[inline(always)]
     pub(super) fn finish<S: Simd>(&mut self, simd: S, rows: &RowRange<S>) {
         self.find_active_quads(simd, rows);
         self.merge_pairs(simd);
     }
 
-    /// Fours of rows any of whose five pairs is touched.
+    /// Collects the quads with any of their five pairs touched.
     #[inline(always)]
     fn find_active_quads<S: Simd>(&mut self, simd: S, rows: &RowRange<S>) {
         let [first, end] = rows.range();
@@ -128,7 +128,7 @@ impl TrackRasterizer {
         for from in (first..end).step_by(SPLAT_LANES) {
             let even = &mut even[2 * from..][..2 * SPLAT_LANES];
             let odd = &mut odd[2 * from..][..2 * SPLAT_LANES + 1];
-            // The second and third odd pair of a four are seen from one byte further on.
+            // The second and third odd pair of a quad are at the next byte.
             let [own, odd_own, odd_next] =
                 [&*even, &odd[..2 * SPLAT_LANES], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
             let touched: u16x16<S> = (own | odd_own | odd_next).bitcast();
@@ -141,20 +141,20 @@ impl TrackRasterizer {
         }
     }
 
-    /// Joins the even and odd pairs of rows that have light, and clears them.
+    /// Merges even and odd pairs of touched quads and clears them.
     #[inline(always)]
     fn merge_pairs<S: Simd>(&mut self, simd: S) {
         let (even, odd) = self.light[self.start..].split_at_mut(QUAD_LIGHT * self.height);
         let (even, none) = (even.as_chunks_mut::<QUAD_LIGHT>().0, Lanes::splat(simd, 0.0));
         for (quad, merged) in self.active[..self.active_count].iter().zip(&mut self.merged) {
             let quad = *quad as usize;
-            // Odd pairs begin a row higher.
+            // Odd pairs start one row higher.
             let odd = odd.get_mut(QUAD_LIGHT * quad..QUAD_LIGHT * (quad + 1) + PAIR_LIGHT / 2);
             let (Some(even), Some(odd)) = (even.get_mut(quad), odd) else { continue };
             let sum = Lanes::from_slice(simd, even) + Lanes::from_slice(simd, &odd[PAIR_LIGHT / 2..]);
             sum.store_slice(&mut merged.0);
             none.store_slice(even);
-            // The row that is left belongs to the four below too, which is lit then.
+            // The remaining row belongs to the next quad too, which is then also active.
             none.store_slice(&mut odd[..QUAD_LIGHT]);
         }
     }
@@ -172,7 +172,7 @@ impl TrackRasterizer {
     }
 }
 
-/// Where points are added up, and what shines there.
+/// Accumulation buffers and photon table.
 struct RowPairSums<'a> {
     light: &'a mut [[f32; PAIR_LIGHT]],
     touched: &'a mut [u8],
@@ -197,21 +197,21 @@ impl RowPairSums<'_> {
     }
 }
 
-/// Collisions that are worked on at once.
+/// Collisions per batch.
 pub(super) const SPLAT_LANES: usize = LANES;
 
-/// Pairs of rows that collisions lie between, and the weights of both rows. Those outside have no weight and a pair each below the chart,
-/// for sums in one would wait for each other.
+/// Row pairs of collisions and the weights of both rows. Collisions outside have weight 0 and a distinct pair each
+/// below the chart, to avoid dependent sums.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct SplatBatch {
-    /// Number of a pair: half its upper row if that is even; else half its lower row, counted from the first odd pair on.
+    /// Index of a pair: half its upper row if even; else half its lower row, offset by the first odd pair.
     pub(super) pairs: [u32; SPLAT_LANES],
-    /// Two numbers each, for they are read at once.
+    /// Two floats each, loaded as one word.
     pub(super) weights: [u64; SPLAT_LANES],
 }
 
-/// The least and the greatest row of each lane.
+/// Minimum and maximum row per lane.
 pub(super) struct RowRange<S: Simd> {
     least: Lanes<S>,
     greatest: Lanes<S>,
@@ -223,7 +223,7 @@ impl<S: Simd> RowRange<S> {
         Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
     }
 
-    /// The first row that may hold something, and the one after the last.
+    /// First row that may have light, and one past the last.
     #[inline(always)]
     pub(super) fn range(&self) -> [usize; 2] {
         let (least, greatest) = (self.least.reduce_min(), self.greatest.reduce_max());
@@ -234,7 +234,7 @@ impl<S: Simd> RowRange<S> {
 impl SplatBatch {
     pub(super) const NONE: Self = Self { pairs: [0; SPLAT_LANES], weights: [0; SPLAT_LANES] };
 
-    /// Places them, so bright, at rows above `last`, or outside.
+    /// Computes pairs and weights of points at rows, with brightness factors; rows outside 0 to `last` are masked.
     #[inline(always)]
     pub(super) fn project<S: Simd>(
         &mut self,
@@ -259,7 +259,7 @@ impl SplatBatch {
     }
 }
 
-/// The first where rows lie from 0 to `end`, the second elsewhere.
+/// Selects `within` where rows are in [0, end), else `without`.
 #[inline(always)]
 fn inside<S: Simd>(rows: Lanes<S>, end: Lanes<S>, [within, without]: [Lanes<S>; 2]) -> Lanes<S> {
     rows.select_lt(rows.broadcast(0.0), without, rows.select_lt(end, within, without))

@@ -1,4 +1,4 @@
-//! Falls of electrons by their energy, ready to be placed in batches.
+//! Electron tracks by energy, arranged in SIMD batches.
 
 use rayon::prelude::*;
 
@@ -11,33 +11,33 @@ use crate::{
     render::project::altitude_polynomial::RowPolynomialBasis,
 };
 
-/// What shines after a collision: the mean of a level, or nothing.
+/// Photon row for padding lanes: no emission. Other values are levels of the atmosphere.
 const NO_EMISSION: u16 = LEVELS as u16;
-/// Lanes from one collision of a full batch to the next below; odd, so that all are filled.
+/// Lane stride between successive collisions of a full batch; odd, so that all lanes are filled.
 const LANE_STRIDE: usize = 5;
 
-/// Falls of a library, their collisions in batches.
+/// Tracks of a library in batches.
 #[derive(Clone, Debug)]
 pub(super) struct TrackTable {
-    /// Where the falls of each node begin, and the end of all, in batches.
+    /// Start of each node's tracks, and the total, in batches.
     starts: Vec<usize>,
     batches: Vec<CollisionBatch>,
 }
 
-/// [`SPLAT_LANES`] collisions of a fall, or fewer in the last of them.
+/// [`SPLAT_LANES`] collisions of a track, or fewer in the last batch.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct CollisionBatch {
-    /// Places among the altitudes, [`RowPolynomialBasis::altitude_coordinate`].
+    /// Altitude coordinates, [`RowPolynomialBasis::altitude_coordinate`].
     pub(super) altitude_coordinates: [f32; SPLAT_LANES],
     pub(super) offsets_km: [f32; SPLAT_LANES],
-    /// Places among the photons.
+    /// Rows of the photon table.
     pub(super) photon_rows: [u16; SPLAT_LANES],
     pub(super) count: u32,
 }
 
 impl TrackTable {
-    /// Falls of so many nodes of the grid of energies, and where the light of each collision stands among the photons.
+    /// Tracks for a number of energy nodes, with the photon row of each collision.
     pub(super) fn new(nodes: usize, track: impl Fn(usize, u32) -> Vec<(Collision, u16)> + Sync) -> Self {
         let of_node = |node: usize| -> Vec<CollisionBatch> {
             let count = (collision_count(node) as usize).div_ceil(SPLAT_LANES);
@@ -52,12 +52,12 @@ impl TrackTable {
         Self { starts, batches: by_node.concat() }
     }
 
-    /// The highest node that has falls.
+    /// The highest node with tracks.
     pub(super) fn highest_node(&self) -> usize {
         self.starts.len() - 2
     }
 
-    /// One of the falls of a node up to the highest, any number.
+    /// One of the tracks of a node up to the highest (any `variant`).
     #[inline(always)]
     pub(super) fn track(&self, node: usize, variant: u32) -> &[CollisionBatch] {
         let (start, end) = (self.starts[node], self.starts[node + 1]);
@@ -66,10 +66,10 @@ impl TrackTable {
     }
 }
 
-/// The collisions of a fall in so many batches, all but the last of them full.
+/// Distributes the collisions of a track to batches, all but the last of them full.
 ///
-/// What the last one has and what each of the others has are evenly spread over the fall; in full ones, collisions of neighbouring lanes are
-/// far apart, since sums in one pair of rows would wait for each other.
+/// Both the last batch and the full ones sample the whole track evenly. In full batches neighboring lanes are far apart
+/// in altitude, to avoid dependent sums in one row pair.
 fn batches(track: &[(Collision, u16)], count: usize) -> Vec<CollisionBatch> {
     let full = count.saturating_sub(1);
     let last = track.len().min(SPLAT_LANES * count).saturating_sub(SPLAT_LANES * full);
@@ -85,12 +85,12 @@ fn batches(track: &[(Collision, u16)], count: usize) -> Vec<CollisionBatch> {
             others += 1;
         }
     }
-    // A fall that ends early goes on in the dark where it ended.
+    // Tracks that end early are padded with collisions that do not emit, at the last position.
     for (collision, _) in track.last().into_iter().cycle().take((SPLAT_LANES * full).saturating_sub(others)) {
         batches[others % full].set_lane(others / full * LANE_STRIDE % SPLAT_LANES, &(*collision, NO_EMISSION));
         others += 1;
     }
-    // Lanes that have none lie where the first does, so that no row is lit for them.
+    // Unused lanes are placed at the first lane, so that no extra row is touched.
     for batch in &mut batches[full..] {
         for lane in batch.count as usize..SPLAT_LANES {
             (batch.altitude_coordinates[lane], batch.offsets_km[lane]) =

@@ -1,4 +1,5 @@
-//! Photons of single collisions: for Fang's falls such that their mean is the emission table, and the mean of the thesis's rules.
+//! Photons of single collisions: normalized so that the mean of the electron tracks is the emission table, and the
+//! thesis's quenching rules.
 
 use bansho_base::math;
 
@@ -16,15 +17,16 @@ use crate::physics::{
 /// k_b, J/K, and the atomic mass unit, kg.
 const BOLTZMANN: f64 = 1.380_649e-23;
 const ATOMIC_MASS: f64 = 1.660_539e-27;
-/// Radius of the molecules that quench in (2.25), m: half the distance at which N2 collides with N2.
+/// Radius of the quenching molecules in (2.25), m: half the distance of an N2-N2 collision.
 const MOLECULAR_RADIUS: f64 = 1.85e-10;
 
 impl Emission {
-    /// Brightness that each collision of a fall adds to the column it stands for, in kR of ion pairs per mW m^-2: times
+    /// Column brightness that one collision of a track stands for, in kR of ion pairs per mW m^-2. Multiplied by
     /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
     ///
     /// # Panics
-    /// For a node that is not of the grid of energies.
+    ///
+    /// If the node is not in the energy grid.
     #[must_use]
     pub fn ion_pairs_per_collision(&self, node: usize) -> f64 {
         let pairs = column_ion_pairs(self.deposition().monoenergetic_profile(node));
@@ -32,14 +34,14 @@ impl Emission {
     }
 }
 
-/// Mean thermal speed of molecules of a mass in atomic units, m/s (2.26).
+/// Mean thermal speed of molecules with a mass in atomic units, m/s (2.26).
 #[must_use]
 pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
     math::sqrt(8.0 * BOLTZMANN * temperature / (std::f64::consts::PI * mass_u * ATOMIC_MASS))
 }
 
-/// Probability that a state is struck by a molecule before its mean lifetime is over (2.25). It quenches green light below 190 km, which
-/// nature does not: a molecule's touch seldom takes the energy.
+/// Probability that a collision de-excites a state within its mean lifetime (2.25). It suppresses green light below 190
+/// km, which is not observed: few collisions with a molecule quench O(1S).
 #[must_use]
 pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
     let mass_u = match emitter {
@@ -51,8 +53,9 @@ pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
     -math::exp_m1(-rate * natural_lifetime(emitter))
 }
 
-/// Counting photons of each emitter for each ion pair made in this air by the rules of the thesis (2.4.2): an atom or a molecule is struck
-/// by number density, then emits one line by production rate unless it is quenched (2.25). O2 gives nothing. The mean over all draws.
+/// Photons of each emitter per ion pair by the rules of the thesis (2.4.2): the target is chosen by number density and
+/// emits one line by production rate, unless it is quenched (2.25). O2 emits nothing. This is the expected value over
+/// all random choices.
 #[must_use]
 pub fn mean_hard_sphere_photons(air: &Air) -> PerEmitter<f64> {
     EMITTERS.map(|emitter| {
@@ -75,7 +78,7 @@ mod tests {
         precipitation::{electron_track::TrackSampler, spectrum::ARC},
     };
 
-    /// Light by level and emitter, kR per mW m^-2, of so many falls of a spectrum.
+    /// Light by level and emitter, kR per mW m^-2, of so many tracks of a spectrum.
     fn light(table: &Emission, tracks: &TrackSampler, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
         let key = Key::new(11, "aurora");
         let mut sum = vec![[0.0; 4]; LEVELS];

@@ -1,11 +1,11 @@
-//! Excited states that are struck before they radiate.
+//! Collisional quenching of excited states.
 
 use bansho_base::math;
 
 use super::emitter::{Emitter, PerEmitter};
 use crate::physics::atmosphere::Air;
 
-/// A rate `A exp(B / T)`, m^3 s^-1.
+/// Rate coefficient `A exp(B / T)`, m^3 s^-1.
 #[derive(Clone, Copy, Debug)]
 struct RateCoefficient {
     a: f64,
@@ -24,7 +24,7 @@ impl RateCoefficient {
     }
 }
 
-/// Lifetime of a state left alone, and the rates at which N2, O2 and O quench it.
+/// Radiative lifetime and quenching rate coefficients by N2, O2 and O.
 #[derive(Clone, Copy, Debug)]
 struct ExcitedState {
     lifetime: f64,
@@ -65,13 +65,13 @@ const STATES: PerEmitter<ExcitedState> = [
     },
 ];
 
-/// Lifetime of a state that nothing strikes, s.
+/// Radiative lifetime, s.
 #[must_use]
 pub fn natural_lifetime(emitter: Emitter) -> f64 {
     STATES[emitter.index()].lifetime
 }
 
-/// The share of excited states that radiate, `1 / (1 + tau sum k_q n_q)`.
+/// Fraction of the excited states that radiate, `1 / (1 + tau sum k_q n_q)` (Stern-Volmer).
 #[must_use]
 pub fn radiated_fraction(emitter: Emitter, air: &Air) -> f64 {
     let ExcitedState { lifetime, n2, o2, o } = STATES[emitter.index()];
@@ -79,7 +79,7 @@ pub fn radiated_fraction(emitter: Emitter, air: &Air) -> f64 {
     1.0 / (1.0 + lifetime * (n2.at(t) * air.n2 + o2.at(t) * air.o2 + o.at(t) * air.o))
 }
 
-/// Lifetime where states are quenched, s: as much shorter as fewer radiate.
+/// Effective lifetime with quenching, s: the radiative lifetime times the radiated fraction.
 #[must_use]
 pub fn lifetime(emitter: Emitter, air: &Air) -> f64 {
     natural_lifetime(emitter) * radiated_fraction(emitter, air)

@@ -1,17 +1,17 @@
-//! Red light by height: it lives for a second at 150 km and for two minutes at 400 km.
+//! Decay of the red line by altitude: its effective lifetime is 1 s at 150 km and two minutes at 400 km.
 //!
-//! How fast it fades is kept for three heights. Between two of them light is a mixture of both, so that what is left of it
-//! has no steps.
+//! The afterglow stores red light for three altitudes, each with its own lifetime. Light between two of them is split
+//! by linear weights, so the decay is continuous in altitude.
 
 use super::{Emitter, PerEmitter};
 use crate::physics::atmosphere::level_altitude_km;
 
-/// How many heights there are.
+/// Number of these altitudes.
 pub const RED_ALTITUDES: usize = 3;
-/// The heights, km: the best three round ones for electrons of 1 to 10 keV.
+/// The altitudes, km: the best three round values for electrons of 1 to 10 keV.
 const RED_ALTITUDES_KM: [f64; RED_ALTITUDES] = [150.0, 220.0, 300.0];
 
-/// How much of the light at an altitude counts to each of the heights; 1 together.
+/// Linear weights of the light at an altitude; their sum is 1.
 #[must_use]
 pub fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
     let mut weights = [0.0; RED_ALTITUDES];
@@ -22,7 +22,7 @@ pub fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
     weights
 }
 
-/// Red light of each level, divided among the heights in place of the emitters; the last has none.
+/// Red light of each level, split by altitude in place of the emitters; the last component is 0.
 #[must_use]
 pub fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let divided = |(level, light): (usize, &PerEmitter<f64>)| {
@@ -33,7 +33,7 @@ pub fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     profile.iter().enumerate().map(divided).collect()
 }
 
-/// The mean over the levels of a lifetime in s, weighted by what of the light there counts to each of the heights.
+/// Lifetimes in s, averaged over the levels with the weights and the emission. `levels` yields emission and lifetime.
 pub(super) fn mean_lifetimes(levels: impl Iterator<Item = (f64, f64)>) -> [f64; RED_ALTITUDES] {
     let (mut light, mut lifetimes) = ([0.0; RED_ALTITUDES], [0.0; RED_ALTITUDES]);
     for (level, (own, lifetime)) in levels.enumerate() {
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(red_altitude_weights(185.0), [0.5, 0.5, 0.0]);
     }
 
-    /// The share of the red light that is left at most too long, or too short, after electrons of an energy have gone: by the heights, and
+    /// The fraction of the red light that is left at most too long, or too short, after electrons of an energy have gone: by the altitudes, and
     /// by one lifetime for the whole column.
     fn errors(energy_ev: f64) -> [f64; 2] {
         let emission = Emission::new(atmosphere(), ARC);

@@ -1,4 +1,4 @@
-//! The table of light: photons of each emitter by electron energy and altitude for a spectrum.
+//! The emission table: photons of each emitter by electron energy and altitude for a spectrum.
 
 use bansho_base::math::lerp;
 
@@ -19,38 +19,38 @@ use crate::physics::{
     },
 };
 
-/// Light by altitude and energy, per unit of energy flux; all of it scales with the flux.
+/// Emission by altitude and energy per unit energy flux; it is linear in the flux.
 #[derive(Clone, Debug)]
 pub struct Emission {
     deposition: Deposition,
-    /// Counting photons of each emitter for each ion pair, by level.
+    /// Counted photons of each emitter per ion pair, by level.
     photons: Vec<PerEmitter<f64>>,
     columns: Vec<ColumnEmission>,
-    /// Mean lifetime of the red light of each of its heights by node, s.
+    /// Mean lifetime of the red light for each of its altitudes, by node, s.
     red_lifetimes: Vec<[f64; RED_ALTITUDES]>,
 }
 
-/// What a whole column shows, by emitter.
+/// Column-integrated quantities by emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColumnEmission {
-    /// Brightness seen along the column, kR per mW m^-2, in counting photons.
+    /// Column brightness, kR per mW m^-2, in counted photons.
     pub kilorayleigh: PerEmitter<f64>,
-    /// Mean lifetime of the light, s, weighted by emission.
+    /// Emission-weighted mean lifetime, s.
     pub lifetime: PerEmitter<f64>,
-    /// How far the light spreads across the field: standard deviation along each direction, km, at the altitude that halves the emission
-    /// (it grows with altitude, so this is the median).
+    /// Lateral spread of the light: standard deviation per direction, km, at the median altitude of the emission (it
+    /// increases with altitude, so this is its median).
     pub spread_km: PerEmitter<f64>,
 }
 
 impl Emission {
-    /// The table for a spectrum. A few milliseconds.
+    /// The table for a spectrum; takes a few milliseconds.
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(photons_per_ion_pair).collect();
         Self::from_photons(air, Deposition::new(air, spectrum), photons)
     }
 
-    /// The table of the thesis's fall through hard spheres, and of its rules for what shines after a collision.
+    /// The table for the thesis's hard-sphere tracks and its rules of emission.
     #[must_use]
     pub fn of_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
@@ -73,20 +73,20 @@ impl Emission {
         Self { deposition, photons, columns, red_lifetimes }
     }
 
-    /// The deposition beneath it.
+    /// The underlying ionization table.
     #[must_use]
     pub const fn deposition(&self) -> &Deposition {
         &self.deposition
     }
 
-    /// Counting photons of each emitter for each ion pair, by level of the atmosphere.
+    /// Counted photons of each emitter per ion pair, by level of the atmosphere.
     #[must_use]
     pub fn photons_per_ion_pair(&self) -> &[PerEmitter<f64>] {
         &self.photons
     }
 
-    /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, at each of the [`LEVELS`] levels, for the spectrum about an
-    /// energy; linear between levels.
+    /// Volume emission rate of each emitter, photons m^-3 s^-1 per mW m^-2, at each of the [`LEVELS`] levels, for the
+    /// spectrum about an energy; linear between levels.
     #[must_use]
     pub fn profile(&self, energy_ev: f64) -> Vec<PerEmitter<f64>> {
         let (node, mixing) = energy_grid::locate(energy_ev);
@@ -98,8 +98,8 @@ impl Emission {
         (0..LEVELS).map(emission).collect()
     }
 
-    /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one altitude. Nothing
-    /// outside 80-800 km.
+    /// Volume emission rate of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one
+    /// altitude; 0 outside 80-800 km.
     #[must_use]
     pub fn at(&self, energy_ev: f64, altitude_km: f64) -> PerEmitter<f64> {
         if !covers(altitude_km) {
@@ -118,7 +118,7 @@ impl Emission {
         std::array::from_fn(|i| lerp(below * self.photons[level][i], above * self.photons[level + 1][i], fraction))
     }
 
-    /// What the whole column shows for the spectrum about an energy: brightness linear between nodes, lifetime and spread too.
+    /// Column quantities for the spectrum about an energy, linear between energy nodes.
     #[must_use]
     pub fn column(&self, energy_ev: f64) -> ColumnEmission {
         let (node, mixing) = energy_grid::locate(energy_ev);
@@ -133,7 +133,7 @@ impl Emission {
         }
     }
 
-    /// Mean lifetime of the red light of each of its [heights](super::red_line_altitudes), s, weighted by emission.
+    /// Mean lifetime of the red light of each of its [altitudes](super::red_line_altitudes), s, weighted by emission.
     #[must_use]
     pub fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_ALTITUDES] {
         let (node, mixing) = energy_grid::locate(energy_ev);
@@ -141,14 +141,14 @@ impl Emission {
         std::array::from_fn(|altitude| lerp(low[altitude], high[altitude], mixing))
     }
 
-    /// Luminance in cd/m^2 of the column per mW m^-2: what a sheet seen end-on shows.
+    /// ACEScg color of the column, luminance in cd/m^2 per mW m^-2.
     #[must_use]
     pub fn column_color(&self, energy_ev: f64) -> [f64; 3] {
         color_of(self.column(energy_ev).kilorayleigh)
     }
 }
 
-/// Absolute ACEScg of kilorayleighs by emitter, luminance in cd/m^2.
+/// Absolute ACEScg color of kilorayleighs by emitter, luminance in cd/m^2.
 #[must_use]
 pub fn color_of(kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
     EMITTERS.into_iter().zip(kilorayleigh).fold([0.0; 3], |sum: [f64; 3], (emitter, kilorayleigh)| {

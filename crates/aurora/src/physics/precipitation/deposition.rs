@@ -1,4 +1,4 @@
-//! The table of deposition: ion pairs by energy and altitude for a spectrum.
+//! The ionization table: ion pairs by energy and altitude for a spectrum.
 
 use bansho_base::math::lerp;
 
@@ -14,23 +14,25 @@ use rayon::prelude::*;
 /// A profile over the levels of the atmosphere.
 pub type AltitudeProfile = [f64; LEVELS];
 
-/// Ion pairs in m^-3 s^-1 per mW m^-2 for each energy of the grid and each level, of single electrons and of a spectrum about them.
+/// Ionization rate in m^-3 s^-1 per mW m^-2 for each energy node and level, of monoenergetic electrons and of the
+/// spectrum about each node.
 #[derive(Clone, Debug)]
 pub struct Deposition {
     monoenergetic: Vec<AltitudeProfile>,
-    /// Shares of the energy flux by central energy, then by energy; summed up for drawing.
+    /// Cumulative fractions of the energy flux, by central energy, then by energy: for inverse transform sampling.
     cumulative_fractions: Vec<[f64; NODES]>,
-    /// For each of so many equal parts of (0, 1) the first node that a uniform number in it may draw.
+    /// Guide tables (Chen and Asau): for each of [`GUIDE_ENTRIES`] intervals of (0, 1) the first node that a uniform
+    /// number in it can select.
     guide_tables: Vec<[u8; GUIDE_ENTRIES]>,
     mixed: Vec<AltitudeProfile>,
 }
 
-/// Parts of (0, 1), a power of two: from the node at which one begins, it is one or two to the one that is drawn.
+/// Entries of a guide table, a power of two: one or two steps lead from the guide to the sampled node.
 const GUIDE_ENTRIES: usize = 64;
 const _: () = assert!(NODES <= u8::MAX as usize);
 
 impl Deposition {
-    /// The table for a spectrum. A few milliseconds.
+    /// The table for a spectrum; takes a few milliseconds.
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let layers: Vec<AirLayer> = air.levels().iter().map(AirLayer::new).collect();
@@ -44,7 +46,7 @@ impl Deposition {
         Self::from_profiles(monoenergetic, spectrum)
     }
 
-    /// The table of the thesis's fall through hard spheres, [`DEFAULT_RADIUS_M`].
+    /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
     #[must_use]
     pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
         Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
@@ -58,33 +60,36 @@ impl Deposition {
         Self { monoenergetic, cumulative_fractions, guide_tables, mixed }
     }
 
-    /// The profile of electrons with exactly the energy of a node.
+    /// Profile of monoenergetic electrons of a node.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
+    ///
+    /// If the node is not in the grid.
     #[must_use]
     pub fn monoenergetic_profile(&self, node: usize) -> &AltitudeProfile {
         &self.monoenergetic[node]
     }
 
-    /// The profile of the spectrum about the energy of a node.
+    /// Profile of the spectrum about the energy of a node.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
+    ///
+    /// If the node is not in the grid.
     #[must_use]
     pub fn spectrum_profile(&self, node: usize) -> &AltitudeProfile {
         &self.mixed[node]
     }
 
-    /// Ion pairs, m^-3 s^-1 per mW m^-2, for a spectrum about any energy at any altitude: linear between levels and, in the logarithm
-    /// of the energy, between nodes. Nothing outside 80-800 km.
+    /// Ionization rate, m^-3 s^-1 per mW m^-2, for a spectrum about any energy at any altitude: linear between levels
+    /// and, in log energy, between nodes; 0 outside 80-800 km.
     #[must_use]
     pub fn ionization(&self, energy_ev: f64, altitude_km: f64) -> f64 {
         interpolate(&self.mixed, energy_ev, altitude_km)
     }
 
-    /// The node of one particle of the spectrum about an energy, drawn by energy flux: particles that carry equal flux have
-    /// [`ionization`](Self::ionization) for the mean of their [`monoenergetic`](Self::monoenergetic) profiles.
+    /// Samples the energy node of one particle by energy flux: the mean of the
+    /// [`monoenergetic_profile`](Self::monoenergetic_profile)s of particles with equal flux is
+    /// [`ionization`](Self::ionization).
     #[must_use]
     pub fn sample_node(&self, energy_ev: f64, uniforms: [f64; 2]) -> usize {
         self.sample_node_around(energy_grid::sample_bracketing_node(energy_ev, uniforms[0]), uniforms[1])
@@ -93,12 +98,13 @@ impl Deposition {
     /// The same for the spectrum about the energy of a node.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
+    ///
+    /// If the node is not in the grid.
     #[must_use]
     pub fn sample_node_around(&self, node: usize, uniform: f64) -> usize {
         let (sums, guide) = (&self.cumulative_fractions[node], &self.guide_tables[node]);
         let mut node_drawn = guide[(uniform * GUIDE_ENTRIES as f64) as usize & (GUIDE_ENTRIES - 1)] as usize;
-        // Nearly always as far as it is, and without a branch that nobody could foresee.
+        // Two branch-free steps are nearly always enough; a data-dependent branch would be mispredicted.
         for _ in 0..2 {
             node_drawn = (node_drawn + usize::from(sums[node_drawn] <= uniform)).min(NODES - 1);
         }
@@ -109,13 +115,13 @@ impl Deposition {
     }
 }
 
-/// Ion pairs of a profile in the whole column, m^-2 s^-1 per mW m^-2.
+/// Column-integrated ionization, m^-2 s^-1 per mW m^-2.
 #[must_use]
 pub fn column_ion_pairs(profile: &AltitudeProfile) -> f64 {
     profile.iter().sum::<f64>() * LEVEL_SPACING
 }
 
-/// Bilinear look-up in profiles by energy and altitude; 0 outside the levels.
+/// Bilinear lookup by energy and altitude; 0 outside the levels.
 fn interpolate(profiles: &[AltitudeProfile], energy_ev: f64, altitude_km: f64) -> f64 {
     let (level, fraction) = locate_level(altitude_km);
     let (node, mixing) = energy_grid::locate(energy_ev);
@@ -123,7 +129,7 @@ fn interpolate(profiles: &[AltitudeProfile], energy_ev: f64, altitude_km: f64) -
     if crate::physics::atmosphere::covers(altitude_km) { lerp(at(node), at(node + 1), mixing) } else { 0.0 }
 }
 
-/// The profiles weighted by shares.
+/// Weighted sum of profiles.
 fn weighted_sum(profiles: &[AltitudeProfile], weights: &[f64; NODES]) -> AltitudeProfile {
     let mut sum = [0.0; LEVELS];
     for (profile, weight) in profiles.iter().zip(weights).filter(|(_, weight)| **weight > 1e-12) {

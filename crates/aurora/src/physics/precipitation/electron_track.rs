@@ -1,4 +1,4 @@
-//! Single collisions of falling electrons, drawn such that the deposition of Fang et al. (2010) is their mean.
+//! Electron tracks as sequences of collisions whose mean is the ionization profile of Fang et al. (2010).
 
 use bansho_base::{
     math,
@@ -15,38 +15,38 @@ use rayon::prelude::*;
 
 const COLLISION: Purpose = Purpose::named("aurora collision");
 const TRACK_VARIANT: Purpose = Purpose::named("aurora fall variant");
-/// The golden ratio: however many of its multiples there are, their fractions lie evenly in 1.
+/// Conjugate of the golden ratio: the fractional parts of its multiples are a low-discrepancy sequence.
 const GOLDEN_RATIO_CONJUGATE: f64 = 0.618_033_988_749_895;
 
 /// A collision of an electron with an atom or a molecule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
-    /// Level of the atmosphere whose air is struck.
+    /// Level of the atmosphere in which it happens.
     pub level: u32,
-    /// Altitude, km: within a kilometre of the level.
+    /// Altitude, km, within one kilometer of the level.
     pub altitude_km: f32,
-    /// Displacement across the magnetic field since the fall began, km.
+    /// Displacement across the magnetic field since the start of the track, km.
     pub transverse_km: [f32; 2],
 }
 
-/// Falls of electrons of every energy of the grid.
+/// Samples electron tracks for every energy of the grid.
 #[derive(Clone, Debug)]
 pub struct TrackSampler {
-    /// For each energy the share of its deposition above and at each level, from the top down.
+    /// For each energy the cumulative fraction of its ionization from the top down to each level.
     cumulative: Vec<AltitudeProfile>,
-    /// Tangent of the angle by which a collision turns an electron from the field, rms along each direction across.
+    /// RMS tangent of the deflection per collision, per transverse direction.
     deflection: f64,
 }
 
-/// Collisions until an electron of a node's energy has spent it: 100 eV each, at least one.
+/// Collisions until an electron of a node's energy has lost it: 100 eV each, at least one.
 #[must_use]
 pub fn collision_count(node: usize) -> u32 {
     (node_energy_ev(node) / COLLISION_EV).round().max(1.0) as u32
 }
 
 impl TrackSampler {
-    /// Falls whose heights have the monoenergetic profiles of `deposition`; each collision turns the electron from the field by an angle
-    /// with a tangent of rms `deflection` (the vector omega of (2.21)).
+    /// Tracks with the monoenergetic profiles of `deposition`; each collision deflects the electron by an angle with
+    /// RMS tangent `deflection` (the vector omega of (2.21)).
     #[must_use]
     pub fn new(deposition: &Deposition, deflection: f64) -> Self {
         Self {
@@ -55,18 +55,20 @@ impl TrackSampler {
         }
     }
 
-    /// The collisions of particle number `particle`, from the first and highest to the last, if its energy is that of `node`.
+    /// The collisions of particle number `particle` with the energy of `node`, from the highest to the lowest.
     ///
-    /// The k-th of n happens where between k/n and (k + 1)/n of the energy has been spent: the mean over particles is the profile, and
-    /// one fall already follows it. Within a level's reach the altitude is triangular, so that the mean is linear between levels.
+    /// Stratified sampling: the k-th of n collisions lies where between k/n and (k + 1)/n of the energy is lost. The
+    /// mean over particles is the profile, and each track follows it approximately. Within one kilometer of a level the
+    /// altitude has a triangular density, so the mean is linear between levels.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
+    ///
+    /// If the node is not in the grid.
     pub fn sample_track(&self, node: usize, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
         self.track_with(node, key, particle, |_, uniform| uniform)
     }
 
-    /// A fall whose k-th collision lies at `quantile(k, uniform)` in [0, 1) of its share of the energy.
+    /// A track whose k-th collision is at `quantile(k, uniform)` in [0, 1) of its stratum.
     fn track_with(
         &self,
         node: usize,
@@ -91,9 +93,10 @@ impl TrackSampler {
 }
 
 impl TrackSampler {
-    /// Where so many collisions of a node lie, from the highest to the lowest, if each has an equal part of the energy.
+    /// The altitudes of `count` collisions of a node at equally spaced quantiles, from the highest to the lowest.
     ///
-    /// It is at the same place in all parts, and at another for another node: high up, those of all energies are as far apart.
+    /// The offset within the strata is the same for all collisions but differs between nodes, so the topmost collisions
+    /// of all energies are spread evenly.
     pub(crate) fn quantile_collisions(&self, node: usize, count: usize) -> impl Iterator<Item = Collision> {
         let cumulative = &self.cumulative[node];
         let quantile = (node as f64 * GOLDEN_RATIO_CONJUGATE) % 1.0;
@@ -109,7 +112,8 @@ impl TrackSampler {
         })
     }
 
-    /// One of the [`TRACKS_PER_ENERGY`] falls of a node: each takes another part of each share, in an order that changes with the collision.
+    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node: each takes another substratum, in a permutation that changes
+    /// with the collision.
     fn stratified_track(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
         let quantile = move |number: u32, uniform: f64| {
             let fraction = variant ^ (key.words(node as u64, number, TRACK_VARIANT)[0] % TRACKS_PER_ENERGY);
@@ -119,23 +123,24 @@ impl TrackSampler {
     }
 }
 
-/// Falls made once, for particles to share: so many for each energy of a range that their mean is the profile.
+/// Precomputed tracks: so many for each energy of a range that their mean is the profile.
 #[derive(Clone, Debug)]
 pub struct TrackLibrary {
     first_node: usize,
-    /// Where the falls of each node begin, and the end of all.
+    /// Start index of the tracks of each node, and the total.
     starts: Vec<usize>,
     collisions: Vec<Collision>,
 }
 
-/// Falls of each energy in a library: a power of two.
+/// Tracks of each energy in a library: a power of two.
 pub const TRACKS_PER_ENERGY: u32 = 64;
 
 impl TrackLibrary {
-    /// Falls for the nodes of a range of energies, by their key.
+    /// Tracks for a range of energy nodes.
     ///
     /// # Panics
-    /// For nodes that are not of the grid.
+    ///
+    /// If nodes are not in the grid.
     #[must_use]
     pub fn new(sampler: &TrackSampler, nodes: std::ops::RangeInclusive<usize>, key: Key) -> Self {
         let first_node = *nodes.start();
@@ -151,9 +156,10 @@ impl TrackLibrary {
         Self { first_node, starts, collisions: by_node.concat() }
     }
 
-    /// One of the [`TRACKS_PER_ENERGY`] falls of a node, any number; the nearest node that the library has.
+    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node (any `variant`); of the nearest node that the library has.
     ///
     /// # Panics
+    ///
     /// If the library was made for an empty range.
     #[must_use]
     pub fn track(&self, node: usize, variant: u32) -> &[Collision] {
@@ -165,7 +171,7 @@ impl TrackLibrary {
     }
 }
 
-/// How many levels, the number `above` or more, lie above the one at which so much of the energy has been spent.
+/// Index from the top, at least `above`, of the level at which the fraction `spent` of the energy is lost.
 fn next_level_from_top(cumulative: &AltitudeProfile, above: usize, energy_fraction: f64) -> usize {
     let passed = cumulative[above..LEVELS - 1].iter().take_while(|sum| **sum <= energy_fraction);
     above + passed.count()
@@ -176,13 +182,13 @@ fn triangular(word: u32) -> f64 {
     uniform(word) as f64 + uniform(word << 16) as f64 - 1.0
 }
 
-/// Where in (-1, 1) a triangular density has such a part above.
+/// Quantile function of the triangular density on (-1, 1), from the top.
 fn inverse_triangular_cdf(fraction: f64) -> f64 {
     let fraction = fraction.clamp(0.0, 1.0);
     if fraction < 0.5 { 1.0 - math::sqrt(2.0 * fraction) } else { math::sqrt(2.0 * (1.0 - fraction)) - 1.0 }
 }
 
-/// Running sums of a profile from the highest level down, as shares of the whole.
+/// Cumulative sums of a profile from the highest level down, normalized.
 fn cumulative_from_top(profile: &AltitudeProfile) -> AltitudeProfile {
     let whole: f64 = profile.iter().sum();
     let mut sum = 0.0;
@@ -192,7 +198,7 @@ fn cumulative_from_top(profile: &AltitudeProfile) -> AltitudeProfile {
     })
 }
 
-/// Where an electron is on its way down.
+/// State of an electron along its track.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TrackState {
     altitude_km: Option<f64>,
@@ -200,7 +206,8 @@ pub(super) struct TrackState {
 }
 
 impl TrackState {
-    /// Down to an altitude along the field turned by `turn` (tangents): (2.24) read as a step along the unit vector of L + omega.
+    /// Moves down to an altitude along the field deflected by `turn` (tangents): (2.24) read as a step along the unit
+    /// vector of L + omega.
     pub(super) fn advance(&mut self, altitude_km: f64, turn: [f64; 2]) {
         let descent = self.altitude_km.map_or(0.0, |before| before - altitude_km).max(0.0);
         self.transverse_km = std::array::from_fn(|i| self.transverse_km[i] + descent * turn[i]);
@@ -262,7 +269,7 @@ mod tests {
                 assert!(track.windows(2).all(|pair| pair[1].level <= pair[0].level));
                 track.iter().for_each(|collision| histogram[collision.level as usize] += 1.0);
             }
-            // Each part of each share has one collision: no running sum is off by more than one of them.
+            // Each part of each fraction has one collision: no running sum is off by more than one of them.
             let all = (TRACKS_PER_ENERGY * collision_count(node)) as f64;
             let mut sum = 0.0;
             for (from_top, expected) in
@@ -282,7 +289,7 @@ mod tests {
     #[test]
     fn altitudes_are_linear_between_levels() {
         let (deposition, sampler) = sampler(0.0);
-        // 10 keV: between the levels 104 and 108 km, in quarters of a kilometre.
+        // 10 keV: between the levels 104 and 108 km, in quarters of a kilometer.
         let node = energy_grid::locate(10_001.0).0;
         let profile = deposition.monoenergetic_profile(node);
         let whole: f64 = profile.iter().sum();

@@ -1,7 +1,8 @@
-//! The deposition of Fang et al. (2010), "Parameterization of monoenergetic electron impact ionization", GRL 37, L22106.
+//! Ionization profiles of Fang et al. (2010), "Parameterization of monoenergetic electron impact ionization", GRL 37,
+//! L22106.
 //!
-//! For electrons of one energy, isotropic over the downward hemisphere, along a vertical field. At auroral dips (75 degrees and more) the
-//! slant lowers a profile by less than half a kilometre.
+//! For monoenergetic electrons, isotropic over the downward hemisphere, along a vertical field. At auroral dip angles
+//! (75 degrees and more) the inclination lowers a profile by less than half a kilometer.
 
 use bansho_base::math;
 
@@ -22,12 +23,12 @@ const COEFFICIENTS: [[f64; 4]; 8] = [
 /// Column that scales y in equation (1): 6e-6 g cm^-2, in kg m^-2.
 const COLUMN_SCALE: f64 = 6e-5;
 
-/// What the deposition at an altitude takes from the air, whatever the energy.
+/// The terms of the parameterization that depend on the air only.
 #[derive(Clone, Copy, Debug)]
 pub struct AirLayer {
     /// ln (rho H / 6e-6 g cm^-2)^0.7, of equation (1): y = 2/E times that power, E in keV.
     ln_column: f64,
-    /// Ion pairs, m^-3 s^-1 per mW m^-2, where the whole energy is spent over a scale height.
+    /// Ion pairs, m^-3 s^-1 per mW m^-2, for f(y) = 1.
     pairs_at_unit_dissipation: f64,
 }
 
@@ -42,7 +43,7 @@ impl AirLayer {
     }
 }
 
-/// Deposition by electrons of one energy.
+/// Ionization by monoenergetic electrons.
 #[derive(Clone, Debug)]
 pub struct MonoenergeticBeam {
     ln_energy: f64,
@@ -59,14 +60,14 @@ impl MonoenergeticBeam {
         Self { ln_energy, coefficients: COEFFICIENTS.map(|row| math::exp(cubic(row))) }
     }
 
-    /// The share of the energy that is spent over a scale height, f(y) of equations (3) and (4), by the logarithm of y.
+    /// Normalized energy dissipation f(y) of equations (3) and (4), from ln y.
     fn dissipation_fraction(&self, ln_y: f64) -> f64 {
         let [c1, c2, c3, c4, c5, c6, c7, c8] = self.coefficients;
         let term = |a, b, c, d| a * math::exp(b * ln_y - c * math::exp(d * ln_y));
         term(c1, c2, c3, c4) + term(c5, c6, c7, c8)
     }
 
-    /// Ion pairs made each second, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
+    /// Ionization rate, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
     #[must_use]
     pub fn ionization(&self, layer: &AirLayer) -> f64 {
         let ln_y = std::f64::consts::LN_2 - self.ln_energy + layer.ln_column;

@@ -1,4 +1,4 @@
-//! The fall of the thesis (section 2.4.1): electrons strike hard spheres, whatever their energy, until their energy is spent.
+//! Electron tracks of the thesis (section 2.4.1): collisions with hard spheres of one radius for all energies.
 
 use bansho_base::{
     math,
@@ -15,14 +15,14 @@ use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, level_altitu
 
 const COLLISION: Purpose = Purpose::named("aurora hard-sphere collision");
 
-/// Radius of the spheres, m, that stops electrons of 10 keV near 105 km; the thesis does not give one. No radius serves all energies:
-/// with it 1 keV stops at 129 km, not 158 km.
+/// Radius of the spheres, m, that stops 10 keV electrons near 105 km; the thesis gives none. No radius fits all
+/// energies: with this one 1 keV electrons stop at 129 km instead of 158 km.
 pub const DEFAULT_RADIUS_M: f64 = 3.2e-11;
 
 /// An atmosphere of hard spheres.
 #[derive(Clone, Debug)]
 pub struct HardSphereAtmosphere {
-    /// Number of spheres above each level, from the top down, m^-2.
+    /// Column density of spheres above each level, from the top down, m^-2.
     columns: Vec<f64>,
     /// pi r^2, m^2.
     cross_section: f64,
@@ -30,14 +30,15 @@ pub struct HardSphereAtmosphere {
 }
 
 impl HardSphereAtmosphere {
-    /// Spheres of `radius` in m, in number those of N2, O2 and O; `deflection` as for [`TrackSampler`](super::electron_track::TrackSampler::new).
+    /// Spheres of `radius` in m with the number density of N2, O2 and O; `deflection` as for
+    /// [`TrackSampler`](super::electron_track::TrackSampler::new).
     #[must_use]
     pub fn new(air: &Atmosphere, radius: f64, deflection: f64) -> Self {
         let mut above = None;
         let mut column = 0.0;
         let columns = air.levels().iter().rev().map(|air| {
             let density = air.number_density();
-            // Above the topmost level the air falls off with its scale height.
+            // Above the topmost level the density decreases with its scale height.
             column += above.map_or(density * air.scale_height, |above| LEVEL_SPACING * 0.5 * (above + density));
             above = Some(density);
             column
@@ -45,10 +46,10 @@ impl HardSphereAtmosphere {
         Self { columns: columns.collect(), cross_section: std::f64::consts::PI * radius * radius, deflection }
     }
 
-    /// The collisions of particle number `particle`, until its energy is spent or it leaves the levels below.
+    /// The collisions of particle number `particle`, until its energy is lost or it leaves the levels.
     ///
-    /// (2.22) is read as `1 - exp(-n pi r^2 |L|)`, which stays below 1 in dense air; then the column to the next collision is exponential
-    /// and drawn at once, without steps.
+    /// (2.22) is read as `1 - exp(-n pi r^2 |L|)`, which stays below 1 in dense air. The column density to the next
+    /// collision is then exponentially distributed and is sampled directly, without steps.
     pub fn track(&self, energy_ev: f64, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
         let mut path = TrackState::default();
         let (mut column, mut from_top) = (0.0, 0);
@@ -66,9 +67,11 @@ impl HardSphereAtmosphere {
         })
     }
 
-    /// Ion pairs, m^-3 s^-1 per mW m^-2, for each energy of the grid and each level of the same air: the mean of all falls without wobble.
+    /// Ionization rate, m^-3 s^-1 per mW m^-2, for each energy node and level: the expected value over all undeflected
+    /// tracks.
     ///
-    /// An electron that has not struck its last sphere yet goes on; how many it strikes down to a column is a Poisson number.
+    /// The number of collisions above a column density is Poisson distributed; an electron contributes while it has
+    /// collisions left.
     #[must_use]
     pub fn profiles(&self, air: &Atmosphere) -> Vec<AltitudeProfile> {
         let counts: [u32; NODES] = std::array::from_fn(collision_count);
@@ -83,7 +86,8 @@ impl HardSphereAtmosphere {
         profiles
     }
 
-    /// Where the column is reached, between the level `from_top` and the one above; none below the lowest.
+    /// Altitude at which the column density is reached, between the level `from_top` and the one above; `None` below
+    /// the lowest level.
     fn altitude_km(&self, from_top: usize, column: f64) -> Option<f64> {
         let low = *self.columns.get(from_top)?;
         let low_km = level_altitude_km(LEVELS - 1 - from_top);
@@ -93,7 +97,7 @@ impl HardSphereAtmosphere {
     }
 }
 
-/// Probabilities that a Poisson number of that mean is below each of the counts, which ascend.
+/// Probabilities that a Poisson variable of that mean is below each of the ascending counts.
 fn poisson_below(counts: &[u32; NODES], mean: f64) -> [f64; NODES] {
     let (mut number, mut log_probability, mut sum) = (0, -mean, 0.0);
     counts.map(|count| {
@@ -140,7 +144,7 @@ mod tests {
             let whole: f64 = profiles[node].iter().sum();
             let expected = profiles[node].chunks(4).map(|levels| levels.iter().sum::<f64>() / whole);
             let difference: f64 = expected.zip(histogram).map(|(expected, found)| (expected - found).abs()).sum();
-            // Shot noise, and levels taken as a kilometre high.
+            // Shot noise, and levels taken as a kilometer high.
             assert!(difference < 0.05, "{node}: {difference}");
             // All of the energy that collisions take, but for what electrons of 1 keV leave above 800 km.
             let pairs = whole * LEVEL_SPACING * ION_PAIR_EV / EV_PER_S_PER_MW;

@@ -1,4 +1,4 @@
-//! How far collisions wander from the field line of their electron.
+//! Lateral spread of an electron's collisions about its field line.
 
 use std::sync::OnceLock;
 
@@ -15,21 +15,23 @@ use super::{
 use crate::physics::atmosphere::atmosphere;
 use rayon::prelude::*;
 
-/// Collisions of each energy that are looked at, about, and the fewest falls: a few long ones have much of the wandering.
+/// Approximate number of sampled collisions per energy and the minimum number of tracks: a few long tracks dominate the
+/// variance.
 const COLLISIONS_PER_ENERGY: u32 = 2000;
 const MIN_TRACKS: u32 = 96;
-/// Falls are followed at every so many nodes of the grid of energies: from one to the next they differ little.
+/// Tracks are sampled at every fourth energy node; the spread varies slowly between them.
 const STRIDE: usize = 4;
 const _: () = assert!((NODES - 1).is_multiple_of(STRIDE));
 
-/// The wandering of measured falls, and of those through hard spheres. Both go straight: what turns them adds to nothing but this.
+/// Spread of Fang and of hard-sphere tracks, for straight tracks: deflections change their altitudes only to second
+/// order.
 static FANG: OnceLock<SpreadByEnergy> = OnceLock::new();
 static HARD_SPHERE: OnceLock<SpreadByEnergy> = OnceLock::new();
 
 fn by_energy(model: TrackModel) -> &'static SpreadByEnergy {
     match model {
         TrackModel::Fang => get_or_make(&FANG, || {
-            // Falls are those of one energy each, whatever the spectrum.
+            // Tracks are monoenergetic, so the spectrum does not matter.
             let tracks = TrackSampler::new(&Deposition::new(atmosphere(), ARC), 0.0);
             SpreadByEnergy::new(|node, key, particle| altitudes_km(tracks.sample_track(node, key, particle)))
         }),
@@ -40,13 +42,13 @@ fn by_energy(model: TrackModel) -> &'static SpreadByEnergy {
     }
 }
 
-/// Root mean square distance of the collisions of electrons of an energy from their field line, along one direction, km, where every
-/// collision turns them by a tangent of rms `deflection`.
+/// RMS distance of the collisions of electrons of an energy from their field line, per direction, km, where each
+/// collision deflects by an RMS tangent of `deflection`.
 pub(crate) fn lateral_spread_km(model: TrackModel, deflection: f64, energy_ev: f64) -> f64 {
     if deflection <= 0.0 { 0.0 } else { deflection * by_energy(model).at(energy_ev) }
 }
 
-/// Root mean square distances for a wobble of 1, km, at every [`STRIDE`]th node: they are in proportion to it.
+/// RMS distance for a deflection of 1, km, at every [`STRIDE`]th node; it is proportional to the deflection.
 struct SpreadByEnergy(Vec<f64>);
 
 impl SpreadByEnergy {
@@ -72,8 +74,8 @@ fn altitudes_km(model: impl Iterator<Item = Collision>) -> Vec<f64> {
     model.map(|collision| f64::from(collision.altitude_km)).collect()
 }
 
-/// Mean square distance from the field line, along one direction, of collisions at those altitudes in km (from the first on), each of
-/// which turns the electron by a tangent of rms 1.
+/// Mean square distance from the field line, per direction, of collisions at these altitudes in km (highest first),
+/// each with an RMS deflection tangent of 1.
 fn variance_km2(altitudes_km: &[f64]) -> f64 {
     let (mut variance, mut sum) = (0.0, 0.0);
     for pair in altitudes_km.windows(2) {

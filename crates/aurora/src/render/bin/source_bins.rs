@@ -1,8 +1,8 @@
-//! Where the precipitation comes down, by longitude and distance from the observer's own field line.
+//! Bins of precipitation by longitude and distance from the observer's own field line.
 //!
-//! Every source is a small patch with a smooth edge, `(1 - r^2)^2` in each direction: broad enough for the chart's
-//! cells, so that none is ever seen alone. Sources are sorted into strips of columns, so that no two threads share a
-//! sum and every sum has one order.
+//! Every source is a patch with the separable kernel `(1 - r^2)^2`, wider than a chart cell so that single sources are
+//! not visible. Sources are sorted into strips of columns: each strip is summed by one thread in a fixed order, so
+//! results do not depend on the number of threads.
 
 use std::{f64::consts::LN_2, ops::Range};
 
@@ -22,39 +22,38 @@ use crate::render::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Sources that a task of the thread pool sorts.
+/// Sources per task.
 const TASK: usize = 4096;
-/// Altitude of the light whose bins are told apart, km: that of lower edges, which are several km high.
+/// Altitude for the width of bins, km: that of the lower border, the sharpest feature.
 const SCALE_KM: f64 = 100.0;
-/// By how much the altitude of a line of sight changes there from one far bin to the next, km; more only where a row is
-/// higher than that.
+/// Change of the altitude on a line of sight between neighboring far bins, km; more only where a chart row is taller.
 const STEP_KM: f64 = 1.0;
-/// Near bins within the reach of a patch, where each takes up as many rows of the chart as these are. Wider ones would blur the sides of
-/// thin sheets near the magnetic zenith.
+/// Near bins per kernel support, and the limits of their width in chart rows. Wider bins would blur the edges of thin
+/// sheets near the magnetic zenith.
 const BINS_PER_REACH: f64 = 5.0;
 const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
-/// Distances beyond this lie behind the horizon, km.
+/// Sources farther than this are below the horizon, km.
 const MAX_DISTANCE_KM: f64 = 3000.0;
-/// Least reach of a patch in cells, so that its sum does not depend on where between the cells it lies.
+/// Minimum kernel support in cells, so that the sum does not depend on the subcell position.
 const MIN_REACH_CELLS: f32 = 1.6;
-/// Widths of a near bin that smoothed tables spread its light over at most: they reach two entries far, each less than twice as wide as
-/// asked for.
+/// Maximum width, in near bins, over which prefiltered tables spread a bin's light: their filter spans two entries,
+/// each less than twice as wide as requested.
 const SMOOTHING_BINS: f32 = 4.0 * ENTRY_PER_STEP[1];
-/// `(1 - r^2)^2` has this integral over (-1, 1), inverted.
+/// Normalization: one over the integral of `(1 - r^2)^2` over (-1, 1).
 const NORM: f32 = 15.0 / 16.0;
 
 /// Precipitation about one field line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FieldLineSource {
-    /// The line's place across the field, km.
+    /// Position in the plane perpendicular to the field, km.
     pub(crate) across: [f32; 2],
-    /// How far the patch reaches, km: its standard deviation times [`REACH`].
+    /// Half-width of the kernel's support, km: standard deviation times [`REACH`].
     pub(crate) reach: f32,
-    /// Place of the electrons' energy among the nodes of the grid of energies.
+    /// Fractional index of the electron energy in the energy grid.
     pub(crate) energy_node: f32,
     /// Power times the cosine to the vertical, 1000 W: for green, red and prompt light.
     pub(crate) power: [f32; 3],
-    /// What its random falls go by: the particle's birth or the cell's place, whatever else shines.
+    /// Random-number counter of its electron tracks: the particle's id or the cell's index.
     pub(crate) random_key: u32,
 }
 
@@ -67,68 +66,68 @@ impl FieldLineSource {
     }
 }
 
-/// Reach of a patch for a standard deviation of 1.
+/// Half-width of the kernel's support for a standard deviation of 1.
 pub(crate) const REACH: f32 = 2.645_751_3;
 
-/// What the bins of a footprint hold: power for green, red and prompt light in 1000 W per km of width, and the sum of
-/// all times the node of their energy.
+/// Contents of a bin: power for green, red and prompt light in 1000 W per km of width, and their sum times the energy
+/// node.
 pub(crate) type Bin = [f32; 4];
 
-/// The sources of a picture, sorted by strips of so many columns of the chart.
+/// The sources of a picture, sorted into strips of chart columns.
 pub(crate) struct SourceBins<'a> {
     sources: &'a [FieldLineSource],
-    /// What each of the tasks has sorted, in the order of the sources.
+    /// Output of each sorting task, in the order of the sources.
     chunks: Vec<SortedSources>,
     bins: DistanceBins,
 }
 
-/// Some of the sources, sorted by strips.
+/// Part of the sources, sorted by strips.
 struct SortedSources {
-    /// Index of the first entry of every strip, and of the end.
+    /// Start index of each strip, and the total.
     starts: Vec<u32>,
     entries: Vec<StripEntry>,
 }
 
-/// A source that shows in a strip.
+/// A source that overlaps a strip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct StripEntry {
-    /// Number of the source.
+    /// Index of the source.
     pub(crate) source: u32,
-    /// The first column of the strip that it may reach, and the one after the last.
+    /// First column of the strip within its support, and one past the last.
     columns: [u16; 2],
 }
 
 impl StripEntry {
-    /// The columns of the strip that it may reach.
+    /// Columns of the strip within its support.
     #[inline(always)]
     pub(crate) fn columns(&self) -> Range<usize> {
         self.columns[0] as usize..self.columns[1] as usize
     }
 }
 
-/// Columns that a source reaches: the first, which may lie before or behind the chart, and how many.
+/// Columns within a source's support: the first, which may be outside the chart, and their number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct ColumnSpan {
     first: i32,
     count: i32,
 }
 
-/// Bins of distance: of one width about the observer's own field line, from there on in proportion to the distance, so
-/// that from each to the next the altitude of a line of sight changes alike.
+/// Distance bins: of constant width near the observer's field line, then proportional to the distance, so that the
+/// altitude on a line of sight changes by a constant step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DistanceBins {
     /// Width of near bins, km, and its inverse.
     width: f64,
     per_width: f64,
-    /// How far they go, km, and how many there are to there.
+    /// Distance at which far bins start, km, and the number of near bins.
     pub(crate) near_limit_km: f64,
     near: f64,
-    /// Width of far bins for their distance, and how many there are from a distance to twice as far.
+    /// Width of far bins divided by their distance, and far bins per octave of distance.
     relative_width: f64,
     per_octave: f64,
-    /// Place at which far bins would be at 1 km.
+    /// Bin coordinate that far bins would have at 1 km.
     far_offset: f64,
-    /// How many there are.
+    /// Number of bins.
     pub(crate) count: usize,
 }
 
@@ -152,26 +151,26 @@ impl DistanceBins {
         (self.relative_width as f32 * distance).max(self.width as f32)
     }
 
-    /// Place of a distance among the bins; 0 is the nearer edge of the first.
+    /// Fractional bin coordinate of a distance; 0 is the near edge of the first bin.
     #[inline(always)]
     fn coordinate(&self, distance: f32) -> f32 {
         let far = approximations::log2(distance).fma(self.per_octave as f32, self.far_offset as f32);
         if distance < self.near_limit_km as f32 { distance * self.per_width as f32 } else { far }
     }
 
-    /// Least reach of a patch along a meridian at a distance, km.
+    /// Minimum kernel support along a meridian at a distance, km.
     #[inline(always)]
     pub(crate) fn min_reach(&self, distance: f32) -> f32 {
         MIN_REACH_CELLS * self.bin_width(distance)
     }
 
-    /// How far smoothed tables spread the light of a bin at a distance along its meridian, km.
+    /// Distance over which prefiltered tables spread the light of a bin along its meridian, km.
     #[inline(always)]
     pub(crate) fn smoothing_km(&self, distance: f32) -> f32 {
         if distance < self.near_limit_km as f32 { SMOOTHING_BINS * self.width as f32 } else { 0.0 }
     }
 
-    /// Distance of a bin's middle, and its width, km.
+    /// Center and width of a bin, km.
     pub(crate) fn distance(&self, bin: usize) -> [f64; 2] {
         let coordinate = bin as f64 + 0.5;
         if coordinate < self.near {
@@ -182,16 +181,16 @@ impl DistanceBins {
     }
 }
 
-/// One strip's sums: bins of one column after those of another.
+/// Bins of one strip, column by column.
 #[derive(Default)]
 pub(crate) struct StripBins {
     bins: Vec<Bin>,
-    /// First and last filled bin of each column, and one past it.
+    /// First non-empty bin of each column, and one past the last.
     filled: [[usize; 2]; STRIP_COLUMNS],
 }
 
 impl StripBins {
-    /// The filled stretch of a column: number of its first bin, and the bins.
+    /// The non-empty bins of a column: index of the first, and the bins.
     pub(crate) fn column(&self, column: usize, bins: &DistanceBins) -> (usize, &[Bin]) {
         let [first, end] = self.filled[column];
         (first, &self.bins[column * bins.count..][first..end.max(first)])
@@ -199,8 +198,8 @@ impl StripBins {
 }
 
 impl<'a> SourceBins<'a> {
-    /// Sorts sources, of this standard deviation in km or more, by strips of so many columns of a chart. What lies above or below all of
-    /// its rows is left out.
+    /// Sorts sources with at least this standard deviation in km into strips of chart columns. Sources outside the
+    /// visible rows are skipped.
     pub(crate) fn new(
         sources: &'a [FieldLineSource],
         (chart, strip): (&Chart, usize),
@@ -224,23 +223,23 @@ impl<'a> SourceBins<'a> {
         &self.bins
     }
 
-    /// What shows in a strip, in the order of the sources, part by part.
+    /// Sources of a strip, in their original order, chunk by chunk.
     pub(crate) fn entries(&self, strip: usize) -> impl Iterator<Item = &[StripEntry]> {
         self.chunks.iter().map(move |part| &part.entries[part.starts[strip] as usize..part.starts[strip + 1] as usize])
     }
 
-    /// How many sources show in a strip.
+    /// Number of sources of a strip.
     pub(crate) fn count(&self, strip: usize) -> usize {
         self.entries(strip).map(<[StripEntry]>::len).sum()
     }
 
-    /// A source by its number.
+    /// A source by its index.
     #[inline(always)]
     pub(crate) fn source(&self, number: u32) -> &FieldLineSource {
         &self.sources[number as usize]
     }
 
-    /// Adds up the sources of a strip whose columns have these cosines and sines.
+    /// Accumulates the sources of a strip whose columns have these cosines and sines.
     #[inline(always)]
     pub(crate) fn accumulate<S: Simd>(
         &self,
@@ -273,7 +272,7 @@ impl<'a> SourceBins<'a> {
 }
 
 impl SortedSources {
-    /// Sources from number `first` on, which reach these columns, by strips of so many.
+    /// Counting sort of sources, the first of which has index `first`, into strips of `width` columns.
     fn new(spans: &[ColumnSpan], first: usize, chart: &Chart, width: usize) -> Self {
         let strips = chart.columns.div_ceil(width);
         let mut starts = vec![0_u32; strips + 1];
@@ -326,7 +325,7 @@ impl ColumnSpan {
             return Self::default();
         }
         if reach * 1.001 >= distance {
-            // It lies about the observer's own field line and may show anywhere.
+            // It includes the observer's own field line and can be seen at any longitude.
             return Self { first: 0, count: chart.columns as i32 };
         }
         let sine = reach / distance;
@@ -337,11 +336,11 @@ impl ColumnSpan {
     }
 }
 
-/// Calls `each` with every strip of so many columns that a span touches, and the columns there.
+/// Calls `each` with every strip that a span overlaps, and its columns there.
 #[inline]
 fn for_each_strip(span: ColumnSpan, chart: &Chart, width: usize, mut each: impl FnMut(usize, [u16; 2])) {
     let columns = chart.columns as i32;
-    // A span that passes the seam of a whole chart shows on its other side too.
+    // A span across the seam of a full-circle chart also appears on the other side.
     let turns = if chart.wraps { &[0, columns, -columns][..] } else { &[0] };
     for turn in turns {
         let mut first = (span.first + turn).max(0) as usize;
@@ -356,11 +355,11 @@ fn for_each_strip(span: ColumnSpan, chart: &Chart, width: usize, mut each: impl 
     }
 }
 
-/// A source as the columns of a strip see it.
+/// Kernel weights of a source in the columns of a strip.
 pub(crate) struct PatchWeights {
-    /// Share of it per km of width.
+    /// Weight per km of width.
     pub(crate) column_weights: [f32; STRIP_COLUMNS],
-    /// How far out it lies, km.
+    /// Distance along the meridian, km.
     pub(super) distances_km: [f32; STRIP_COLUMNS],
 }
 
@@ -379,7 +378,7 @@ impl PatchWeights {
         Self { column_weights: side, distances_km: along }
     }
 
-    /// The bins that it covers along the columns.
+    /// Bins within its support along each column.
     #[inline(always)]
     fn bins(&self, source: &FieldLineSource, bins: &DistanceBins) -> PatchBins {
         let (mut middles, mut reaches) = ([0.0; STRIP_COLUMNS], [0.0; STRIP_COLUMNS]);
@@ -393,7 +392,7 @@ impl PatchWeights {
     }
 }
 
-/// Where along each column of a strip a patch lies, and how far it reaches, in bins.
+/// Center and half-width of a patch along each column of a strip, in bins.
 struct PatchBins {
     middles: [f32; STRIP_COLUMNS],
     reaches: [f32; STRIP_COLUMNS],

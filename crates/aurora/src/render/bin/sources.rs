@@ -1,4 +1,4 @@
-//! What shines: particles for light that leaves at once, the afterglow's cells for green and red.
+//! Light sources: particles for prompt light, afterglow cells for green and red.
 
 use bansho_base::{
     math::{self, MulAdd, simd::LANES},
@@ -23,42 +23,42 @@ use crate::{
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// Sources that a task of the thread pool makes.
+/// Sources per task.
 const TASK: usize = 4096;
-/// Spread of a particle beside the distance to its neighbours: none is seen by itself.
+/// Standard deviation of a particle's patch relative to the particle spacing: single particles are not visible.
 const SPREAD_PER_SPACING: f64 = 1.2;
-/// Afterglow without particles that is fainter than this share of a typical cell is not seen.
+/// Afterglow cells without particles are skipped below this fraction of a typical cell.
 const FAINTEST: f32 = 2e-4;
-/// The same beside single collisions, whose noise hides more: what is left out is a hundredth of what stays behind.
+/// The same with single collisions, whose noise masks more; the skipped light is a hundredth of the afterglow.
 const FAINTEST_FALLING: f32 = 1e-2;
-/// Keys of a particle's falls are so far apart from instant to instant.
+/// Offset between the random-number counters of a particle at successive instants.
 const PER_INSTANT: u32 = 0x9e37_79b9;
 /// 1000 W, the power of one mW/m^2 on one km^2.
 const PER_UNIT: f32 = 1e-3;
 
-/// What an aurora shines with at a moment, or on average.
+/// Sources at one instant, or averaged over a long exposure.
 #[derive(Default)]
 pub(crate) struct Sources {
     /// Light with fine detail: particles and the green map.
     pub(crate) sharp: Vec<FieldLineSource>,
-    /// The red map, by height in place of emitters.
+    /// The red map, with altitudes in place of emitters.
     pub(crate) soft: Vec<FieldLineSource>,
     /// Standard deviations of both, km.
     pub(crate) spread_km: [f64; 2],
 }
 
-/// Shares of green, red and prompt light; on the soft chart, of red light of three heights.
+/// Weights of green, red and prompt light; for the soft chart, of the three red altitudes.
 pub(crate) type EmitterWeights = [f32; 3];
 const GREEN: [EmitterWeights; 1] = [[1.0, 0.0, 0.0]];
 const RED: [EmitterWeights; RED_ALTITUDES] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// How electrons become sources.
+/// Converts particles and cells to sources.
 pub(crate) struct SourceBuilder<'a> {
     pub(crate) field: &'a FieldLines,
     pub(crate) reach: f32,
-    /// Part of the power that each of several instants has.
+    /// Weight of the power at each of several instants.
     pub(crate) weight: f32,
-    /// Which of them it is, so that a particle has falls of its own at each.
+    /// Index of the instant, so that a particle has other tracks at each.
     pub(crate) instant: u32,
 }
 
@@ -71,13 +71,13 @@ impl SourceBuilder<'_> {
         FieldLineSource { across: foot.across, reach: self.reach, energy_node: node, power, random_key: key }
     }
 
-    /// What the falls of a particle or cell of that number go by.
+    /// Random-number counter for the tracks of a particle or cell.
     #[inline(always)]
     fn random_key(&self, number: u32) -> u32 {
         number.wrapping_add(self.instant.wrapping_mul(PER_INSTANT))
     }
 
-    /// A source for each of the cells, which gives these shares of the light of each height.
+    /// One source per cell, with these weights of the light of each altitude.
     pub(crate) fn cells<const ALTITUDES: usize>(
         &self,
         cells: &[AfterglowCell<ALTITUDES>],
@@ -115,7 +115,7 @@ impl SourceBuilder<'_> {
         }
     }
 
-    /// Particles as they are `offset_s` seconds after their step, with the green light of each.
+    /// Particles extrapolated by `offset_s` seconds, with the green light of each.
     fn particles(&self, particles: &AuroraParticles, green_w: &[f32], offset_s: f32) -> Vec<FieldLineSource> {
         let level = Level::new();
         let mut sources = vec![FieldLineSource::default(); particles.len()];
@@ -163,7 +163,7 @@ impl SourceBuilder<'_> {
 }
 
 impl Sources {
-    /// What shines while the shutter is open.
+    /// Sources while the shutter is open.
     pub(crate) fn new(light: &EmissionInputs, field: &FieldLines, moments: &SampleTimes) -> Self {
         let by_collisions = light.parameters.sampling == Sampling::CollisionRenderer;
         let faintest = if by_collisions { FAINTEST_FALLING } else { FAINTEST };
@@ -181,7 +181,7 @@ impl Sources {
             || afterglow.green.distribute_to_particles(light.particles, faintest, blocks[0]),
             || afterglow.red.bright_blocks(FAINTEST, blocks[1]),
         );
-        // What is drawn from the middle of a block is spread as its cells would be.
+        // Merged cells are drawn at their center: their spread replaces that of the single cells.
         let of_block = |own: f64, cell_km: f64, block: usize| {
             math::sqrt(own * own + ((block * block - 1) as f64) * cell_km * cell_km / 12.0)
         };
@@ -200,7 +200,7 @@ impl Sources {
 }
 
 impl Sources {
-    /// Adds others with a share of their power.
+    /// Adds others with their power scaled by a weight.
     pub(crate) fn add(&mut self, others: &Self, weight: f32) {
         let first = self.sharp.is_empty() && self.soft.is_empty();
         for (own, others) in [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft)] {
@@ -216,33 +216,33 @@ impl Sources {
     }
 }
 
-/// When particles are drawn.
+/// Instants at which particles are drawn.
 pub(crate) struct SampleTimes {
-    /// Instants, s after their step; each has an equal part of the power.
+    /// Offsets from the step's time, s; all have the same weight.
     pub(crate) offsets_s: Vec<f64>,
-    /// Number of the first of them.
+    /// Index of the first instant.
     pub(crate) first_index: u32,
-    /// How far they are spread by their motion from one to the next (standard deviation), km.
+    /// Motion blur between successive instants (standard deviation), km.
     pub(crate) smear_km: f64,
 }
 
-/// What an aurora's light is made from.
+/// Everything that sources are made from.
 pub(crate) struct EmissionInputs<'a> {
     pub(crate) particles: &'a AuroraParticles,
     /// The green and the red map.
     pub(crate) afterglow: &'a Afterglow,
     pub(crate) emission: &'a Emission,
     pub(crate) parameters: &'a DrawingParameters,
-    /// Mean distance of neighbouring particles, km.
+    /// Mean distance between neighboring particles, km.
     pub(crate) spacing_km: f64,
-    /// Energy of the electrons where nothing varies it, eV.
+    /// Mean electron energy without rays and sheet factors, eV.
     pub(crate) energy_ev: f64,
     /// Spread of collisions about their field line, km.
     pub(crate) lateral_spread_km: f64,
 }
 
 impl EmissionInputs<'_> {
-    /// Standard deviation of the light of a particle across the field, km.
+    /// Standard deviation of a particle's light perpendicular to the field, km.
     pub(crate) fn spread_km(&self) -> f64 {
         let own = match (self.parameters.blur, self.parameters.spread_km) {
             (Blur::Pixels, _) => 0.0,
@@ -253,7 +253,7 @@ impl EmissionInputs<'_> {
     }
 }
 
-/// The node of the grid that is nearest to an energy.
+/// The nearest node of the energy grid.
 pub(crate) fn nearest_node(energy_ev: f64) -> usize {
     let least = |node: &usize| (math::ln(node_energy_ev(*node) / energy_ev.max(1.0))).abs();
     (0..NODES).min_by(|a, b| least(a).total_cmp(&least(b))).unwrap_or(0)

@@ -1,6 +1,6 @@
-//! Columns of the chart that one thread draws the falls of sources in.
+//! A block of chart columns in which one thread rasterizes the electron tracks of sources.
 //!
-//! They are worked on in a buffer that stays in the cache, and are then written to the picture at once.
+//! The buffer fits into the cache and is written to the picture once.
 
 use bansho_base::math::{self, MulAdd, approximations, simd::FourLanes};
 
@@ -18,17 +18,18 @@ use crate::{
 };
 use fearless_simd::Simd;
 
-/// Columns that a thread draws at once: the more, the fewer sources are placed twice.
+/// Columns per block: the wider, the fewer sources are projected more than once.
 pub(crate) const BLOCK_COLUMNS: usize = 4 * STRIP_COLUMNS;
 
-/// Ranges of distance from one to twice as far, in each of which lines are seen alike but for a shift: a hundredth.
+/// Distance intervals per octave, in each of which field lines differ by a shift of their rows only, to within a
+/// hundredth.
 const RANGES_PER_OCTAVE: f32 = 70.0;
-/// Ranges from 1 km on, to beyond the horizon.
+/// Number of intervals, from 1 km to beyond the horizon.
 const RANGES: usize = 12 * 70;
 /// No column.
 const NONE: u32 = u32::MAX;
 
-/// How the lines of a column in a range of distance are seen, by the line in its middle.
+/// Projection of the field line at the center of a distance interval, for one column.
 #[derive(Clone, Copy)]
 pub(crate) struct CachedProjection {
     column: u32,
@@ -37,25 +38,25 @@ pub(crate) struct CachedProjection {
     pub(crate) descent: RowPolynomials,
 }
 
-/// What a thread keeps from group to group.
+/// Buffers that a thread reuses from block to block.
 pub(crate) struct ColumnBlock {
-    /// Fours of rows of one column after those of another, of which those from `valid` on are valid.
+    /// Groups of four rows, column by column; only those within `valid` are initialized.
     light: Vec<RowQuad>,
     valid: [[usize; 2]; BLOCK_COLUMNS],
-    /// Fours of rows from column to column.
+    /// Groups of four rows per column.
     stride: usize,
-    /// What shows, by the first column where it does.
+    /// Sources of the block, sorted by their first column.
     entries: Vec<StripEntry>,
-    /// Cosines and sines of the columns' longitudes, and as many more.
+    /// Cosines and sines of the columns' longitudes, padded by one strip.
     units: [[f32; BLOCK_COLUMNS + STRIP_COLUMNS]; 2],
     meridians: [[f32; 3]; BLOCK_COLUMNS],
-    /// How lines were last seen in each range of distance, by an even and by an odd column.
+    /// Direct-mapped cache of projections by distance interval and column parity.
     cache: Vec<CachedProjection>,
 }
 
 impl ColumnBlock {
     pub(crate) fn new(chart: &Chart) -> Self {
-        // Odd, so that the same row of many columns does not fall to one place of the cache.
+        // Odd, to avoid cache-set aliasing between the same row of neighboring columns.
         let stride = chart.rows.div_ceil(QUAD_ROWS) | 1;
         Self {
             light: vec![RowQuad::DARK; stride * BLOCK_COLUMNS],
@@ -68,7 +69,7 @@ impl ColumnBlock {
         }
     }
 
-    /// Begins with a group of the chart; gives what shows in it.
+    /// Starts a block of the chart and returns its sources.
     pub(crate) fn begin(
         &mut self,
         index: usize,
@@ -91,7 +92,7 @@ impl ColumnBlock {
         std::mem::take(&mut self.entries)
     }
 
-    /// Sources that show first in one column one after the other: what is written stays in the nearest cache.
+    /// Counting sort by first column, for cache locality of the writes.
     fn sort(&mut self, index: usize, source_bins: &SourceBins) {
         let mut starts = [0; BLOCK_COLUMNS + 1];
         for entry in source_bins.entries(index).flatten() {
@@ -109,7 +110,7 @@ impl ColumnBlock {
         }
     }
 
-    /// Takes the list of entries back to be used again.
+    /// Returns the entry list for reuse.
     pub(crate) fn recycle(&mut self, entries: Vec<StripEntry>) {
         self.entries = entries;
     }
@@ -124,14 +125,14 @@ impl ColumnBlock {
         units
     }
 
-    /// The meridian of a column, and how far out on it a source lies, km.
+    /// The meridian of a column, and the source's distance along it, km.
     #[inline(always)]
     pub(crate) fn meridian_and_distance(&self, column: usize, source: &FieldLineSource) -> (&[f32; 3], f32) {
         let [x, y] = source.across;
         (&self.meridians[column], x.fma(self.units[0][column], y * self.units[1][column]))
     }
 
-    /// How a column sees lines about that distance, km.
+    /// The cached projection of field lines at about that distance in km, for a column.
     #[inline(always)]
     pub(crate) fn cached_projection<S: Simd>(
         &mut self,
@@ -149,7 +150,7 @@ impl ColumnBlock {
         cached
     }
 
-    /// Adds a fall with weights to a column.
+    /// Adds a rasterized track with weights to a column.
     #[inline(always)]
     pub(crate) fn add<S: Simd>(&mut self, column: usize, rasterizer: &TrackRasterizer, weights: FourLanes<S>) {
         let (Some(first), Some(last)) = (rasterizer.active_quads().first(), rasterizer.active_quads().last()) else {
@@ -160,7 +161,7 @@ impl ColumnBlock {
         rasterizer.add_to(light, weights);
     }
 
-    /// Writes everything to the picture.
+    /// Writes the block to the picture.
     pub(crate) fn write(&self, strip: ColumnStrip, rows: usize) {
         let columns = strip.light.chunks_mut(rows).zip(strip.valid_rows);
         for ((own, valid), (light, rows_lit)) in self.light.chunks(self.stride).zip(&self.valid).zip(columns) {
@@ -185,7 +186,7 @@ impl CachedProjection {
     }
 }
 
-/// Makes more of a column valid: what has been lit stays, what is new is dark.
+/// Extends the valid range of a column; new quads are cleared.
 #[inline(always)]
 fn extend_valid_quads(light: &mut [RowQuad], valid: &mut [usize; 2], [start, end]: [usize; 2]) {
     let end = end.min(light.len());

@@ -1,4 +1,4 @@
-//! Light by altitude for every energy, as single precision tables that the drawing walks.
+//! Emission profiles by altitude for every energy, as prefiltered single-precision tables.
 
 use std::sync::OnceLock;
 
@@ -13,18 +13,17 @@ use crate::physics::{
     precipitation::energy_grid::NODES,
 };
 
-/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column,
-/// which falls fastest, within 1 %.
+/// Tables per node of the energy grid: the nearest is within 0.5 % of the energy, and the red column, which varies
+/// fastest, within 1 %.
 const TABLES_PER_NODE: usize = 8;
-/// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
+/// Mip levels of a table: each is filtered and sampled at twice the spacing of the previous one, starting at 1 km.
 pub(super) const MIP_LEVELS: usize = 12;
-/// Where the table of each spacing begins among those of one energy, and the end of all.
+/// Start of each mip level among those of one energy, and the total.
 const STARTS: [usize; MIP_LEVELS + 1] = starts();
-/// A column is drawn from where this share of its light is left below up to where it is left above.
+/// Profiles are cut off where this fraction of the light is left above or below.
 const CUTOFF_FRACTION: f64 = 3e-4;
 
-/// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses
-/// nothing.
+/// Entries of a mip level: one below the levels and zeros above, so that filtering conserves light.
 const fn entries(spacing: usize) -> usize {
     ((LEVELS - 1) >> spacing) + 4
 }
@@ -38,31 +37,30 @@ const fn starts() -> [usize; MIP_LEVELS + 1] {
     starts
 }
 
-/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first
-/// asked for.
+/// Emission by energy and altitude, in kR per km along the line of sight and mW/m^2; tables are computed on first use.
 #[derive(Clone, Debug)]
 pub(crate) struct EmissionProfiles {
     emission: Emission,
-    /// Whether it is red light alone, its heights in place of the emitters.
+    /// Whether the components are red light by altitude instead of emitters.
     red_by_altitude: bool,
     tables: Vec<OnceLock<MipTables>>,
 }
 
-/// The tables of one energy, one after the other.
+/// Mip levels of one energy, concatenated.
 #[derive(Clone, Debug)]
 struct MipTables {
     values: Vec<PerEmitter<f32>>,
-    /// Altitudes above which there is hardly any prompt, and any red light, km.
+    /// Cutoff altitudes at the top for prompt and for red light, km.
     tops_km: [f32; 2],
-    /// Altitude below which there is hardly any light, km.
+    /// Cutoff altitude at the bottom, km.
     bottom_km: f32,
 }
 
-/// Light by altitude of one energy.
+/// Emission by altitude of one energy.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EmissionProfile<'a> {
     values: &'a [PerEmitter<f32>],
-    /// Altitudes between which nearly all light is, km.
+    /// Cutoff altitudes, km.
     pub(super) bottom_km: f32,
     pub(super) top_km: f32,
 }
@@ -74,12 +72,12 @@ impl EmissionProfiles {
         Self { emission: emission.clone(), red_by_altitude: false, tables }
     }
 
-    /// The tables of red light alone, its heights in place of the emitters.
+    /// Tables of red light by altitude instead of emitters.
     pub(crate) fn red_by_altitude(emission: &Emission) -> Self {
         Self { red_by_altitude: true, ..Self::new(emission) }
     }
 
-    /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
+    /// The profile of an energy, given as fractional node index; `red` includes the red line's altitude range.
     #[inline(always)]
     pub(super) fn at(&self, node: f32, red: bool) -> EmissionProfile<'_> {
         let last = self.tables.len() - 1;
@@ -111,7 +109,7 @@ impl MipTables {
         }
     }
 
-    /// From that of red light at each level, by its heights in place of the emitters.
+    /// The same for red light by altitude.
     fn of_heights(profile: &[PerEmitter<f64>]) -> Self {
         let top_km = top_km(profile, RED_ALTITUDES - 1);
         let heights: [usize; RED_ALTITUDES] = std::array::from_fn(|height| height);
@@ -119,7 +117,7 @@ impl MipTables {
     }
 }
 
-/// The tables of all spacings one after the other, from the volume emission at each level.
+/// All mip levels, from the volume emission at each level.
 fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
     let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
@@ -133,21 +131,21 @@ fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
 }
 
 impl<'a> EmissionProfile<'a> {
-    /// The table smoothed over 2^`spacing` km. Entries lie so far apart, the second at 80 km; the last is dark.
+    /// The table filtered to 2^`spacing` km. The second entry is at 80 km, the last is 0.
     #[inline(always)]
     pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
         &self.values[STARTS[spacing]..STARTS[spacing + 1]]
     }
 }
 
-/// Energy of a table, eV.
+/// Nominal energy of a table, eV.
 fn table_energy_ev(table_index: usize) -> f64 {
     use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
     let log_fraction = table_index as f64 / ((NODES - 1) * TABLES_PER_NODE) as f64;
     LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, log_fraction)
 }
 
-/// Every other entry from the second on, and one before, smoothed so that none of the light is lost.
+/// Downsamples by two with the filter 1/4, 1/2, 1/4, which conserves the sum.
 fn downsampled(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let entry = |at: Option<usize>| at.and_then(|at| table.get(at)).copied().unwrap_or_default();
     let smoothed = |number: usize| -> PerEmitter<f64> {
@@ -167,7 +165,7 @@ fn bottom_km(profile: &[PerEmitter<f64>], emitters: &[usize]) -> f32 {
     emitters.iter().map(bottom).fold(f32::INFINITY, f32::min)
 }
 
-/// How many of the levels, in that order, hold hardly any of the light together.
+/// Number of levels, in iteration order, within the cutoff fraction.
 fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
     let light = |level: usize| profile[level][emitter];
     let whole: f64 = (0..LEVELS).map(light).sum();

@@ -1,4 +1,4 @@
-//! Where on the chart the altitudes of a field line are seen: of single points exactly, of many by polynomials.
+//! Projection of altitudes on a field line to chart rows: exact for single points, by Chebyshev interpolation for many.
 
 use std::f64::consts::PI;
 
@@ -11,24 +11,24 @@ use super::{chart::ChartProjection, field_lines::EARTH_RADIUS_KM};
 use crate::physics::atmosphere::{HIGHEST_KM, LOWEST_KM};
 use fearless_simd::{Simd, prelude::*};
 
-/// Altitudes at which a line is seen exactly, and terms of the polynomial through its rows.
+/// Chebyshev nodes at which a line is projected exactly, and terms of the row polynomial.
 const NODES: usize = 8;
-/// Terms of the polynomials through slopes and brightness, which are smoother.
+/// Terms of the polynomials of slope and brightness, which are smoother.
 const TERMS: usize = 5;
-/// Points of a level lie up to a kilometre from it.
+/// Collisions of a level lie up to a kilometer from it.
 const MARGIN_KM: f64 = 1.0;
-/// Polynomials are those of `1 / (altitude + PIVOT_KM)`, nearly in proportion to which rays are foreshortened.
+/// The polynomials are in `1 / (altitude + PIVOT_KM)`, which approximates the perspective foreshortening of rays.
 const PIVOT_KM: f64 = 100.0;
-/// That quantity at both ends, per km.
+/// Range of that quantity, per km.
 const ENDS: [f64; 2] = [1.0 / (HIGHEST_KM + MARGIN_KM + PIVOT_KM), 1.0 / (LOWEST_KM - MARGIN_KM + PIVOT_KM)];
 const MIDDLE: f64 = 0.5 * (ENDS[0] + ENDS[1]);
 const HALF: f64 = 0.5 * (ENDS[1] - ENDS[0]);
 
-/// A field line that electrons fall down, as it is seen.
+/// A field line and its projection.
 pub(crate) struct ProjectedFieldLine<'a> {
     /// Distance from the observer's own field line, km.
     pub(super) distance: f32,
-    /// Of its meridian, [`Meridian::single`](super::field_lines::Meridian::single).
+    /// Coefficients of its meridian, [`Meridian::coefficients_f32`](super::field_lines::Meridian::coefficients_f32).
     meridian: &'a [f32; 3],
     projection: &'a ChartProjection,
 }
@@ -39,7 +39,7 @@ impl<'a> ProjectedFieldLine<'a> {
         Self { distance, meridian, projection }
     }
 
-    /// Rows of points at altitudes in km, so far from the line in km, and how bright they are seen.
+    /// Rows of points at altitudes and offsets from the line in km, and their brightness factors.
     #[inline(always)]
     pub(crate) fn points<S: Simd>(&self, altitudes_km: &[f32; LANES], offsets: Lanes<S>) -> [Lanes<S>; 2] {
         let mut distances: [f32; LANES] = offsets.into();
@@ -50,7 +50,8 @@ impl<'a> ProjectedFieldLine<'a> {
         [Lanes::from_slice(offsets.simd, &rows), Lanes::from_slice(offsets.simd, &brightness)]
     }
 
-    /// Points of the meridian at altitudes and distances, km. One step a loop: each of them becomes vector code.
+    /// Exact projection of points of the meridian at altitudes and distances, km. One operation per loop, so that each
+    /// is vectorized.
     #[inline(always)]
     fn project_points<const COUNT: usize>(
         &self,
@@ -80,8 +81,8 @@ impl<'a> ProjectedFieldLine<'a> {
             let per_far = far_squared.simd_rsqrt();
             let slope = distance.fma((outward + distance) * per_upward[i], coordinates[i]) * (per_far * per_far);
             projected.slopes[i] = projection.rows(slope);
-            // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is
-            // taken out again.
+            // A source's power is per area perpendicular to the field; a collision stands for all of it, so the cosine
+            // to the vertical cancels.
             let slant = (RADIUS + altitudes[i]) * per_upward[i] * per_far;
             projected.brightness[i] = if distance > 0.0 && far_squared > 1.0 { slant } else { 0.0 };
         }
@@ -89,10 +90,10 @@ impl<'a> ProjectedFieldLine<'a> {
     }
 }
 
-/// How points are seen.
+/// Projected points.
 struct ProjectedPoints<const COUNT: usize> {
     rows: [f32; COUNT],
-    /// Rows for each km of distance.
+    /// Rows per km of distance.
     slopes: [f32; COUNT],
     brightness: [f32; COUNT],
 }
@@ -107,22 +108,22 @@ pub(crate) fn altitudes_km(coordinates: &[f32; LANES]) -> [f32; LANES] {
     altitudes
 }
 
-/// From nodes to polynomials.
+/// Matrices from values at the nodes to polynomial coefficients.
 #[derive(Clone, Debug)]
 pub(crate) struct RowPolynomialBasis {
     altitudes_km: [f32; NODES],
-    /// What the value at each node adds to each coefficient: of all terms, and of the first [`TERMS`].
+    /// Contribution of each node's value to each coefficient: for all terms, and for the first [`TERMS`].
     full: [[f32; NODES]; NODES],
     short: [[f32; NODES]; NODES],
 }
 
-/// Rows, slopes and brightness by place among the altitudes.
+/// Polynomials of row, slope and brightness in the altitude coordinate.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct RowPolynomials {
     rows: [f32; NODES],
     slopes: [f32; NODES],
     brightness: [f32; NODES],
-    /// Rows of the highest and the lowest node, and the steepest slope.
+    /// Rows of the highest and the lowest node, and the maximum slope.
     ends: [f32; 2],
     steepest: f32,
 }
@@ -137,12 +138,12 @@ impl RowPolynomialBasis {
         }
     }
 
-    /// Place of an altitude: 1 at the lowest, -1 at the highest.
+    /// Altitude coordinate: 1 at the lowest altitude, -1 at the highest.
     pub(crate) fn altitude_coordinate(altitude_km: f32) -> f32 {
         ((1.0 / (f64::from(altitude_km) + PIVOT_KM) - MIDDLE) / HALF) as f32
     }
 
-    /// How the points of a line are seen.
+    /// Fits the polynomials of a line.
     #[inline(always)]
     pub(crate) fn fit<S: Simd>(&self, simd: S, line: &ProjectedFieldLine) -> RowPolynomials {
         let ProjectedPoints { rows, slopes, brightness } =
@@ -162,15 +163,15 @@ impl RowPolynomialBasis {
 }
 
 impl RowPolynomials {
-    /// Whether any of its points within `reach` km may lie on a chart of so many rows.
+    /// Conservative test whether points within `reach` km of the line can lie on a chart of `rows` rows.
     #[inline(always)]
     pub(crate) fn may_be_visible(&self, reach: f32, rows: usize) -> bool {
-        // A row more for what lies beyond the outermost nodes.
+        // One row of margin beyond the outermost nodes.
         let beyond = self.steepest.fma(2.0 * reach, 0.1 * (self.ends[1] - self.ends[0]).abs() + 1.0);
         self.ends[1] + beyond > 0.0 && self.ends[0] - beyond < rows as f32
     }
 
-    /// Rows of points at places, so far from the line in km, and how bright they are seen.
+    /// Rows of points at altitude coordinates and offsets from the line in km, and their brightness factors.
     #[inline(always)]
     pub(crate) fn points<S: Simd>(&self, coordinates: Lanes<S>, offsets: Lanes<S>) -> [Lanes<S>; 2] {
         let slopes = polynomial(coordinates, &self.slopes[..TERMS]);
@@ -179,7 +180,7 @@ impl RowPolynomials {
     }
 }
 
-/// Its value at `coordinates`, coefficients from the constant on.
+/// Evaluates a polynomial at `coordinates`, coefficients from the constant term on (Horner).
 #[inline(always)]
 fn polynomial<S: Simd>(coordinates: Lanes<S>, coefficients: &[f32]) -> Lanes<S> {
     let Some((highest, others)) = coefficients.split_last() else { return coordinates.broadcast(0.0) };
@@ -190,7 +191,7 @@ fn polynomial<S: Simd>(coordinates: Lanes<S>, coefficients: &[f32]) -> Lanes<S> 
     value
 }
 
-/// The coefficients for values at the nodes.
+/// Coefficients from the values at the nodes.
 #[inline(always)]
 fn sum<S: Simd>(simd: S, basis: &[[f32; NODES]; NODES], values: &[f32; NODES]) -> [f32; NODES] {
     let mut sum = HalfLanes::splat(simd, 0.0);
@@ -200,13 +201,13 @@ fn sum<S: Simd>(simd: S, basis: &[[f32; NODES]; NODES], values: &[f32; NODES]) -
     sum.into()
 }
 
-/// Place of a node: Chebyshev's.
+/// Chebyshev node.
 fn chebyshev_node(node: usize) -> f64 {
     math::cos(PI * (node as f64 + 0.5) / NODES as f64)
 }
 
-/// What a value of 1 at a node and 0 at all others adds to the coefficients of the first `terms` Chebyshev polynomials,
-/// in powers of the place.
+/// Contribution of a value of 1 at a node to the coefficients of the first `terms` Chebyshev polynomials, in powers of
+/// the coordinate.
 fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
     let mut powers = [0.0; NODES];
     let (mut last, mut polynomial) = ([0.0; NODES], [0.0; NODES]);

@@ -1,5 +1,4 @@
-//! The chart that auroras are drawn on: the part of the sky that a picture shows, by longitude and colatitude about the
-//! magnetic zenith.
+//! The chart: the visible part of the sky in longitude and colatitude about the magnetic zenith.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -11,26 +10,26 @@ use bansho_base::{
 
 use super::field_lines::FieldLines;
 
-/// Columns of a strip, which one thread draws.
+/// Columns per strip; one thread works on a strip.
 pub(crate) const STRIP_COLUMNS: usize = 16;
-/// Places along each side of the picture at which its directions are sampled.
+/// Samples per side of the picture for the coverage.
 const SAMPLES_PER_SIDE: usize = 24;
-/// Most columns and rows.
+/// Maximum number of columns and of rows.
 const MOST: f64 = 16_384.0;
-/// Most cells of a chart for each of the picture's pixels: more are seen only where a camera zooms or turns far while its shutter is open,
-/// which blurs them.
+/// Maximum chart cells per pixel: more occur only where a camera zooms or pans far during the exposure, which blurs
+/// them.
 const MOST_PER_PIXEL: f64 = 16.0;
-/// Lower than this below the horizon nothing is drawn: sine of the elevation.
+/// Minimum sine of the elevation that is drawn.
 const MIN_SINE_ELEVATION: f64 = -0.35;
 
-/// What a chart covers, radians.
+/// Angular range of a chart, radians.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coverage {
-    /// Longitude of the middle and how far it reaches to both sides; all around from pi on.
+    /// Center and half-width of the longitude range; full circle from pi on.
     longitude: [f64; 2],
     /// Least and greatest colatitude.
     colatitude: [f64; 2],
-    /// Angle of a pixel, or more where the chart would have far more cells than the picture has pixels.
+    /// Angle of a pixel, or more where the chart would have too many cells.
     pub(crate) pixel: f64,
 }
 
@@ -47,16 +46,16 @@ pub(crate) struct Chart {
     pub(crate) row_step: f64,
     first_longitude: f64,
     first_colatitude: f64,
-    /// Whether it goes all around.
+    /// Whether it spans the full circle of longitude.
     pub(crate) wraps: bool,
 }
 
 impl Coverage {
-    /// What the whole picture shows while the shutter is open.
+    /// Range of the whole picture over the exposure.
     pub(crate) fn of_view(view: &View, field: &FieldLines) -> Self {
         let cameras = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(|t| view.camera_at(t));
         let directions: Vec<[f64; 3]> = cameras.iter().flat_map(|camera| directions(camera, field)).collect();
-        // The longitude of the middle of what is seen.
+        // Circular mean of the longitudes.
         let sum = directions.iter().fold([0.0; 2], |sum, [_, x, y]| [sum[0] + x, sum[1] + y]);
         let middle = math::atan2(sum[1], sum[0]);
         let (mut reach, mut least, mut greatest) = (0.0_f64, PI, 0.0_f64);
@@ -81,7 +80,7 @@ impl Coverage {
         coverage
     }
 
-    /// Sine of the colatitude where meridians lie farthest apart.
+    /// Maximum sine of the colatitude.
     fn widest(&self) -> f64 {
         let [least, greatest] = self.colatitude;
         if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
@@ -90,14 +89,14 @@ impl Coverage {
         math::sin(least).max(math::sin(greatest)).max(1e-3)
     }
 
-    /// What a chart over it takes up, columns as wide everywhere as where they are widest, square radians.
+    /// Solid-angle bound, with columns as wide as the widest, square radians.
     fn area(&self) -> f64 {
         let [least, greatest] = self.colatitude;
         2.0 * self.longitude[1] * self.widest() * (greatest - least)
     }
 }
 
-/// Parts along and across the field of directions all over the picture, without those far below the horizon.
+/// Components along and across the field of sampled directions of the picture, without those far below the horizon.
 fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<Item = [f64; 3]> + 'a {
     (0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE).filter_map(move |index| {
         let fraction = |at: usize| at as f64 / (SAMPLES_PER_SIDE - 1) as f64;
@@ -112,7 +111,7 @@ fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<It
 }
 
 impl Chart {
-    /// A chart over `coverage` whose cells are `column` by `row` radians where they are widest, or somewhat less.
+    /// A chart over `coverage` with cells of at most `column` by `row` radians where they are widest.
     pub(crate) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
         let ([least, greatest], widest) = (coverage.colatitude, coverage.widest());
         let [middle, reach] = coverage.longitude;
@@ -121,7 +120,7 @@ impl Chart {
         let columns = (range * widest / column).min(MOST).ceil() as usize;
         let columns = columns.max(1).next_multiple_of(STRIP_COLUMNS);
         let column_step = if wraps { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
-        // On multiples of the step, so that a chart does not crawl over the sky as the camera turns.
+        // Aligned to multiples of the step, so that the chart does not crawl as the camera turns.
         let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
         let row = row.max((greatest - least) / MOST);
         let first_row = (least / row).floor();
@@ -156,7 +155,7 @@ impl Chart {
         units
     }
 
-    /// Cotangent of the colatitude of every row and so many more, and inverse sine of that of every row.
+    /// Cotangents of the colatitude of every row and `more` rows beyond, and inverse sines of that of every row.
     pub(crate) fn row_tables(&self, more: usize) -> [Vec<f32>; 2] {
         let trigonometry = |row| math::sin_cos(self.colatitude(row));
         let cotangents = (0..self.rows + more).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
@@ -164,7 +163,7 @@ impl Chart {
         [cotangents.collect(), inverses.collect()]
     }
 
-    /// The column that stands for one less than a column beside the chart.
+    /// Wraps or clamps a column that is at most one column outside the chart.
     #[inline(always)]
     pub(crate) fn wrap_column(&self, column: i32) -> usize {
         let columns = self.columns as i32;
@@ -176,7 +175,7 @@ impl Chart {
         wrapped.clamp(0, columns - 1) as usize
     }
 
-    /// How places on the chart are found.
+    /// The mapping from directions to cells.
     pub(crate) fn projection(&self) -> ChartProjection {
         ChartProjection {
             per_column: (1.0 / self.column_step) as f32,
@@ -188,7 +187,7 @@ impl Chart {
     }
 }
 
-/// Places on a chart in cells: 0 is the chart's edge, 0.5 the middle of its first column or row.
+/// Maps directions to fractional cells: 0 is the chart's edge, 0.5 the center of the first column or row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChartProjection {
     per_column: f32,
@@ -199,7 +198,7 @@ pub(crate) struct ChartProjection {
 }
 
 impl ChartProjection {
-    /// One for rows of so many radians from the magnetic zenith on.
+    /// For rows of so many radians, starting at the magnetic zenith.
     #[cfg(test)]
     pub(super) fn of_rows(step: f32) -> Self {
         Self { per_column: 1.0 / step, per_row: 1.0 / step, middle: 0.0, half: 0.0, first_row: 0.0 }

@@ -1,24 +1,23 @@
-//! Field lines over a round Earth, as an observer sees them.
+//! Field lines over a spherical Earth, seen by an observer.
 //!
-//! Lines of a uniform field are parallel, so that from one place each is seen on a meridian of the sky about the
-//! magnetic zenith, the point to which all of them converge: its longitude never changes along the line. Everything
-//! here rests on that.
+//! The lines of a uniform field are parallel, so from one position each appears on a meridian of the sky about the
+//! magnetic zenith, their vanishing point: the longitude is constant along a line. The whole renderer relies on that.
 
 use bansho_base::math::{self, DVec2, DVec3, MulAdd, approximations};
 
 pub(crate) use bansho_base::world::sky::EARTH_RADIUS_KM;
 
-/// Altitude of the plane on which feet are drawn, km.
+/// Altitude of the drawn plane, km.
 pub(crate) const FOOT_ALTITUDE_KM: f64 = 100.0;
-/// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach
-/// the ground.
+/// Minimum dip angle, degrees: nearer the magnetic equator there are no auroras and field lines would not reach the
+/// ground.
 const MIN_DIP_DEG: f64 = 30.0;
 
 /// The magnetic field about an observer. Lengths are km; x east, y up, z south from the point on the ground below the
-/// drawn square's middle.
+/// center of the drawn square.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FieldLines {
-    /// The observer, from the Earth's middle.
+    /// The observer, relative to the Earth's center.
     observer: DVec3,
     /// Unit vector along the field, away from the ground.
     pub(crate) along: DVec3,
@@ -26,22 +25,22 @@ pub(crate) struct FieldLines {
     pub(crate) across: [DVec3; 2],
 }
 
-/// Where a field line passes the foot's plane.
+/// Intersection of a field line with the drawn plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FootPoint {
-    /// The line's place in the plane across the field through the observer, km.
+    /// Position in the plane perpendicular to the field through the observer, km.
     pub(crate) across: [f32; 2],
     /// Cosine of the angle between the field and the vertical there.
     pub(crate) vertical_cosine: f32,
 }
 
 impl FieldLines {
-    /// The field of that dip and declination for an observer at a place in m.
+    /// The field of that dip and declination for an observer at a position in m.
     pub(crate) fn new(dip_deg: f64, declination_deg: f64, position: DVec3) -> Self {
         let dip = dip_deg.abs().max(MIN_DIP_DEG).to_radians();
         let (sin, cos) = math::sin_cos(dip);
         let (east, north) = math::sin_cos(declination_deg.to_radians());
-        // Lines lean away from the nearer pole: to the south in the north.
+        // Field lines incline away from the nearer pole: to the south in the northern hemisphere.
         let lean = if dip_deg < 0.0 { cos } else { -cos };
         let along = DVec3::new(lean * east, sin, -lean * north);
         let first = (DVec3::X - along * along.x).normalize();
@@ -49,8 +48,7 @@ impl FieldLines {
         Self { observer, along, across: [first, along.cross(first)] }
     }
 
-    /// The field line whose foot is at a place of the drawn plane, km east and south: that far from the middle along
-    /// the shell at 100 km.
+    /// The field line through a position of the drawn plane, km east and south, measured along the shell at 100 km.
     #[inline(always)]
     pub(crate) fn foot_point(&self, east: f32, south: f32) -> FootPoint {
         const SHELL: f32 = (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM) as f32;
@@ -69,7 +67,7 @@ impl FieldLines {
         FootPoint { across: [dot(first, position), dot(second, position)], vertical_cosine: dot(along, up).max(0.05) }
     }
 
-    /// The place of the drawn plane, km east and south, that is seen in a direction; none where it is not seen.
+    /// The position of the drawn plane, km east and south, that is seen in a direction, if any.
     pub(crate) fn foot_position(&self, direction: DVec3) -> Option<DVec2> {
         const SHELL: f64 = EARTH_RADIUS_KM + FOOT_ALTITUDE_KM;
         let direction = direction.normalize();
@@ -98,7 +96,7 @@ impl FieldLines {
         [self.along.as_vec3().to_array(), first.as_vec3().to_array(), second.as_vec3().to_array()]
     }
 
-    /// Cosine of the colatitude, and the two parts across the field, of a direction.
+    /// Cosine of the colatitude, and the two components across the field, of a direction.
     pub(crate) fn to_field_frame(&self, direction: DVec3) -> [f64; 3] {
         [direction.dot(self.along), direction.dot(self.across[0]), direction.dot(self.across[1])]
     }
@@ -117,10 +115,10 @@ pub(crate) struct Meridian {
     along: f64,
 }
 
-/// A field line of a meridian. Places on it are counted in km along the field from the plane through the observer.
+/// A field line of a meridian. Coordinates on it are km along the field from the plane through the observer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FieldLine {
-    /// Square of the distance from the Earth's middle at place 0, less that of the ground.
+    /// Squared distance from the Earth's center at coordinate 0, minus the squared Earth radius.
     excess: f64,
     along: f64,
 }
@@ -131,8 +129,8 @@ impl Meridian {
         FieldLine { excess: self.squared + distance * (2.0 * self.outward + distance), along: self.along }
     }
 
-    /// In single precision: square of the observer's distance from the Earth's middle less that of the ground, and the
-    /// parts of that distance outward and along the field.
+    /// In single precision: squared distance of the observer from the Earth's center minus the squared Earth radius,
+    /// and its components outward and along the field.
     #[inline(always)]
     pub(crate) fn single(&self) -> [f32; 3] {
         [self.squared, self.outward, self.along].map(|value| value as f32)
@@ -140,13 +138,13 @@ impl Meridian {
 }
 
 impl FieldLine {
-    /// Place of the line where it is so high; where it comes nearest if it is never so low.
+    /// Coordinate at an altitude; the point of closest approach if the line does not reach it.
     pub(crate) fn position_at_altitude(&self, altitude_km: f64) -> f64 {
         let squared = altitude_km * (2.0 * EARTH_RADIUS_KM + altitude_km);
         math::sqrt((self.along * self.along - self.excess + squared).max(0.0)) - self.along
     }
 
-    /// The coefficients of the square of the distance from the Earth's middle less that of the ground, `(c0 + s (c1 +
+    /// Coefficients of the squared distance from the Earth's center minus the squared Earth radius, `(c0 + s (c1 +
     /// s))`.
     pub(crate) fn quadratic(&self) -> [f32; 2] {
         [self.excess as f32, (2.0 * self.along) as f32]
@@ -159,7 +157,7 @@ pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0].fma(b[0], a[1].fma(b[1], a[2] * b[2]))
 }
 
-/// Altitude from what [`FieldLine::square`] comes to, km; written so that little is lost to rounding.
+/// Altitude from the value of [`FieldLine::quadratic`], km; arranged to avoid cancellation.
 #[inline(always)]
 pub(crate) fn altitude(squared: f32) -> f32 {
     const RADIUS: f32 = EARTH_RADIUS_KM as f32;
@@ -193,7 +191,7 @@ mod tests {
             let distance = math::hypot(x, y);
             let line = field.meridian([x / distance, y / distance]).line(distance);
             let position = line.position_at_altitude(100.0);
-            // The same place, by the sphere.
+            // The same position, by the sphere.
             let radius = EARTH_RADIUS_KM + 100.0;
             let far = math::hypot(f64::from(east), f64::from(south)).max(1e-9);
             let (sin, cos) = math::sin_cos(far / radius);

@@ -1,4 +1,4 @@
-//! From kilorayleighs to the color that reaches the observer through the air.
+//! From kilorayleighs to color, with the extinction of the lower atmosphere.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,21 +13,21 @@ use crate::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-/// Steps from the horizon to the zenith, even in the root of the sine of the elevation: the air changes fast near the
-/// horizon.
+/// Steps from the horizon to the zenith, uniform in the square root of the sine of the elevation: extinction varies
+/// rapidly near the horizon.
 const STEPS: usize = 1024;
-/// Where the visible light of the first positive bands has its middle, nm.
+/// Effective wavelength of the visible first positive bands, nm.
 const BANDS_NM: f64 = 655.0;
 
 /// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
 #[derive(Clone, Debug)]
 pub(crate) struct EmitterColors {
-    /// Red, green, blue, and whether its brightness counts.
+    /// Red, green, blue, and 1 for emitters whose brightness counts.
     colors: Vec<PerEmitter<[f32; 4]>>,
 }
 
 impl EmitterColors {
-    /// Through this air.
+    /// Precomputes the table for an extinction.
     pub(crate) fn new(air: &Extinction) -> Self {
         let colors = (0..=STEPS).map(|step| {
             let root = step as f64 / STEPS as f64;
@@ -40,15 +40,15 @@ impl EmitterColors {
         Self { colors: colors.collect() }
     }
 
-    /// Where the elevation of that sine stands in the table; as the horizon below it.
+    /// Table coordinate of a sine of elevation, clamped at the horizon.
     #[inline(always)]
     pub(crate) fn table_coordinate(sine: f32) -> f32 {
         let held = if sine > 0.0 { sine } else { 0.0 };
         held.sqrt().fma(STEPS as f32, 0.5)
     }
 
-    /// The color in which light by emitter, in kR, arrives from a [`coordinate`](Self::table_coordinate), and after it its brightness in kR, but for that of
-    /// the dim first positive bands.
+    /// Color of light by emitter in kR at a [`table_coordinate`](Self::table_coordinate); the fourth component is its
+    /// brightness in kR without the dim first positive bands.
     #[inline(always)]
     pub(crate) fn attenuated<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, coordinate: f32) -> FourLanes<S> {
         let mut sum = FourLanes::splat(simd, 0.0);
@@ -59,7 +59,7 @@ impl EmitterColors {
     }
 }
 
-/// A kilorayleigh of an emitter, all its lines together, as it arrives.
+/// Attenuated color of a kilorayleigh of an emitter, all lines included.
 fn attenuated_color(emitter: Emitter, air: &Extinction, elevation: f64) -> [f64; 3] {
     if emitter == Emitter::Nitrogen {
         let transmittance = air.transmittance(BANDS_NM, elevation);

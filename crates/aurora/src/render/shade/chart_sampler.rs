@@ -1,4 +1,4 @@
-//! Light looked up on a chart: between its columns and rows.
+//! Bilinear sampling of a chart.
 
 #[cfg(test)]
 use fearless_simd::{Level, dispatch};
@@ -12,20 +12,20 @@ use crate::{
 };
 
 impl ColumnBuffer {
-    /// The picture with how to find places on it.
+    /// A sampler of this buffer.
     pub(crate) fn sampler(&self) -> ChartSampler<'_> {
         ChartSampler { meridians: self, projection: self.chart.projection() }
     }
 }
 
-/// A chart with how to find places on it.
+/// A chart and its mapping from directions to cells.
 pub(crate) struct ChartSampler<'a> {
     meridians: &'a ColumnBuffer,
     projection: ChartProjection,
 }
 
 impl ChartSampler<'_> {
-    /// Adds the light at directions, linear between the cells of the chart.
+    /// Adds the light at directions, bilinear between cells.
     #[inline(always)]
     pub(crate) fn add<S: Simd, const COUNT: usize>(
         &self,
@@ -65,7 +65,7 @@ impl ChartSampler<'_> {
         if upper as u32 + 1 < first || upper as u32 >= end {
             return;
         }
-        // The row and the one below lie side by side.
+        // A row and the next one are adjacent in memory.
         let (left, right) = (left * chart.rows + upper, right * chart.rows + upper);
         let left = HalfLanes::from_slice(simd, all[left..left + 2].as_flattened());
         let right = HalfLanes::from_slice(simd, all[right..right + 2].as_flattened());
@@ -73,11 +73,11 @@ impl ChartSampler<'_> {
         *light = above.broadcast(fraction).fma(below - above, above + FourLanes::simd_from(simd, *light)).into();
     }
 
-    /// Whether all of a part of the sky is dark: between two longitudes, in radians, and two colatitudes.
+    /// Conservative test whether a region between two longitudes, in radians, and two colatitudes is dark.
     pub(crate) fn is_dark(&self, longitudes: [f32; 2], colatitudes: [f32; 2]) -> bool {
         let ColumnBuffer { chart, valid_rows, .. } = self.meridians;
         let [left, right] = longitudes.map(|longitude| self.projection.column(longitude) as i32);
-        // Where a part reaches over the seam of a whole chart nothing is said.
+        // Regions across the seam of a full-circle chart are not tested.
         if right < left || (right - left) as usize > chart.columns / 2 {
             return false;
         }

@@ -1,4 +1,5 @@
-//! The charts as they are seen: sharp and soft light together, dimmed and colored by the air below, so that a pixel looks up one color.
+//! Composites the sharp and the soft chart, applies extinction and converts to color, so that a pixel samples one
+//! chart.
 
 use bansho_base::{
     host::scratch_pool::Spares,
@@ -20,25 +21,25 @@ use crate::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Rows whose elevations are found at once.
+/// Rows per batch.
 const ROWS: usize = 16;
 
-/// What all columns share.
+/// Inputs that all columns share.
 struct ColorPass<'a> {
     chart: &'a Chart,
     soft: &'a ColumnBuffer,
     soft_projection: ChartProjection,
     emitter_colors: &'a EmitterColors,
     field: &'a FieldLines,
-    /// By row, and [`ROWS`] more: cosine and sine of the colatitude, and the row of the soft chart.
+    /// By row, padded by [`ROWS`]: cosine and sine of the colatitude, and the row of the soft chart.
     cosines: Vec<f32>,
     sines: Vec<f32>,
     soft_rows: Vec<f32>,
 }
 
 impl ColumnBuffer {
-    /// In place of light by emitter the color in which the light of this chart and of the soft one arrives, ACEScg in cd/m^2, and after it the
-    /// brightness in kR of what is bright enough to be seen as an aurora.
+    /// Replaces brightness by emitter with the attenuated color of this and the soft chart, ACEScg in cd/m^2; the
+    /// fourth component is the brightness in kR.
     pub(crate) fn composite(mut self, soft: &Self, field: &FieldLines, emitter_colors: &EmitterColors) -> Self {
         let level = Level::new();
         let (chart, strips) = self.strips(STRIP_COLUMNS);
@@ -82,12 +83,12 @@ impl ColorPass<'_> {
         }
     }
 
-    /// The row of the chart that holds a row of the soft one.
+    /// The row of the chart at a row of the soft one.
     fn row_of_soft(&self, soft_row: usize) -> usize {
         self.soft_rows[..self.chart.rows].partition_point(|row| *row < soft_row as f32)
     }
 
-    /// The soft light along a longitude, row by row, and where it is lit.
+    /// The soft light along a longitude, by row, and its valid rows.
     #[inline(always)]
     fn soft_column<S: Simd>(&self, simd: S, longitude: f32, column: &mut Vec<PerEmitter<f32>>) -> [usize; 2] {
         let rows = self.soft.chart.rows;
@@ -108,7 +109,7 @@ impl ColorPass<'_> {
         [first, end]
     }
 
-    /// Colors the rows of a column from `first` on.
+    /// Converts the rows of a column from `first` on to color.
     #[inline(always)]
     fn color<S: Simd>(
         &self,

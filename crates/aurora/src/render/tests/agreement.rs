@@ -1,4 +1,4 @@
-//! Pictures of collisions have the picture of the mean fall for their mean, each emitter by itself.
+//! Pictures of collisions have the picture of the mean track for their mean, each emitter by itself.
 
 use super::*;
 use crate::{parameters::MAX_WOBBLE, physics::precipitation::lateral_spread::lateral_spread_km};
@@ -15,7 +15,7 @@ fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
 /// Standard deviation of sources but for the wandering of their collisions, km.
 const OWN_SPREAD_KM: f64 = 1.5;
 
-/// How far the mean of 64 pictures of collisions is from the picture of the mean fall, and that one.
+/// How far the mean of 64 pictures of collisions is from the picture of the mean track, and that one.
 fn beside_profile(
     emission: &Emission,
     collisions: &CollisionRenderer,
@@ -40,7 +40,7 @@ fn beside_profile(
     (differences(&mean, &expected.light), expected)
 }
 
-/// The same for an arc of so many particles with falls of a seed.
+/// The same for an arc of so many particles with tracks of a seed.
 fn arc_beside_profile(fall: TrackModel, wobble: f64, seed: u64, particles: usize) -> ([f64; 3], ColumnBuffer) {
     let (emission, drawing) = (fall.emission(ARC), DrawingParameters { fall, wobble, ..DrawingParameters::default() });
     let collisions =
@@ -63,14 +63,14 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
 
 #[test]
 fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
-    // A fall has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
+    // A track has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
     for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, MAX_WOBBLE)] {
         let (apart, _) = arc_beside_profile(TrackModel::HardSphereAtmosphere, wobble, seed, 40_000);
         assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
     }
 }
 
-/// A sheet with the greatest energy factor that a scene may give, and the falls that its aurora has for it.
+/// A sheet with the greatest energy factor that a scene may give, and the tracks that its aurora has for it.
 #[test]
 fn collisions_lose_no_light_on_hard_sheets() {
     const FACTOR: f64 = 20.0;

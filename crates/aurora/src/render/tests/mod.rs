@@ -1,4 +1,4 @@
-//! What the drawing must get right: brightness, place, and the same for every way of drawing.
+//! What the drawing must get right: brightness, position, and the same for every way of drawing.
 
 mod agreement;
 mod threads;
@@ -51,7 +51,7 @@ const ENERGY_EV: f64 = 5000.0;
 const STEP: f64 = 0.01;
 const GREEN: EmitterWeights = [1.0, 0.0, 0.0];
 const RED: EmitterWeights = [0.0, 1.0, 0.0];
-/// All heights of red light on the soft chart.
+/// All altitudes of red light on the soft chart.
 const SOFT: EmitterWeights = [1.0; 3];
 const PROMPT: EmitterWeights = [0.0, 0.0, 1.0];
 const PROMPT_AND_GREEN: EmitterWeights = [1.0, 0.0, 1.0];
@@ -199,7 +199,7 @@ fn a_ray_is_seen_where_every_lens_puts_it() {
                 );
             }
         }
-        // Three heights; the mirror image of all but the panorama looks down.
+        // Three altitudes; the mirror image of all but the panorama looks down.
         assert_eq!(shown, if lens == Lens::Panorama { 6 } else { 3 }, "{lens:?}");
     }
 }
@@ -355,7 +355,7 @@ const THIN_SPREAD_KM: f64 = 0.35;
 /// Distance of its sources, km.
 const THIN_CELL_KM: f64 = 0.15;
 
-/// Places across a thin sheet at which its sources lie, km.
+/// Positions across a thin sheet at which its sources lie, km.
 fn across_thin() -> impl Iterator<Item = f64> {
     let count = (THIN_KM / THIN_CELL_KM) as i32;
     (-count..=count).map(|index| THIN_CELL_KM * f64::from(index))

@@ -9,7 +9,7 @@ use crate::shapes::{
     interpolation::spline_track::ControlPointTrack,
 };
 
-/// Nearest that a linked point comes to an end of its sheet, as a share of the length: ends go to ends.
+/// Nearest that a linked point comes to an end of its sheet, as a fraction of the length: ends go to ends.
 const END_MARGIN: f64 = 1e-3;
 
 /// What the links to a shape ask for.
@@ -17,7 +17,7 @@ const END_MARGIN: f64 = 1e-3;
 pub(crate) struct LinkConstraints {
     /// What each chain of strands must become.
     pub(crate) chain_constraints: Vec<MatchConstraint>,
-    /// Tracks, and the share of their new sheet's length at which they must arrive.
+    /// Tracks, and the fraction of their new sheet's length at which they must arrive.
     points: Vec<(usize, f64)>,
 }
 
@@ -91,7 +91,7 @@ impl LinkConstraints {
         Ok(())
     }
 
-    /// The linked points of `strand`: their places in it and where they arrive, within the part `range` of the sheet.
+    /// The linked points of `strand`: their positions in it and where they arrive, within the part `range` of the sheet.
     pub(crate) fn linked_points(&self, strand: &[usize], range: [f64; 2]) -> Vec<(usize, f64)> {
         let [low, high] = if range[0] <= range[1] { range } else { [range[1], range[0]] };
         let arrives = |(index, track): (usize, &usize)| {
@@ -110,7 +110,7 @@ fn splits(sheet: &[usize], change: &Transition) -> bool {
     !change.strands.iter().any(whole)
 }
 
-/// The control point within `sheet` that is nearest to the share `at` of its length.
+/// The control point within `sheet` that is nearest to the fraction `at` of its length.
 fn nearest(sheet: &[usize], at: f64, tracks: &[ControlPointTrack], knot: usize) -> usize {
     let positions: Vec<_> = sheet.iter().map(|&track| tracks[track].knot(knot).position).collect();
     let fractions = length_fractions(&positions);

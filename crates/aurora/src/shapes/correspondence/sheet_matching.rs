@@ -18,7 +18,7 @@ const CHECKED_FRACTIONS: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Sheets that are looked at for crossings in all tries of turns and exchanges together, for about a second. Of few sheets all are tried.
 const MAX_CROSSING_TESTS: usize = 60_000;
-/// Share of the tries in which one change is looked for.
+/// Fraction of the tries in which one change is looked for.
 const CANDIDATES_DIVISOR: usize = 8;
 
 /// The target of a sheet, and whether it was drawn the other way round.
@@ -99,7 +99,7 @@ impl Comparison<'_> {
         if turned < straight { (turned, true) } else { (straight, false) }
     }
 
-    /// The sheets at a share of the way.
+    /// The sheets at a fraction of the way.
     fn interpolated(&self, matches: &[SheetMatch], fraction: f64) -> Vec<Vec<DVec2>> {
         let sheet = |(source, of): (&Vec<DVec2>, &SheetMatch)| -> Vec<DVec2> {
             source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, fraction)).collect()

@@ -36,14 +36,14 @@ pub(crate) struct Transition {
     pub(crate) merges: Vec<CoincidentPoints>,
 }
 
-/// A cut of a sheet: after which control point, and at which share of the segment.
+/// A cut of a sheet: after which control point, and at which fraction of the segment.
 type Cut = (usize, f64);
 
 impl Transition {
     /// The change that leads to shape `index` from the one before, whose sheets are `sheets`.
     ///
     /// # Errors
-    /// A sheet or segment that is not there, a point that is no end, two changes of one place, a ring.
+    /// A sheet or segment that is not there, a point that is no end, two changes of one position, a ring.
     pub(crate) fn new(
         parameters: &ShapeParameters,
         index: usize,

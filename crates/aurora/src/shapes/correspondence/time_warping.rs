@@ -6,12 +6,12 @@ use crate::shapes::geometry::polyline::{Polyline, length_fractions};
 
 /// Points that are looked at one by one: those of two sheets of the most control points that have grown together.
 const MOST_POINTS: usize = 1024;
-/// Places on the target between two control points where they lie evenly.
+/// Positions on the target between two control points where they lie evenly.
 const SLOTS_PER_POINT: usize = 8;
-/// Fewest and most such places from one control point to the next.
+/// Fewest and most such positions from one control point to the next.
 const STEP_RANGE: [usize; 2] = [3, 20];
-/// For each of `points` the share of `target`'s length that it goes to, from `range[0]` for the first to `range[1]` for the last: the
-/// least sum of (distance / length)^2 and `evenness` (spacing - 1)^2, by dynamic programming over 8 places a point: what has
+/// For each of `points` the fraction of `target`'s length that it goes to, from `range[0]` for the first to `range[1]` for the last: the
+/// least sum of (distance / length)^2 and `evenness` (spacing - 1)^2, by dynamic programming over 8 positions a point: what has
 /// not moved stays, and the points stay at 3/8 to 5/2 of the even distance.
 pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
@@ -36,10 +36,10 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     for point in 1..=last {
         next.fill(f64::INFINITY);
         best.fill(0.0);
-        // Places from which the rest can still be reached, and that can be reached from the start.
+        // Positions from which the rest can still be reached, and that can be reached from the start.
         let low = (point * STEP_RANGE[0]).max(slots.saturating_sub((last - point) * STEP_RANGE[1]));
         let high = (point * STEP_RANGE[1]).min(slots - (last - point) * STEP_RANGE[0]);
-        // Step by step over all places: compilers make vector code of that.
+        // Step by step over all positions: compilers make vector code of that.
         for step in STEP_RANGE[0]..=STEP_RANGE[1].min(high) {
             let first = low.max(step);
             let from = &costs[first - step..=high - step];
@@ -68,7 +68,7 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
 }
 
 /// As [`warp`], whose cost grows with the square of the points, through no more than [`MOST_POINTS`] of them, evenly chosen; those
-/// between keep their share of the way from one of these to the next.
+/// between keep their fraction of the way from one of these to the next.
 fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
     if points.len() <= MOST_POINTS {
@@ -85,7 +85,7 @@ fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: 
     all
 }
 
-/// As [`warp`], but each of `anchors`, a point and its share, arrives there; both are in order along the points.
+/// As [`warp`], but each of `anchors`, a point and its fraction, arrives there; both are in order along the points.
 pub(crate) fn warp_through(
     points: &[DVec2],
     target: &Polyline,
@@ -121,7 +121,7 @@ mod tests {
         assert!(back.iter().enumerate().all(|(i, fraction)| (fraction - (1.0 - i as f64 / 31.0)).abs() < 1e-12));
     }
 
-    /// The line grows at its end by half: most of what was there stays, where equal shares would pull all of it along.
+    /// The line grows at its end by half: most of what was there stays, where equal fractions would pull all of it along.
     #[test]
     fn what_has_not_moved_stays_where_the_line_grows() {
         let points = straight(0.0, 300.0, 31);

@@ -5,14 +5,14 @@ use bansho_base::math::DVec2;
 use super::cell_grid::CellGrid;
 use crate::shapes::Shape;
 
-/// Cells along the reach: the finer they are, the fewer segments can be nearest to a place in one.
+/// Cells along the reach: the finer they are, the fewer segments can be nearest to a position in one.
 const CELLS_PER_REACH: f64 = 4.0;
 /// Most cells along a side.
 const MAX_CELLS_PER_SIDE: usize = 512;
 /// About as many cells as lie within the reach at most, so that long shapes cost no more than their segments do.
 const MAX_CELLS_WITHIN_REACH: f64 = 40_000.0;
 
-/// Segments of a shape by the cells to whose places they can be nearest.
+/// Segments of a shape by the cells to whose positions they can be nearest.
 #[derive(Clone, Debug)]
 pub struct NearestSegmentGrid {
     reach: f64,
@@ -22,12 +22,12 @@ pub struct NearestSegmentGrid {
     lists: Vec<SegmentGeometry>,
 }
 
-/// The place of a shape that is nearest to a point.
+/// The position of a shape that is nearest to a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestPoint {
     /// Its segment, counted over all sheets in turn.
     pub(crate) segment: usize,
-    /// Share of the segment before it.
+    /// Fraction of the segment before it.
     pub(crate) fraction: f64,
     /// Square of the distance, km^2.
     pub(crate) distance_squared: f64,
@@ -77,7 +77,7 @@ impl NearestSegmentGrid {
         Some((nearest.segment, nearest.distance_squared.sqrt()))
     }
 
-    /// The place of the shape that is nearest to `point`; that on the first of several segments that are as near. `None` beyond the reach.
+    /// The position of the shape that is nearest to `point`; that on the first of several segments that are as near. `None` beyond the reach.
     #[inline]
     pub(crate) fn nearest_point(&self, point: DVec2) -> Option<NearestPoint> {
         let cell = self.grid.cell_of(point);
@@ -100,12 +100,12 @@ impl NearestSegmentGrid {
 /// A run of cells that a segment passes near by.
 struct CellRun {
     segment: u32,
-    /// Its first cell, and the place of its distance in the list of all.
+    /// Its first cell, and the position of its distance in the list of all.
     cell: u32,
     first: u32,
 }
 
-/// The segments that can be nearest to a place within `reach` in each cell, one cell's after those of another, and where each cell's begin:
+/// The segments that can be nearest to a position within `reach` in each cell, one cell's after those of another, and where each cell's begin:
 /// those no farther from its middle than the nearest one by more than twice the way from there to its corners.
 fn nearest_candidates(grid: &CellGrid, segments: &[SegmentGeometry], reach: f64) -> (Vec<u32>, Vec<SegmentGeometry>) {
     let (mut runs, mut squares) = (Vec::new(), Vec::new());
@@ -156,7 +156,7 @@ impl SegmentGeometry {
         Self { number, start, direction: end - start, inverse_square }
     }
 
-    /// Squares of the distances from places in a row, so far from each other, of which the first is given.
+    /// Squares of the distances from positions in a row, so far from each other, of which the first is given.
     fn fill_squares(&self, first: DVec2, apart: f64, squares: &mut [f32]) {
         let from_start = first - self.start;
         let ([x, y], [u, v]) =

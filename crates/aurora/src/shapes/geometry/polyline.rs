@@ -1,4 +1,4 @@
-//! Polylines: length along them, points at shares of it, and how strokes become control points.
+//! Polylines: length along them, points at fractions of it, and how strokes become control points.
 
 use bansho_base::math::{DVec2, lerp};
 
@@ -31,7 +31,7 @@ impl Polyline {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// The point at the share `fraction` of the length, 0 at the start to 1 at the end.
+    /// The point at the fraction `fraction` of the length, 0 at the start to 1 at the end.
     pub(crate) fn at(&self, fraction: f64) -> DVec2 {
         let distance = fraction * self.length();
         let last = self.points.len() - 1;
@@ -62,7 +62,7 @@ pub(crate) fn cumulative_lengths(points: &[DVec2]) -> Vec<f64> {
     lengths
 }
 
-/// Share of the length at each point; evenly from 0 to 1 where the line has no length.
+/// Fraction of the length at each point; evenly from 0 to 1 where the line has no length.
 pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
     let mut fractions = cumulative_lengths(points);
     let sum = fractions.last().copied().unwrap_or(0.0);
@@ -73,7 +73,7 @@ pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
     fractions
 }
 
-/// Eq. (2.1): `count` control points P_i by linear interpolation over the recorded positions M_j. The printed place i m/n
+/// Eq. (2.1): `count` control points P_i by linear interpolation over the recorded positions M_j. The printed position i m/n
 /// leaves out the end of the stroke; i (m - 1)/(n - 1) reaches it.
 pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
     let last = recorded.len().saturating_sub(1);
@@ -145,7 +145,7 @@ mod tests {
         assert!(Polyline::new(Vec::new()).is_none());
     }
 
-    /// m = 3 recorded points, n = 5 control points: places 0, 1/2, 1, 3/2, 2.
+    /// m = 3 recorded points, n = 5 control points: positions 0, 1/2, 1, 3/2, 2.
     #[test]
     fn control_points_reach_the_end_of_the_stroke() {
         let points = resample_by_index(&corner(), 5);

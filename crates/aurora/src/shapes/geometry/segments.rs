@@ -4,7 +4,7 @@ use bansho_base::math::{DVec2, lerp};
 
 use crate::shapes::{SegmentId, Shape};
 
-/// A place on a sheet.
+/// A position on a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SheetSample {
     /// Where it is, km.
@@ -13,7 +13,7 @@ pub struct SheetSample {
     pub tangent: DVec2,
     /// Where it is on the sheet.
     pub segment: SegmentId,
-    /// Share of the sheet's length before it.
+    /// Fraction of the sheet's length before it.
     pub fraction: f64,
     /// Factor of the aurora's flux there.
     pub flux: f64,
@@ -54,7 +54,7 @@ impl<'a> SheetSampler<'a> {
         self.ends.last().copied().unwrap_or(0.0)
     }
 
-    /// The place at the share `u` of the length of all sheets, 0 to 1: even `u` lie evenly along the sheets. O(log n) for n
+    /// The position at the fraction `u` of the length of all sheets, 0 to 1: even `u` lie evenly along the sheets. O(log n) for n
     /// segments. `None` for a shape without length.
     pub fn sample(&self, u: f64) -> Option<SheetSample> {
         let distance = u.clamp(0.0, 1.0) * self.length();

@@ -18,7 +18,7 @@ use crate::shapes::{
     strokes::validate::{DrawnSheet, ShapeContext, drawn_sheets},
 };
 
-/// Control points nearer than this lie at one place, km.
+/// Control points nearer than this lie at one position, km.
 const SAME_KM: f64 = 1e-3;
 
 /// Control points of all shapes together that are followed at most: some 200 MB.
@@ -54,7 +54,7 @@ pub(crate) fn drawn_shapes(
 }
 
 /// Follows the control points through all shapes, with what is drawn of them; `evenness` weighs even spacing against nearness where
-/// they are matched by place.
+/// they are matched by position.
 ///
 /// # Errors
 /// A shape that does not come from the one before; more control points than can be followed.
@@ -212,7 +212,7 @@ impl TrackedControlPoints {
         self.shapes.push(change.chains.iter().map(sheet).collect());
     }
 
-    /// By place: each chain of strands to the sheet that it is matched with, each point to one by length and nearness.
+    /// By position: each chain of strands to the sheet that it is matched with, each point to one by length and nearness.
     fn advance_by_nearness(
         &mut self,
         change: &Transition,
@@ -278,7 +278,7 @@ impl TrackedControlPoints {
     }
 }
 
-/// The share of a sheet's length that each strand of a chain takes: as its length, and half of the gap on each side.
+/// The fraction of a sheet's length that each strand of a chain takes: as its length, and half of the gap on each side.
 fn strand_ranges(strands: &[Vec<DVec2>]) -> Vec<[f64; 2]> {
     let length = |points: &[DVec2]| points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
     let gap = |index: usize| match (

@@ -9,10 +9,10 @@ use crate::shapes::{Sheet, geometry::polyline::cumulative_lengths};
 
 /// Light passes over gaps narrower than this, km, and narrower than half of what they are when they are widest.
 const BRIDGED_KM: f64 = 40.0;
-/// Over this way along a sheet its light fades toward a gap, km, and over no more than this share of the sheet.
+/// Over this way along a sheet its light fades toward a gap, km, and over no more than this fraction of the sheet.
 const FADE_KM: f64 = 60.0;
 const FADE_SHARE: f64 = 0.35;
-/// Share of the transition, at the side where the gap is widest, in which ends change between what is drawn and dark.
+/// Fraction of the transition, at the side where the gap is widest, in which ends change between what is drawn and dark.
 const DARKENING: f64 = 0.15;
 
 /// Two control points that are one where the gap is closed.
@@ -32,7 +32,7 @@ pub(crate) struct GapFlux {
     pub(crate) across: f64,
 }
 
-/// A stretch of light over a narrow gap between two ends of sheets.
+/// An interval of light over a narrow gap between two ends of sheets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bridge {
     /// The two sheets, as the shape lists them, and whether it is the end of each (or its start).
@@ -44,7 +44,7 @@ pub struct Bridge {
 }
 
 impl GapFlux {
-    /// A gap of `width` km that is `widest` km when it is widest, at a share of the time from where it is closed to there.
+    /// A gap of `width` km that is `widest` km when it is widest, at a fraction of the time from where it is closed to there.
     pub(crate) fn new(width: f64, widest: f64, fraction: f64) -> Self {
         let limit = BRIDGED_KM.min(0.5 * widest);
         let closed = if limit > 0.0 { 1.0 - smoothstep(0.0, limit, width) } else { 1.0 };
@@ -54,7 +54,7 @@ impl GapFlux {
     }
 }
 
-/// Lets the flux of a sheet fade toward its start, or its end, down to that share there.
+/// Lets the flux of a sheet fade toward its start, or its end, down to that fraction there.
 pub(crate) fn fade_toward_gap(sheet: &mut Sheet, at_end: bool, fraction: f64) {
     let lengths = cumulative_lengths(&sheet.points);
     let whole = lengths.last().copied().unwrap_or(0.0);

@@ -35,7 +35,7 @@ impl Knot {
     }
 }
 
-/// The two control points between which one is born, and the share of the way from the first to the second.
+/// The two control points between which one is born, and the fraction of the way from the first to the second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parents {
     pub(crate) tracks: [usize; 2],
@@ -71,7 +71,7 @@ impl ControlPointTrack {
         self.knots[index - self.first_shape]
     }
 
-    /// Where it is between the shapes `index` and the next, at the share `fraction` of the time between them.
+    /// Where it is between the shapes `index` and the next, at the fraction `fraction` of the time between them.
     pub(crate) fn between(&self, index: usize, fraction: f64, timing: &ShapeTiming) -> Knot {
         let knot_index = index - self.first_shape;
         let [from, to] = [self.knots[knot_index], self.knots[knot_index + 1]];
@@ -89,7 +89,7 @@ impl ControlPointTrack {
 
 /// Finds the velocities of all tracks. A held shape stands still; one that nothing fixes begins and ends without curvature,
 /// but eases in and out where there are only two shapes; what is born between two points begins as they move on, and also ends so
-/// if it lives to the next shape only. With `closed`, points that end where they began pass that place with one velocity.
+/// if it lives to the next shape only. With `closed`, points that end where they began pass that position with one velocity.
 pub(crate) fn find_velocities(tracks: &mut [ControlPointTrack], timing: &ShapeTiming, closed: bool) {
     for index in 0..tracks.len() {
         let (known, rest) = tracks.split_at_mut(index);
@@ -142,7 +142,7 @@ fn velocities(
     velocities
 }
 
-/// The velocity with which a point passes the place where it begins and ends; none for one that does not return.
+/// The velocity with which a point passes the position where it begins and ends; none for one that does not return.
 fn closing_velocity(track: &ControlPointTrack, timing: &ShapeTiming) -> Option<DVec2> {
     let count = track.knots.len();
     let [first, last] = [track.knots[0], track.knots[count - 1]].map(|knot| knot.position);

@@ -131,7 +131,7 @@ fn orient2d(a: DVec2, b: DVec2, point: DVec2) -> f64 {
 fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Meeting) -> bool {
     let [[a, b], [c, d]] = [first.ends, second.ends];
     if follows {
-        // They share a point; they meet elsewhere only if the second runs back over the first.
+        // They fraction a point; they meet elsewhere only if the second runs back over the first.
         return meeting == Meeting::Touching && orient2d(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
     }
     let [c_side, d_side, a_side, b_side] = [orient2d(a, b, c), orient2d(a, b, d), orient2d(c, d, a), orient2d(c, d, b)];
@@ -147,7 +147,7 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
 
 /// With more sheets than these nobody sees which is which.
 const MOST_SHEETS: usize = 40;
-/// Places along a sheet that are looked at, in quarters of its points.
+/// Positions along a sheet that are looked at, in quarters of its points.
 const PLACES: [usize; 3] = [1, 2, 3];
 /// Those who pass are as near to each other as they move, but for this factor.
 const NEAR: f64 = 1.5;

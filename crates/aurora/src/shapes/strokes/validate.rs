@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Points closer than this are one, km.
 const SAME_KM: f64 = 1e-6;
 
-/// Length of a form as a share of the drawn square.
+/// Length of a form as a fraction of the drawn square.
 const DEFAULT_FORM_LENGTH: f64 = 0.6;
 
 /// Most sheets of a shape.
@@ -244,7 +244,7 @@ fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), S
 #[derive(Clone, Debug)]
 pub(crate) struct FluxEnergyFactors {
     curves: Arc<[Curve; 2]>,
-    /// Share of the length over which the flux rises from nothing at both ends.
+    /// Fraction of the length over which the flux rises from nothing at both ends.
     fade: f64,
 }
 
@@ -253,14 +253,14 @@ impl FluxEnergyFactors {
         Self { curves: Arc::new([parameters.flux.clone(), parameters.energy.clone()]), fade: parameters.fade }
     }
 
-    /// Flux and energy at that share of the length.
+    /// Flux and energy at that fraction of the length.
     pub(crate) fn at(&self, fraction: f64) -> [f64; 2] {
         let [flux, energy] = [0, 1].map(|index| self.curves[index].eval(fraction));
         let from_end = fraction.min(1.0 - fraction).max(0.0);
         [flux * smoothstep(0.0, self.fade, from_end), energy]
     }
 
-    /// Whether both are the same at every place where a control point may be.
+    /// Whether both are the same at every position where a control point may be.
     pub(crate) fn are_those_of(&self, other: &Self) -> bool {
         const SAMPLES: usize = 512;
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());

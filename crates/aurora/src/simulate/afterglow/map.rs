@@ -26,7 +26,7 @@ const TILES_PER_TASK: usize = 256;
 /// A lit cell of a map, or a block of some.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AfterglowCell<const ALTITUDES: usize> {
-    /// Number of its place on the map, row by row, for a block that of its first cell.
+    /// Number of its position on the map, row by row, for a block that of its first cell.
     pub cell_index: u32,
     /// Its middle, for a block that of its light, km: x east, z south.
     pub position_km: [f32; 2],
@@ -87,14 +87,14 @@ impl<const ALTITUDES: usize> Tile<ALTITUDES> {
 /// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
 /// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
 /// ([`Column::spread_km`](crate::physics::emission::table::Column)). The lifetime is that of the column of the energy at
-/// each place, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
+/// each position, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AfterglowMap<const ALTITUDES: usize> {
     cell_km: f64,
     half_km: f64,
     /// Tiles along each side.
     side: usize,
-    /// For each place of a tile its number, or [`NO_TILE`].
+    /// For each position of a tile its number, or [`NO_TILE`].
     numbers: Vec<u32>,
     tiles: Vec<Tile<ALTITUDES>>,
 }
@@ -186,7 +186,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         })
     }
 
-    /// Its lit tiles: the place of each, and the powers and then the powers times energy of its cells.
+    /// Its lit tiles: the position of each, and the powers and then the powers times energy of its cells.
     pub(crate) fn to_arrays(&self) -> (Vec<u32>, Vec<f32>) {
         let positions = self.tiles.iter().map(|tile| tile.tile_position).collect();
         let values = |tile: &Tile<ALTITUDES>| tile.powers.into_iter().chain(tile.weighted).flatten();
@@ -271,7 +271,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         gain
     }
 
-    /// Adds to each tile its share of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
+    /// Adds to each tile its fraction of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
     /// that of the first particle in it.
     fn feed(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>, gain: &mut Vec<[f32; ALTITUDES]>) {
         let [xs, zs] = &particles.positions;
@@ -293,7 +293,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         }
     }
 
-    /// The place of the tile that a place in km lies in, and the cell of the tile.
+    /// The position of the tile that a position in km lies in, and the cell of the tile.
     #[inline(always)]
     fn locate(&self, place_km: [f32; 2]) -> (usize, usize) {
         let last = (self.side * TILE_SIDE) as f64 - 1.0;
@@ -304,7 +304,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         (row / TILE_SIDE * self.side + column / TILE_SIDE, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
     }
 
-    /// Number of the tile at a place, which may be a new one.
+    /// Number of the tile at a position, which may be a new one.
     fn number(&mut self, position: usize) -> usize {
         if self.numbers[position] == NO_TILE {
             self.numbers[position] = self.tiles.len() as u32;
@@ -330,7 +330,7 @@ impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
 }
 
 impl AfterglowMap<1> {
-    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
+    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the fraction of each
     /// particle, W, and the lit cells that hold none, as blocks of `block` by `block`; cells fainter than `faintest` of a typical one are left
     /// out.
     pub(crate) fn distribute_to_particles(
@@ -367,7 +367,7 @@ mod tests {
         DecayFactors::new(seconds, |_| [lifetime])
     }
 
-    /// Particles of 3 W and 1 W at those places, of 1 and 5 keV.
+    /// Particles of 3 W and 1 W at those positions, of 1 and 5 keV.
     fn particles(positions: [[f32; 2]; 2]) -> AuroraParticles {
         AuroraParticles {
             positions: [0, 1].map(|axis| positions.iter().map(|position| position[axis]).collect()),
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn light_of_soft_electrons_lives_as_long_as_theirs() {
-        // Two places far apart, of 1 and 5 keV, of which one has light that lives ten times as long.
+        // Two positions far apart, of 1 and 5 keV, of which one has light that lives ten times as long.
         let gain = particles([[10.1, -20.1], [-30.2, 30.2]]);
         let lifetime = |energy_ev: f64| if energy_ev < 2000.0 { 8.0 } else { 0.8 };
         let mut map = AfterglowMap::new(100.0, 0.5);

@@ -16,9 +16,9 @@ struct GridLayout {
 }
 
 impl GridLayout {
-    /// For a place: the cell whose middle is next below it on each axis, and how far it is on the way to the one above (0 to 1).
+    /// For a position: the cell whose middle is next below it on each axis, and how far it is on the way to the one above (0 to 1).
     ///
-    /// Middles are numbered from 0; places are held to one cell around the grid.
+    /// Middles are numbered from 0; positions are held to one cell around the grid.
     fn split(&self, position: [f64; 2]) -> ([isize; 2], [f64; 2]) {
         let at: [f64; 2] = std::array::from_fn(|c| {
             let cells = (position[c] - self.origin[c]) / self.spacing - 0.5;
@@ -73,7 +73,7 @@ impl Grid2 {
         if inside { self.values[row as usize * columns + column as usize] } else { 0.0 }
     }
 
-    /// The cell that holds a place (column, row); none outside.
+    /// The cell that holds a position (column, row); none outside.
     #[must_use]
     pub fn cell(&self, position: [f64; 2]) -> Option<[usize; 2]> {
         let GridLayout { size, spacing, origin } = self.layout;
@@ -82,13 +82,13 @@ impl Grid2 {
         inside.then(|| cell.map(|cell| cell as usize))
     }
 
-    /// Number among the [`values`](Self::values) of the cell that holds a place; none outside.
+    /// Number among the [`values`](Self::values) of the cell that holds a position; none outside.
     #[must_use]
     pub fn index(&self, position: [f64; 2]) -> Option<usize> {
         self.cell(position).map(|[column, row]| row * self.layout.size[0] + column)
     }
 
-    /// Value at a place, bilinear between middles.
+    /// Value at a position, bilinear between middles.
     #[must_use]
     pub fn sample(&self, position: [f64; 2]) -> f64 {
         let ([i, j], [s, t]) = self.layout.split(position);
@@ -124,7 +124,7 @@ impl Gradient2 {
         &self.values
     }
 
-    /// Gradient at a place, bilinear between middles; beyond the outermost middles as at the nearest.
+    /// Gradient at a position, bilinear between middles; beyond the outermost middles as at the nearest.
     #[must_use]
     pub fn sample(&self, position: [f64; 2]) -> [f64; 2] {
         let [columns, rows] = self.layout.size;

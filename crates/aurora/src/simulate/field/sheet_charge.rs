@@ -15,10 +15,10 @@ const CHARGE: [f64; 2] = [0.1, 4.0];
 const NODES_PER_PARTICLE: f64 = 0.05;
 /// Nodes that a task of the thread pool changes, at least.
 const TASK: usize = 256;
-/// Most that charge is denser at one side of a sheet than in its middle, as a share of that.
+/// Most that charge is denser at one side of a sheet than in its middle, as a fraction of that.
 const MOST_TILT: f64 = 0.9;
 
-/// Charge of a scattered particle by its place along the sheets, linear between nodes, 1 on a long, straight, lone sheet.
+/// Charge of a scattered particle by its position along the sheets, linear between nodes, 1 on a long, straight, lone sheet.
 ///
 /// With the same charge everywhere the potential would rise by half toward the ends of sheets, and fall where they wind up or lie close
 /// together: all particles would gather there. Here it is the same along all sheets. And a sheet that bends, or has another on one side of it,
@@ -28,7 +28,7 @@ const MOST_TILT: f64 = 0.9;
 pub(crate) struct SheetCharge {
     /// One sheet's after those of another; evenly spaced over its length, one at each end.
     nodes: Vec<f64>,
-    /// How much denser it is at the one side (left of the way along) than in the middle, as a share of that, at the same places.
+    /// How much denser it is at the one side (left of the way along) than in the middle, as a fraction of that, at the same positions.
     tilts: Vec<f64>,
     /// Where each sheet's begin, and the end of all.
     starts: Vec<usize>,
@@ -123,7 +123,7 @@ pub(crate) struct ScatteredParticle {
     pub(crate) position: DVec2,
     /// The sheet that it is nearest to.
     pub(crate) sheet: u32,
-    /// Share of that sheet's length before it.
+    /// Fraction of that sheet's length before it.
     pub(crate) arc_fraction: f32,
     /// How far it is to the side, from -1 to 1 within L_thr.
     pub(super) side: f32,
@@ -131,7 +131,7 @@ pub(crate) struct ScatteredParticle {
 
 /// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials.
 ///
-/// A place counts for the segment that it is nearest to, so that nothing is counted twice where segments overlap.
+/// A position counts for the segment that it is nearest to, so that nothing is counted twice where segments overlap.
 pub(crate) fn scatter(
     refined: &RefinedShape,
     half_thickness: f64,

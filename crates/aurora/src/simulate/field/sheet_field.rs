@@ -27,7 +27,7 @@ use rayon::prelude::*;
 const REACH_CELLS: f64 = 3.0;
 /// How often the charge along the sheets is made better.
 const ADJUSTMENTS: usize = 4;
-/// Scattered particles that a task of the thread pool finds the places of, at least.
+/// Scattered particles that a task of the thread pool finds the positions of, at least.
 const TASK: usize = 4096;
 /// Field at the edge of a sheet at a pull of 1, cells per frame^2.
 const EDGE_FIELD: f64 = 0.25;
@@ -115,7 +115,7 @@ impl FieldBuilder {
         }
     }
 
-    /// Sum of values at places over those in each cell.
+    /// Sum of values at positions over those in each cell.
     pub(crate) fn sum_by_cell(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
         let mut sums = self.grid();
         for (position, value) in values {

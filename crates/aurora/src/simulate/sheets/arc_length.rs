@@ -32,7 +32,7 @@ pub(crate) struct ArcLengthMap {
     cycle: i64,
 }
 
-/// The coordinate at a place, km, and 1 or -1 where the sheet runs with or against the way map which it has grown.
+/// The coordinate at a position, km, and 1 or -1 where the sheet runs with or against the way map which it has grown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ArcPosition {
     pub(super) coordinate: f64,
@@ -67,7 +67,7 @@ impl ArcLengthMap {
     }
 
     /// The coordinate on `shape`, which this has become, and whose control points are those of `ids`: each keeps its own, in whichever
-    /// order and direction its sheet is listed now; those that are new have that of the place where they are born.
+    /// order and direction its sheet is listed now; those that are new have that of the position where they are born.
     pub(crate) fn transfer(&self, shape: &Shape, ids: &ControlPointIds) -> Self {
         let points = points(shape);
         if ids.cycle == self.cycle && ids.sheets == self.tracks {
@@ -105,7 +105,7 @@ impl ArcLengthMap {
         }
     }
 
-    /// What there is at the share `t` of the way from control point `index` of a sheet to the next. Where two sheets have grown together
+    /// What there is at the fraction `t` of the way from control point `index` of a sheet to the next. Where two sheets have grown together
     /// there, each half is as its own end, so that nothing depends on the direction.
     pub(super) fn interpolate(&self, sheet: usize, index: usize, t: f64) -> ArcPosition {
         let (coordinates, points) = (&self.coordinates[sheet], &self.points[sheet]);
@@ -125,9 +125,9 @@ impl ArcLengthMap {
 /// What there was before the control points changed.
 struct PreviousArcMap<'a> {
     map: &'a ArcLengthMap,
-    /// The control points by number, with their sheet and place in it.
+    /// The control points by number, with their sheet and position in it.
     slots: Vec<(usize, [usize; 2])>,
-    /// The sheet and place at which each segment began.
+    /// The sheet and position at which each segment began.
     starts: Vec<[usize; 2]>,
     near: NearestSegmentGrid,
 }
@@ -233,7 +233,7 @@ impl<'a> PreviousArcMap<'a> {
         is_one.then(|| lerp(from, to, t))
     }
 
-    /// What there was at the place nearest to `point`, and the way map the sheet there; none beyond the reach.
+    /// What there was at the position nearest to `point`, and the way map the sheet there; none beyond the reach.
     fn nearest(&self, point: DVec2) -> Option<(ArcPosition, DVec2)> {
         let nearest = self.near.nearest_point(point)?;
         let [sheet, index] = self.starts[nearest.segment];

@@ -1,6 +1,6 @@
 //! Values at evenly spaced nodes along each sheet, one at each end, and straight between them.
 
-/// The node before a share of a sheet's length among `count` of them (two or more), and how far the share is on the way to the next, 0 to 1.
+/// The node before a fraction of a sheet's length among `count` of them (two or more), and how far the fraction is on the way to the next, 0 to 1.
 #[inline]
 pub(crate) fn split(fraction: f64, count: usize) -> (usize, f64) {
     let coordinate = fraction.clamp(0.0, 1.0) * (count - 1) as f64;
@@ -46,7 +46,7 @@ impl<'a> NodeValues<'a> {
         Self { layout, values: vec![0.0; layout.starts[layout.starts.len() - 1]] }
     }
 
-    /// Length of the sheets, km: half a stretch on each side of a node.
+    /// Length of the sheets, km: half an interval on each side of a node.
     pub(crate) fn of_lengths(layout: &'a NodeLayout, lengths: &[f64]) -> Self {
         let mut nodes = Self::new(layout);
         for (sheet, length) in lengths.iter().enumerate() {
@@ -59,14 +59,14 @@ impl<'a> NodeValues<'a> {
         nodes
     }
 
-    /// The node before a place, over all sheets, and how far the place is on the way to the next.
+    /// The node before a position, over all sheets, and how far the position is on the way to the next.
     #[inline]
     fn split(&self, sheet: u32, fraction: f32) -> (usize, f64) {
         let (node, t) = split(f64::from(fraction), self.layout.count(sheet as usize));
         (self.layout.starts[sheet as usize] + node, t)
     }
 
-    /// Adds a value to the two nodes around a place.
+    /// Adds a value to the two nodes around a position.
     #[inline]
     pub(crate) fn add(&mut self, sheet: u32, fraction: f32, value: f64) {
         let (node, t) = self.split(sheet, fraction);
@@ -74,7 +74,7 @@ impl<'a> NodeValues<'a> {
         self.values[node + 1] += value * t;
     }
 
-    /// Value at a place, linear between nodes.
+    /// Value at a position, linear between nodes.
     #[inline]
     pub(crate) fn at(&self, sheet: u32, fraction: f32) -> f64 {
         let (node, t) = self.split(sheet, fraction);

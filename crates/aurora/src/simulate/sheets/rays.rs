@@ -47,7 +47,7 @@ pub(crate) struct RayTable {
     sheets: Vec<Vec<Noises>>,
 }
 
-/// Sixteen places on the sheets.
+/// Sixteen positions on the sheets.
 pub(crate) struct PatternInputs {
     /// The noises there.
     pub(crate) noises: [Noises; LANES],
@@ -55,7 +55,7 @@ pub(crate) struct PatternInputs {
     pub(crate) side: [f32; LANES],
 }
 
-/// What the pattern does at sixteen places.
+/// What the pattern does at sixteen positions.
 pub(crate) struct PatternSample {
     /// Factor of the power, before it is shared out.
     pub(crate) brightness: [f32; LANES],
@@ -116,7 +116,7 @@ impl RayPattern {
         rays.min(others) / NODES_PER_CELL
     }
 
-    /// The pattern at sixteen places at a time.
+    /// The pattern at sixteen positions at a time.
     pub(crate) fn at(&self, level: Level, coordinates: &PatternInputs, time: f64) -> PatternSample {
         dispatch!(level, _simd => self.combined(coordinates, time))
     }
@@ -200,7 +200,7 @@ fn fade(nodes: &mut [Noises], coordinates: &[f64], spacing: f64, scale: f64) {
 }
 
 impl RayTable {
-    /// The noises at a share of a sheet's length.
+    /// The noises at a fraction of a sheet's length.
     #[inline]
     pub(crate) fn at(&self, sheet: u32, fraction: f64) -> Noises {
         let nodes = &self.sheets[sheet as usize];
@@ -214,7 +214,7 @@ impl RayTable {
     }
 }
 
-/// Noise at sixteen places, in cells, and an age, in lives.
+/// Noise at sixteen positions, in cells, and an age, in lives.
 fn values(level: Level, noise: &Noise<2>, coordinates: [f64; LANES], age: f64) -> [f32; LANES] {
     let (mut cells, mut fractions) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
     let age = Coordinate::from_f64(age);
@@ -329,7 +329,7 @@ mod tests {
         parameters.rays.life_s = 1e5;
         let [before, ..] = coordinate(&parameters, 1.0);
         let [after, ..] = coordinate(&parameters, 1.5);
-        // 1.5 km are 30 places; on the left they run onward.
+        // 1.5 km are 30 positions; on the left they run onward.
         let moved = |shift: isize| -> f64 {
             (100..15_000).map(|i| (after[(i as isize + shift) as usize] - before[i]).abs()).sum()
         };

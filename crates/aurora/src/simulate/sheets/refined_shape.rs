@@ -15,7 +15,7 @@ use crate::{
 const PIECES_PER_FOLD: f64 = 12.0;
 /// Pieces are not shorter than L_thr over this.
 const PIECES_PER_THICKNESS: f64 = 4.0;
-/// Points nearer than so many pieces may have changed places.
+/// Points nearer than so many pieces may have changed positions.
 const NEAR_PIECES: f64 = 2.0;
 /// Most pieces of all sheets together, and for each particle, but not fewer than so many, nor than there are segments between control points.
 const MOST_PIECES: f64 = 20_000.0;
@@ -61,7 +61,7 @@ pub(crate) struct RefinedShape {
     pub(crate) shape: Shape,
     /// The coordinate along the sheets at each point of the finer shape, km.
     arc_coordinates: Vec<Vec<f64>>,
-    /// Share of the sheet's length before each point.
+    /// Fraction of the sheet's length before each point.
     fractions: Vec<Vec<f64>>,
     /// The sheet and point at which each segment begins, over all sheets in turn.
     starts: Vec<[u32; 2]>,
@@ -81,7 +81,7 @@ struct SegmentAttributes {
     sheet: u32,
 }
 
-/// The place of a sheet that is nearest to a particle.
+/// The position of a sheet that is nearest to a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SheetProjection {
     pub(crate) sheet: u32,
@@ -144,7 +144,7 @@ impl RefinedShape {
         self.shape.sheets.iter().map(|sheet| length(&sheet.points)).collect()
     }
 
-    /// The place at a share of a sheet's length, km.
+    /// The position at a fraction of a sheet's length, km.
     pub(crate) fn position(&self, sheet: usize, fraction: f64) -> DVec2 {
         let (point, t) = self.split(sheet, fraction);
         let points = &self.shape.sheets[sheet].points;
@@ -169,14 +169,14 @@ impl RefinedShape {
         (0..=last).map(at).collect()
     }
 
-    /// The point before a share of a sheet's length, and how far it is on the way to the next.
+    /// The point before a fraction of a sheet's length, and how far it is on the way to the next.
     fn split(&self, sheet: usize, fraction: f64) -> (usize, f64) {
         let fractions = &self.fractions[sheet];
         let after = fractions.partition_point(|end| *end <= fraction).clamp(1, fractions.len() - 1);
         (after - 1, fraction_between([fractions[after - 1], fractions[after]], fraction))
     }
 
-    /// Each piece of the sheets in turn, in parts of at most the share `most` of its sheet's length: its sheet, the share of the sheet's length
+    /// Each piece of the sheets in turn, in parts of at most the fraction `most` of its sheet's length: its sheet, the fraction of the sheet's length
     /// before its middle, the flux factor there, its length in km.
     pub(crate) fn for_each_strip(&self, most: impl Fn(usize) -> f64) -> impl Iterator<Item = (usize, f64, f64, f64)> {
         self.starts.iter().flat_map(move |start| {
@@ -202,7 +202,7 @@ impl RefinedShape {
         self.near.nearest(point).map(|(segment, _)| self.starts[segment].map(|number| number as usize))
     }
 
-    /// `point`, or if it is farther than `most` km from the shape, the place on the way to it that is not; itself beyond the reach.
+    /// `point`, or if it is farther than `most` km from the shape, the position on the way to it that is not; itself beyond the reach.
     pub(crate) fn clamp_distance(&self, point: DVec2, most: f64) -> DVec2 {
         let Some(nearest) = self.near.nearest_point(point).filter(|nearest| nearest.distance_squared > most * most)
         else {
@@ -214,7 +214,7 @@ impl RefinedShape {
         coordinates + (point - coordinates) * (most / math::sqrt(nearest.distance_squared))
     }
 
-    /// The place nearest to `point`; none beyond the reach.
+    /// The position nearest to `point`; none beyond the reach.
     #[inline]
     pub(crate) fn project(&self, point: DVec2) -> Option<SheetProjection> {
         let nearest = self.near.nearest_point(point)?;
@@ -251,12 +251,12 @@ impl SegmentAttributes {
     }
 }
 
-/// How far a share of the length is from the one to the other.
+/// How far a fraction of the length is from the one to the other.
 fn fraction_between([before, end]: [f64; 2], fraction: f64) -> f64 {
     ((fraction - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
-/// Share of the length before each point; 0 everywhere where there is no length.
+/// Fraction of the length before each point; 0 everywhere where there is no length.
 fn length_fractions(points: &[DVec2]) -> Vec<f64> {
     let ends = cumulative_lengths(points);
     let length = ends.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
@@ -316,8 +316,8 @@ fn bridge_sheet(
     (sheet, own)
 }
 
-/// The points in the order in which the sheet passes them: two nearer than `near_km` that lie the wrong way round between their neighbours, as
-/// where a fold is born, change places. Else the sheet would pass there three times, as bright.
+/// The points in the order in which the sheet passes them: two nearer than `near_km` that lie the wrong way round between their neighbors, as
+/// where a fold is born, change positions. Else the sheet would pass there three times, as bright.
 fn without_swapped_points(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
     let mut points = points.to_vec();
     for index in 1..points.len().saturating_sub(2) {
@@ -333,7 +333,7 @@ fn without_swapped_points(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
     points
 }
 
-/// The direction of the sheet at each point: that of the circle through it and its neighbours.
+/// The direction of the sheet at each point: that of the circle through it and its neighbors.
 fn headings(points: &[DVec2]) -> Vec<DVec2> {
     let weighted = |from: usize| {
         let displacement = points[from + 1] - points[from];

@@ -18,7 +18,7 @@ use fearless_simd::Level;
 
 const KEY: Key = Key::new(8, "arrivals");
 
-/// A sheet at that place south.
+/// A sheet at that position south.
 fn row(from: f64, to: f64, south: f64) -> SheetParameters {
     SheetParameters { smooth: false, ..line([from, south], [to, south]) }
 }
@@ -35,7 +35,7 @@ fn reached(sheets: Vec<SheetParameters>) -> ShapeParameters {
 /// What is seen of the sheets at a moment.
 struct Seen {
     refined: RefinedShape,
-    /// The logarithm of the rays' brightness at places beside the sheets, some on their left and some on their right.
+    /// The logarithm of the rays' brightness at positions beside the sheets, some on their left and some on their right.
     rays: Vec<f32>,
 }
 
@@ -80,11 +80,11 @@ impl Seen {
 enum Known {
     /// As the sequence says.
     ByNumber,
-    /// By their places in the list of sheets, as if these never changed.
+    /// By their positions in the list of sheets, as if these never changed.
     ByPosition,
 }
 
-/// The most that folds move, km, and that rays change at fixed places, from just before `arrivals` to just after them.
+/// The most that folds move, km, and that rays change at fixed positions, from just before `arrivals` to just after them.
 fn jumps(
     parameters: &AuroraParameters,
     sequence: &Sequence,
@@ -126,7 +126,7 @@ fn in_turn(shape: &Shape) -> Vec<Vec<usize>> {
     shape.sheets.iter().map(|sheet| numbers.by_ref().take(sheet.points.len()).collect()).collect()
 }
 
-/// Places 9 km to both sides of a sheet along 300 km.
+/// Positions 9 km to both sides of a sheet along 300 km.
 fn beside(south: f64) -> Vec<DVec2> {
     let position =
         |index: i32| DVec2::new(f64::from(index) * 7.0 - 150.0, south + if index % 2 == 0 { 9.0 } else { -9.0 });
@@ -167,7 +167,7 @@ fn nothing_jumps_where_a_sheet_joins_one_of_the_other_direction() {
     let positions: Vec<DVec2> = beside(0.0).into_iter().filter(|position| position.x.abs() > 60.0).collect();
     let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByNumber);
     assert!(rays < 1e-2, "rays jump by {rays}, folds by {folds} km");
-    // Where they grow together; a split in the very place of that join moves the one segment there.
+    // Where they grow together; a split in the very position of that join moves the one segment there.
     let [folds, _] = jumps(&parameters, &sequence, &sequence.arrivals()[1..2], &positions, Known::ByNumber);
     assert!(folds < 0.2, "folds jump by {folds} km");
 }

@@ -68,7 +68,7 @@ fn a_snapshot_holds_numbers_only() {
     let bytes = simulation.snapshot();
     let count = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
     // Behind version, steps, next number, support, time and renewals: the two courses of the coordinate, each with coordinates, ways and
-    // places of every sheet.
+    // positions of every sheet.
     let (mut at, mut starts) = (40, Vec::new());
     for _ in 0..2 {
         let sheets = count(at);

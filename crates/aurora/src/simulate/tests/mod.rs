@@ -76,7 +76,7 @@ fn live(simulation: &AuroraSimulation) -> Vec<(DVec2, f64)> {
     live.map(|index| (particles.position(index), f64::from(particles.powers_w[index]))).collect()
 }
 
-/// Sums of power over stretches of the shape, each a 50th of its length, by the nearest of many points on it; and counts.
+/// Sums of power over intervals of the shape, each a 50th of its length, by the nearest of many points on it; and counts.
 fn intervals(shape: &Shape, particles: &[(DVec2, f64)]) -> [Vec<f64>; 2] {
     const INTERVALS: usize = 50;
     const POINTS: usize = 10 * INTERVALS;

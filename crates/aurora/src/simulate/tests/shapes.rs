@@ -9,7 +9,7 @@ const MOMENT_STEPS: u64 = 15;
 const WATCHED_S: f64 = 3.5;
 
 /// What particles must do at one moment: how many lie within L_thr of the target, how many in the gaps, and what the least stretch holds of
-/// its share of the power and of the particles.
+/// its fraction of the power and of the particles.
 struct Moment {
     within: f64,
     in_gaps: f64,
@@ -89,10 +89,10 @@ fn narrow_s() -> SheetParameters {
     through(points)
 }
 
-/// Of all stretches of the sheets, folded as they are, that are as long as a fiftieth of them all: the least share that one holds of the
+/// Of all intervals of the sheets, folded as they are, that are as long as a fiftieth of them all: the least fraction that one holds of the
 /// particles that are due to it.
 fn least_stretch(simulation: &AuroraSimulation) -> f64 {
-    /// Bins of such a stretch, by which one is moved on to the next.
+    /// Bins of such an interval, by which one is moved on to the next.
     const BINS: usize = 4;
     let refined = simulation.refined_shape();
     let lengths = refined.sheet_lengths();
@@ -197,7 +197,7 @@ fn nothing_jumps_from_frame_to_frame_through_split_merge_and_relocation() {
     }
 }
 
-/// Median distance from a particle of a straight sheet to its nearest neighbour, beside that of as many strewn at random.
+/// Median distance from a particle of a straight sheet to its nearest neighbor, beside that of as many strewn at random.
 fn parting(kernel: RepulsionKernel) -> f64 {
     let mut parameters = AuroraParameters { shapes: vec![shape(vec![line([-200.0, 0.0], [200.0, 0.0])])], ..small() };
     parameters.particles.kernel = kernel;
