@@ -1,8 +1,8 @@
-//! The aurora's foot as an artist draws it, and as it moves (thesis, 2.2.1 and 2.2.2).
+//! The sheets of the aurora as drawn curves, and their interpolation in time (thesis, 2.2.1 and 2.2.2).
 //!
-//! A scene lists shapes; each has sheets, and says what splits and merges on the way to it. [`Sequence`] is the shape at any time.
+//! A scene lists key shapes; each has sheets, splits and merges. [`Sequence`] is the shape at any time.
 //!
-//! Geometry is in km in the plane at 100 km altitude: x east, z south, the observer's nadir at the origin. Points are
+//! Coordinates are km in the plane at 100 km altitude: x east, z south, the observer's zenith at the origin. Points are
 //! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
 
 pub(crate) mod correspondence;

@@ -1,10 +1,10 @@
-//! What a scene says of the aurora's shapes.
+//! Parameters of the shapes, and the default shapes.
 
 use super::form::Form;
 use bansho_base::math::curve::{Curve, Interpolation};
 use bansho_base::parameters::{AssetPath, Auto, CurveLimits, Length, Range};
 
-/// A frame of the thesis, s (table 3.2: a step of 0.0333 s); `_frames` count these, whatever the picture's frame rate.
+/// Frame duration of the thesis, s (table 3.2: 0.0333 s); parameters in `_frames` are in this unit.
 pub const FRAME_S: f64 = 1.0 / 30.0;
 
 /// Frames from shape to shape (table 3.2).
@@ -16,7 +16,7 @@ pub(super) const TRANSITION_S: f64 = TRANSITION_FRAMES * FRAME_S;
 const KM: Range = Range::new(-20_000.0, 20_000.0);
 const DEGREES: Range = Range::new(-3600.0, 3600.0);
 
-/// A factor that is 1 all along the sheet.
+/// A constant factor of 1.
 fn even() -> Curve {
     Curve::new(vec![[0.0, 1.0]], Interpolation::Monotone).expect("one finite point is a curve")
 }
@@ -162,10 +162,10 @@ impl MotionParameters {
     }
 }
 
-/// Side of the square on which the curtains below are drawn, km.
+/// Side of the square of the default shapes, km.
 const DRAWN_EXTENT_KM: f64 = 600.0;
 
-/// Strokes from west to east, [east, south] in km: the far curtain, low over the northern horizon, and the near one above it.
+/// Default strokes from west to east, [east, south] in km: two curtains in the north.
 const DEFAULT_FIRST: [[[f64; 2]; 8]; 2] = [
     [
         [-290., -250.],
@@ -188,7 +188,7 @@ const DEFAULT_FIRST: [[[f64; 2]; 8]; 2] = [
         [215., -85.],
     ],
 ];
-/// The same curtains, their waves farther on and deeper.
+/// The same curtains with their waves moved and deepened.
 const DEFAULT_SECOND: [[[f64; 2]; 8]; 2] = [
     [
         [-290., -225.],
@@ -212,7 +212,7 @@ const DEFAULT_SECOND: [[[f64; 2]; 8]; 2] = [
     ],
 ];
 
-/// Two curtains in slow motion on a square of that side.
+/// Two slowly waving curtains, scaled to a square of that side.
 pub(super) fn default_shapes(extent_km: f64) -> Vec<ShapeParameters> {
     let scale = extent_km / DRAWN_EXTENT_KM;
     let curtain = |stroke: &[[f64; 2]; 8]| SheetParameters {

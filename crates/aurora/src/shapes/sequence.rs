@@ -1,4 +1,4 @@
-//! The aurora's shape at any time.
+//! The shape as a function of time.
 
 use bansho_base::{
     host::assets::Assets,
@@ -19,65 +19,67 @@ use crate::shapes::{
 };
 use rayon::prelude::*;
 
-/// Weights of even spacing against nearness, the favourite first: others are tried where sheets would cross themselves on the way.
+/// Weights of uniform spacing against distance, in order of preference: later ones are tried where sheets cross during
+/// a transition.
 const EVENNESS: [f64; 4] = [0.01, 0.03, 0.1, 1.0];
 
-/// Moments of each transition at which that is looked at.
+/// Times per transition at which crossings are counted.
 const CHECKED_MOMENTS: usize = 32;
 
-/// The shapes of a scene and all in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
+/// All key shapes and in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
 ///
-/// A shape is a continuous function of time, also where sheets split and merge. Points that a spline would carry beyond the drawn
-/// square stop at its border.
+/// The shape is continuous in time, also at splits and merges. Points are clamped to the drawn square.
 #[derive(Clone, Debug)]
 pub struct Sequence {
     tracked: TrackedControlPoints,
     timing: ShapeTiming,
     half_km: f64,
-    /// The shape on whose way sheets first pass through each other.
+    /// The first shape whose transition has sheets that pass through each other.
     crossing: Option<usize>,
     loop_s: Option<f64>,
 }
 
-/// The control points of the shape at a time: one that goes on keeps its number, whichever sheet it is listed in and where.
+/// Ids of the control points of the shape at a time; a control point keeps its id in whichever sheet and position it is
+/// listed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ControlPointIds<'a> {
-    /// Their numbers, sheet by sheet.
+    /// Ids by sheet.
     pub(crate) sheets: &'a [Vec<usize>],
-    /// How many turns of a loop are over in which all shapes are passed; then those of the last shape are those of the first again.
+    /// Number of completed cycles of a loop through all shapes; then ids of the last shape are replaced by those of the
+    /// first.
     pub(crate) cycle: i64,
-    /// Each of the last shape that lies where one of the first does, and that one, in order.
+    /// Sorted pairs of coincident tracks of the last and the first shape.
     repeated: &'a [[usize; 2]],
 }
 
 impl<'a> ControlPointIds<'a> {
-    /// Control points without a sequence.
+    /// Ids without a sequence.
     #[cfg(test)]
     pub(crate) fn alone(sheets: &'a [Vec<usize>]) -> Self {
         Self { sheets, cycle: 0, repeated: &[] }
     }
 
-    /// What a control point becomes when a turn of the loop is over.
+    /// Id of a control point in the next cycle of the loop.
     pub(crate) fn after_cycle(&self, track: usize) -> Option<usize> {
         let index = self.repeated.binary_search_by_key(&track, |pair| pair[0]).ok()?;
         Some(self.repeated[index][1])
     }
 }
 
-/// A time among the shapes: at one of them, or at a fraction of the way from one to the next.
+/// A time within the sequence: at a key shape, or at a fraction between two.
 enum SequencePosition {
     At(usize),
     Between(usize, f64),
 }
 
 impl Sequence {
-    /// The sequence of `shapes` on a drawn square of side `extent_km`; two curtains that wave where there is no shape.
+    /// The sequence of `shapes` on a drawn square of side `extent_km`; the default shapes if there are none.
     ///
-    /// With `loop_s` it repeats after that time, in which all of it passes: round and round if the last shape is the first
-    /// again, there and back if not.
+    /// With `loop_s` it repeats after that time: cyclically if the last shape equals the first, else back and forth.
     ///
     /// # Errors
-    /// Shapes that are no aurora's, at their sheet and point; see [`ShapeErrorKind`].
+    ///
+    /// Invalid shapes, with sheet and point; see [`ShapeErrorKind`].
     pub fn new(
         shapes: &[ShapeParameters],
         motion: &MotionParameters,
@@ -115,17 +117,17 @@ impl Sequence {
         Ok(Self { loop_s, crossing, ..best.1 })
     }
 
-    /// When each shape of the scene is reached, s, without a loop.
+    /// Arrival time of each key shape, s, without a loop.
     pub fn arrivals(&self) -> &[f64] {
         &self.timing.arrivals
     }
 
-    /// How long all of it takes, s, without a loop.
+    /// Total duration, s, without a loop.
     pub fn duration(&self) -> f64 {
         self.timing.departures[self.timing.departures.len() - 1]
     }
 
-    /// The shape at time `t`, s. Before the first shape and after the last, these stay. Toward gaps that open or close its flux fades.
+    /// The shape at time `t`, s, constant before the first and after the last key shape. The flux fades toward gaps.
     pub fn at(&self, t: f64) -> Shape {
         let (index, fraction) = match self.moment(t) {
             SequencePosition::At(index) => {
@@ -144,7 +146,7 @@ impl Sequence {
         shape
     }
 
-    /// Who the control points of [`Self::at`] are that time.
+    /// Ids of the control points of [`Self::at`].
     pub(crate) fn control_point_ids(&self, t: f64) -> ControlPointIds<'_> {
         let sheets = match self.moment(t) {
             SequencePosition::At(index) => &self.tracked.shapes[index],
@@ -154,7 +156,7 @@ impl Sequence {
         ControlPointIds { sheets, cycle: turns as i64, repeated: &self.tracked.repeated }
     }
 
-    /// What passes over narrow gaps between the sheets of [`Self::at`] that time.
+    /// Bridges over narrow gaps between the sheets of [`Self::at`].
     pub fn bridges(&self, t: f64) -> Vec<Bridge> {
         let SequencePosition::Between(index, fraction) = self.moment(t) else { return Vec::new() };
         let bridge = |gap: &Gap| {
@@ -167,7 +169,7 @@ impl Sequence {
         self.tracked.gaps[index].iter().filter_map(bridge).collect()
     }
 
-    /// Where a time lies among the shapes.
+    /// Position of a time within the sequence.
     fn moment(&self, t: f64) -> SequencePosition {
         let t = self.phase(t);
         let next = self.timing.arrivals.partition_point(|&arrival| arrival <= t).max(1);
@@ -179,7 +181,7 @@ impl Sequence {
         SequencePosition::Between(index, (t - departure) / (self.timing.arrivals[next] - departure))
     }
 
-    /// A gap on the way from shape `index`, and its two ends.
+    /// State of a gap in the transition from shape `index`, and its two ends.
     fn gap(&self, gap: &Gap, index: usize, fraction: f64) -> (GapFlux, [Knot; 2]) {
         let tracks = gap.ends.map(|track| &self.tracked.tracks[track]);
         let width = |[a, b]: [Knot; 2]| a.position.distance(b.position);
@@ -189,7 +191,8 @@ impl Sequence {
         (GapFlux::new(width(now), width(widest), from_closed), now)
     }
 
-    /// The strand on the way from shape `index` that a control point ends, and whether it does so at its end or at its start.
+    /// The strand in the transition from shape `index` with this control point at an end, and whether it is the last
+    /// point.
     fn end(&self, track: usize, index: usize) -> Option<(usize, bool)> {
         let strands = self.tracked.strands[index].iter().enumerate();
         let mut ends = strands.filter_map(|(number, strand)| {
@@ -199,15 +202,15 @@ impl Sequence {
         ends.next()
     }
 
-    /// The ways of all control points from shape `index` to the next: where each leaves and where it arrives, km. They are listed
-    /// strand by strand: a sheet that splits is two strands, two that merge are two still. Empty for the last shape.
+    /// Start and end positions of all control points in the transition from shape `index`, km, by strand: a splitting
+    /// sheet has two strands, two merging sheets are still two. Empty for the last shape.
     pub fn control_point_paths(&self, index: usize) -> Vec<Vec<[DVec2; 2]>> {
         let path = |&track: &usize| [index, index + 1].map(|knot| self.tracked.tracks[track].knot(knot).position);
         let strands = self.tracked.strands.get(index).into_iter().flatten();
         strands.map(|strand| strand.iter().map(path).collect()).collect()
     }
 
-    /// The times at which sheets are looked at on their way from each shape to the next, s, and the shape from which that leads.
+    /// Times at which transitions are checked for crossings, s, with the index of the shape before.
     fn checked_times(&self) -> Vec<(usize, f64)> {
         let ShapeTiming { arrivals, departures } = &self.timing;
         let of_way = |index: usize| {
@@ -218,17 +221,17 @@ impl Sequence {
         (0..arrivals.len() - 1).flat_map(of_way).collect()
     }
 
-    /// How many segments cross in the in-between shapes at those times, all added up.
+    /// Total number of crossings at these times.
     fn crossings(&self) -> usize {
         self.checked_times().into_par_iter().map(|(_, time)| self.at(time).crossings()).sum()
     }
 
-    /// The shape of the scene, counted from 0, on whose way sheets first pass through each other or themselves, where they do.
+    /// The first shape, counted from 0, whose transition has sheets that cross each other or themselves.
     pub fn crossing(&self) -> Option<usize> {
         self.crossing
     }
 
-    /// The same, as it is found.
+    /// Computes [`Self::crossing`].
     fn first_crossing(&self) -> Option<usize> {
         let mut before: Option<(usize, Shape)> = None;
         for (index, time) in self.checked_times() {
@@ -242,12 +245,12 @@ impl Sequence {
         None
     }
 
-    /// Factors of flux and of energy of every control point at every shape of the scene; those of in-between shapes lie between them.
+    /// Flux and energy factors of every control point at every key shape; those of in-between shapes are between them.
     pub fn factors(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         self.tracked.tracks.iter().flat_map(|track| &track.knots).map(|knot| knot.factors)
     }
 
-    /// Time within the sequence.
+    /// Time within the sequence, with the loop applied.
     fn phase(&self, t: f64) -> f64 {
         let Some(loop_s) = self.loop_s else { return t };
         let turns = t / loop_s;
@@ -274,7 +277,7 @@ impl Sequence {
     }
 }
 
-/// When each shape is reached and left.
+/// Arrival and departure times of each shape.
 fn timing(shapes: &[ShapeParameters]) -> Result<ShapeTiming, ShapeError> {
     let mut timing = ShapeTiming { arrivals: Vec::new(), departures: Vec::new() };
     for (index, shape) in shapes.iter().enumerate() {

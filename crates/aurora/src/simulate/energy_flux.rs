@@ -1,4 +1,4 @@
-//! What each particle brings into the air: energy and power, by its position on the sheets.
+//! Distributes the energy flux of the sheets to the particles.
 
 use bansho_base::{math::random::Key, noise::LANES};
 
@@ -15,34 +15,35 @@ use crate::{
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-/// Particles that a task of the thread pool takes, a multiple of the lanes.
+/// Particles per task, a multiple of the lanes.
 const TASK: usize = 4096;
-/// What a particle far from every sheet keeps of its power in a step.
+/// Power factor per step of a particle that is far from every sheet.
 const STRAY_DECAY: f32 = 0.85;
-/// Stretches of a sheet that have their drawn power each, at least and at most, and how many particles each has at least where there may be
-/// more.
+/// Minimum and maximum number of coarse intervals per sheet, each of which gets its drawn power, and the minimum number
+/// of particles per interval.
 const COARSE: [f64; 2] = [16.0, 32.0];
 const PER_COARSE: f64 = 128.0;
-/// The same of those along which the particles' own density is evened out: where a fold is born they lie in a heap for seconds.
+/// The same for the fine intervals, which compensate for the particle density: where a fold forms, particles cluster
+/// for seconds.
 const FINE: [f64; 2] = [32.0, 256.0];
 const PER_FINE: f64 = 64.0;
-/// Where particles are scarce, one gets at most this many times what it would have if all were evenly spread.
+/// Maximum power of a particle relative to a uniform distribution, where particles are scarce.
 const MAX_CONCENTRATION: f64 = 6.0;
-/// The power of a particle comes this fraction nearer in a step to what it shall be.
+/// Relaxation factor per step of a particle's power toward its target.
 const POWER_RELAXATION: f32 = 0.2;
-/// Least and most that all powers are changed by to make up for that delay: a flux that is keyed to jump is followed in some steps still.
+/// Limits of the global correction for that delay: a step in the animated flux is still followed gradually.
 const BALANCE: [f64; 2] = [0.9, 1.1];
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 
-/// The flux and energy of an aurora and the pattern along its sheets.
+/// Flux, energy and ray pattern of an aurora.
 #[derive(Clone, Debug)]
 pub(super) struct EnergyFlux {
     parameters: AuroraParameters,
     rays: RayPattern,
 }
 
-/// A part of the arrays that one task works on.
+/// Part of the arrays for one task.
 struct ParticleChunk<'a> {
     positions: [&'a [f32]; 2],
     fades: &'a [f32],
@@ -58,19 +59,19 @@ impl EnergyFlux {
         Self { parameters: parameters.clone(), rays: RayPattern::new(parameters, key) }
     }
 
-    /// The coarse and the fine intervals of sheets of those lengths.
+    /// Layouts of the coarse and the fine intervals for sheets of these lengths.
     fn layouts(&self, lengths: &[f64]) -> [NodeLayout; 2] {
         let count = self.parameters.particles.count as f64;
         [(PER_COARSE, COARSE), (PER_FINE, FINE)].map(|(per, bounds)| NodeLayout::new(lengths, count / per, bounds))
     }
 
-    /// Power of the electrons on all sheets without pulsation and black rays, by sheet and node, W: flux times length times thickness.
+    /// Target power by sheet and node without pulsation and black rays, W: flux times length times thickness.
     fn target_power<'a>(&self, refined: &RefinedShape, layout: &'a NodeLayout, time: f64) -> NodeValues<'a> {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
         let mut wanted = NodeValues::new(layout);
-        // Parts as long as half of an interval: sheets that bridge a gap have fewer pieces than nodes.
-        refined.for_each_strip(|sheet| 0.5 / (layout.count(sheet) - 1) as f64).for_each(
+        // Parts of at most half an interval: bridges have fewer segments than nodes.
+        refined.pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64).for_each(
             |(sheet, arc_fraction, factor, length)| {
                 wanted.add(sheet as u32, arc_fraction as f32, flux * factor * length)
             },
@@ -78,16 +79,16 @@ impl EnergyFlux {
         wanted
     }
 
-    /// The pattern along the sheets at a time.
+    /// The ray pattern along the sheets at a time.
     pub(super) fn ray_table(&self, refined: &RefinedShape, time: f64) -> RayTable {
         self.rays.table(&refined.sheet_lengths(), |sheet, last| refined.arc_coordinates(sheet, last), time)
     }
 
-    /// Gives every particle its fraction of the power.
+    /// Assigns the power of every particle.
     ///
-    /// All together have the power of the sheets, and those along an interval that of the stretch, however many they are: no
-    /// birth, death, split or merge can make the aurora flicker, and the flux along it is the one that was drawn. Within an interval each
-    /// stands for the more of the sheet's length the fewer of them there are, and has the rays' pattern.
+    /// The total is the power of the sheets, and each interval has its drawn power whatever its number of particles, so
+    /// births, deaths, splits and merges do not cause flicker. Within an interval the power of a particle is inversely
+    /// proportional to the local density, times the ray pattern.
     pub(super) fn distribute_power(
         &self,
         particles: &mut AuroraParticles,
@@ -113,7 +114,7 @@ impl EnergyFlux {
         balance(particles, &given);
     }
 
-    /// Weighs a chunk of particles, as negative powers while they wait for their factors.
+    /// Computes weights of a chunk; they are stored as negative powers until normalized.
     fn weight_chunk<'a>(
         &self,
         chunk: ParticleChunk,
@@ -155,11 +156,11 @@ impl EnergyFlux {
     }
 }
 
-/// A chunk of particles, weighed.
+/// Weights of a chunk of particles.
 struct WeightedChunk<'a> {
-    /// How many there are along the sheets.
+    /// Particle counts along the sheets.
     counts: NodeValues<'a>,
-    /// The weight of each before black rays and pulsation; 0 for strays.
+    /// Weight of each particle before black rays and pulsation; 0 far from the sheets.
     weights: Vec<f32>,
 }
 
@@ -168,7 +169,7 @@ impl ParticleChunk<'_> {
         refined.project([f64::from(self.positions[0][index]), f64::from(self.positions[1][index])].into())
     }
 
-    /// Adds up the weights of particles that stand for so much of the sheets' length each, and gives it to their negative powers.
+    /// Multiplies the pending weights by the sheet length per particle and sums them by interval.
     fn accumulate_weights<'a>(self, weights: &[f32], lengths: &NodeValues, layout: &'a NodeLayout) -> NodeValues<'a> {
         let mut sums = NodeValues::new(layout);
         for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
@@ -180,16 +181,15 @@ impl ParticleChunk<'_> {
         sums
     }
 
-    /// Gives particles that wait for them their factors. Their power follows what it shall be with a delay: where two parts of a sheet
-    /// lie close together, a particle that passes from the one to the other does not flash. Gives the power that they shall have together, and
-    /// the one that they have, W.
+    /// Normalizes pending powers. The power relaxes toward its target, so a particle that moves between two adjacent
+    /// parts of a sheet does not flash. Returns the target and the actual total, W.
     fn assign_powers(self, factors: &NodeValues) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
             let (sheet, arc_fraction) = (self.sheets[index], self.arc_fractions[index]);
             let wanted = -*power * factors.at(sheet, arc_fraction) as f32;
             let full = &mut self.full_powers[index];
-            // Those that are just appearing begin with nothing: as fast as they rise, those around them give up their fraction.
+            // New particles start at 0, as fast as the others give up their power.
             let follows = *full > 0.0 || self.fades[index] < 1.0;
             *full = if follows { *full + POWER_RELAXATION * (wanted - *full) } else { wanted };
             *power = self.fades[index] * *full;
@@ -200,8 +200,8 @@ impl ParticleChunk<'_> {
     }
 }
 
-/// Makes up for the delay with which powers follow, from the powers that parts of the particles shall have and those that they have: else all
-/// would be too bright while many are being born, for those that were there give up their fraction late.
+/// Corrects the total for the relaxation delay: otherwise the aurora would be too bright while many particles are being
+/// created.
 fn balance(particles: &mut AuroraParticles, given: &[[f64; 2]]) {
     let [wanted, found] = given.iter().fold([0.0; 2], |sum, chunk| [sum[0] + chunk[0], sum[1] + chunk[1]]);
     if found > 0.0 {
@@ -255,8 +255,8 @@ mod tests {
         let energy_flux = EnergyFlux::new(&parameters, key);
         let [layout, _] = energy_flux.layouts(&refined.sheet_lengths());
         let intervals = layout.count(0) - 1;
-        let for_each_strip = refined.for_each_strip(|_| 1.0).count();
-        assert!(for_each_strip < intervals / 2, "{for_each_strip} pieces");
+        let pieces = refined.pieces(|_| 1.0).count();
+        assert!(pieces < intervals / 2, "{pieces} pieces");
         let wanted = energy_flux.target_power(&refined, &layout, 0.0);
         let length = refined.sheet_lengths()[0];
         let flux = parameters.flux_mw_per_m2.at(0.0) * W_PER_KM2 * 2.0 * parameters.half_thickness_km();

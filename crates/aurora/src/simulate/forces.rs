@@ -1,4 +1,4 @@
-//! Forces and the step (thesis, 2.3.1 to 2.3.3).
+//! Forces and time integration (thesis, 2.3.1 to 2.3.3).
 
 use bansho_base::math::{self, MulAdd};
 
@@ -10,16 +10,16 @@ use rayon::prelude::*;
 
 /// Gas constant k at a repulsion of 1, cells^2 per frame^2.
 const STIFFNESS: f64 = 0.1;
-/// Particles that a task of the thread pool moves.
+/// Particles per task.
 const TASK: usize = 4096;
-/// The support radius follows the density by this fraction each step.
+/// Relaxation factor per step of the support radius.
 const FOLLOWING: f64 = 0.1;
-/// The support radius is at least this fraction of a cell and at most so many cells.
+/// Minimum and maximum support radius, cells.
 const SUPPORT_CELLS: [f64; 2] = [0.02, 2.0];
-/// Mass of a particle that is just appearing, beside 1 of one that is there: none is lighter.
+/// Minimum mass of a particle that is fading in.
 const LEAST_MASS: f32 = 0.05;
 
-/// What the particles do to each other; buffers are kept from step to step.
+/// SPH repulsion with reusable buffers.
 #[derive(Clone, Debug)]
 pub(super) struct Repulsion {
     cells: Cells<2>,
@@ -31,7 +31,7 @@ pub(super) struct Repulsion {
     masses: Vec<f32>,
     densities: Vec<f32>,
     pressures: Vec<f32>,
-    /// km/s^2, x and z, in the particles' order.
+    /// Accelerations, km/s^2, x and z, in the particles' order.
     pub(super) accelerations: [Vec<f32>; 2],
 }
 
@@ -57,14 +57,14 @@ impl Repulsion {
         }
     }
 
-    /// The support radius h about which particles of that density have as many neighbors as is asked for, km.
+    /// Support radius h with the required number of neighbors at a density, km.
     pub(super) fn support_km(&self, density_per_km2: f64) -> f64 {
         let [least, most] = self.bounds_km;
         (self.neighbors / (std::f64::consts::PI * density_per_km2.max(f64::MIN_POSITIVE))).sqrt().clamp(least, most)
     }
 
-    /// Sorts the particles and finds how they push each other, eqs. (2.11) to (2.18); `rest_density` per km^2 is delta_0. Gives the
-    /// support radius for the next step, km.
+    /// Sorts the particles and computes the repulsion, eqs. (2.11) to (2.18); `rest_density` per km^2 is delta_0.
+    /// Returns the support radius for the next step, km.
     pub(super) fn compute_accelerations(
         &mut self,
         particles: &mut AuroraParticles,
@@ -76,7 +76,8 @@ impl Repulsion {
         let level = Level::new();
         dispatch!(level, _simd => particle_masses(&particles.fades, &mut self.masses));
         densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
-        // To itself a particle is all there: one that is just appearing would be next to weightless, and be flung away.
+        // A particle has its full mass in its own density: one that is fading in would otherwise have nearly no density
+        // and be accelerated too much.
         let whole = self.density_kernel.at_centre::<2>(self.cells.support_radius());
         let state = StateEquation { rest_density: rest_density as f32, tension: true };
         let Self { masses, densities, pressures, stiffness, .. } = self;
@@ -91,7 +92,7 @@ impl Repulsion {
     }
 }
 
-/// Masses of particles that are there so far.
+/// Masses of particles that fade in or out.
 #[inline(always)]
 fn particle_masses(fades: &[f32], masses: &mut Vec<f32>) {
     masses.resize(fades.len(), 0.0);
@@ -100,7 +101,7 @@ fn particle_masses(fades: &[f32], masses: &mut Vec<f32>) {
     }
 }
 
-/// Adds to densities what particles lack themselves; `whole` is what one that is all there has.
+/// Completes densities to the full mass of the particle itself; `whole` is the self-density of a full particle.
 #[inline(always)]
 fn add_missing_self_density(densities: &mut [f32], masses: &[f32], whole: f32) {
     for (density, mass) in densities.iter_mut().zip(masses) {
@@ -108,12 +109,12 @@ fn add_missing_self_density(densities: &mut [f32], masses: &[f32], whole: f32) {
     }
 }
 
-/// Numbers of a step that all particles fraction.
+/// Integration constants that all particles share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Integrator {
     pull_weight: f32,
     repulsion_weight: f32,
-    /// Cosine and sine of the angle by which the magnetic field turns a velocity in a step.
+    /// Cosine and sine of the rotation of the velocity by the magnetic field per step.
     rotation: [f32; 2],
     friction_factor: f32,
     limit_energy: bool,
@@ -134,7 +135,7 @@ impl Integrator {
         }
     }
 
-    /// Moves all particles by a step.
+    /// Advances all particles by a step.
     pub(super) fn advance(&self, particles: &mut AuroraParticles, field: &ElectricField, repulsion: &[Vec<f32>; 2]) {
         let [xs, zs] = &mut particles.positions;
         let [us, ws] = &mut particles.velocities;
@@ -161,8 +162,8 @@ impl Integrator {
         }
     }
 
-    /// Eqs. (2.10), (2.19) and (2.20), friction, and the bound on energy. The magnetic part of (2.10) only turns the velocity,
-    /// and is done as a turn: it can then not feed energy in.
+    /// Eqs. (2.10), (2.19) and (2.20), friction, and the energy limit. The magnetic part of (2.10) is an exact
+    /// rotation, so it does not change the energy.
     #[inline(always)]
     fn integrate(
         &self,
@@ -189,7 +190,7 @@ impl Integrator {
         (to, if factor > 0.0 { [new[0] * factor, new[1] * factor] } else { [0.0; 2] })
     }
 
-    /// The factor that holds kinetic plus potential energy; `fall` is by how much the potential has fallen.
+    /// Velocity factor that limits kinetic plus potential energy; `fall` is the decrease of the potential.
     #[inline(always)]
     fn energy_limit_factor(&self, before: [f32; 2], after: [f32; 2], fall: f32) -> f32 {
         let energy = (2.0 * self.pull_weight).fma(fall, before[0].fma(before[0], before[1] * before[1]));

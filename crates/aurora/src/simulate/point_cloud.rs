@@ -1,4 +1,4 @@
-//! The particles for other programs.
+//! Export of the particles as a point cloud.
 
 use bansho_base::{
     geometry::point_cloud::{PointCloud, Quantity},
@@ -8,11 +8,11 @@ use bansho_base::{
 use super::{AuroraParticles, AuroraSimulation};
 use crate::render::project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM};
 
-/// Half of the time over which a velocity is taken, s.
+/// Half of the interval of the finite-difference velocity, s.
 const MOMENT_S: f64 = 1e-3;
 
-/// Where the particles pass 100 km altitude, `offset_s` seconds after their step: x east, y up, z south, as the camera has
-/// it.
+/// Particle positions at 100 km altitude, `offset_s` seconds after their step: x east, y up, z south, as for the
+/// camera.
 pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64) -> PointCloud {
     let offset_s = offset_s.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
     let [us, ws] = &particles.velocities;
@@ -30,7 +30,7 @@ pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64) -> PointCl
     }
 }
 
-/// A position of the drawn plane, km, on the shell that it is spread over, m: as far from the middle along it.
+/// Maps a position of the drawn plane, km, to the spherical shell at 100 km, m.
 fn on_shell(position_at: DVec2) -> DVec3 {
     const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM);
     let distance = position_at.length();

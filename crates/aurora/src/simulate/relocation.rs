@@ -1,4 +1,4 @@
-//! Births and deaths when the in-between shape is renewed (thesis, 2.3.4 and table 3.3).
+//! Relocation: births and deaths when the in-between shape is updated (thesis, 2.3.4 and table 3.3).
 
 use super::AuroraParticles;
 use crate::simulate::field::sheet_charge::ScatteredParticle;
@@ -11,17 +11,18 @@ use rayon::prelude::*;
 
 const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");
-/// The counts of table 3.3 are taken as those of a near cell that holds this many particles on average.
+/// Average number of particles per near cell that the counts of table 3.3 refer to.
 const TABLE_COUNT: f64 = 75.0;
-/// Particles that a task of the thread pool finds the cells of, at least.
+/// Minimum particles per task.
 const TASK: usize = 4096;
-/// By so much more is an interval filled than the table says: until the next renewal it stretches by up to a half, and its particles move on.
+/// Intervals are filled by this factor more than the table says: until the next update they stretch by up to a half and
+/// particles move on.
 const AHEAD: f64 = 1.35;
 
-/// Position and velocity of a particle that is born, km and km/s.
+/// Position and velocity of a new particle, km and km/s.
 type Birth = (DVec2, [f32; 2]);
 
-/// Table 3.3 for a number of particles, and the random numbers of births.
+/// Parameters of table 3.3 and the random key.
 #[derive(Clone, Debug)]
 pub(super) struct Relocation {
     parameters: RelocationParameters,
@@ -30,9 +31,9 @@ pub(super) struct Relocation {
     key: Key,
 }
 
-/// Particles of each cell, those that stay alive.
+/// Living particles of each cell.
 struct CellOccupants {
-    /// Where the list of each cell begins, and where the last one ends.
+    /// Start of each cell's list, and the total.
     starts: Vec<u32>,
     indices: Vec<u32>,
 }
@@ -47,7 +48,8 @@ impl Relocation {
         }
     }
 
-    /// Lets strays and the surplus die and fills what is thin, by the shape, its scattered particles and the field from before the renewal.
+    /// Removes strays and surplus particles and adds missing ones, by the shape, scatter and field from before the
+    /// update.
     pub(super) fn relocate(
         &self,
         particles: &mut AuroraParticles,
@@ -79,8 +81,8 @@ impl Relocation {
         }
     }
 
-    /// How much of a whole cell the sheets cover of each near cell, from 0 to 1; 0 in others. All near cells count as whole where the table
-    /// is taken to the letter.
+    /// Fraction of each near cell that the sheets cover, 0 to 1; 0 in other cells. 1 in all near cells if the table is
+    /// applied literally.
     fn coverage(&self, field: &ElectricField, near: &[bool]) -> Vec<f64> {
         let full = full_cell_count(&field.counts).max(f64::MIN_POSITIVE);
         let fraction = |(count, near): (&f64, &bool)| match (near, self.parameters.scaled) {
@@ -91,13 +93,13 @@ impl Relocation {
         field.counts.values().iter().zip(near).map(fraction).collect()
     }
 
-    /// What the counts of the table are multiplied by.
+    /// Scale factor of the table's counts.
     fn scale(&self, coverage: &[f64]) -> f64 {
         let cells = coverage.iter().sum::<f64>().max(1.0);
         if self.parameters.scaled { self.count / (cells * TABLE_COUNT) } else { 1.0 }
     }
 
-    /// In every cell with too many, those farthest from the shape die.
+    /// Removes the particles farthest from the shape in cells with too many.
     fn remove_excess(
         &self,
         particles: &mut AuroraParticles,
@@ -119,8 +121,8 @@ impl Relocation {
         }
     }
 
-    /// In every near cell with too few, the deficit appears at random, with the mean velocity of the cells around: positions and velocities, by
-    /// the letter of the table.
+    /// Adds the deficit of near cells at random positions with the mean velocity of the neighboring cells: the literal
+    /// table.
     fn births_by_cell(
         &self,
         particles: &AuroraParticles,
@@ -151,9 +153,9 @@ impl Relocation {
         births
     }
 
-    /// Where an interval of the sheets holds too few, the deficit appears among the positions of its scattered particles, with the mean velocity
-    /// there. All together are as many as the table gives to all near cells at most; where they are born is where they lack. Cells would not
-    /// see that: where sheets bend, a full limb passes through the cells of an empty one.
+    /// Adds the deficit of intervals at the positions of their scattered particles, with the local mean velocity. The
+    /// total is limited to what the table allows for all near cells. Unlike cells, intervals detect an empty part of a
+    /// sheet next to a full one.
     fn births_by_interval(
         &self,
         intervals: &mut ArcIntervals,
@@ -188,12 +190,12 @@ impl Relocation {
         births
     }
 
-    /// How many more particles may be born among so many.
+    /// Remaining capacity for new particles.
     fn room(&self, living: usize) -> f64 {
         (MOST_PARTICLES * self.count - living as f64).max(0.0)
     }
 
-    /// Lets the surplus over the wanted count die, in the stretches that hold more than their fraction.
+    /// Removes the surplus over the requested count, from intervals with more than their target.
     fn remove_surplus(&self, particles: &mut AuroraParticles, intervals: &mut ArcIntervals, renewal: u32) {
         let living: f64 = intervals.all().iter().map(|interval| interval.count).sum();
         let excess = |interval: &ArcInterval| (interval.count - interval.target_count).max(0.0);
@@ -215,15 +217,15 @@ impl Relocation {
     }
 }
 
-/// However many births the table asks for, there are never more particles than this many times their number.
+/// Maximum number of particles relative to the requested count.
 const MOST_PARTICLES: f64 = 4.0;
 
-/// Cells that are near the shape: their scatter count is high and their potential low enough, beside the means over all cells.
+/// Near cells: scatter count and potential compared with their means over all cells.
 pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
     let (counts, potential) = (field.counts.values(), field.potential.values());
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (least, greatest) = (table.count * mean(counts), table.potential * mean(potential));
-    // An empty shape has no near cells, whatever the fractions.
+    // An empty shape has no near cells, whatever the thresholds.
     let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
     counts.iter().zip(potential).map(near).collect()
 }
@@ -254,7 +256,7 @@ impl CellOccupants {
         &self.indices[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// Mean velocity of those in the cell and the eight around it; rest where there is nobody.
+    /// Mean velocity in the 3 x 3 cells around; 0 if they are empty.
     fn mean_velocity(&self, particles: &AuroraParticles, cell: usize, columns: usize) -> [f32; 2] {
         let (mut sum, mut count) = ([0.0_f64; 2], 0.0);
         for list in cells_around(cell, columns, self.starts.len() - 1).map(|cell| self.of(cell)) {
@@ -267,7 +269,7 @@ impl CellOccupants {
     }
 }
 
-/// A cell and the eight around it, of so many in rows of `columns`.
+/// The 3 x 3 cells around a cell of a grid with `columns` columns.
 fn cells_around(cell: usize, columns: usize, cells: usize) -> impl Iterator<Item = usize> {
     let around = |position: usize, count: usize| position.saturating_sub(1)..(position + 2).min(count);
     let across = around(cell % columns, columns);
@@ -275,33 +277,33 @@ fn cells_around(cell: usize, columns: usize, cells: usize) -> impl Iterator<Item
         .flat_map(move |row| across.clone().map(move |column| row * columns + column))
 }
 
-/// Stretches that all sheets together are cut into: half as long as those that must hold half their fraction.
+/// Number of intervals of all sheets: half as long as those for which half the target density is guaranteed.
 const INTERVALS: f64 = 100.0;
-/// Particles that an interval shall hold at least: fewer would come and go by chance.
+/// Minimum target count per interval, against sampling noise.
 const MIN_INTERVAL_COUNT: f64 = 32.0;
 
-/// Stretches of the sheets about as long as each other, one sheet's after those of another.
+/// Intervals of about equal length, sheet by sheet.
 #[derive(Clone, Debug)]
 pub(super) struct ArcIntervals {
-    /// Where each sheet's begin, and the end of all.
+    /// Start of each sheet's intervals, and the total.
     starts: Vec<usize>,
     all: Vec<ArcInterval>,
 }
 
-/// What is known of an interval.
+/// State of an interval.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ArcInterval {
-    /// Particles that it shall hold: as much of them all as it is of the sheets' length, like the power that they bring.
+    /// Target number of particles, in proportion to its length.
     pub(super) target_count: f64,
-    /// Particles that were scattered about it: fewer than are due where another sheet lies close by.
+    /// Number of scattered particles: below the target where another sheet is close by.
     pub(super) scattered: f64,
-    /// Particles that it holds and that stay alive, and the sum of their velocities, km/s.
+    /// Number of living particles, and the sum of their velocities, km/s.
     pub(super) count: f64,
     momentum: [f64; 2],
 }
 
 impl ArcIntervals {
-    /// The intervals of a shape for so many particles, and what was scattered about each.
+    /// Intervals of a shape for a number of particles, with their scatter counts.
     pub(super) fn new(refined: &RefinedShape, scattered: &[ScatteredParticle], count: f64) -> Self {
         let lengths = refined.sheet_lengths();
         let whole = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
@@ -321,7 +323,7 @@ impl ArcIntervals {
         intervals
     }
 
-    /// Finds what they hold.
+    /// Counts the particles.
     pub(super) fn fill(&mut self, particles: &AuroraParticles) {
         for index in (0..particles.len()).filter(|index| !particles.dying[*index]) {
             let Some(interval) = self.index(particles.sheets[index], particles.arc_fractions[index]) else { continue };
@@ -333,7 +335,7 @@ impl ArcIntervals {
         }
     }
 
-    /// The stretch at a fraction of a sheet's length; none where there is no such sheet.
+    /// Index of the interval at a fraction of a sheet's length; `None` for a missing sheet.
     pub(super) fn index(&self, sheet: u32, fraction: f32) -> Option<usize> {
         let (first, end) = (*self.starts.get(sheet as usize)?, *self.starts.get(sheet as usize + 1)?);
         let coordinate = f64::from(fraction) * (end - first) as f64;
@@ -345,7 +347,7 @@ impl ArcIntervals {
         &mut self.all
     }
 
-    /// Mean velocity of those in the interval at that index and in those beside it on the sheet, km/s; rest where there is nobody.
+    /// Mean velocity in an interval and its neighbors on the sheet, km/s; 0 if they are empty.
     pub(super) fn velocity(&self, index: usize) -> [f32; 2] {
         let sheet = self.starts.partition_point(|start| *start <= index);
         let beside = index.saturating_sub(1).max(self.starts[sheet - 1])..(index + 2).min(self.starts[sheet]);

@@ -1,4 +1,4 @@
-//! The simulation: what it is made of and what a step does.
+//! The simulation: state and step.
 
 use bansho_base::{
     math::{DVec2, random::Key},
@@ -30,7 +30,7 @@ use crate::{
     },
 };
 
-/// How far from the sheets particles still know where on them they are, beside L_thr.
+/// Maximum distance of sheet queries relative to L_thr.
 const REACH: f64 = 3.0;
 
 /// An aurora's particles, afterglow and field, stepped by frames of 1/30 s.
@@ -44,11 +44,11 @@ pub struct AuroraSimulation {
     integrator: Integrator,
     energy_flux: EnergyFlux,
     state: SimulationState,
-    /// The in-between shape that the particles are drawn to, and what follows from it alone.
+    /// The in-between shape that attracts the particles, and data derived from it.
     target: Target,
 }
 
-/// What in-between shapes are made from.
+/// Builds targets from the sequence.
 #[derive(Clone, Debug)]
 struct TargetBuilder {
     key: Key,
@@ -58,19 +58,19 @@ struct TargetBuilder {
     fields: FieldBuilder,
 }
 
-/// What a step changes.
+/// State that a step changes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SimulationState {
     pub(super) steps: u64,
     pub(super) next_id: u64,
     /// Support radius h of the repulsion, km.
     pub(super) support_km: f64,
-    /// The coordinate along the sheets as they are now.
+    /// Arc-length map of the current sheets.
     pub(super) arc_map: ArcLengthMap,
-    /// The same for the in-between shape that particles are drawn to, and the time of that shape, s.
+    /// Arc-length map of the target shape, and its time, s.
     pub(super) target_arc_map: ArcLengthMap,
     pub(super) target_time: f64,
-    /// How many renewals there have been.
+    /// Number of updates of the target.
     pub(super) renewals: u32,
     pub(super) particles: AuroraParticles,
     pub(super) afterglow: Afterglow,
@@ -79,7 +79,7 @@ pub(super) struct SimulationState {
 #[derive(Clone, Debug)]
 struct Target {
     refined: RefinedShape,
-    /// The particles that were scattered about it.
+    /// Scattered particles of the shape.
     scattered: Vec<ScatteredParticle>,
     field: ElectricField,
     /// delta_0, particles per km^2.
@@ -87,19 +87,19 @@ struct Target {
 }
 
 impl TargetBuilder {
-    /// The course of the shape at a time, by the coordinate along it.
+    /// The refined shape at a time, with its arc-length map.
     fn refined_shape(&self, arc_map: &ArcLengthMap, time: f64) -> RefinedShape {
         let reach = REACH * self.parameters.half_thickness_km();
         let (shape, bridges) = (self.sequence.at(time), self.sequence.bridges(time));
         RefinedShape::new((&shape, &bridges), arc_map, &self.fold_model, time, reach)
     }
 
-    /// The coordinate along the sheets at a time that `before` have become.
+    /// The arc-length map at a time, transferred from `before`.
     fn transfer_arc_map(&self, before: &ArcLengthMap, time: f64) -> ArcLengthMap {
         before.transfer(&self.sequence.at(time), &self.sequence.control_point_ids(time))
     }
 
-    /// The target that a state speaks of.
+    /// The target of a state.
     fn target(&self, state: &SimulationState) -> Target {
         let refined = self.refined_shape(&state.target_arc_map, state.target_time);
         let count = self.parameters.particles.count as usize;
@@ -112,7 +112,7 @@ impl TargetBuilder {
     }
 }
 
-/// Forces and motion; particles appear and vanish, and those that have vanished are gone.
+/// Forces, integration and fading; particles that have faded out are removed.
 fn advance(
     state: &mut SimulationState,
     target: &Target,
@@ -136,7 +136,7 @@ impl AuroraSimulation {
     /// Length of a step, s.
     pub const STEP_S: f64 = FRAME_S;
 
-    /// The aurora `name` at the beginning of its preroll: particles evenly about the first shape, at rest.
+    /// The aurora `name` at the start of its preroll: particles uniformly about the first shape, at rest.
     #[must_use]
     pub fn new(parameters: AuroraParameters, sequence: Sequence, name: &str, seed: u64) -> Self {
         let key = Key::new(seed, name);
@@ -181,8 +181,8 @@ impl AuroraSimulation {
         }
     }
 
-    /// Renews the in-between shape: births and deaths by the one before, then the field of the new one. It is the shape of the
-    /// next renewal, so that particles are there when the shape is.
+    /// Updates the target: births and deaths by the previous one, then the field of the new one. It is the shape at the
+    /// time of the next update, so that particles arrive in time.
     fn renew(&mut self, frames: u64) {
         let (state, target) = (&mut self.state, &self.target);
         self.relocation.relocate(
@@ -203,7 +203,7 @@ impl AuroraSimulation {
         self.state.steps as f64 * Self::STEP_S - self.targets.parameters.preroll_s
     }
 
-    /// Steps to [`Self::STEP_S`] later.
+    /// Advances by [`Self::STEP_S`].
     pub fn step(&mut self) {
         let frames = self.targets.parameters.motion.renew_frames.round().max(1.0) as u64;
         if self.state.steps.is_multiple_of(frames) {
@@ -212,7 +212,7 @@ impl AuroraSimulation {
         let time = (self.state.steps + 1) as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
         let Self { targets, repulsion, integrator, state, target, energy_flux, decay, .. } = self;
         let before = state.arc_map.clone();
-        // Where the sheets will be does not depend on the particles, and is found beside them.
+        // The sheets do not depend on the particles and are computed in parallel.
         let (_, (arc_map, refined, rays)) = rayon::join(
             || advance(state, target, (repulsion, integrator), targets.parameters.particles.fade_s),
             || {
@@ -229,16 +229,17 @@ impl AuroraSimulation {
         state.afterglow.step(&state.particles, decay);
     }
 
-    /// The state as bytes.
+    /// Serializes the state.
     #[must_use]
     pub fn snapshot(&self) -> Vec<u8> {
         snapshot::write(&self.state)
     }
 
-    /// Returns to a state that [`Self::snapshot`] of an aurora with the same parameters gave.
+    /// Restores a state from [`Self::snapshot`] of an aurora with the same parameters.
     ///
     /// # Errors
-    /// The bytes are not such a state; nothing is changed then.
+    ///
+    /// Invalid bytes; the state is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let mut state = snapshot::read(bytes, &self.state)?;
         let time = state.steps as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
@@ -252,7 +253,7 @@ impl AuroraSimulation {
         Ok(())
     }
 
-    /// The sheets as they are now, with their folds.
+    /// The current sheets with folds.
     #[cfg(test)]
     pub(super) fn refined_shape(&self) -> RefinedShape {
         self.targets.refined_shape(&self.state.arc_map, self.time())
@@ -264,7 +265,7 @@ impl AuroraSimulation {
         &self.targets.parameters
     }
 
-    /// Light by energy and altitude for its spectrum.
+    /// Emission table of its spectrum.
     #[must_use]
     pub fn emission(&self) -> &Emission {
         &self.emission
@@ -276,12 +277,12 @@ impl AuroraSimulation {
         &self.state.particles
     }
 
-    /// Mean distance of neighboring particles, km: the side of a square that holds one.
+    /// Mean distance between neighboring particles, km: the side of a square with one particle.
     pub(crate) fn spacing_km(&self) -> f64 {
         (std::f64::consts::PI / self.targets.parameters.particles.neighbours).sqrt() * self.state.support_km
     }
 
-    /// Where green and red linger.
+    /// Afterglow of the green and the red line.
     #[must_use]
     pub fn afterglow(&self) -> &Afterglow {
         &self.state.afterglow
@@ -294,20 +295,20 @@ impl AuroraSimulation {
         &self.target.field.potential
     }
 
-    /// How many particles were scattered into each cell about the in-between shape, N(i, j) (thesis, figure 2.10).
+    /// Scattered particles per cell of the in-between shape, N(i, j) (thesis, figure 2.10).
     #[must_use]
     pub fn scatter_counts(&self) -> &Grid2 {
         &self.target.field.counts
     }
 
-    /// What noise adds to the potential at a position, km^2/s^2 (thesis, figure 2.11).
+    /// Noise in the potential at a position, km^2/s^2 (thesis, figure 2.11).
     #[must_use]
     pub fn potential_noise(&self, position: DVec2) -> f64 {
         let noisy = self.target.field.sample(position.x as f32, position.y as f32).potential;
         f64::from(noisy) - self.potential().sample(position.to_array())
     }
 
-    /// How many particles are in each cell now (thesis, figure 2.14).
+    /// Particles per cell (thesis, figure 2.14).
     #[must_use]
     pub fn particle_counts(&self) -> Grid2 {
         let particles = self.particles();

@@ -1,4 +1,4 @@
-//! The state as bytes and back: a version, then numbers and lists, each list with its length before it.
+//! Serialization of the state: a version, then little-endian numbers and length-prefixed arrays.
 
 use bansho_base::{math::DVec2, phenomenon::SnapshotError};
 
@@ -11,10 +11,10 @@ use super::{
 use crate::simulate::sheets::arc_length::ArcLengthMap;
 
 const VERSION: u32 = 3;
-/// Counts below this are exact as times.
+/// Counts below this are exact in f64.
 const MAX_EXACT_COUNT: u64 = 1 << 53;
 
-/// Numbers that stand in a snapshot.
+/// Numbers in a snapshot.
 trait SnapshotValue: Copy {
     const SIZE: usize;
     fn put(self, bytes: &mut Vec<u8>);
@@ -41,7 +41,7 @@ fn put_list<T: SnapshotValue>(bytes: &mut Vec<u8>, values: &[T]) {
     values.iter().for_each(|value| value.put(bytes));
 }
 
-/// What is left to read.
+/// Remaining bytes.
 struct SnapshotReader<'a>(&'a [u8]);
 
 impl SnapshotReader<'_> {
@@ -80,7 +80,7 @@ pub(super) fn write(state: &SimulationState) -> Vec<u8> {
     bytes
 }
 
-/// The state in `bytes`, whose afterglow has the layout of `layout`.
+/// Deserializes a state whose afterglow has the same layout as `layout`.
 pub(super) fn read(bytes: &[u8], layout: &SimulationState) -> Result<SimulationState, SnapshotError> {
     let mut reader = SnapshotReader(bytes);
     let found = reader.item::<u32>()?;
@@ -104,7 +104,7 @@ pub(super) fn read(bytes: &[u8], layout: &SimulationState) -> Result<SimulationS
     if reader.0.is_empty() && is_possible(&state) { Ok(state) } else { Err(SnapshotError::Damaged) }
 }
 
-/// Whether a state has only numbers, and counts that can go on.
+/// Validates a state: finite numbers and counts within range.
 fn is_possible(state: &SimulationState) -> bool {
     let is_finite = |arc_map: &ArcLengthMap| {
         arc_map.coordinates.iter().flatten().all(|coordinate| coordinate.is_finite())

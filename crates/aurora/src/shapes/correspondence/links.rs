@@ -1,4 +1,4 @@
-//! Sheets and points that go where a person says, rather than where it is near.
+//! User-specified links between sheets and points of successive shapes, which override the automatic matching.
 
 use super::{
     sheet_matching::MatchConstraint,
@@ -9,23 +9,26 @@ use crate::shapes::{
     interpolation::spline_track::ControlPointTrack,
 };
 
-/// Nearest that a linked point comes to an end of its sheet, as a fraction of the length: ends go to ends.
+/// Minimum distance of a linked point from the ends of its sheet, as a fraction of the length: ends are matched to
+/// ends.
 const END_MARGIN: f64 = 1e-3;
 
-/// What the links to a shape ask for.
+/// Constraints from the links to a shape.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LinkConstraints {
-    /// What each chain of strands must become.
+    /// Required match of each chain of strands.
     pub(crate) chain_constraints: Vec<MatchConstraint>,
-    /// Tracks, and the fraction of their new sheet's length at which they must arrive.
+    /// Control-point tracks and the fraction of the new sheet's length at which they must arrive.
     points: Vec<(usize, f64)>,
 }
 
 impl LinkConstraints {
-    /// What `links` to shape `index` ask for, which has `count` sheets and comes of `sheets` by `change`.
+    /// Constraints from `links` to shape `index`, which follows `sheets` by the transition `change`.
     ///
     /// # Errors
-    /// A sheet that is not there, a sheet that is linked to two, points that would pass each other or arrive nowhere.
+    ///
+    /// A link to a missing sheet, two links of one sheet, linked points that change their order, or a point without an
+    /// arrival.
     pub(crate) fn new(
         links: &[LinkParameters],
         index: usize,
@@ -58,10 +61,10 @@ impl LinkConstraints {
         Ok(constraints)
     }
 
-    /// The chain that holds `track` becomes sheet `to`, and no other does.
+    /// Requires that the chain that contains `track` becomes sheet `to`.
     fn constrain_chain(&mut self, change: &Transition, track: usize, to: usize) -> Result<(), ShapeErrorKind> {
         let holds = |chain: &usize| change.tracks_of(*chain).contains(&track);
-        // Every track of a sheet lies in one of its strands.
+        // Every track of a sheet is in one of its strands.
         let own = (0..change.chains.len()).find(holds).unwrap_or_default();
         let other = self.chain_constraints.iter().position(|chain_constraint| chain_constraint.target == Some(to));
         if self.chain_constraints[own].target.is_some_and(|target| target != to)
@@ -73,7 +76,7 @@ impl LinkConstraints {
         Ok(())
     }
 
-    /// Points arrive in the order in which they lie, one way round or the other, which tells how the sheet is turned.
+    /// Linked points must arrive in ascending or descending order, which determines the sheet's direction.
     fn check_order(&mut self, change: &Transition) -> Result<(), ShapeErrorKind> {
         for (chain, chain_constraint) in self.chain_constraints.iter_mut().enumerate() {
             let tracks = change.tracks_of(chain);
@@ -91,7 +94,7 @@ impl LinkConstraints {
         Ok(())
     }
 
-    /// The linked points of `strand`: their positions in it and where they arrive, within the part `range` of the sheet.
+    /// Linked points of `strand` as index and arrival, within `range` of the sheet.
     pub(crate) fn linked_points(&self, strand: &[usize], range: [f64; 2]) -> Vec<(usize, f64)> {
         let [low, high] = if range[0] <= range[1] { range } else { [range[1], range[0]] };
         let arrives = |(index, track): (usize, &usize)| {
@@ -103,7 +106,7 @@ impl LinkConstraints {
     }
 }
 
-/// Whether a sheet parts on the way.
+/// Whether a sheet splits in the transition.
 fn splits(sheet: &[usize], change: &Transition) -> bool {
     let whole =
         |strand: &Vec<usize>| [sheet.first(), sheet.last()].into_iter().flatten().all(|end| strand.contains(end));

@@ -1,4 +1,4 @@
-//! Which sheet becomes which, found from where they lie (thesis, chapter 4, asks for it).
+//! Automatic matching of sheets between shapes (requested in chapter 4 of the thesis).
 
 use std::collections::BTreeSet;
 
@@ -10,25 +10,26 @@ use crate::shapes::{
     strokes::intersection::{count_crossings, crossing_sheets},
 };
 
-/// Points by which sheets are compared.
+/// Samples per sheet.
 const SAMPLES: usize = 32;
 
-/// Moments of the way at which sheets should not cross.
+/// Fractions of the transition at which crossings are counted.
 const CHECKED_FRACTIONS: [f64; 3] = [0.25, 0.5, 0.75];
 
-/// Sheets that are looked at for crossings in all tries of turns and exchanges together, for about a second. Of few sheets all are tried.
+/// Maximum number of sheet crossing tests in the local search, about a second. With few sheets the search is
+/// exhaustive.
 const MAX_CROSSING_TESTS: usize = 60_000;
-/// Fraction of the tries in which one change is looked for.
+/// Candidate changes per iteration are the remaining tests divided by this.
 const CANDIDATES_DIVISOR: usize = 8;
 
-/// The target of a sheet, and whether it was drawn the other way round.
+/// The target of a sheet, and whether its direction is reversed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SheetMatch {
     pub(crate) target: usize,
     pub(crate) reversed: bool,
 }
 
-/// What a person asks of a sheet.
+/// A constraint from links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct MatchConstraint {
     pub(super) target: Option<usize>,
@@ -41,17 +42,17 @@ impl MatchConstraint {
     }
 }
 
-/// Sheets and targets as evenly spaced points, as many of one as of the other.
+/// Resampled sheets and targets, equal in number.
 struct Comparison<'a> {
     constraints: &'a [MatchConstraint],
     sources: Vec<Vec<DVec2>>,
     targets: Vec<Vec<DVec2>>,
-    /// Mean length of a sheet and its target weighs their motion.
+    /// Lengths of sheets and targets; their mean weights the motion.
     lengths: [Vec<f64>; 2],
 }
 
-/// The target of each source such that all together move least, and no two cross on the way where that can be had by
-/// exchanging two targets or turning one round. What is `constraints` of a source comes first.
+/// Matches sources to targets with the minimum total motion, then removes crossings by swapping two targets or
+/// reversing one sheet where possible. `constraints` take precedence.
 pub(crate) fn match_sheets(
     sources: &[Polyline],
     targets: &[&Polyline],
@@ -66,7 +67,7 @@ pub(crate) fn match_sheets(
     let count = sources.len();
     let best: Vec<(f64, bool)> =
         (0..count * count).map(|pair| comparison.best_direction(pair / count, pair % count)).collect();
-    // More than all sheets could move together.
+    // Larger than any possible total motion.
     let forbidden = 1.0 + best.iter().map(|(motion, _)| motion).sum::<f64>();
     let columns = assign(count, |source, target| {
         let elsewhere = constraints[source].target.is_some_and(|own| own != target);
@@ -83,14 +84,14 @@ impl Comparison<'_> {
         (0..SAMPLES).map(move |index| points[if of.reversed { SAMPLES - 1 - index } else { index }])
     }
 
-    /// Mean square of the way of each point, times the length of the sheet.
+    /// Mean squared displacement times the length of the sheet.
     fn motion(&self, source: usize, of: SheetMatch) -> f64 {
         let squares = self.sources[source].iter().zip(self.target(of)).map(|(from, to)| from.distance_squared(to));
         let length = (self.lengths[0][source] + self.lengths[1][of.target]) / 2.0;
         squares.sum::<f64>() / SAMPLES as f64 * length
     }
 
-    /// The lesser motion of the two ways round, and whether it is the reverse one.
+    /// The smaller motion of the two directions, and whether it is the reversed one.
     fn best_direction(&self, source: usize, target: usize) -> (f64, bool) {
         let [straight, turned] = [false, true].map(|reversed| self.motion(source, SheetMatch { target, reversed }));
         if let Some(reversed) = self.constraints[source].reversed {
@@ -99,7 +100,7 @@ impl Comparison<'_> {
         if turned < straight { (turned, true) } else { (straight, false) }
     }
 
-    /// The sheets at a fraction of the way.
+    /// Sheets interpolated at a fraction of the transition.
     fn interpolated(&self, matches: &[SheetMatch], fraction: f64) -> Vec<Vec<DVec2>> {
         let sheet = |(source, of): (&Vec<DVec2>, &SheetMatch)| -> Vec<DVec2> {
             source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, fraction)).collect()
@@ -127,7 +128,8 @@ impl Comparison<'_> {
         matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum()
     }
 
-    /// Turns one or exchanges two as long as fewer cross, or as many with less motion; and how many such changes were tried.
+    /// Local search: reverses one or swaps two as long as the number of crossings, or at equal number the motion,
+    /// decreases. Also returns the number of changes tried.
     fn reduce_crossings(&self, mut matches: Vec<SheetMatch>) -> (Vec<SheetMatch>, usize) {
         let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
         let most = MAX_CROSSING_TESTS / matches.len().max(1);
@@ -145,8 +147,8 @@ impl Comparison<'_> {
         (matches, tries)
     }
 
-    /// Up to `most` matches with a sheet that crosses turned, or exchanged with another, that are allowed: those that move least.
-    /// Two that cross nothing take no crossing away.
+    /// Up to `most` allowed changes that involve a crossing sheet, those with the least motion first. Changes of two
+    /// sheets without crossings cannot remove one.
     fn candidate_changes(&self, matches: &[SheetMatch], most: usize) -> Vec<Vec<SheetMatch>> {
         let crossed = self.crossed(matches);
         let mut changes = Vec::new();
@@ -158,7 +160,7 @@ impl Comparison<'_> {
             changes.extend(allowed);
         }
         let more = |change: &[(usize, SheetMatch); 2]| -> f64 {
-            // A sheet that turns stands here twice.
+            // A reversal is listed twice.
             let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
             changed.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
         };
@@ -174,7 +176,7 @@ impl Comparison<'_> {
         changes.into_iter().map(changed).collect()
     }
 
-    /// What two sheets become where they exchange their targets, or a sheet where it is turned.
+    /// The new matches of two sheets that swap their targets, or of a sheet that is reversed.
     fn change(&self, matches: &[SheetMatch], [one, other]: [usize; 2]) -> [(usize, SheetMatch); 2] {
         if one == other {
             let of = matches[one];

@@ -1,4 +1,4 @@
-//! What splits and merges on the way from one shape to the next (thesis, figs. 2.4 and 2.5).
+//! Splits and merges in the transition between two shapes (thesis, figs. 2.4 and 2.5).
 
 use bansho_base::{math::DVec2, parameters::Auto};
 
@@ -11,39 +11,42 @@ use crate::shapes::{
     },
 };
 
-/// A strand in a chain of strands that grow together, first to last.
+/// A strand within a chain of strands that merge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ChainLink {
     pub(super) strand: usize,
-    /// Whether it runs against the chain.
+    /// Whether it is traversed backward.
     pub(super) reversed: bool,
 }
 
-/// Two new control points, coincident at first (split) or at last (merge), and the old ones that they were added to.
+/// Two new control points, coincident at the start (split) or the end (merge) of the transition, and the old points
+/// next to them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CoincidentPoints {
     pub(crate) new: [usize; 2],
     pub(crate) old: [usize; 2],
 }
 
-/// The strands that move from a shape to the next: the sheets, cut where they split. A strand is a list of tracks.
+/// A transition to the next shape: strands are the sheets, cut where they split. A strand is a list of control-point
+/// tracks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Transition {
     pub(crate) strands: Vec<Vec<usize>>,
-    /// What each sheet of the next shape is made of.
+    /// The strands that form each sheet of the next shape.
     pub(crate) chains: Vec<Vec<ChainLink>>,
     pub(crate) splits: Vec<CoincidentPoints>,
     pub(crate) merges: Vec<CoincidentPoints>,
 }
 
-/// A cut of a sheet: after which control point, and at which fraction of the segment.
+/// A cut of a sheet: the control point before it, and the fraction of the segment.
 type Cut = (usize, f64);
 
 impl Transition {
-    /// The change that leads to shape `index` from the one before, whose sheets are `sheets`.
+    /// The transition to shape `index` from the previous shape, whose sheets are `sheets`.
     ///
     /// # Errors
-    /// A sheet or segment that is not there, a point that is no end, two changes of one position, a ring.
+    ///
+    /// A missing sheet or segment, a merge point that is not an end, two changes at one position, or a closed ring.
     pub(crate) fn new(
         parameters: &ShapeParameters,
         index: usize,
@@ -51,7 +54,7 @@ impl Transition {
         tracks: &mut Vec<ControlPointTrack>,
     ) -> Result<Self, ShapeError> {
         let mut change = Self::default();
-        // The strands of each sheet, in order.
+        // First and last strand of each sheet.
         let mut parts = Vec::new();
         let cuts = cuts(parameters, index, sheets, tracks)?;
         for (sheet, cuts) in sheets.iter().zip(cuts) {
@@ -78,7 +81,7 @@ impl Transition {
         Ok(change)
     }
 
-    /// Adds the strands of a sheet: at each cut both sides let go and take a new point there.
+    /// Cuts a sheet into strands, with two new coincident points at each cut.
     fn cut(&mut self, sheet: &[usize], cuts: &[Cut], knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         let mut strand = Vec::new();
         let mut start = 0;
@@ -95,7 +98,7 @@ impl Transition {
         self.strands.push(strand);
     }
 
-    /// Adds a new point at each of two ends that grow together.
+    /// Adds a new point at each of two merging ends.
     fn add_merge_points(
         &mut self,
         ends_of_strands: [(usize, usize); 2],
@@ -114,7 +117,8 @@ impl Transition {
         self.merges.push(pair);
     }
 
-    /// Gives every strand at least `count` control points by halving its longest segments, which changes no line.
+    /// Subdivides the longest segments of each strand until it has at least `count` control points; the curve does not
+    /// change.
     pub(crate) fn refine(&mut self, count: usize, knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         for strand in &mut self.strands {
             while strand.len() < count {
@@ -149,20 +153,20 @@ impl Transition {
     }
 }
 
-/// A new control point between two others.
+/// Adds a control point between two others.
 fn add_track(parents: Parents, knot: usize, tracks: &mut Vec<ControlPointTrack>) -> usize {
     let [first, second] = parents.tracks.map(|parent| tracks[parent].knot(knot));
     tracks.push(ControlPointTrack::new(knot, Some(parents), first.lerp(second, parents.fraction)));
     tracks.len() - 1
 }
 
-/// The index of the sheet that a person calls `number`.
+/// Index of a sheet from its one-based number.
 pub(super) fn sheet_index(number: i64, count: usize) -> Result<usize, ShapeErrorKind> {
     let index = usize::try_from(number - 1).ok().filter(|&index| index < count);
     index.ok_or(ShapeErrorKind::NoSuchSheet { sheet: number, count })
 }
 
-/// Where each sheet is cut, in order along it.
+/// Cuts of each sheet, sorted.
 fn cuts(
     parameters: &ShapeParameters,
     index: usize,
@@ -203,7 +207,7 @@ fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<
     }
 }
 
-/// The two ends that a merge names: sheet, and 0 for its start or 1 for its end.
+/// The two ends named by a merge: sheet, and 0 for its start or 1 for its end.
 fn merged_ends(
     merge: &MergeParameters,
     sheets: &[Vec<usize>],
@@ -240,11 +244,11 @@ fn nearest_ends(
     [(pair[0], ends[0]), (pair[1], ends[1])]
 }
 
-/// Strands joined end to end.
+/// Strands joined at their ends.
 struct Chains {
-    /// What each end of each strand is joined to: strand and end.
+    /// The strand and end that each end of each strand is joined to.
     links: Vec<[Option<(usize, usize)>; 2]>,
-    /// A number that all strands of a chain have.
+    /// Chain id of each strand (union by relabeling).
     chain: Vec<usize>,
 }
 
@@ -265,7 +269,7 @@ impl Chains {
         true
     }
 
-    /// The chains, by the first strand of each, which none runs against.
+    /// The chains, each starting with its lowest-numbered strand in forward direction.
     fn collect(&self) -> Vec<Vec<ChainLink>> {
         let mut seen = vec![false; self.links.len()];
         let mut chains = Vec::new();

@@ -1,18 +1,19 @@
-//! Points along two lines that belong together: by length along them, and by nearness (thesis, chapter 4, asks for it).
+//! Dynamic time warping: matches control points to positions on a target line by arc length and distance (requested in
+//! chapter 4 of the thesis).
 
 use bansho_base::math::{DVec2, lerp};
 
 use crate::shapes::geometry::polyline::{Polyline, length_fractions};
 
-/// Points that are looked at one by one: those of two sheets of the most control points that have grown together.
+/// Maximum number of points for the exact algorithm: two merged sheets with the maximum number of control points.
 const MOST_POINTS: usize = 1024;
-/// Positions on the target between two control points where they lie evenly.
+/// Candidate slots on the target per control point.
 const SLOTS_PER_POINT: usize = 8;
-/// Fewest and most such positions from one control point to the next.
+/// Minimum and maximum number of slots between successive control points.
 const STEP_RANGE: [usize; 2] = [3, 20];
-/// For each of `points` the fraction of `target`'s length that it goes to, from `range[0]` for the first to `range[1]` for the last: the
-/// least sum of (distance / length)^2 and `evenness` (spacing - 1)^2, by dynamic programming over 8 positions a point: what has
-/// not moved stays, and the points stay at 3/8 to 5/2 of the even distance.
+/// Target length fractions for `points`, from `range[0]` for the first to `range[1]` for the last. Minimizes the sum of
+/// (distance / length)^2 and `evenness` (spacing - 1)^2 by dynamic programming with 8 slots per point. Unmoved parts
+/// stay where they are; the spacing stays within 3/8 to 5/2 of the uniform one.
 pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
     let slots = last * SLOTS_PER_POINT;
@@ -36,10 +37,10 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     for point in 1..=last {
         next.fill(f64::INFINITY);
         best.fill(0.0);
-        // Positions from which the rest can still be reached, and that can be reached from the start.
+        // Slots that are reachable from the start and from which the end is reachable.
         let low = (point * STEP_RANGE[0]).max(slots.saturating_sub((last - point) * STEP_RANGE[1]));
         let high = (point * STEP_RANGE[1]).min(slots - (last - point) * STEP_RANGE[0]);
-        // Step by step over all positions: compilers make vector code of that.
+        // The loop over slots is innermost so that it is vectorized.
         for step in STEP_RANGE[0]..=STEP_RANGE[1].min(high) {
             let first = low.max(step);
             let from = &costs[first - step..=high - step];
@@ -67,8 +68,8 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     fractions
 }
 
-/// As [`warp`], whose cost grows with the square of the points, through no more than [`MOST_POINTS`] of them, evenly chosen; those
-/// between keep their fraction of the way from one of these to the next.
+/// [`warp`] for at most [`MOST_POINTS`] evenly chosen points, since its cost is quadratic; the others are interpolated
+/// by arc length.
 fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
     if points.len() <= MOST_POINTS {
@@ -85,7 +86,7 @@ fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: 
     all
 }
 
-/// As [`warp`], but each of `anchors`, a point and its fraction, arrives there; both are in order along the points.
+/// [`warp`] with `anchors`: pairs of point index and fraction at which it must arrive, both ascending along the points.
 pub(crate) fn warp_through(
     points: &[DVec2],
     target: &Polyline,

@@ -1,41 +1,41 @@
-//! How far a point is from the shape, answered near the shape only: the test with L_thr (thesis, 2.2.3).
+//! Nearest-segment queries within a maximum distance: the test against L_thr (thesis, 2.2.3).
 
 use bansho_base::math::DVec2;
 
 use super::cell_grid::CellGrid;
 use crate::shapes::Shape;
 
-/// Cells along the reach: the finer they are, the fewer segments can be nearest to a position in one.
+/// Cells per query radius: smaller cells have fewer candidate segments.
 const CELLS_PER_REACH: f64 = 4.0;
-/// Most cells along a side.
+/// Maximum number of cells along a side.
 const MAX_CELLS_PER_SIDE: usize = 512;
-/// About as many cells as lie within the reach at most, so that long shapes cost no more than their segments do.
+/// Approximate maximum number of cells within the radius, which bounds the cost for long shapes.
 const MAX_CELLS_WITHIN_REACH: f64 = 40_000.0;
 
-/// Segments of a shape by the cells to whose positions they can be nearest.
+/// A uniform grid with the candidate segments of each cell.
 #[derive(Clone, Debug)]
 pub struct NearestSegmentGrid {
     reach: f64,
     grid: CellGrid,
-    /// Where the list of each cell begins in `lists`, and where the last one ends.
+    /// Start of each cell's list in `lists`, and the total.
     starts: Vec<u32>,
     lists: Vec<SegmentGeometry>,
 }
 
-/// The position of a shape that is nearest to a point.
+/// The point of a shape that is nearest to a query point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestPoint {
-    /// Its segment, counted over all sheets in turn.
+    /// Its segment index, counted over all sheets.
     pub(crate) segment: usize,
-    /// Fraction of the segment before it.
+    /// Fraction along the segment.
     pub(crate) fraction: f64,
     /// Square of the distance, km^2.
     pub(crate) distance_squared: f64,
-    /// Signed distance from the line through the segment, negative on the left of the way along it, times the segment's length, km^2.
+    /// Signed distance from the line through the segment, negative to the left, times the segment's length, km^2.
     pub(crate) cross: f64,
 }
 
-/// A segment: its number, its start, the way to its end, and one over the square of its length (0 where it has none).
+/// Index, start and direction of a segment, and one over its squared length (0 for a degenerate one).
 #[derive(Clone, Copy, Debug)]
 struct SegmentGeometry {
     number: u32,
@@ -45,7 +45,7 @@ struct SegmentGeometry {
 }
 
 impl NearestSegmentGrid {
-    /// What lies within `reach` km of `shape`.
+    /// A grid for queries within `reach` km of `shape`.
     pub fn new(shape: &Shape, reach: f64) -> Self {
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
         let segments: Vec<SegmentGeometry> =
@@ -69,15 +69,16 @@ impl NearestSegmentGrid {
         self.nearest(point).map(|(_, distance)| distance)
     }
 
-    /// The segment nearest to `point`, counted over all sheets in turn, and the distance to it, km; the first of several that
-    /// are as near. `None` beyond the reach.
+    /// Index of the segment nearest to `point`, counted over all sheets, and its distance, km; the first one at equal
+    /// distance. `None` beyond the reach.
     #[inline]
     pub fn nearest(&self, point: DVec2) -> Option<(usize, f64)> {
         let nearest = self.nearest_point(point)?;
         Some((nearest.segment, nearest.distance_squared.sqrt()))
     }
 
-    /// The position of the shape that is nearest to `point`; that on the first of several segments that are as near. `None` beyond the reach.
+    /// The point of the shape that is nearest to `point`, on the first segment at equal distance. `None` beyond the
+    /// reach.
     #[inline]
     pub(crate) fn nearest_point(&self, point: DVec2) -> Option<NearestPoint> {
         let cell = self.grid.cell_of(point);
@@ -87,7 +88,7 @@ impl NearestSegmentGrid {
             let fraction = (from_start.dot(segment.direction) * segment.inverse_square).clamp(0.0, 1.0);
             let square = from_start.distance_squared(segment.direction * fraction);
             if square < nearest.distance_squared {
-                // Times the length, the distance from the line through the segment.
+                // Cross product: distance from the line times the length.
                 let side = from_start.perp_dot(segment.direction);
                 nearest =
                     NearestPoint { segment: segment.number as usize, fraction, distance_squared: square, cross: side };
@@ -97,16 +98,16 @@ impl NearestSegmentGrid {
     }
 }
 
-/// A run of cells that a segment passes near by.
+/// A run of cells within reach of a segment.
 struct CellRun {
     segment: u32,
-    /// Its first cell, and the position of its distance in the list of all.
+    /// First cell, and the index of its distance in the common list.
     cell: u32,
     first: u32,
 }
 
-/// The segments that can be nearest to a position within `reach` in each cell, one cell's after those of another, and where each cell's begin:
-/// those no farther from its middle than the nearest one by more than twice the way from there to its corners.
+/// Candidate lists of all cells: a segment is kept if its distance from the cell's center exceeds that of the nearest
+/// segment by at most the cell's diagonal. Distances are computed per run of cells.
 fn nearest_candidates(grid: &CellGrid, segments: &[SegmentGeometry], reach: f64) -> (Vec<u32>, Vec<SegmentGeometry>) {
     let (mut runs, mut squares) = (Vec::new(), Vec::new());
     let mut least = vec![f32::INFINITY; grid.count()];
@@ -121,7 +122,7 @@ fn nearest_candidates(grid: &CellGrid, segments: &[SegmentGeometry], reach: f64)
             }
         });
     }
-    // A little more, so that rounding loses nothing.
+    // Margin for rounding.
     let slack = (2.0 * 1.001 * grid.half_diagonal()) as f32;
     let most: Vec<f32> = least.iter().map(|least| (least.sqrt() + slack) * (least.sqrt() + slack)).collect();
     let ends = runs.iter().skip(1).map(|run| run.first as usize).chain([squares.len()]);
@@ -156,7 +157,7 @@ impl SegmentGeometry {
         Self { number, start, direction: end - start, inverse_square }
     }
 
-    /// Squares of the distances from positions in a row, so far from each other, of which the first is given.
+    /// Squared distances of `squares.len()` points in a row, `apart` from each other, starting at `first`.
     fn fill_squares(&self, first: DVec2, apart: f64, squares: &mut [f32]) {
         let from_start = first - self.start;
         let ([x, y], [u, v]) =

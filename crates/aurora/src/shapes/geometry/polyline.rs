@@ -1,11 +1,11 @@
-//! Polylines: length along them, points at fractions of it, and how strokes become control points.
+//! Polylines: arc length, resampling, and control points from strokes.
 
 use bansho_base::math::{DVec2, lerp};
 
-/// Strokes with fewer points than this are taken for sketches and smoothed.
+/// Strokes with fewer points are treated as sketches and smoothed.
 const SKETCH_POINTS: usize = 256;
 
-/// Points with the length along them; at least one point.
+/// Points with cumulative arc length; at least one point.
 #[derive(Clone, Debug)]
 pub(crate) struct Polyline {
     points: Vec<DVec2>,
@@ -31,7 +31,7 @@ impl Polyline {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// The point at the fraction `fraction` of the length, 0 at the start to 1 at the end.
+    /// The point at a fraction of the length, 0 at the start to 1 at the end.
     pub(crate) fn at(&self, fraction: f64) -> DVec2 {
         let distance = fraction * self.length();
         let last = self.points.len() - 1;
@@ -45,7 +45,7 @@ impl Polyline {
         }
     }
 
-    /// `count` points at equal distances along it, both ends included.
+    /// Resamples to `count` points at equal arc length, both ends included.
     pub(crate) fn resample(&self, count: usize) -> Vec<DVec2> {
         (0..count).map(|index| self.at(index as f64 / (count - 1).max(1) as f64)).collect()
     }
@@ -62,7 +62,7 @@ pub(crate) fn cumulative_lengths(points: &[DVec2]) -> Vec<f64> {
     lengths
 }
 
-/// Fraction of the length at each point; evenly from 0 to 1 where the line has no length.
+/// Fraction of the length at each point; uniform where the length is 0.
 pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
     let mut fractions = cumulative_lengths(points);
     let sum = fractions.last().copied().unwrap_or(0.0);
@@ -73,8 +73,8 @@ pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
     fractions
 }
 
-/// Eq. (2.1): `count` control points P_i by linear interpolation over the recorded positions M_j. The printed position i m/n
-/// leaves out the end of the stroke; i (m - 1)/(n - 1) reaches it.
+/// Eq. (2.1): `count` control points P_i by linear interpolation over the recorded positions M_j. The printed index i
+/// m/n cuts off the end of the stroke; i (m - 1)/(n - 1) reaches it.
 pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
     let last = recorded.len().saturating_sub(1);
     let point = |i: usize| {
@@ -86,8 +86,9 @@ pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> 
     (0..count).map(point).collect()
 }
 
-/// A smooth line through the points of a sketch: Catmull-Rom segments, whose centripetal knots make neither loops nor cusps
-/// between two points (Yuksel, Schaefer & Keyser 2011), and how many pieces lie between them. Strokes of many points stay as they are.
+/// A centripetal Catmull-Rom spline through the points of a sketch, without cusps or self-intersections within a
+/// segment (Yuksel, Schaefer & Keyser 2011), and its number of segments per point. Longer strokes are returned
+/// unchanged.
 pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     const PIECES: usize = 8;
     let count = points.len();
@@ -108,7 +109,7 @@ pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     (line, PIECES)
 }
 
-/// The curve between the two inner points, by the pyramid of Barry & Goldman (1988).
+/// The segment between the two inner points (Barry & Goldman 1988).
 fn centripetal([a, b, c, d]: [DVec2; 4], fraction: f64) -> DVec2 {
     let step = |from: DVec2, to: DVec2| from.distance(to).sqrt().max(1e-9);
     let [ta, tb] = [0.0, step(a, b)];
@@ -155,8 +156,8 @@ mod tests {
 
     #[test]
     fn a_smoothed_sketch_passes_its_points_and_stays_straight_where_they_are() {
-        let (line, for_each_strip) = smooth_sketch(corner());
-        assert_eq!((line.len(), for_each_strip), (17, 8));
+        let (line, pieces) = smooth_sketch(corner());
+        assert_eq!((line.len(), pieces), (17, 8));
         assert!(corner().iter().all(|point| line.contains(point)));
         let straight: Vec<DVec2> = (0..4).map(|i| DVec2::new(f64::from(i), 0.0)).collect();
         let (line, _) = smooth_sketch(straight);

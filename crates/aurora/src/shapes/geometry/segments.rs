@@ -1,19 +1,19 @@
-//! Sampling along the sheets: cost grows with what is sampled, not with the area that the shape takes.
+//! Uniform sampling of sheets by arc length: the cost depends on the number of samples, not on the covered area.
 
 use bansho_base::math::{DVec2, lerp};
 
 use crate::shapes::{SegmentId, Shape};
 
-/// A position on a sheet.
+/// A sampled position on a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SheetSample {
-    /// Where it is, km.
+    /// Position, km.
     pub point: DVec2,
     /// Unit vector along the sheet.
     pub tangent: DVec2,
-    /// Where it is on the sheet.
+    /// The segment.
     pub segment: SegmentId,
-    /// Fraction of the sheet's length before it.
+    /// Fraction of the sheet's length.
     pub fraction: f64,
     /// Factor of the aurora's flux there.
     pub flux: f64,
@@ -21,14 +21,14 @@ pub struct SheetSample {
     pub energy: f64,
 }
 
-/// The segments of a shape that have a length, with the length up to each.
+/// Segments with non-zero length and their cumulative length.
 #[derive(Clone, Debug)]
 pub struct SheetSampler<'a> {
     shape: &'a Shape,
     ids: Vec<SegmentId>,
     /// Length of all sheets up to the end of each segment, km.
     ends: Vec<f64>,
-    /// Where each sheet begins and ends in that length, km.
+    /// Range of each sheet in the cumulative length, km.
     sheets: Vec<[f64; 2]>,
 }
 
@@ -54,7 +54,7 @@ impl<'a> SheetSampler<'a> {
         self.ends.last().copied().unwrap_or(0.0)
     }
 
-    /// The position at the fraction `u` of the length of all sheets, 0 to 1: even `u` lie evenly along the sheets. O(log n) for n
+    /// The position at the fraction `u` of the length of all sheets; uniform `u` give uniform density. O(log n) for n
     /// segments. `None` for a shape without length.
     pub fn sample(&self, u: f64) -> Option<SheetSample> {
         let distance = u.clamp(0.0, 1.0) * self.length();

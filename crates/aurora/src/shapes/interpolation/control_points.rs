@@ -1,4 +1,4 @@
-//! From drawn shapes to control points that are followed from shape to shape.
+//! Tracks control points through all shapes of a sequence.
 
 use bansho_base::{host::assets::Assets, math::DVec2};
 
@@ -18,13 +18,13 @@ use crate::shapes::{
     strokes::validate::{DrawnSheet, ShapeContext, drawn_sheets},
 };
 
-/// Control points nearer than this lie at one position, km.
+/// Control points closer than this coincide, km.
 const SAME_KM: f64 = 1e-3;
 
-/// Control points of all shapes together that are followed at most: some 200 MB.
+/// Maximum number of control points of all shapes: about 200 MB.
 const MOST_POINTS: usize = 4_000_000;
 
-/// Tracks, and which of them make up the sheets.
+/// Control-point tracks, and the tracks of each sheet.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TrackedControlPoints {
     pub(crate) tracks: Vec<ControlPointTrack>,
@@ -34,16 +34,17 @@ pub(crate) struct TrackedControlPoints {
     pub(crate) strands: Vec<Vec<Vec<usize>>>,
     /// Gaps that open or close from each shape to the next.
     pub(crate) gaps: Vec<Vec<Gap>>,
-    /// Whether the last shape is the first again.
+    /// Whether the last shape equals the first.
     pub(crate) is_closed: bool,
-    /// Each track of the last shape that then lies where one of the first does, and that one, in order.
+    /// Pairs of tracks: one of the last shape, sorted, and the coincident one of the first shape.
     pub(crate) repeated: Vec<[usize; 2]>,
 }
 
-/// The sheets of all shapes as they are drawn.
+/// The sheets of all shapes as drawn.
 ///
 /// # Errors
-/// A shape that cannot be drawn.
+///
+/// An invalid shape.
 pub(crate) fn drawn_shapes(
     shapes: &[ShapeParameters],
     extent_km: f64,
@@ -53,11 +54,12 @@ pub(crate) fn drawn_shapes(
     shapes.iter().enumerate().map(draw).collect()
 }
 
-/// Follows the control points through all shapes, with what is drawn of them; `evenness` weighs even spacing against nearness where
-/// they are matched by position.
+/// Tracks control points through all shapes. `evenness` weights uniform spacing against distance in the automatic
+/// correspondence.
 ///
 /// # Errors
-/// A shape that does not come from the one before; more control points than can be followed.
+///
+/// A shape with the wrong number of sheets; too many control points.
 pub(crate) fn follow(
     (shapes, drawn): (&[ShapeParameters], &[Vec<DrawnSheet>]),
     motion: &MotionParameters,
@@ -75,7 +77,7 @@ pub(crate) fn follow(
     let mut count = tracked.point_count(0);
     tracked.is_closed = drawn.len() > 1 && same(&drawn[0], &drawn[drawn.len() - 1], extent_km);
     if let Some(last) = shapes.last().filter(|_| in_order) {
-        // There the drawing shows the sheets before they part or join.
+        // In drawing order a shape is drawn before its splits and merges.
         tracked.is_closed &= last.split.is_empty() && last.merge.is_empty();
     }
     for (index, parameters) in shapes.iter().enumerate().skip(1) {
@@ -99,7 +101,7 @@ pub(crate) fn follow(
         }
         tracked.gaps.push(change.gaps());
         tracked.strands.push(change.strands);
-        // Sheets that have grown together keep all of their points.
+        // Merged sheets keep all their points.
         count += tracked.point_count(index);
         check_count(count, index)?;
     }
@@ -109,24 +111,24 @@ pub(crate) fn follow(
     Ok(tracked)
 }
 
-/// Refuses more control points of all shapes up to shape `index` than can be held.
+/// Checks the number of control points up to shape `index`.
 fn check_count(found: usize, index: usize) -> Result<(), ShapeError> {
     let kind = ShapeErrorKind::TooManyPoints { found, most: MOST_POINTS };
     let error = || ShapeError { key: format!("shapes.{index}.sheets"), kind };
     if found > MOST_POINTS { Err(error()) } else { Ok(()) }
 }
 
-/// Where a chain of strands goes.
+/// The target of a chain of strands.
 struct ChainTarget<'a> {
     drawn: &'a DrawnSheet,
     of: SheetMatch,
-    /// The tracks of that sheet in the first shape, if it shall be reached again point by point.
+    /// Tracks of that sheet in the first shape, if the sequence closes there point by point.
     first_shape: Option<Vec<usize>>,
     evenness: f64,
     constraints: &'a LinkConstraints,
 }
 
-/// Whether two drawn shapes are the same, sheet by sheet: where they lie, and their flux and energy along them.
+/// Whether two drawn shapes are equal in position, flux and energy.
 fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
     const SAMPLES: usize = 64;
     let near = |a: &DVec2, b: &DVec2| a.distance(*b) < 1e-6 * extent_km;
@@ -137,7 +139,7 @@ fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
     first.len() == last.len() && first.iter().zip(last).all(same_sheet)
 }
 
-/// Control points of a sheet with flux and energy there.
+/// Control points of a sheet with flux and energy factors.
 fn control_knots(sheet: &DrawnSheet, count: usize, motion: &MotionParameters) -> Vec<Knot> {
     let points = sheet.control_points(count, motion.spacing);
     let fractions = length_fractions(&points);
@@ -151,7 +153,7 @@ impl TrackedControlPoints {
         self.shapes[shape].iter().map(Vec::len).sum()
     }
 
-    /// Each track of the last shape that lies where one of the first does, point by point of the sheets as they are drawn.
+    /// Pairs of coincident tracks of the last and the first shape.
     fn repeated_points(&self) -> Vec<[usize; 2]> {
         let last = self.shapes.len() - 1;
         let same_count = |(first, last): &(&Vec<usize>, &Vec<usize>)| first.len() == last.len();
@@ -166,7 +168,7 @@ impl TrackedControlPoints {
         pairs
     }
 
-    /// The first shape.
+    /// Adds the first shape.
     fn begin(&mut self, drawn: &[DrawnSheet], motion: &MotionParameters) {
         let mut sheets = Vec::new();
         for sheet in drawn {
@@ -178,8 +180,8 @@ impl TrackedControlPoints {
         self.shapes.push(sheets);
     }
 
-    /// The thesis's way: sheet by sheet and point by point. Where a sheet splits, the segment between the parts shrinks away; where
-    /// two ends merge, a segment grows between them.
+    /// Correspondence by drawing order, as in the thesis. Where a sheet splits, the segment between its parts shrinks;
+    /// where two ends merge, a segment grows between them.
     fn advance_in_order(&mut self, change: &Transition, drawn: &[DrawnSheet], motion: &MotionParameters) {
         let sheets = self.shapes[self.shapes.len() - 1].clone();
         let next = self.shapes.len();
@@ -212,7 +214,7 @@ impl TrackedControlPoints {
         self.shapes.push(change.chains.iter().map(sheet).collect());
     }
 
-    /// By position: each chain of strands to the sheet that it is matched with, each point to one by length and nearness.
+    /// Automatic correspondence: chains by sheet matching, points by time warping.
     fn advance_by_nearness(
         &mut self,
         change: &Transition,
@@ -226,7 +228,7 @@ impl TrackedControlPoints {
         let line = |chain: &Vec<ChainLink>| -> Vec<DVec2> {
             chain.iter().flat_map(|&link| change.tracks_along(link)).map(|track| position(&track)).collect()
         };
-        // A strand has at least two points, so that no line is left out.
+        // A strand has at least two points, so the polyline exists.
         let sources: Vec<Polyline> = change.chains.iter().filter_map(|chain| Polyline::new(line(chain))).collect();
         let targets: Vec<&Polyline> = drawn.iter().map(|sheet| &sheet.line).collect();
         let matches = match_sheets(&sources, &targets, &constraints.chain_constraints);
@@ -243,7 +245,7 @@ impl TrackedControlPoints {
         self.shapes.push(sheets);
     }
 
-    /// Moves the strands of a chain to their parts of a sheet; the sheet's tracks, along the chain.
+    /// Moves the strands of a chain to their ranges of a sheet; returns the sheet's tracks along the chain.
     fn advance_chain(&mut self, change: &Transition, chain: &[ChainLink], target: &ChainTarget) -> Vec<usize> {
         let ChainTarget { drawn, of, first_shape, evenness, constraints } = target;
         let knot = self.shapes.len() - 1;
@@ -271,14 +273,14 @@ impl TrackedControlPoints {
                 let index = if turned { knots.len() - 1 - index } else { index };
                 self.tracks[track].knots.push(knots[index]);
             }
-            // Where two strands have met, two points coincide; one of them goes on.
+            // Where two strands merge, one of the two coincident points is kept.
             sheet.extend(&strand[usize::from(!sheet.is_empty())..]);
         }
         sheet
     }
 }
 
-/// The fraction of a sheet's length that each strand of a chain takes: as its length, and half of the gap on each side.
+/// Length range of a sheet for each strand of a chain: in proportion to its length plus half of the adjacent gaps.
 fn strand_ranges(strands: &[Vec<DVec2>]) -> Vec<[f64; 2]> {
     let length = |points: &[DVec2]| points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
     let gap = |index: usize| match (

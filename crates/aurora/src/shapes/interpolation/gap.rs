@@ -1,21 +1,21 @@
-//! Gaps that open where a sheet splits and close where two merge: how light fades toward them and passes over them.
+//! Gaps where a sheet splits or two sheets merge: how flux fades toward them and bridges them.
 //!
-//! A sheet does not break like a rod. Where it splits, precipitation first weakens over some way to both sides, then the two ends draw apart
-//! in the dark; where ends merge they stay faint until they are near, and brighten together.
+//! Before a gap opens, the flux decreases over some distance on both sides; the ends then separate while dark. Merging
+//! ends stay dim until they are close, then brighten together.
 
 use bansho_base::math::smoothstep;
 
 use crate::shapes::{Sheet, geometry::polyline::cumulative_lengths};
 
-/// Light passes over gaps narrower than this, km, and narrower than half of what they are when they are widest.
+/// Gaps narrower than this, km, and than half of their maximum width, are bridged by light.
 const BRIDGED_KM: f64 = 40.0;
-/// Over this way along a sheet its light fades toward a gap, km, and over no more than this fraction of the sheet.
+/// Length over which the flux fades toward a gap, km, and its maximum as a fraction of the sheet.
 const FADE_KM: f64 = 60.0;
 const FADE_SHARE: f64 = 0.35;
-/// Fraction of the transition, at the side where the gap is widest, in which ends change between what is drawn and dark.
+/// Fraction of the transition, on the side of the maximum width, over which ends change between drawn and dark.
 const DARKENING: f64 = 0.15;
 
-/// Two control points that are one where the gap is closed.
+/// Two control points that coincide where the gap is closed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gap {
     pub(crate) ends: [usize; 2],
@@ -23,7 +23,7 @@ pub(crate) struct Gap {
     pub(crate) opens: bool,
 }
 
-/// A gap at a moment.
+/// State of a gap at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GapFlux {
     /// Factor of the flux at both ends.
@@ -32,10 +32,10 @@ pub(crate) struct GapFlux {
     pub(crate) across: f64,
 }
 
-/// An interval of light over a narrow gap between two ends of sheets.
+/// Light across a narrow gap between two ends of sheets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bridge {
-    /// The two sheets, as the shape lists them, and whether it is the end of each (or its start).
+    /// Index of the two sheets, and whether it is the end of each (or its start).
     pub ends: [(usize, bool); 2],
     /// Factors of the aurora's flux and energy there.
     pub flux: f64,
@@ -44,17 +44,17 @@ pub struct Bridge {
 }
 
 impl GapFlux {
-    /// A gap of `width` km that is `widest` km when it is widest, at a fraction of the time from where it is closed to there.
+    /// A gap of `width` km with the maximum `widest`, at a fraction of the time from closed to widest.
     pub(crate) fn new(width: f64, widest: f64, fraction: f64) -> Self {
         let limit = BRIDGED_KM.min(0.5 * widest);
         let closed = if limit > 0.0 { 1.0 - smoothstep(0.0, limit, width) } else { 1.0 };
-        // At the wide side sheets are as they are drawn.
+        // At maximum width the sheets are as drawn.
         let free = 1.0 - smoothstep(1.0 - DARKENING, 1.0, fraction);
         Self { ends: 1.0 - (1.0 - closed) * free, across: closed * free }
     }
 }
 
-/// Lets the flux of a sheet fade toward its start, or its end, down to that fraction there.
+/// Fades the flux of a sheet toward its start or end, down to that fraction.
 pub(crate) fn fade_toward_gap(sheet: &mut Sheet, at_end: bool, fraction: f64) {
     let lengths = cumulative_lengths(&sheet.points);
     let whole = lengths.last().copied().unwrap_or(0.0);

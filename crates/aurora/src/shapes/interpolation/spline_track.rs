@@ -1,8 +1,8 @@
-//! A control point on its way through the shapes: a cubic spline in time (thesis, 2.2.2).
+//! The path of a control point through the shapes: a cubic spline in time (thesis, 2.2.2).
 
 use bansho_base::math::{DVec2, lerp, smoothstep};
 
-/// When each shape is reached and left, s.
+/// Arrival and departure times of each shape, s.
 #[derive(Clone, Debug)]
 pub(crate) struct ShapeTiming {
     pub(crate) arrivals: Vec<f64>,
@@ -20,7 +20,7 @@ impl ShapeTiming {
     }
 }
 
-/// Where a control point is at one shape.
+/// State of a control point at one shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knot {
     pub(crate) position: DVec2,
@@ -35,17 +35,17 @@ impl Knot {
     }
 }
 
-/// The two control points between which one is born, and the fraction of the way from the first to the second.
+/// The two control points between which a point is inserted, and the fraction from the first to the second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parents {
     pub(crate) tracks: [usize; 2],
     pub(crate) fraction: f64,
 }
 
-/// A control point from the shape at which it is born to the last one that has it.
+/// A control point from the shape where it is inserted to the last one that has it.
 #[derive(Clone, Debug)]
 pub(crate) struct ControlPointTrack {
-    /// The shape at which it is born.
+    /// Index of its first shape.
     pub(super) first_shape: usize,
     pub(super) parents: Option<Parents>,
     pub(crate) knots: Vec<Knot>,
@@ -53,10 +53,10 @@ pub(crate) struct ControlPointTrack {
     velocities: Vec<DVec2>,
 }
 
-/// What is known of the velocity at an end of a spline.
+/// Boundary condition of a spline.
 #[derive(Clone, Copy)]
 enum SplineEnd {
-    /// No curvature there.
+    /// Zero curvature.
     Natural,
     Velocity(DVec2),
 }
@@ -66,12 +66,12 @@ impl ControlPointTrack {
         Self { first_shape, parents, knots: vec![knot], velocities: Vec::new() }
     }
 
-    /// The knot at shape `index`, which it must pass.
+    /// The knot at shape `index`, which must be one of its shapes.
     pub(crate) fn knot(&self, index: usize) -> Knot {
         self.knots[index - self.first_shape]
     }
 
-    /// Where it is between the shapes `index` and the next, at the fraction `fraction` of the time between them.
+    /// Interpolates between shape `index` and the next, at a fraction of the time between them.
     pub(crate) fn between(&self, index: usize, fraction: f64, timing: &ShapeTiming) -> Knot {
         let knot_index = index - self.first_shape;
         let [from, to] = [self.knots[knot_index], self.knots[knot_index + 1]];
@@ -87,9 +87,9 @@ impl ControlPointTrack {
     }
 }
 
-/// Finds the velocities of all tracks. A held shape stands still; one that nothing fixes begins and ends without curvature,
-/// but eases in and out where there are only two shapes; what is born between two points begins as they move on, and also ends so
-/// if it lives to the next shape only. With `closed`, points that end where they began pass that position with one velocity.
+/// Computes the velocities of all tracks. Velocities are 0 at held shapes. Free ends have zero curvature; with only two
+/// shapes the motion eases in and out. An inserted point starts with its parents' velocity, and also ends with it if it
+/// exists for one transition only. With `closed`, points that return to their start have one velocity there.
 pub(crate) fn find_velocities(tracks: &mut [ControlPointTrack], timing: &ShapeTiming, closed: bool) {
     for index in 0..tracks.len() {
         let (known, rest) = tracks.split_at_mut(index);
@@ -101,7 +101,7 @@ pub(crate) fn find_velocities(tracks: &mut [ControlPointTrack], timing: &ShapeTi
 }
 
 impl Parents {
-    /// How they move at shape `index`.
+    /// Interpolated velocity of the parents at shape `index`.
     fn velocity(&self, index: usize, tracks: &[ControlPointTrack]) -> DVec2 {
         let [first, second] = self.tracks.map(|parent| {
             let parent = &tracks[parent];
@@ -142,7 +142,7 @@ fn velocities(
     velocities
 }
 
-/// The velocity with which a point passes the position where it begins and ends; none for one that does not return.
+/// Velocity at the common start and end position of a closed track, if it returns.
 fn closing_velocity(track: &ControlPointTrack, timing: &ShapeTiming) -> Option<DVec2> {
     let count = track.knots.len();
     let [first, last] = [track.knots[0], track.knots[count - 1]].map(|knot| knot.position);
@@ -153,7 +153,7 @@ fn closing_velocity(track: &ControlPointTrack, timing: &ShapeTiming) -> Option<D
     })
 }
 
-/// Velocities of the cubic spline through `positions`: continuous in its second derivative.
+/// Velocities of the C2 cubic spline through `positions` (tridiagonal system, Thomas algorithm).
 fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<DVec2> {
     let last = spans.len();
     if last == 1 && matches!(ends, [SplineEnd::Natural, SplineEnd::Natural]) {
@@ -187,7 +187,7 @@ fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<D
     values
 }
 
-/// The first row of the system: nothing before, the point, the one after, right side.
+/// Boundary row of the system: lower, diagonal and upper coefficient, right-hand side.
 fn end_row(end: SplineEnd, slope: DVec2) -> (f64, f64, f64, DVec2) {
     match end {
         SplineEnd::Natural => (0.0, 2.0, 1.0, 3.0 * slope),

@@ -1,11 +1,12 @@
-//! Where sheets cross: themselves or one another. Sheets of an aurora never do (thesis, 2.2.1).
+//! Crossings of sheets with themselves or one another, which are not allowed (thesis, 2.2.1), and sheets that pass
+//! through each other over time.
 
 use crate::shapes::geometry::cell_grid::CellGrid;
 use crate::shapes::{Shape, Sheet};
 use bansho_base::math::DVec2;
 use std::collections::BTreeSet;
 
-/// A segment of one of several sheets; both count from 0.
+/// A segment of a sheet, indices from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SegmentId {
     /// The sheet.
@@ -18,22 +19,23 @@ pub struct SegmentId {
 struct SheetSegment {
     id: SegmentId,
     ends: [DVec2; 2],
-    /// Whether it goes on from the one before it in the list.
+    /// Whether it continues the previous segment in the list.
     continues: bool,
 }
 
-/// Which meetings of segments count.
+/// Which intersections count.
 #[derive(Clone, Copy, PartialEq)]
 enum Meeting {
-    /// Also those that only touch.
+    /// Touching segments included.
     Touching,
-    /// Those where each passes from one side of the other to its other side.
+    /// Proper crossings only.
     Proper,
 }
 
-/// The first crossing along the sheets, touching included: of all segments that meet an earlier one the first, and the earliest that it meets.
+/// The first crossing along the sheets, touching included: the first segment that meets an earlier one, and the
+/// earliest of these.
 ///
-/// A cell list makes it linear for strokes as hands draw them; it ends at the first crossing.
+/// A cell list makes the cost linear for typical strokes; the search ends at the first crossing.
 pub fn first_crossing<S: AsRef<[DVec2]>>(sheets: &[S]) -> Option<[SegmentId; 2]> {
     let mut found = None;
     for_each_meeting(sheets, Meeting::Touching, |pair| {
@@ -43,7 +45,7 @@ pub fn first_crossing<S: AsRef<[DVec2]>>(sheets: &[S]) -> Option<[SegmentId; 2]>
     found
 }
 
-/// How many pairs of segments pass through each other. In-between shapes may; it is a figure to show, not a fault.
+/// Number of properly crossing pairs of segments. In-between shapes may have some; this is not an error.
 pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
     let mut count = 0;
     for_each_meeting(sheets, Meeting::Proper, |_| {
@@ -53,7 +55,7 @@ pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
     count
 }
 
-/// The sheets of which a segment passes through one of another or of its own.
+/// Indices of sheets with proper crossings.
 pub(crate) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     for_each_meeting(sheets, Meeting::Proper, |pair| {
@@ -63,7 +65,7 @@ pub(crate) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize
     found
 }
 
-/// All segments that have a length, in order.
+/// All segments with non-zero length, in order.
 fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
     let mut list = Vec::new();
     for (sheet, points) in sheets.iter().enumerate() {
@@ -76,7 +78,7 @@ fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
     list
 }
 
-/// Cells about as long as a segment, and not many more than there are segments, since all of them are cleared.
+/// Cells about as long as a segment, and not many more cells than segments, since all are cleared.
 fn grid(segments: &[SheetSegment]) -> CellGrid {
     let ends = || segments.iter().flat_map(|segment| segment.ends);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);
@@ -87,14 +89,14 @@ fn grid(segments: &[SheetSegment]) -> CellGrid {
 
 const NONE: u32 = u32::MAX;
 
-/// Calls `visit` with each pair that meets, the later segment last, until it says `false`.
+/// Calls `visit` with each intersecting pair, the later segment last, until it returns `false`.
 fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit: impl FnMut([SegmentId; 2]) -> bool) {
     let segments = segments(sheets);
     if segments.len() < 2 {
         return;
     }
     let grid = grid(&segments);
-    // Each cell's list of segments, linked from the latest to the earliest.
+    // Linked list of segments per cell, latest first.
     let mut heads = vec![NONE; grid.count()];
     let mut links: Vec<(u32, u32)> = Vec::with_capacity(4 * segments.len());
     let mut compared_with = vec![NONE; segments.len()];
@@ -123,7 +125,7 @@ fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit
     }
 }
 
-/// Twice the area of the triangle, positive on one side of the line from `a` to `b`.
+/// Orientation predicate: twice the signed area of the triangle.
 fn orient2d(a: DVec2, b: DVec2, point: DVec2) -> f64 {
     (b - a).perp_dot(point - a)
 }
@@ -131,7 +133,7 @@ fn orient2d(a: DVec2, b: DVec2, point: DVec2) -> f64 {
 fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Meeting) -> bool {
     let [[a, b], [c, d]] = [first.ends, second.ends];
     if follows {
-        // They fraction a point; they meet elsewhere only if the second runs back over the first.
+        // Consecutive segments share a point; they overlap only if the second runs backward.
         return meeting == Meeting::Touching && orient2d(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
     }
     let [c_side, d_side, a_side, b_side] = [orient2d(a, b, c), orient2d(a, b, d), orient2d(c, d, a), orient2d(c, d, b)];
@@ -145,14 +147,15 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
             .any(|(side, from, to, point)| side == 0.0 && (point - from).dot(point - to) <= 0.0)
 }
 
-/// With more sheets than these nobody sees which is which.
+/// The test is skipped with more sheets.
 const MOST_SHEETS: usize = 40;
-/// Positions along a sheet that are looked at, in quarters of its points.
+/// Tested points of a sheet, in quarters of its points.
 const PLACES: [usize; 3] = [1, 2, 3];
-/// Those who pass are as near to each other as they move, but for this factor.
+/// Maximum distance relative to the motion.
 const NEAR: f64 = 1.5;
 
-/// Whether a sheet of `before` is on the other side of another in `after`, a moment later: both have the same control points.
+/// Whether a sheet of `before` is on the other side of another sheet in `after`; both shapes have the same control
+/// points.
 pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
     let count = before.sheets.len();
     let alike = |(a, b): (&Sheet, &Sheet)| a.points.len() == b.points.len();
@@ -173,7 +176,7 @@ pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
     })
 }
 
-/// Distance of a point from a line, positive on one side of it; none where its end is nearest.
+/// Signed distance of a point from a polyline; `None` beyond its ends.
 fn signed_distance(point: DVec2, line: &[DVec2]) -> Option<f64> {
     let (mut least, mut nearest) = (f64::INFINITY, None);
     let last = line.len().saturating_sub(2);

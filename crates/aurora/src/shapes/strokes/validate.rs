@@ -1,4 +1,4 @@
-//! From parameters to drawn sheets, checked one by one and against each other.
+//! Converts parameters to drawn sheets and validates them.
 
 use super::intersection::first_crossing;
 use crate::shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch};
@@ -10,27 +10,27 @@ use bansho_base::math::{self, DVec2, smoothstep};
 use bansho_base::parameters::Auto;
 use std::sync::Arc;
 
-/// Points closer than this are one, km.
+/// Points closer than this are merged, km.
 const SAME_KM: f64 = 1e-6;
 
-/// Length of a form as a fraction of the drawn square.
+/// Default length of a form as a fraction of the drawn square.
 const DEFAULT_FORM_LENGTH: f64 = 0.6;
 
-/// Most sheets of a shape.
+/// Maximum number of sheets of a shape.
 const MOST_SHEETS: usize = 256;
 
-/// A sheet as it was drawn, in its drawn direction.
+/// A sheet in its drawn direction.
 #[derive(Clone, Debug)]
 pub(crate) struct DrawnSheet {
     pub(crate) line: Polyline,
-    /// The points that were given, without repetitions.
+    /// The given points without repetitions.
     recorded: Vec<DVec2>,
-    /// Which point of the parameters each recorded one is.
+    /// Parameter index of each recorded point.
     origins: Vec<usize>,
-    /// Pieces of the line between two recorded points.
-    for_each_strip: usize,
+    /// Segments of the line per recorded point.
+    pieces: usize,
     pub(crate) factors: FluxEnergyFactors,
-    /// The parameter that it comes from, below `sheets`, and whether that lists points.
+    /// Its index below `sheets` in the parameters, and whether that entry lists points.
     entry: usize,
     lists_points: bool,
 }
@@ -44,13 +44,13 @@ impl DrawnSheet {
         }
     }
 
-    /// The parameter's point at or before a point of the line.
+    /// Parameter index of the point at or before a point of the line.
     fn origin(&self, point: usize) -> usize {
-        self.origins[(point / self.for_each_strip).min(self.origins.len() - 1)]
+        self.origins[(point / self.pieces).min(self.origins.len() - 1)]
     }
 }
 
-/// Where a shape stands in the parameters, and the square that it must lie in.
+/// Key prefix of a shape and its bounds.
 #[derive(Clone, Copy)]
 pub(crate) struct ShapeContext {
     pub(crate) shape: usize,
@@ -62,7 +62,7 @@ impl ShapeContext {
         ShapeError { key: format!("shapes.{}{key}", self.shape), kind }
     }
 
-    /// A fault at a point of a sheet.
+    /// An error at a point of a sheet.
     fn error_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeErrorKind) -> ShapeError {
         let point = if sheet.lists_points { format!(".points.{}", sheet.origin(point)) } else { String::new() };
         self.error(&format!(".sheets.{}{point}", sheet.entry), kind)
@@ -72,7 +72,8 @@ impl ShapeContext {
 /// All sheets of a shape, in order.
 ///
 /// # Errors
-/// The first sheet that is no line, leaves the square, or meets itself or another.
+///
+/// The first sheet that has fewer than two points, leaves the square, or crosses itself or another.
 pub(crate) fn drawn_sheets(
     parameters: &ShapeParameters,
     context: ShapeContext,
@@ -93,7 +94,7 @@ pub(crate) fn drawn_sheets(
     Ok(sheets)
 }
 
-/// Adds the sheets of one entry: one a stroke and copy.
+/// Adds the sheets of one entry: one per stroke and copy.
 fn draw_entry(
     parameters: &SheetParameters,
     entry: usize,
@@ -134,10 +135,11 @@ fn draw_entry(
     Ok(())
 }
 
-/// A sheet through different points.
+/// A sheet through distinct points.
 ///
 /// # Errors
-/// The number of different points, where it is below two.
+///
+/// The number of distinct points if it is below two.
 fn sheet(
     points: Vec<DVec2>,
     parameters: &SheetParameters,
@@ -152,18 +154,9 @@ fn sheet(
             origins.push(origin);
         }
     }
-    let (line, for_each_strip) =
-        if parameters.smooth { smooth_sketch(recorded.clone()) } else { (recorded.clone(), 1) };
+    let (line, pieces) = if parameters.smooth { smooth_sketch(recorded.clone()) } else { (recorded.clone(), 1) };
     let line = Polyline::new(line).filter(|_| recorded.len() > 1).ok_or(recorded.len())?;
-    Ok(DrawnSheet {
-        line,
-        recorded,
-        origins,
-        for_each_strip,
-        factors,
-        entry,
-        lists_points: parameters.points.is_some(),
-    })
+    Ok(DrawnSheet { line, recorded, origins, pieces, factors, entry, lists_points: parameters.points.is_some() })
 }
 
 fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
@@ -174,7 +167,7 @@ fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
     line.into_iter().map(|point| point * length).collect()
 }
 
-/// Size, mirror, turn and shift, in this order; a copy lies `offset` km to the south before it is turned.
+/// Applies scale, mirror, rotation and translation, in this order; a copy is offset to the south before the rotation.
 fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
     let mut point = point * parameters.scale;
     if parameters.mirror {
@@ -184,7 +177,7 @@ fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
     DVec2::new(cos, sin).rotate(point + DVec2::new(0.0, offset)) + DVec2::from(parameters.position_km)
 }
 
-/// The strokes of a drawing whose sheet is fitted to the drawn square.
+/// The strokes of a drawing, scaled to the drawn square.
 fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) -> Result<Vec<Vec<DVec2>>, AssetError> {
     let drawing = assets.drawing(file)?;
     let wanted = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
@@ -203,12 +196,12 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
     points.iter().map(|&point| (point - middle) * scale).collect()
 }
 
-/// The points that were given come first, so that a fault names one of them; then the smooth line between them.
+/// Given points are checked first, so that the error names one of them; then the smoothed line.
 fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let half = context.extent_km / 2.0;
     let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
-        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.for_each_strip);
+        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
         let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
         let point = sheet.line.points()[at];
         let number = sheet.origin(at) + 1;
@@ -240,11 +233,11 @@ fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), S
     Err(context.error_at(&sheets[later.sheet], later.segment, kind))
 }
 
-/// What a scene says of them, for all sheets of one entry.
+/// Flux and energy factors along a sheet, for all sheets of one entry.
 #[derive(Clone, Debug)]
 pub(crate) struct FluxEnergyFactors {
     curves: Arc<[Curve; 2]>,
-    /// Fraction of the length over which the flux rises from nothing at both ends.
+    /// Fraction of the length over which the flux rises from 0 at both ends.
     fade: f64,
 }
 
@@ -260,7 +253,7 @@ impl FluxEnergyFactors {
         [flux * smoothstep(0.0, self.fade, from_end), energy]
     }
 
-    /// Whether both are the same at every position where a control point may be.
+    /// Whether both are equal at sampled positions.
     pub(crate) fn are_those_of(&self, other: &Self) -> bool {
         const SAMPLES: usize = 512;
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());

@@ -1,4 +1,4 @@
-//! A sparse map of power in the plane that follows what feeds it with a delay.
+//! A sparse map of power that relaxes toward the power of the particles.
 
 use bansho_base::math;
 
@@ -8,31 +8,31 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Cells along a tile.
+/// Cells per tile side.
 const TILE_SIDE: usize = 8;
 const TILE_CELLS: usize = TILE_SIDE * TILE_SIDE;
-/// A tile is dark where no cell has as much as this flux, mW/m^2, would bring it in a step: a tenth of a rayleigh.
+/// A tile is freed if no cell has as much power as this flux, mW/m^2, would add in a step: a tenth of a rayleigh.
 const DARK_MW_PER_M2: f64 = 2e-4;
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 const NO_TILE: u32 = u32::MAX;
-/// Blocks of cells are so wide at most beside the spread of their light.
+/// Maximum width of merged blocks relative to the spread of their light.
 const BLOCK_PER_SPREAD: f64 = 1.1;
-/// Particles that a task of the thread pool finds the cells of, at least.
+/// Minimum number of particles per task.
 const TASK: usize = 4096;
-/// Tiles that a task goes through, at least.
+/// Tiles per task.
 const TILES_PER_TASK: usize = 256;
 
-/// A lit cell of a map, or a block of some.
+/// A non-zero cell, or a block of merged cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AfterglowCell<const ALTITUDES: usize> {
-    /// Number of its position on the map, row by row, for a block that of its first cell.
+    /// Row-major index of the cell, for a block of its first cell.
     pub cell_index: u32,
-    /// Its middle, for a block that of its light, km: x east, z south.
+    /// Its center, for a block the centroid of its light, km: x east, z south.
     pub position_km: [f32; 2],
-    /// Power that electrons would have to bring now for the light that it gives at each height, W: a steady aurora's own.
+    /// Power per altitude, W: that of steady precipitation with the same light.
     pub powers_w: [f32; ALTITUDES],
-    /// Central energy of those electrons, eV.
+    /// Power-weighted mean electron energy, eV.
     pub energy_ev: f32,
 }
 
@@ -44,21 +44,21 @@ struct Tile<const ALTITUDES: usize> {
     weighted: [[f32; ALTITUDES]; TILE_CELLS],
 }
 
-/// What of a cell's power is kept in a step, by the energy of the electrons that brought it.
+/// Decay factor of a cell's power per step, by electron energy.
 #[derive(Clone, Debug)]
 pub(super) struct DecayFactors<const ALTITUDES: usize> {
-    /// By node of the grid of energies.
+    /// By node of the energy grid.
     nodes: Vec<[f32; ALTITUDES]>,
 }
 
 impl<const ALTITUDES: usize> DecayFactors<ALTITUDES> {
-    /// In steps of so many seconds, of light that lives `lifetimes(energy_ev)` seconds at each height.
+    /// For a step in s and lifetimes in s by energy and altitude.
     pub(super) fn new(seconds: f64, lifetimes: impl Fn(f64) -> [f64; ALTITUDES]) -> Self {
         let kept = |lifetime: f64| if lifetime > 0.0 { math::exp(-seconds / lifetime) as f32 } else { 0.0 };
         Self { nodes: (0..NODES).map(|node| lifetimes(node_energy_ev(node)).map(kept)).collect() }
     }
 
-    /// Nothing of what was before: light that follows power at once.
+    /// Decay to 0 in one step: the light follows the power at once.
     pub(super) fn instantaneous() -> Self {
         Self { nodes: vec![[0.0; ALTITUDES]; NODES] }
     }
@@ -75,32 +75,32 @@ impl<const ALTITUDES: usize> Tile<ALTITUDES> {
         Self { tile_position: position, powers: [Self::CELL; TILE_CELLS], weighted: [Self::CELL; TILE_CELLS] }
     }
 
-    /// Mean energy of the electrons that brought its power, eV.
+    /// Power-weighted mean electron energy, eV.
     fn energy_ev(&self) -> f32 {
         let sum = |values: &[[f32; ALTITUDES]; TILE_CELLS]| values.as_flattened().iter().sum::<f32>();
         sum(&self.weighted) / sum(&self.powers).max(f32::MIN_POSITIVE)
     }
 }
 
-/// Power on square cells of which only lit ones are stored, once for each of some heights whose light lives differently long.
+/// Power on square cells, stored in sparse tiles, once per altitude of the red line with its own lifetime.
 ///
-/// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
-/// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
-/// ([`Column::spread_km`](crate::physics::emission::table::Column)). The lifetime is that of the column of the energy at
-/// each position, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
+/// Each cell relaxes toward the power of the particles in it, `dP/dt = (P_particles - P) / lifetime`: a steady sheet
+/// shows its own power, and one that has gone fades. Diffusion of the excited atoms is applied later as a blur
+/// ([`ColumnEmission::spread_km`](crate::physics::emission::table::ColumnEmission)). The lifetime is that of the local
+/// mean energy, per tile of eight by eight cells: soft electrons emit at high altitudes, where it is long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AfterglowMap<const ALTITUDES: usize> {
     cell_km: f64,
     half_km: f64,
-    /// Tiles along each side.
+    /// Tiles per side.
     side: usize,
-    /// For each position of a tile its number, or [`NO_TILE`].
+    /// Tile number by tile position, or [`NO_TILE`].
     numbers: Vec<u32>,
     tiles: Vec<Tile<ALTITUDES>>,
 }
 
 impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
-    /// A dark map.
+    /// An empty map.
     pub(super) fn new(extent_km: f64, cell_km: f64) -> Self {
         let side = (extent_km / (cell_km * TILE_SIDE as f64)).ceil().max(1.0) as usize;
         Self { cell_km, half_km: extent_km / 2.0, side, numbers: vec![NO_TILE; side * side], tiles: Vec::new() }
@@ -112,29 +112,28 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         self.cell_km
     }
 
-    /// All cells that are lit, in an order that does not depend on threads.
+    /// All non-zero cells, in an order that does not depend on the number of threads.
     pub fn cells(&self) -> impl Iterator<Item = AfterglowCell<ALTITUDES>> + '_ {
         self.tiles.iter().flat_map(|tile| (0..TILE_CELLS).filter_map(|cell| self.cell(tile, cell)))
     }
 
-    /// All cells that are not fainter than `faintest` of a typical one, as blocks of `block` by `block`.
+    /// All cells brighter than `faintest` times a typical cell, merged into blocks of `block` by `block`.
     pub(crate) fn bright_blocks(&self, faintest: f32, block: usize) -> Vec<AfterglowCell<ALTITUDES>> {
         let faintest = faintest * self.typical_w();
         self.blocks(block, |tile, cell| self.tiles[tile].powers[cell].iter().any(|power| *power > faintest))
     }
 
-    /// Side of the widest blocks, in cells, whose light a spread (standard deviation, km) makes even.
+    /// Block side in cells that is still smooth after a blur with this standard deviation, km.
     pub(crate) fn block(&self, spread_km: f64) -> usize {
         [8, 4, 2].into_iter().find(|block| *block as f64 * self.cell_km <= BLOCK_PER_SPREAD * spread_km).unwrap_or(1)
     }
 
-    /// Blocks of `block` by `block` cells, a divisor of [`TILE_SIDE`], with the light of those of their cells, by tile and cell, that `wanted` lets
-    /// through.
+    /// Merges the `wanted` cells (tile, cell) into blocks of `block` by `block`, a divisor of [`TILE_SIDE`].
     fn blocks(&self, block: usize, wanted: impl Fn(usize, usize) -> bool + Sync) -> Vec<AfterglowCell<ALTITUDES>> {
         let of_tiles = |(task, tiles): (usize, &[Tile<ALTITUDES>])| {
             let mut blocks = Vec::new();
             for (tile, number) in tiles.iter().zip(task * TILES_PER_TASK..) {
-                // The number that each block has got.
+                // Output index of each block.
                 let mut numbers = [usize::MAX; TILE_CELLS];
                 for cell in (0..TILE_CELLS).filter(|cell| wanted(number, *cell)) {
                     let Some(mut lit) = self.cell(tile, cell) else { continue };
@@ -156,7 +155,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         partial_sums.concat()
     }
 
-    /// Number of the cell that each particle is in, tile after tile; one that does not exist where the map is dark.
+    /// Storage index of each particle's cell; out of range where there is no tile.
     fn cells_of(&self, particles: &AuroraParticles) -> Vec<u32> {
         let [xs, zs] = &particles.positions;
         let cell = |(x, z): (&f32, &f32)| {
@@ -166,19 +165,19 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         xs.par_iter().zip(zs).map(cell).collect()
     }
 
-    /// Power of a cell, weighted by power, W: faint cells, however many, do not count.
+    /// Power-weighted mean power of a cell, W, which is insensitive to many faint cells.
     fn typical_w(&self) -> f32 {
         let of_tiles = |tiles: &[Tile<ALTITUDES>]| {
             let powers = tiles.iter().flat_map(|tile| tile.powers.as_flattened()).map(|power| f64::from(*power));
             powers.fold([0.0; 2], |[sum, squares], power| [sum + power, squares + power * power])
         };
-        // Tasks of the same tiles, whatever the threads.
+        // Fixed chunks, so that the sum does not depend on the number of threads.
         let partial_sums: Vec<[f64; 2]> = self.tiles.par_chunks(TILES_PER_TASK).map(of_tiles).collect();
         let [sum, squares] = partial_sums.iter().fold([0.0; 2], |sums, part| [sums[0] + part[0], sums[1] + part[1]]);
         (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
     }
 
-    /// Power of the whole map at each height, W.
+    /// Total power per altitude, W.
     #[must_use]
     pub fn powers_w(&self) -> [f64; ALTITUDES] {
         self.cells().fold([0.0; ALTITUDES], |sum, cell| {
@@ -186,14 +185,14 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         })
     }
 
-    /// Its lit tiles: the position of each, and the powers and then the powers times energy of its cells.
+    /// Tile positions, and per tile the powers and the powers times energy of its cells.
     pub(crate) fn to_arrays(&self) -> (Vec<u32>, Vec<f32>) {
         let positions = self.tiles.iter().map(|tile| tile.tile_position).collect();
         let values = |tile: &Tile<ALTITUDES>| tile.powers.into_iter().chain(tile.weighted).flatten();
         (positions, self.tiles.iter().flat_map(values).collect())
     }
 
-    /// A map laid out as this one that holds what [`Self::to_arrays`] gave; none if the lists are no such map.
+    /// Inverse of [`Self::to_arrays`] for a map of this layout; `None` for inconsistent arrays.
     pub(crate) fn from_arrays(&self, positions: &[u32], values: &[f32]) -> Option<Self> {
         let cells = values.as_chunks::<ALTITUDES>().0;
         let (tiles, rest) = cells.as_chunks::<{ 2 * TILE_CELLS }>();
@@ -210,7 +209,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         Some(map)
     }
 
-    /// Column and row of a cell on the map.
+    /// Column and row of a cell in the map.
     fn column_and_row(&self, tile: &Tile<ALTITUDES>, cell: usize) -> [usize; 2] {
         let position = tile.tile_position as usize;
         [position % self.side * TILE_SIDE + cell % TILE_SIDE, position / self.side * TILE_SIDE + cell / TILE_SIDE]
@@ -233,15 +232,14 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         })
     }
 
-    /// Lets a step pass.
+    /// Advances by one step.
     pub(super) fn step(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>) {
         let dark_w = (DARK_MW_PER_M2 * W_PER_KM2 * self.cell_km * self.cell_km) as f32;
         let mut gain = self.fade(decay, dark_w);
         self.feed(particles, decay, &mut gain);
     }
 
-    /// Fades all cells and lets go of tiles that a flux which brings `dark_w` to a cell would not have lit in a step; what shall be fed of
-    /// the particles' power to each tile that is left.
+    /// Applies the decay and frees dark tiles; returns the gain of the particles' power for each remaining tile.
     fn fade(&mut self, decay: &DecayFactors<ALTITUDES>, dark_w: f32) -> Vec<[f32; ALTITUDES]> {
         let fade = |tile: &mut Tile<ALTITUDES>| {
             let kept = decay.of(tile.energy_ev());
@@ -271,8 +269,8 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         gain
     }
 
-    /// Adds to each tile its fraction of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
-    /// that of the first particle in it.
+    /// Adds the particles' power times the gain of their tile, sequentially, so that sums do not depend on threads. A
+    /// new tile takes the gain of its first particle.
     fn feed(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>, gain: &mut Vec<[f32; ALTITUDES]>) {
         let [xs, zs] = &particles.positions;
         let positions = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
@@ -285,7 +283,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
             }
             let (tile, fractions) = (&mut self.tiles[number], gain[number]);
             let (powers, weighted) = (&mut tile.powers[cell], &mut tile.weighted[cell]);
-            // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
+            // No `mul_add`: outside of vectorized loops it is a library call on targets without FMA.
             for i in 0..ALTITUDES {
                 powers[i] += power * fractions[i];
                 weighted[i] += power * energy * fractions[i];
@@ -293,7 +291,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         }
     }
 
-    /// The position of the tile that a position in km lies in, and the cell of the tile.
+    /// Tile position and cell within the tile, for a position in km.
     #[inline(always)]
     fn locate(&self, place_km: [f32; 2]) -> (usize, usize) {
         let last = (self.side * TILE_SIDE) as f64 - 1.0;
@@ -304,7 +302,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         (row / TILE_SIDE * self.side + column / TILE_SIDE, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
     }
 
-    /// Number of the tile at a position, which may be a new one.
+    /// Tile number at a tile position; allocates the tile if necessary.
     fn number(&mut self, position: usize) -> usize {
         if self.numbers[position] == NO_TILE {
             self.numbers[position] = self.tiles.len() as u32;
@@ -315,7 +313,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
 }
 
 impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
-    /// The light of both, where its middle is, under the number of the first.
+    /// Sum of both at their centroid, with the index of the first.
     fn merged_with(self, other: Self) -> Self {
         let whole = [self, other].map(|cell| cell.powers_w.iter().sum::<f32>());
         let fraction = whole[1] / (whole[0] + whole[1]);
@@ -330,9 +328,9 @@ impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
 }
 
 impl AfterglowMap<1> {
-    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the fraction of each
-    /// particle, W, and the lit cells that hold none, as blocks of `block` by `block`; cells fainter than `faintest` of a typical one are left
-    /// out.
+    /// Distributes each cell's power to the particles in it in proportion to their power. Returns the power per
+    /// particle, W, and the cells without particles, merged into blocks of `block` by `block`; cells below `faintest`
+    /// times a typical cell are skipped.
     pub(crate) fn distribute_to_particles(
         &self,
         particles: &AuroraParticles,

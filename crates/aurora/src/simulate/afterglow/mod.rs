@@ -1,8 +1,7 @@
-//! Light that lingers where electrons have been: the green and the red line, on maps of the plane at 100 km altitude.
+//! Afterglow of the green and the red line, on maps of the plane at 100 km altitude.
 //!
-//! Blue and purple light leaves at once, where the electrons are. Oxygen keeps its green for 0.8 s and its red for up to two
-//! minutes, less where the air quenches it, so that red light fades by height. So the green
-//! follows a moving sheet softly and the red stays behind.
+//! Blue and violet light is prompt. O(1S) has a lifetime of 0.8 s and O(1D) of up to two minutes, shorter at low
+//! altitudes because of quenching. So green light slightly lags behind a moving sheet and red light stays behind.
 
 mod map;
 
@@ -11,10 +10,10 @@ use crate::physics::emission::{Emission, Emitter, red_line_altitudes::RED_ALTITU
 use map::DecayFactors;
 pub use map::{AfterglowCell, AfterglowMap};
 
-/// Cells of the green map along a cell of the field; the green is sharp.
+/// Green cells per cell of the field.
 const GREEN_FINENESS: f64 = 8.0;
 
-/// What the maps of both slow emitters keep in a step.
+/// Decay factors of both maps.
 #[derive(Clone, Debug)]
 pub(crate) struct AfterglowDecay {
     green: DecayFactors<1>,
@@ -22,7 +21,7 @@ pub(crate) struct AfterglowDecay {
 }
 
 impl AfterglowDecay {
-    /// In steps of so many seconds of the aurora. `emission` says how long light of electrons of an energy lives.
+    /// For a step in s of the aurora's time; lifetimes are from `emission`.
     pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
         let green = |energy_ev| [emission.column(energy_ev).lifetime[Emitter::OxygenGreen.index()]];
         let red = |energy_ev| emission.red_lifetimes(energy_ev);
@@ -35,12 +34,12 @@ impl AfterglowDecay {
 pub struct Afterglow {
     /// O(1S), 557.7 nm: cells an eighth as wide as the field's.
     pub green: AfterglowMap<1>,
-    /// O(1D), 630.0 and 636.4 nm, by its heights: cells as wide as the field's.
+    /// O(1D), 630.0 and 636.4 nm, by altitude: cells as wide as the field's.
     pub red: AfterglowMap<RED_ALTITUDES>,
 }
 
 impl Afterglow {
-    /// Dark maps of a square of side `extent_km` whose field has cells of `cell_km`.
+    /// Empty maps of a square of side `extent_km` whose field has cells of `cell_km`.
     #[must_use]
     pub fn new(extent_km: f64, cell_km: f64) -> Self {
         Self {
@@ -49,12 +48,12 @@ impl Afterglow {
         }
     }
 
-    /// Lets a step pass while `particles` feed both maps.
+    /// Advances both maps by one step.
     pub(crate) fn step(&mut self, particles: &AuroraParticles, decay: &AfterglowDecay) {
         rayon::join(|| self.green.step(particles, &decay.green), || self.red.step(particles, &decay.red));
     }
 
-    /// Fills the maps as if `particles` had been as they are for long.
+    /// Sets the maps to the steady state of `particles`.
     pub(crate) fn fill_steady_state(&mut self, particles: &AuroraParticles) {
         self.green.step(particles, &DecayFactors::instantaneous());
         self.red.step(particles, &DecayFactors::instantaneous());

@@ -1,13 +1,13 @@
-//! Values on a rectangle of square cells.
+//! A two-dimensional grid of square cells.
 
-/// A rectangle of square cells with one value at the middle of each; outside it everything is 0.
+/// Cell-centered values; 0 outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid2 {
     layout: GridLayout,
     values: Vec<f64>,
 }
 
-/// Where the cells of a grid lie.
+/// Geometry of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct GridLayout {
     size: [usize; 2],
@@ -16,9 +16,9 @@ struct GridLayout {
 }
 
 impl GridLayout {
-    /// For a position: the cell whose middle is next below it on each axis, and how far it is on the way to the one above (0 to 1).
+    /// Cell below a position on each axis, by cell centers, and the interpolation fractions toward the next.
     ///
-    /// Middles are numbered from 0; positions are held to one cell around the grid.
+    /// Positions are clamped to one ghost cell around the grid.
     fn split(&self, position: [f64; 2]) -> ([isize; 2], [f64; 2]) {
         let at: [f64; 2] = std::array::from_fn(|c| {
             let cells = (position[c] - self.origin[c]) / self.spacing - 0.5;
@@ -30,7 +30,8 @@ impl GridLayout {
 }
 
 impl Grid2 {
-    /// A grid of zeros, `size` columns and rows, its lower corner at `origin`; `spacing` is the width of a cell, above 0.
+    /// A grid of zeros with `size` columns and rows and its lower corner at `origin`; `spacing` is the cell width,
+    /// above 0.
     #[must_use]
     pub fn new(size: [usize; 2], spacing: f64, origin: [f64; 2]) -> Self {
         Self { layout: GridLayout { size, spacing, origin }, values: vec![0.0; size[0] * size[1]] }
@@ -65,7 +66,7 @@ impl Grid2 {
         &mut self.values
     }
 
-    /// Value at the middle of a cell; 0 outside, as in the ghost cells around.
+    /// Value of a cell; 0 in the ghost cells outside.
     #[must_use]
     pub fn at(&self, column: isize, row: isize) -> f64 {
         let [columns, rows] = self.layout.size;
@@ -73,7 +74,7 @@ impl Grid2 {
         if inside { self.values[row as usize * columns + column as usize] } else { 0.0 }
     }
 
-    /// The cell that holds a position (column, row); none outside.
+    /// Column and row of the cell at a position, if inside.
     #[must_use]
     pub fn cell(&self, position: [f64; 2]) -> Option<[usize; 2]> {
         let GridLayout { size, spacing, origin } = self.layout;
@@ -82,13 +83,13 @@ impl Grid2 {
         inside.then(|| cell.map(|cell| cell as usize))
     }
 
-    /// Number among the [`values`](Self::values) of the cell that holds a position; none outside.
+    /// Index into [`values`](Self::values) of the cell at a position, if inside.
     #[must_use]
     pub fn index(&self, position: [f64; 2]) -> Option<usize> {
         self.cell(position).map(|[column, row]| row * self.layout.size[0] + column)
     }
 
-    /// Value at a position, bilinear between middles.
+    /// Bilinear interpolation between cell centers.
     #[must_use]
     pub fn sample(&self, position: [f64; 2]) -> f64 {
         let ([i, j], [s, t]) = self.layout.split(position);
@@ -97,7 +98,7 @@ impl Grid2 {
         t.mul_add(upper - lower, lower)
     }
 
-    /// Gradient at the middles by central differences, the aurora thesis (2.8) and (2.9) without their sign.
+    /// Gradient at cell centers by central differences: (2.8) and (2.9) of the thesis without their sign.
     #[must_use]
     pub fn gradient(&self) -> Gradient2 {
         let [columns, rows] = self.layout.size;
@@ -110,7 +111,7 @@ impl Grid2 {
     }
 }
 
-/// Gradient of a [`Grid2`] at the middles of its cells.
+/// Cell-centered gradient of a [`Grid2`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gradient2 {
     layout: GridLayout,
@@ -118,13 +119,13 @@ pub struct Gradient2 {
 }
 
 impl Gradient2 {
-    /// Gradient at the middles, row by row.
+    /// Gradients, row by row.
     #[must_use]
     pub fn values(&self) -> &[[f64; 2]] {
         &self.values
     }
 
-    /// Gradient at a position, bilinear between middles; beyond the outermost middles as at the nearest.
+    /// Bilinear interpolation between cell centers, clamped to the outermost.
     #[must_use]
     pub fn sample(&self, position: [f64; 2]) -> [f64; 2] {
         let [columns, rows] = self.layout.size;

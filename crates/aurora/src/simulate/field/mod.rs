@@ -1,4 +1,4 @@
-//! Fields on a rectangle of square cells: sampling, gradient, Poisson's equation.
+//! The electric field: grid, Poisson solvers and charge of the sheets.
 
 mod grid;
 mod poisson;

@@ -1,4 +1,5 @@
-//! Poisson's equation on a grid, solved exactly in one go: sine transform along x, elimination along z.
+//! Solvers of the screened Poisson equation: direct (sine transform along x, tridiagonal systems along z) and
+//! Gauss-Seidel.
 
 use super::grid::Grid2;
 use super::sine_transform::SineTransform;
@@ -8,22 +9,24 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Rows that a task of the thread pool transforms, an even number.
+/// Rows per task of the transform, an even number.
 const TASK_ROWS: usize = 16;
-/// Columns that a task of the thread pool eliminates.
+/// Columns per task of the elimination.
 const TASK_COLUMNS: usize = 64;
 
-/// Solver of the five-point equation `laplacian(phi) - phi / l^2 = source` with phi = 0 in the ghost cells around the grid.
+/// Direct solver of the five-point equation `laplacian(phi) - phi / l^2 = source` with phi = 0 in the ghost cells
+/// around the grid.
 ///
-/// The sine transform along x parts the equation into one tridiagonal system along z for each wave number, which elimination solves. The
-/// answer is that of converged relaxation, the aurora thesis (2.6), to rounding. A transform is fast if columns + 1 has small
-/// prime factors only: 255 is a good number of columns; 256, where 257 is prime, takes twice as long. Rows may be any number.
+/// The sine transform along x decouples the equation into one tridiagonal system along z per wave number (Thomas
+/// algorithm). The solution equals converged relaxation (2.6) to rounding. The transform is fast if columns + 1 has
+/// small prime factors: 255 columns are good; 256, where 257 is prime, take twice as long. The number of rows is
+/// arbitrary.
 #[derive(Clone)]
 pub struct PoissonSolver {
     size: [usize; 2],
     area: f64,
     transform: Arc<SineTransform>,
-    /// Factors of the elimination, one a cell, row by row.
+    /// Elimination factors, one per cell, row by row.
     factors: Vec<f64>,
 }
 
@@ -40,7 +43,7 @@ impl std::fmt::Debug for PoissonSolver {
 impl PoissonSolver {
     /// For grids of that many columns and rows of cells `spacing` wide; `screening` is `1 / l^2`, not below 0.
     ///
-    /// The screening length l is how far a charge reaches; 0 is Poisson's equation itself.
+    /// l is the screening length (Debye length); a `screening` of 0 is Poisson's equation.
     #[must_use]
     pub fn new(size: [usize; 2], spacing: f64, screening: f64) -> Self {
         let [columns, rows] = size;
@@ -59,16 +62,17 @@ impl PoissonSolver {
         Self { size, area, transform: Arc::new(SineTransform::new(columns)), factors }
     }
 
-    /// Turns a grid that holds the source, `rho / eps`, into one that holds the potential.
+    /// Replaces the source `rho / eps` in the grid with the potential.
     ///
     /// # Panics
-    /// If the grid is not of the solver's size.
+    ///
+    /// If the grid has another size than the solver.
     pub fn solve(&self, grid: &mut Grid2) {
         assert_eq!(grid.size(), self.size, "a solver is made for one size");
         if grid.values().is_empty() {
             return;
         }
-        // Twice transformed, a row is (columns + 1) / 2 times itself.
+        // The transform applied twice is (columns + 1) / 2 times the identity.
         let scale = -self.area * 2.0 / (self.size[0] + 1) as f64;
         self.transform_rows(grid);
         self.eliminate(grid, scale);
@@ -104,7 +108,7 @@ impl PoissonSolver {
     }
 }
 
-/// Down with the source, up with the potential.
+/// Forward elimination and back substitution.
 #[inline(always)]
 fn eliminate_block(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
     let mut above = [0.0; TASK_COLUMNS];
@@ -123,12 +127,14 @@ fn eliminate_block(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
     }
 }
 
-/// One Gauss-Seidel sweep toward `laplacian(phi) - phi / l^2 = source`, row by row; phi is 0 in ghost cells around the grid.
+/// One Gauss-Seidel sweep for `laplacian(phi) - phi / l^2 = source`, row by row; phi is 0 in the ghost cells.
 ///
-/// The aurora thesis (2.6) with `source = rho / eps`; `screening` is `1 / l^2`, 0 in the thesis. Returns the greatest change.
+/// Eq. (2.6) of the thesis with `source = rho / eps`; `screening` is `1 / l^2`, 0 in the thesis. Returns the maximum
+/// change.
 ///
 /// # Panics
-/// If potential and source are not of one size.
+///
+/// If potential and source differ in size.
 pub fn gauss_seidel_sweep(potential: &mut Grid2, source: &Grid2, screening: f64) -> f64 {
     assert_eq!(potential.size(), source.size(), "one source a cell");
     let [columns, rows] = potential.size();
@@ -149,12 +155,11 @@ pub fn gauss_seidel_sweep(potential: &mut Grid2, source: &Grid2, screening: f64)
     change
 }
 
-/// What is left of the equation: `laplacian(phi) - phi / l^2 - source`, root mean square over that of the source.
-///
-/// 0 if the source is 0 everywhere and the equation holds.
+/// Relative residual: RMS of `laplacian(phi) - phi / l^2 - source` over RMS of the source; 0 if the residual is 0.
 ///
 /// # Panics
-/// If potential and source are not of one size.
+///
+/// If potential and source differ in size.
 #[must_use]
 pub fn relative_residual(potential: &Grid2, source: &Grid2, screening: f64) -> f64 {
     assert_eq!(potential.size(), source.size(), "one source a cell");

@@ -1,4 +1,4 @@
-//! Charge that lies on the sheets as on conductors.
+//! Charge on the sheets: scattered particles (thesis, 2.2.3) and their charge as on conductors.
 
 use super::Grid2;
 use crate::simulate::sheets::nodes::split;
@@ -7,34 +7,35 @@ use bansho_base::math::DVec2;
 use bansho_base::math::random::{Key, Purpose, uniform};
 use rayon::prelude::*;
 
-/// How much a node changes at a time, and how little and how much charge it has at most beside one of a long, straight, lone sheet.
+/// Limits of the change per iteration, and of the charge relative to a long, straight, isolated sheet.
 const CHANGE: [f64; 2] = [0.5, 2.0];
 const CHARGE: [f64; 2] = [0.1, 4.0];
 
-/// Most nodes of all sheets together for each particle.
+/// Maximum nodes of all sheets per particle.
 const NODES_PER_PARTICLE: f64 = 0.05;
-/// Nodes that a task of the thread pool changes, at least.
+/// Minimum nodes per task.
 const TASK: usize = 256;
-/// Most that charge is denser at one side of a sheet than in its middle, as a fraction of that.
+/// Maximum relative difference of the charge between a sheet's edge and its middle.
 const MOST_TILT: f64 = 0.9;
 
-/// Charge of a scattered particle by its position along the sheets, linear between nodes, 1 on a long, straight, lone sheet.
+/// Charge per scattered particle as a function of the position along the sheets, linear between nodes; 1 on a long,
+/// straight, isolated sheet.
 ///
-/// With the same charge everywhere the potential would rise by half toward the ends of sheets, and fall where they wind up or lie close
-/// together: all particles would gather there. Here it is the same along all sheets. And a sheet that bends, or has another on one side of it,
-/// pulls toward that side, so that particles would come to rest beside the drawn line: charge gathers on the other side until both are at one
-/// potential.
+/// With uniform charge the potential would be half as deep at the ends of sheets and deeper where they wind up or lie
+/// close together, and particles would collect there. Here the potential is constant along all sheets, as on
+/// conductors. Next to a bend or another sheet the charge is also tilted across the sheet until both edges have the
+/// same potential; otherwise particles would rest beside the drawn line.
 #[derive(Clone, Debug)]
 pub(crate) struct SheetCharge {
-    /// One sheet's after those of another; evenly spaced over its length, one at each end.
+    /// Uniformly spaced nodes with one at each end, sheet by sheet.
     nodes: Vec<f64>,
-    /// How much denser it is at the one side (left of the way along) than in the middle, as a fraction of that, at the same positions.
+    /// Relative increase of the charge at the left edge over the middle, at the same nodes.
     tilts: Vec<f64>,
-    /// Where each sheet's begin, and the end of all.
+    /// Start of each sheet's nodes, and the total.
     starts: Vec<usize>,
 }
 
-/// Where a particle is among the nodes: the one before it, and the part of the way to the next.
+/// Position of a particle among the nodes: the node before, the interpolation fraction, and the side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SheetCoordinate {
     node: u32,
@@ -42,18 +43,18 @@ pub(super) struct SheetCoordinate {
     side: f32,
 }
 
-/// What charge shall come to.
+/// Target of the iteration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ChargeTarget {
-    /// Potential along the sheets, negative, km^2/s^2.
+    /// Potential on the sheets, negative, km^2/s^2.
     pub(super) potential: f64,
-    /// Charge density over eps of a lone sheet, 1/s^2, and half its thickness, km.
+    /// Charge density over eps of an isolated sheet, 1/s^2, and half its thickness, km.
     pub(super) density: f64,
     pub(super) half_thickness: f64,
 }
 
 impl SheetCharge {
-    /// The same charge everywhere, at nodes about `spacing` km apart, or more where so many particles do not show as much.
+    /// Uniform charge, with nodes about `spacing` km apart, or more where there are few particles.
     pub(crate) fn even(refined: &RefinedShape, spacing: f64, particles: f64) -> Self {
         let lengths = refined.sheet_lengths();
         let spacing = spacing.max(lengths.iter().sum::<f64>() / (NODES_PER_PARTICLE * particles));
@@ -72,7 +73,7 @@ impl SheetCharge {
         self.nodes.len()
     }
 
-    /// Where a particle is.
+    /// Coordinate of a particle.
     pub(super) fn coordinate(&self, particle: &ScatteredParticle) -> SheetCoordinate {
         let sheet = particle.sheet as usize;
         let (first, end) = (self.starts[sheet], self.starts[sheet + 1]);
@@ -80,7 +81,7 @@ impl SheetCharge {
         SheetCoordinate { node: (first + node) as u32, fraction: fraction as f32, side: particle.side }
     }
 
-    /// Charge of a particle that is there.
+    /// Charge of a particle at a coordinate.
     #[inline]
     pub(super) fn charge(&self, position: SheetCoordinate) -> f64 {
         let node = position.node as usize;
@@ -90,7 +91,7 @@ impl SheetCharge {
         (before + fraction * (after - before)) * (1.0 + (tilt + fraction * (next - tilt)) * side)
     }
 
-    /// Changes it where the potential that it makes is not the one that is wanted, or not the same on both sides.
+    /// Adjusts charge and tilt toward the target potential and equal potentials at both edges.
     pub(super) fn adjust_toward(&mut self, refined: &RefinedShape, potential: &Grid2, wanted: ChargeTarget) {
         let ChargeTarget { density, half_thickness, .. } = wanted;
         let starts = &self.starts;
@@ -106,7 +107,7 @@ impl SheetCharge {
             let across = chord.perp().normalize_or_zero() * half_thickness;
             let rise =
                 potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
-            // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
+            // A tilt a of the charge lowers one edge relative to the other by 2/3 a density L^2.
             let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
             *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);
         };
@@ -116,22 +117,23 @@ impl SheetCharge {
 
 const SCATTER: Purpose = Purpose::named("aurora scatter");
 
-/// A particle that stands for the charge about a shape.
+/// A particle that carries charge of a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ScatteredParticle {
-    /// Where it is, km.
+    /// Position, km.
     pub(crate) position: DVec2,
-    /// The sheet that it is nearest to.
+    /// Index of the nearest sheet.
     pub(crate) sheet: u32,
     /// Fraction of that sheet's length before it.
     pub(crate) arc_fraction: f32,
-    /// How far it is to the side, from -1 to 1 within L_thr.
+    /// Lateral position, -1 to 1 within L_thr.
     pub(super) side: f32,
 }
 
-/// Particles within `half_thickness` km of the shape, evenly over the area that it covers; the `renewal`th set of `count` trials.
+/// Scatters particles uniformly within `half_thickness` km of the shape; set number `renewal` of `count` trials.
 ///
-/// A position counts for the segment that it is nearest to, so that nothing is counted twice where segments overlap.
+/// Sampled along the segments, so the cost depends on the number of particles only. A position counts for its nearest
+/// segment, so overlaps are not counted twice.
 pub(crate) fn scatter(
     refined: &RefinedShape,
     half_thickness: f64,

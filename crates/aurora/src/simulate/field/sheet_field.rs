@@ -1,7 +1,7 @@
-//! The field that pulls particles to the in-between shape (thesis, 2.2.3).
+//! The electric field that attracts particles to the in-between shape (thesis, 2.2.3).
 //!
-//! Units: km and s, the particle's charge and mass are 1, so the field is an acceleration in km/s^2 and the potential is in km^2/s^2. What
-//! is natural here is the cell and the frame, as the constants say.
+//! Units: km and s, particle charge and mass 1; the field is an acceleration in km/s^2 and the potential is in
+//! km^2/s^2. Constants are given in cells and frames.
 
 use bansho_base::{
     math::{
@@ -23,16 +23,16 @@ use crate::{
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-/// Screening length l unless a scene says otherwise, cells: particles are drawn in from a few cells, strays beyond can die.
+/// Default screening length l, cells: particles are attracted from a few cells, those farther away can be removed.
 const REACH_CELLS: f64 = 3.0;
-/// How often the charge along the sheets is made better.
+/// Iterations of the conductor charge.
 const ADJUSTMENTS: usize = 4;
-/// Scattered particles that a task of the thread pool finds the positions of, at least.
+/// Minimum particles per task.
 const TASK: usize = 4096;
 /// Field at the edge of a sheet at a pull of 1, cells per frame^2.
 const EDGE_FIELD: f64 = 0.25;
 
-/// Everything about fields that does not change from shape to shape.
+/// Everything that does not depend on the shape.
 #[derive(Clone, Debug)]
 pub(crate) struct FieldBuilder {
     parameters: AuroraParameters,
@@ -45,19 +45,20 @@ pub(crate) struct FieldBuilder {
 /// The field of one in-between shape.
 #[derive(Clone, Debug)]
 pub(crate) struct ElectricField {
-    /// N(i, j): how many particles were scattered into each cell.
+    /// N(i, j): number of scattered particles per cell.
     pub(crate) counts: Grid2,
-    /// phi(i, j) without noise, which relocation looks at.
+    /// phi(i, j) without noise, as used by relocation.
     pub(crate) potential: Grid2,
-    /// Potential with noise, and the field from it by (2.7) to (2.9) and nothing, one a cell and one row and column of ghosts around.
+    /// Potential with noise and field (2.7) to (2.9), padded to four components, with one ghost row and column on each
+    /// side.
     table: Vec<[f32; 4]>,
-    /// Columns and rows, the lower corner in cells, and cells a km.
+    /// Columns and rows, the lower corner in cells, and cells per km.
     size: [f32; 2],
     corner: [f32; 2],
     per_km: f32,
 }
 
-/// Potential and field where a particle is.
+/// Potential and field at a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FieldSample {
     /// km^2/s^2.
@@ -95,7 +96,7 @@ impl FieldBuilder {
         1.0 / self.screening.sqrt()
     }
 
-    /// The field of particles scattered about a shape, with the noise of a time.
+    /// The field of scattered particles, with the noise at a time.
     pub(crate) fn build(&self, refined: &RefinedShape, scattered: &[ScatteredParticle], time: f64) -> ElectricField {
         let counts = self.sum_by_cell(scattered.iter().map(|particle| (particle.position, 1.0)));
         let source = self.charge_density(refined, scattered, &counts);
@@ -115,7 +116,7 @@ impl FieldBuilder {
         }
     }
 
-    /// Sum of values at positions over those in each cell.
+    /// Sums values by cell.
     pub(crate) fn sum_by_cell(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
         let mut sums = self.grid();
         for (position, value) in values {
@@ -126,8 +127,8 @@ impl FieldBuilder {
         sums
     }
 
-    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and unless it shall be
-    /// even are at one potential all along.
+    /// Charge density over eps, eq. (2.2), normalized so that all sheets attract equally whatever the number of
+    /// particles; by default with constant potential along the sheets.
     pub(crate) fn charge_density(
         &self,
         refined: &RefinedShape,
@@ -137,7 +138,7 @@ impl FieldBuilder {
         let half_thickness = self.parameters.half_thickness_km();
         let density = self.edge_field() / half_thickness;
         let unit = density / full_cell_count(counts).max(1.0);
-        // In the middle of a long, straight, lone sheet.
+        // In the middle of a long, straight, isolated sheet.
         let reach = self.reach_km();
         let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
         let wanted = ChargeTarget { potential, density, half_thickness };
@@ -155,7 +156,7 @@ impl FieldBuilder {
             }
             source
         };
-        // Sheets that do not pull have no potential to be at.
+        // Sheets without attraction have no target potential.
         let is_conductor = self.parameters.field.charge == FieldCharge::Conductor;
         let adjustments = if density > 0.0 && is_conductor { ADJUSTMENTS } else { 0 };
         for _ in 0..adjustments {
@@ -169,13 +170,13 @@ impl FieldBuilder {
         self.parameters.field.pull * EDGE_FIELD * self.parameters.cell_km() / (FRAME_S * FRAME_S)
     }
 
-    /// `laplacian(phi) - phi / l^2 = rho`, phi = 0 around the grid; negative, lowest on the shape.
+    /// Solves `laplacian(phi) - phi / l^2 = rho` directly; phi is negative, lowest on the shape.
     fn solve_directly(&self, mut source: Grid2) -> Grid2 {
         self.solver.solve(&mut source);
         source
     }
 
-    /// Eq. (2.6), stopped after so many sweeps or where no cell changes by more than the tolerance.
+    /// Eq. (2.6), until the maximum number of sweeps or the tolerance.
     fn solve_by_relaxation(&self, source: &Grid2) -> Grid2 {
         let mut potential = self.grid();
         let least = self.parameters.field.tolerance * self.edge_field() * self.reach_km();
@@ -219,7 +220,7 @@ impl FieldBuilder {
     }
 }
 
-/// How many a cell holds that lies all within a sheet: the mean over particles of the count where they are.
+/// Typical count of a cell that lies entirely within a sheet: the mean over particles of their cell's count.
 pub(crate) fn full_cell_count(counts: &Grid2) -> f64 {
     let sum: f64 = counts.values().iter().sum();
     let squares: f64 = counts.values().iter().map(|count| count * count).sum();
@@ -227,7 +228,7 @@ pub(crate) fn full_cell_count(counts: &Grid2) -> f64 {
 }
 
 impl ElectricField {
-    /// Bilinear between the middles of cells; as at the nearest middle beyond the outermost.
+    /// Bilinear interpolation between cell centers, clamped to the outermost.
     #[inline(always)]
     pub(crate) fn sample(&self, x: f32, z: f32) -> FieldSample {
         let coordinates = [x, z];

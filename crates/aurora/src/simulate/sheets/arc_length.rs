@@ -1,4 +1,5 @@
-//! A coordinate map the sheets that stays with them while they move, split and merge: rays and folds hang on it.
+//! A persistent arc-length coordinate along the sheets, carried along as they move, split and merge: the texture
+//! coordinate of rays and folds.
 
 use std::collections::BTreeMap;
 
@@ -6,33 +7,33 @@ use bansho_base::math::{DVec2, lerp};
 
 use crate::shapes::{ControlPointIds, NearestSegmentGrid, Shape, Sheet, cumulative_lengths};
 
-/// Distance in the coordinate from one sheet of the first shape to the next, km: no two show the same rays.
+/// Offset between the coordinates of successive sheets of the first shape, km, so that no two have the same rays.
 const SHEET_OFFSET_KM: f64 = 40_000.0;
-/// Time in which the coordinate comes back to the length map the sheet where this has stretched, s.
+/// Relaxation time of the coordinate toward arc length after stretching, s.
 const RELAXATION_S: f64 = 2.0;
-/// Where the coordinate changes this many times faster than the length, or slower, two sheets have grown together.
+/// Maximum ratio between changes of the coordinate and of the length; beyond it two sheets have merged there.
 const MAX_STRETCH: f64 = 6.0;
-/// Segments shorter than this join whatever is beside them, km.
+/// Minimum length for that test, km.
 const SHORT_KM: f64 = 0.5;
 
-/// From farther than this an added control point takes no coordinate, km.
+/// Maximum distance for the coordinate of an inserted control point, km.
 const REACH_KM: f64 = 30.0;
 
-/// The coordinate of each control point of a shape, km.
+/// Coordinate of each control point of a shape, km.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ArcLengthMap {
     pub(crate) coordinates: Vec<Vec<f64>>,
-    /// Whether the sheet passes each control point against the way on which the coordinate grew at first: left and right are those of that
-    /// way, whichever way a sheet is listed.
+    /// Whether the sheet is listed there against the original direction of the coordinate, which defines left and
+    /// right.
     pub(crate) reversed: Vec<Vec<bool>>,
-    /// Where the control points were.
+    /// Positions of the control points.
     pub(crate) points: Vec<Vec<DVec2>>,
-    /// Who they are, and the turn of the loop in which they are these.
+    /// Their ids, and the cycle of the loop.
     tracks: Vec<Vec<usize>>,
     cycle: i64,
 }
 
-/// The coordinate at a position, km, and 1 or -1 where the sheet runs with or against the way map which it has grown.
+/// Coordinate at a position, km, and 1 or -1 for a sheet listed along or against it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ArcPosition {
     pub(super) coordinate: f64,
@@ -40,7 +41,7 @@ pub(super) struct ArcPosition {
 }
 
 impl ArcLengthMap {
-    /// The length map each sheet.
+    /// Initializes the coordinate with the arc length of each sheet.
     pub(crate) fn from_lengths(shape: &Shape, ids: &ControlPointIds) -> Self {
         let sheet = |(index, sheet): (usize, &Sheet)| {
             cumulative_lengths(&sheet.points)
@@ -66,8 +67,8 @@ impl ArcLengthMap {
         Self::from_lengths(shape, &ControlPointIds::alone(&shape.sheets.iter().map(number).collect::<Vec<_>>()))
     }
 
-    /// The coordinate on `shape`, which this has become, and whose control points are those of `ids`: each keeps its own, in whichever
-    /// order and direction its sheet is listed now; those that are new have that of the position where they are born.
+    /// Transfers the coordinate to `shape`, whose control points are `ids`: existing points keep theirs, in whichever
+    /// order and direction they are listed; new points take that of the position where they appear.
     pub(crate) fn transfer(&self, shape: &Shape, ids: &ControlPointIds) -> Self {
         let points = points(shape);
         if ids.cycle == self.cycle && ids.sheets == self.tracks {
@@ -84,14 +85,14 @@ impl ArcLengthMap {
         Self { points, ..next }
     }
 
-    /// Takes the control points of `ids` for its own, as after it has been read; `false` if they are not as many.
+    /// Sets the ids after deserialization; `false` if the number of points differs.
     pub(crate) fn take_control_point_ids(&mut self, ids: &ControlPointIds) -> bool {
         self.tracks = ids.sheets.to_vec();
         self.cycle = ids.cycle;
         self.coordinates.iter().map(Vec::len).eq(self.tracks.iter().map(Vec::len))
     }
 
-    /// Lets `seconds` pass in which stretches are taken back.
+    /// Relaxes the coordinate toward arc length for a time in s.
     pub(crate) fn relax(&mut self, seconds: f64) {
         let fraction = (seconds / RELAXATION_S).min(1.0);
         for ((coordinates, reversed), points) in self.coordinates.iter_mut().zip(&self.reversed).zip(&self.points) {
@@ -105,8 +106,8 @@ impl ArcLengthMap {
         }
     }
 
-    /// What there is at the fraction `t` of the way from control point `index` of a sheet to the next. Where two sheets have grown together
-    /// there, each half is as its own end, so that nothing depends on the direction.
+    /// The coordinate at fraction `t` between control point `index` and the next. Where two sheets have merged, each
+    /// half continues its own end, so the result does not depend on the direction.
     pub(super) fn interpolate(&self, sheet: usize, index: usize, t: f64) -> ArcPosition {
         let (coordinates, points) = (&self.coordinates[sheet], &self.points[sheet]);
         let length = points[index].distance(points[index + 1]);
@@ -122,12 +123,12 @@ impl ArcLengthMap {
     }
 }
 
-/// What there was before the control points changed.
+/// The previous map and lookup structures.
 struct PreviousArcMap<'a> {
     map: &'a ArcLengthMap,
-    /// The control points by number, with their sheet and position in it.
+    /// Sorted control-point ids with sheet and index.
     slots: Vec<(usize, [usize; 2])>,
-    /// The sheet and position at which each segment began.
+    /// Sheet and index of the start of each segment.
     starts: Vec<[usize; 2]>,
     near: NearestSegmentGrid,
 }
@@ -154,8 +155,8 @@ impl<'a> PreviousArcMap<'a> {
         Some(self.slots[index].1)
     }
 
-    /// Coordinates map a sheet of these control points, and whether it passes each against its first way; `begin` km at the start of a
-    /// sheet that comes from nowhere.
+    /// Coordinates and directions of a sheet with these control points; `begin` km at the start of a sheet without
+    /// predecessor.
     fn transfer_sheet(&self, tracks: &[usize], points: &[DVec2], begin: f64) -> (Vec<f64>, Vec<bool>) {
         let known: Vec<Option<[usize; 2]>> = tracks.iter().map(|&track| self.slot(track)).collect();
         let (reversed, cumulative_lengths) = (self.reversed(&known, points), cumulative_lengths(points));
@@ -177,7 +178,7 @@ impl<'a> PreviousArcMap<'a> {
                     within.or_else(|| Some(self.nearest(points[index])?.0.coordinate))
                 }
             };
-            // Farther from all than a sheet moves in a step: on from the point before.
+            // Beyond the search distance: continue from the previous point.
             let beyond = match index.checked_sub(1) {
                 Some(last) if reversed[index] => {
                     coordinates[last] - (cumulative_lengths[index] - cumulative_lengths[last])
@@ -190,8 +191,9 @@ impl<'a> PreviousArcMap<'a> {
         (coordinates, reversed)
     }
 
-    /// Whether a sheet passes its control points against their first way: turned round since where it passes those of a sheet the other
-    /// way. New ones do as those beside them, and a sheet of new ones as what was there.
+    /// Direction of a sheet at its control points: reversed where it passes those of a previous sheet in the opposite
+    /// order. New points take the direction of their neighbors, and a sheet of new points that of the nearest previous
+    /// sheet.
     fn reversed(&self, known: &[Option<[usize; 2]>], points: &[DVec2]) -> Vec<bool> {
         let mut ends: BTreeMap<usize, [usize; 2]> = BTreeMap::new();
         for [sheet, slot] in known.iter().flatten() {
@@ -210,14 +212,14 @@ impl<'a> PreviousArcMap<'a> {
         all
     }
 
-    /// Whether the middle of a sheet of new control points runs against what is nearest to it.
+    /// Whether the middle of a sheet of new control points runs against the nearest previous sheet.
     fn reversed_by_position(&self, points: &[DVec2]) -> bool {
         let middle = points.len() / 2;
         let displacement = points[middle] - points[middle.saturating_sub(1)];
         self.nearest(points[middle]).is_some_and(|(mark, heading)| displacement.dot(heading) * mark.direction < 0.0)
     }
 
-    /// The coordinate of a new control point between two that were there, if these are still joined: as far from one to the other.
+    /// Coordinate of a new control point between two existing ones that are still joined, by arc length.
     fn within(
         &self,
         ends: [usize; 2],
@@ -233,7 +235,8 @@ impl<'a> PreviousArcMap<'a> {
         is_one.then(|| lerp(from, to, t))
     }
 
-    /// What there was at the position nearest to `point`, and the way map the sheet there; none beyond the reach.
+    /// Coordinate at the nearest point of the previous sheets, and the direction of the sheet there; `None` beyond the
+    /// search distance.
     fn nearest(&self, point: DVec2) -> Option<(ArcPosition, DVec2)> {
         let nearest = self.near.nearest_point(point)?;
         let [sheet, index] = self.starts[nearest.segment];
@@ -246,13 +249,13 @@ fn points(shape: &Shape) -> Vec<Vec<DVec2>> {
     shape.sheets.iter().map(|sheet| sheet.points.clone()).collect()
 }
 
-/// Whether a step of the coordinate over a segment of that length may be one sheet's.
+/// Whether a coordinate step over a segment of that length is consistent with one sheet.
 fn joined(step: f64, length: f64) -> bool {
     let long = length.max(SHORT_KM);
     step.abs() <= MAX_STRETCH * long && step.abs() >= length / MAX_STRETCH - SHORT_KM
 }
 
-/// Where the run that begins at point `start` ends: the points that have kept together, with the coordinate in one direction.
+/// End of the run from point `start`: points that belong together, with a monotonic coordinate.
 fn run_end(coordinates: &[f64], cumulative_lengths: &[f64], reversed: &[bool], start: usize) -> usize {
     let mut sign = 0.0;
     for index in start + 1..coordinates.len() {
@@ -268,7 +271,7 @@ fn run_end(coordinates: &[f64], cumulative_lengths: &[f64], reversed: &[bool], s
     coordinates.len()
 }
 
-/// Moves a run toward the length map it, its middle fixed; a run without extent grows by the way in which it is `reversed`.
+/// Relaxes a run toward arc length about its mean; a degenerate run takes the direction of `reversed`.
 fn relax_run(coordinates: &mut [f64], cumulative_lengths: &[f64], reversed: bool, fraction: f64) {
     let count = coordinates.len() as f64;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / count;

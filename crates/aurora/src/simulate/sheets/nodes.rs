@@ -1,6 +1,6 @@
-//! Values at evenly spaced nodes along each sheet, one at each end, and straight between them.
+//! Piecewise linear functions on uniformly spaced nodes along each sheet.
 
-/// The node before a fraction of a sheet's length among `count` of them (two or more), and how far the fraction is on the way to the next, 0 to 1.
+/// Node before a fraction of a sheet's length with `count` nodes (two or more), and the interpolation fraction.
 #[inline]
 pub(crate) fn split(fraction: f64, count: usize) -> (usize, f64) {
     let coordinate = fraction.clamp(0.0, 1.0) * (count - 1) as f64;
@@ -8,15 +8,15 @@ pub(crate) fn split(fraction: f64, count: usize) -> (usize, f64) {
     (node, coordinate - node as f64)
 }
 
-/// How many nodes each sheet has: the more, the longer it is.
+/// Number of nodes per sheet, in proportion to its length.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NodeLayout {
-    /// Where each sheet's begin, and the end of all.
+    /// Start of each sheet's nodes, and the total.
     starts: Vec<usize>,
 }
 
 impl NodeLayout {
-    /// Cuts sheets of those lengths into about `all` stretches together, each into `bounds` of them at least and at most.
+    /// Divides sheets of these lengths into about `all` intervals, each sheet into at least and at most `bounds`.
     pub(crate) fn new(lengths: &[f64], all: f64, bounds: [f64; 2]) -> Self {
         let whole = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let mut starts = vec![0];
@@ -46,7 +46,7 @@ impl<'a> NodeValues<'a> {
         Self { layout, values: vec![0.0; layout.starts[layout.starts.len() - 1]] }
     }
 
-    /// Length of the sheets, km: half an interval on each side of a node.
+    /// Sheet length per node, km: half an interval on each side.
     pub(crate) fn of_lengths(layout: &'a NodeLayout, lengths: &[f64]) -> Self {
         let mut nodes = Self::new(layout);
         for (sheet, length) in lengths.iter().enumerate() {
@@ -59,14 +59,14 @@ impl<'a> NodeValues<'a> {
         nodes
     }
 
-    /// The node before a position, over all sheets, and how far the position is on the way to the next.
+    /// Index of the node before a position, over all sheets, and the interpolation fraction.
     #[inline]
     fn split(&self, sheet: u32, fraction: f32) -> (usize, f64) {
         let (node, t) = split(f64::from(fraction), self.layout.count(sheet as usize));
         (self.layout.starts[sheet as usize] + node, t)
     }
 
-    /// Adds a value to the two nodes around a position.
+    /// Adds a value with linear weights to the two nodes around a position.
     #[inline]
     pub(crate) fn add(&mut self, sheet: u32, fraction: f32, value: f64) {
         let (node, t) = self.split(sheet, fraction);
@@ -92,8 +92,8 @@ impl<'a> NodeValues<'a> {
         self.values.iter().sum()
     }
 
-    /// What a unit of weight gets of these powers at each node, so that all is given out, but nowhere more than `max_concentration` times what it
-    /// would be if all were even. Where there is next to no weight, not everything can be given out there.
+    /// Power per unit of weight at each node, so that the total is distributed but nowhere more than
+    /// `max_concentration` times the mean. Power of nodes with nearly no weight cannot be distributed completely there.
     pub(crate) fn distributed_by(mut self, weights: &Self, max_concentration: f64) -> Self {
         let (whole, weight) = (self.sum(), weights.sum());
         let most = if weight > 0.0 { max_concentration * whole / weight } else { 0.0 };

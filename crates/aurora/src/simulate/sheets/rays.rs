@@ -1,4 +1,4 @@
-//! How bright and how hard the precipitation is along the sheets: rays, black rays, pulsation.
+//! Patterns of brightness and energy along the sheets: rays, black rays, pulsation.
 
 use bansho_base::{
     math::{
@@ -12,20 +12,20 @@ use super::nodes::split;
 use crate::{AuroraParameters, PulsationParameters, RayParameters};
 use fearless_simd::{Level, dispatch};
 
-/// Octaves of the rays: groups of rays, rays, and streaks in them.
+/// Fractal noise of the rays: groups, rays, and fine structure.
 const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
-/// Nodes of the table for the length of the finest cell of noise: with straight lines between them within a hundredth of it.
+/// Table nodes per cell of the finest octave: linear interpolation is then accurate to a hundredth.
 const NODES_PER_CELL: f64 = 12.0;
-/// Most nodes of all sheets together for each particle: finer rays are finer than what particles show.
+/// Maximum table nodes per particle: finer rays are not resolved by particles.
 const NODES_PER_PARTICLE: f64 = 0.5;
-/// Where the coordinate runs so many times as fast as the sheet is long, rays begin to fade, and so many times they are gone: they would be so
-/// much narrower, or stand beside others where it jumps.
+/// Stretching of the coordinate relative to arc length at which rays start to fade and have vanished: they would be
+/// compressed or discontinuous.
 const FADE_START_STRETCH: f64 = 1.5;
 const FADE_END_STRETCH: f64 = 3.0;
-/// Width of a black ray beside the distance between two.
+/// Width of a black ray relative to their distance.
 const BLACK_WIDTH: f32 = 0.12;
 
-/// The pattern along the sheets at a moment.
+/// The pattern generator.
 #[derive(Clone, Debug)]
 pub(crate) struct RayPattern {
     rays: RayParameters,
@@ -33,33 +33,34 @@ pub(crate) struct RayPattern {
     noise: [Noise<2>; 2],
     black: Noise<2>,
     patches: Noise<2>,
-    /// What noise is divided by so that its variance is 1.
+    /// Standard deviation of the noise, for normalization.
     deviation: f32,
     most_nodes: f64,
 }
 
-/// The noises of rays on both sides, of black rays and of patches.
+/// Noise of the rays on both sides, of black rays and of patches.
 type Noises = [f32; 4];
 
-/// The noises along the sheets at a moment, in a table: they cost what the sheets' detail costs, not the particles.
+/// Tabulated noise along the sheets at one time: the cost depends on the detail of the sheets, not on the number of
+/// particles.
 pub(crate) struct RayTable {
-    /// By sheet, evenly spaced over its length.
+    /// By sheet, uniformly spaced.
     sheets: Vec<Vec<Noises>>,
 }
 
-/// Sixteen positions on the sheets.
+/// Inputs for a batch of positions.
 pub(crate) struct PatternInputs {
     /// The noises there.
     pub(crate) noises: [Noises; LANES],
-    /// Which side of the sheet, from -1 to 1 within its thickness.
+    /// Lateral position, -1 to 1 within the thickness.
     pub(crate) side: [f32; LANES],
 }
 
-/// What the pattern does at sixteen positions.
+/// Pattern factors for a batch of positions.
 pub(crate) struct PatternSample {
-    /// Factor of the power, before it is shared out.
+    /// Power factor before normalization.
     pub(crate) brightness: [f32; LANES],
-    /// Factor of the power after it has been shared out: what makes the whole aurora darker.
+    /// Power factor after normalization, which darkens the whole aurora.
     pub(crate) dimming: [f32; LANES],
     /// Factor of the energy.
     pub(crate) hardness: [f32; LANES],
@@ -83,7 +84,8 @@ impl RayPattern {
         }
     }
 
-    /// The noises at a time along sheets of those lengths in km; `arc_coordinates` gives the coordinate after every so many equal parts of a sheet.
+    /// Tabulates the noise for sheets of these lengths in km; `arc_coordinates` returns the coordinate at equally
+    /// spaced nodes of a sheet.
     pub(crate) fn table(
         &self,
         lengths: &[f64],
@@ -107,7 +109,7 @@ impl RayPattern {
         RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
     }
 
-    /// Distance of nodes that shows the finest of what is asked for.
+    /// Node spacing for the finest requested pattern.
     fn node_km(&self) -> f64 {
         let finest = |strength: f64, scale: f64| if strength > 0.0 { scale } else { f64::INFINITY };
         let rays = finest(self.rays.contrast.max(self.rays.energy), self.rays.scale_km);
@@ -127,7 +129,7 @@ impl RayPattern {
         for i in 0..LANES {
             let [left, right, black, patch] = coordinates.noises[i];
             let fraction = (0.5 + 0.5 * coordinates.side[i]).clamp(0.0, 1.0);
-            // Two patterns mix to less than the variance of one.
+            // A blend of two independent patterns has less variance than one; normalized.
             let variance = fraction * fraction + (1.0 - fraction) * (1.0 - fraction);
             let mixed = (left + fraction * (right - left)) / (self.deviation * variance.sqrt());
             sample.brightness[i] = approximations::exp(self.rays.contrast as f32 * mixed);
@@ -137,11 +139,11 @@ impl RayPattern {
         sample
     }
 
-    /// The noise of the rays on both sides, of black rays and of patches; what is not asked for is 0.
+    /// Noise of the rays on both sides, of black rays and of patches; 0 for disabled patterns.
     fn noises(&self, level: Level, coordinates: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
         let rays = &self.rays;
         let (shift, age) = (rays.shear_km_per_s * time, time / rays.life_s);
-        // Groups of rays are four rays long. Black rays run against the rays of the one side.
+        // Groups of rays are four rays long. Black rays drift against the rays of one side.
         let [group, black, patch] = [4.0 * rays.scale_km, rays.black_scale_km, self.pulsation.patch_km];
         let wanted = [
             (rays.contrast.max(rays.energy), &self.noise[0], shift, group, age),
@@ -158,14 +160,14 @@ impl RayPattern {
         })
     }
 
-    /// Black rays are where a noise passes 0.
+    /// Black rays are the zero crossings of a noise.
     #[inline(always)]
     fn darkness(&self, noise: f32) -> f32 {
         let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
         1.0 - self.rays.black_rays as f32 * depth.sqrt()
     }
 
-    /// Patches go bright and dark, each in its own time.
+    /// Patches pulsate with independent phases.
     #[inline(always)]
     fn pulse(&self, noise: f32, time: f64) -> f32 {
         let turns = time / self.pulsation.period_s;
@@ -175,8 +177,8 @@ impl RayPattern {
     }
 }
 
-/// Fades the rays of nodes of a sheet, `spacing` km apart, about those between which the coordinate runs fast or jumps: over `scale` km to
-/// both sides.
+/// Fades the rays near nodes where the coordinate is stretched or discontinuous, over `scale` km on both sides; nodes
+/// are `spacing` km apart.
 fn fade(nodes: &mut [Noises], coordinates: &[f64], spacing: f64, scale: f64) {
     let mut strengths = vec![1.0_f64; nodes.len()];
     for (node, pair) in coordinates.windows(2).enumerate() {
@@ -214,7 +216,7 @@ impl RayTable {
     }
 }
 
-/// Noise at sixteen positions, in cells, and an age, in lives.
+/// Noise for a batch of coordinates, in cells, and a time, in lifetimes.
 fn values(level: Level, noise: &Noise<2>, coordinates: [f64; LANES], age: f64) -> [f32; LANES] {
     let (mut cells, mut fractions) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
     let age = Coordinate::from_f64(age);

@@ -1,4 +1,4 @@
-//! The in-between shape as the particles see it: smooth through its control points, with folds that travel along it.
+//! The refined in-between shape: a smooth curve through the control points, with folds that travel along it.
 
 use bansho_base::{
     math::{self, DVec2, lerp, random::Key},
@@ -11,20 +11,21 @@ use crate::{
     shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetSampler, cumulative_lengths},
 };
 
-/// Pieces that a fold is made of, unless all sheets together would have too many.
+/// Segments per fold, unless there would be too many.
 const PIECES_PER_FOLD: f64 = 12.0;
-/// Pieces are not shorter than L_thr over this.
+/// Minimum segment length is L_thr divided by this.
 const PIECES_PER_THICKNESS: f64 = 4.0;
-/// Points nearer than so many pieces may have changed positions.
+/// Points closer than this many segments may be swapped.
 const NEAR_PIECES: f64 = 2.0;
-/// Most pieces of all sheets together, and for each particle, but not fewer than so many, nor than there are segments between control points.
+/// Maximum segments of all sheets, per particle and in total, and the minimum of that limit; never fewer than one per
+/// control segment.
 const MOST_PIECES: f64 = 20_000.0;
 const PIECES_PER_PARTICLE: f64 = 0.05;
 const FEW_PIECES: f64 = 2_000.0;
-/// Gradient noise seldom leaves half of its bounds: this makes its swings those that are asked for.
+/// Normalization: gradient noise rarely exceeds half of its range.
 const SWING: f64 = 2.0;
 
-/// How the shape is made finer and folded.
+/// Parameters of refinement and folds.
 #[derive(Clone, Debug)]
 pub(crate) struct FoldModel {
     parameters: FoldParameters,
@@ -41,13 +42,13 @@ impl FoldModel {
         let fractal = Fractal { octaves: 2, ..Fractal::default() };
         let noise = Noise::new(seed, fractal, [0; 2]).expect("two octaves without a period are noise");
         let fold = if parameters.amplitude_km > 0.0 { parameters.scale_km / PIECES_PER_FOLD } else { f64::INFINITY };
-        // Nothing finer than a part of its thickness can be seen of a sheet.
+        // Detail finer than a fraction of the thickness is not visible.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
         let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(FEW_PIECES, MOST_PIECES);
         Self { noise, piece_km, most_pieces, half_km: aurora.extent_km / 2.0, parameters }
     }
 
-    /// How far the sheet swings at a coordinate along it and a time, km.
+    /// Lateral displacement of the sheet at a coordinate and a time, km.
     fn swing(&self, along: f64, time: f64) -> f64 {
         let FoldParameters { amplitude_km, scale_km, speed_km_per_s, life_s, .. } = self.parameters;
         let coordinates = [(along - speed_km_per_s * time) / scale_km, time / life_s];
@@ -55,45 +56,46 @@ impl FoldModel {
     }
 }
 
-/// The finer, folded shape, where everything on it is found by nearness.
+/// The refined, folded shape with nearest-point queries.
 #[derive(Clone, Debug)]
 pub(crate) struct RefinedShape {
     pub(crate) shape: Shape,
-    /// The coordinate along the sheets at each point of the finer shape, km.
+    /// Arc-length coordinate of each point, km.
     arc_coordinates: Vec<Vec<f64>>,
-    /// Fraction of the sheet's length before each point.
+    /// Fraction of the sheet's length at each point.
     fractions: Vec<Vec<f64>>,
-    /// The sheet and point at which each segment begins, over all sheets in turn.
+    /// Sheet and index of the start of each segment, over all sheets.
     starts: Vec<[u32; 2]>,
-    /// What there is along each segment, in the same order.
+    /// Attributes of each segment, in the same order.
     attributes: Vec<SegmentAttributes>,
     near: NearestSegmentGrid,
 }
 
-/// What there is at the start of a segment, and by how much it is more at its end.
+/// Attributes at the start of a segment, and their change to its end.
 #[derive(Clone, Copy, Debug)]
 struct SegmentAttributes {
     fraction: [f64; 2],
     flux: [f64; 2],
     energy: [f64; 2],
-    /// One over its length, 1/km, negative where the sheet is listed against the way of its coordinate; 0 where it has no length.
+    /// One over its length, 1/km, negative where the sheet is listed against its coordinate; 0 for a degenerate
+    /// segment.
     per_length: f64,
     sheet: u32,
 }
 
-/// The position of a sheet that is nearest to a particle.
+/// The point of a sheet that is nearest to a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SheetProjection {
     pub(crate) sheet: u32,
     pub(crate) fraction: f64,
     pub(crate) flux: f64,
     pub(crate) energy: f64,
-    /// Distance, km, negative on the left of the way along which the sheet's coordinate has grown.
+    /// Signed distance, km, negative to the left of the coordinate's direction.
     pub(crate) side: f64,
 }
 
 impl RefinedShape {
-    /// The course of `shape` and the bridges over its gaps at a time; particles within `reach` km find it.
+    /// Refines `shape` and the bridges over its gaps at a time, for queries within `reach` km.
     pub(crate) fn new(
         (shape, bridges): (&Shape, &[Bridge]),
         along: &ArcLengthMap,
@@ -101,7 +103,7 @@ impl RefinedShape {
         time: f64,
         reach: f64,
     ) -> Self {
-        // Each segment between control points is made of whole pieces, up to one more than fit.
+        // Each control segment has a whole number of segments, at most one more than would fit.
         let segments: usize = shape.sheets.iter().map(|sheet| sheet.points.len().saturating_sub(1)).sum();
         let piece = folds.piece_km.max(shape.length() / (folds.most_pieces - segments as f64).max(1.0));
         let (mut fine, mut arc_positions) = (Shape::default(), Vec::new());
@@ -151,7 +153,7 @@ impl RefinedShape {
         points[point].lerp(points[point + 1], t)
     }
 
-    /// The coordinate after every `last`th part of a sheet's length, from its beginning to its end, km.
+    /// Coordinates at `last + 1` equally spaced fractions of a sheet's length, km.
     pub(crate) fn arc_coordinates(&self, sheet: usize, last: usize) -> Vec<f64> {
         let (arc_coordinates, fractions) = (&self.arc_coordinates[sheet], &self.fractions[sheet]);
         let mut after = 1;
@@ -169,16 +171,16 @@ impl RefinedShape {
         (0..=last).map(at).collect()
     }
 
-    /// The point before a fraction of a sheet's length, and how far it is on the way to the next.
+    /// Point before a fraction of a sheet's length, and the interpolation fraction.
     fn split(&self, sheet: usize, fraction: f64) -> (usize, f64) {
         let fractions = &self.fractions[sheet];
         let after = fractions.partition_point(|end| *end <= fraction).clamp(1, fractions.len() - 1);
         (after - 1, fraction_between([fractions[after - 1], fractions[after]], fraction))
     }
 
-    /// Each piece of the sheets in turn, in parts of at most the fraction `most` of its sheet's length: its sheet, the fraction of the sheet's length
-    /// before its middle, the flux factor there, its length in km.
-    pub(crate) fn for_each_strip(&self, most: impl Fn(usize) -> f64) -> impl Iterator<Item = (usize, f64, f64, f64)> {
+    /// All segments, subdivided to at most the fraction `most` of their sheet's length: sheet, fraction of the length
+    /// at its middle, flux factor, length in km.
+    pub(crate) fn pieces(&self, most: impl Fn(usize) -> f64) -> impl Iterator<Item = (usize, f64, f64, f64)> {
         self.starts.iter().flat_map(move |start| {
             let [number, index] = start.map(|t| t as usize);
             let (sheet, fractions) = (&self.shape.sheets[number], &self.fractions[number]);
@@ -202,7 +204,7 @@ impl RefinedShape {
         self.near.nearest(point).map(|(segment, _)| self.starts[segment].map(|number| number as usize))
     }
 
-    /// `point`, or if it is farther than `most` km from the shape, the position on the way to it that is not; itself beyond the reach.
+    /// `point`, moved toward the shape if it is farther than `most` km from it; unchanged beyond the reach.
     pub(crate) fn clamp_distance(&self, point: DVec2, most: f64) -> DVec2 {
         let Some(nearest) = self.near.nearest_point(point).filter(|nearest| nearest.distance_squared > most * most)
         else {
@@ -256,14 +258,14 @@ fn fraction_between([before, end]: [f64; 2], fraction: f64) -> f64 {
     ((fraction - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
-/// Fraction of the length before each point; 0 everywhere where there is no length.
+/// Fraction of the length at each point; 0 everywhere for a line without length.
 fn length_fractions(points: &[DVec2]) -> Vec<f64> {
     let ends = cumulative_lengths(points);
     let length = ends.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
     ends.iter().map(|end| end / length).collect()
 }
 
-/// A smooth line through a sheet's points in pieces of about that length, and the coordinate along it at each of its points.
+/// Refines a sheet to a cubic Hermite curve in segments of about that length, and interpolates the coordinate.
 fn refine(sheet: &Sheet, piece_km: f64, arc_position: impl Fn(usize, f64) -> ArcPosition) -> (Sheet, Vec<ArcPosition>) {
     let points = without_swapped_points(&sheet.points, NEAR_PIECES * piece_km);
     let headings = headings(&points);
@@ -279,9 +281,9 @@ fn refine(sheet: &Sheet, piece_km: f64, arc_position: impl Fn(usize, f64) -> Arc
         let length = displacement.length();
         let tangents = [headings[index], headings[index + 1]]
             .map(|heading| without_backward_component(heading, displacement) * length);
-        let for_each_strip = (length / piece_km).ceil().max(1.0) as usize;
-        for number in 0..for_each_strip {
-            let t = number as f64 / for_each_strip as f64;
+        let pieces = (length / piece_km).ceil().max(1.0) as usize;
+        for number in 0..pieces {
+            let t = number as f64 / pieces as f64;
             push(hermite([pair[0], pair[1]], tangents, t), index, t);
         }
     }
@@ -291,8 +293,7 @@ fn refine(sheet: &Sheet, piece_km: f64, arc_position: impl Fn(usize, f64) -> Arc
     (fine, arc_positions)
 }
 
-/// The light over a gap as a sheet of its own, from the one end of a sheet to that of another, and the coordinate along it, which goes on from
-/// the first.
+/// A bridge as a sheet between two ends; the coordinate continues that of the first.
 fn bridge_sheet(
     bridge: &Bridge,
     fine: &Shape,
@@ -304,10 +305,10 @@ fn bridge_sheet(
     let begin = arc_positions[bridge.ends[0].0][point(bridge.ends[0])];
     let direction = if bridge.ends[0].1 { begin.direction } else { -begin.direction };
     let length = from.distance(to);
-    let for_each_strip = (length / piece_km).ceil().max(1.0) as usize;
+    let pieces = (length / piece_km).ceil().max(1.0) as usize;
     let (mut sheet, mut own) = (Sheet::default(), Vec::new());
-    for number in 0..=for_each_strip {
-        let t = number as f64 / for_each_strip as f64;
+    for number in 0..=pieces {
+        let t = number as f64 / pieces as f64;
         sheet.points.push(from.lerp(to, t));
         sheet.flux.push(bridge.flux);
         sheet.energy.push(bridge.energy);
@@ -316,8 +317,8 @@ fn bridge_sheet(
     (sheet, own)
 }
 
-/// The points in the order in which the sheet passes them: two nearer than `near_km` that lie the wrong way round between their neighbors, as
-/// where a fold is born, change positions. Else the sheet would pass there three times, as bright.
+/// Swaps neighboring points closer than `near_km` that are in the wrong order, as occurs where a fold forms. Otherwise
+/// the sheet would pass there three times and be three times as bright.
 fn without_swapped_points(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
     let mut points = points.to_vec();
     for index in 1..points.len().saturating_sub(2) {
@@ -333,7 +334,7 @@ fn without_swapped_points(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
     points
 }
 
-/// The direction of the sheet at each point: that of the circle through it and its neighbors.
+/// Tangent direction at each point: that of the circle through it and its neighbors.
 fn headings(points: &[DVec2]) -> Vec<DVec2> {
     let weighted = |from: usize| {
         let displacement = points[from + 1] - points[from];
@@ -348,13 +349,13 @@ fn headings(points: &[DVec2]) -> Vec<DVec2> {
     (0..points.len()).map(heading).collect()
 }
 
-/// A heading without what of it goes against the way: a curve that first went back would pass there three times, as bright.
+/// Removes the backward component of a tangent, which would make the curve pass there three times.
 fn without_backward_component(heading: DVec2, displacement: DVec2) -> DVec2 {
     let back = (heading.dot(displacement) / displacement.length_squared().max(1e-12)).min(0.0);
     heading - displacement * back
 }
 
-/// Cubic from one point to the other with those tangents.
+/// Cubic Hermite interpolation.
 fn hermite([a, b]: [DVec2; 2], [at_a, at_b]: [DVec2; 2], t: f64) -> DVec2 {
     let (distance_squared, rest) = (t * t, 1.0 - t);
     let rest_square = rest * rest;
@@ -362,7 +363,8 @@ fn hermite([a, b]: [DVec2; 2], [at_a, at_b]: [DVec2; 2], t: f64) -> DVec2 {
         - at_b * (distance_squared * rest)
 }
 
-/// Swings every point of the sheet to its side, and along it so that crests lean over: by the way of the coordinate.
+/// Displaces every point laterally, and along the sheet so that crests lean over, relative to the coordinate's
+/// direction.
 fn fold(sheet: &mut Sheet, arc_positions: &[ArcPosition], folds: &FoldModel, time: f64) {
     let headings = headings(&sheet.points);
     let half = DVec2::splat(folds.half_km);
