@@ -268,7 +268,7 @@ impl TrackModel {
     pub fn emission(self, spectrum: Spectrum) -> Emission {
         match self {
             Self::Fang => Emission::new(atmosphere(), spectrum),
-            Self::HardSphereAtmosphere => Emission::of_hard_spheres(atmosphere(), spectrum),
+            Self::HardSphereAtmosphere => Emission::from_hard_spheres(atmosphere(), spectrum),
         }
     }
 
@@ -285,7 +285,7 @@ bansho_base::choice! {
     /// How single collisions are smoothed to light.
     pub enum Blur {
         /// On the sky, across the field, as far as `spread_km` says: a near ray is wider than a far one.
-        Kilometres = "km",
+        Kilometers = "km",
         /// In the picture, by `blur_radii`, wherever they are, as in the thesis (2.28).
         Pixels = "pixels",
     }
@@ -317,7 +317,7 @@ bansho_base::parameters! {
         /// What stops the electrons: measured air, or the thesis's hard spheres.
         fall: TrackModel = TrackModel::Fang;
         /// Where light is smoothed: on the sky in km, or in the picture in pixels.
-        blur: Blur = Blur::Kilometres;
+        blur: Blur = Blur::Kilometers;
         /// Radii of the blur in pixels.
         blur_radii: BlurParameters = BlurParameters::default();
         /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbours are, and rays stay sharp.

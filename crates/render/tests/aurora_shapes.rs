@@ -120,7 +120,7 @@ fn shares_within(simulation: &AuroraSimulation, places: &[([f64; 2], f64)]) -> V
     let particles = simulation.particles();
     let (count, power) = (particles.len() as f64, particles.power_w());
     let within = |(middle, radius): &([f64; 2], f64)| {
-        let inside = |index: &usize| particles.place(*index).distance(DVec2::from(*middle)) < *radius;
+        let inside = |index: &usize| particles.position(*index).distance(DVec2::from(*middle)) < *radius;
         let inside: Vec<usize> = (0..particles.len()).filter(inside).collect();
         let own: f64 = inside.iter().map(|index| f64::from(particles.powers_w[*index])).sum();
         [inside.len() as f64 / count, own / power]
@@ -169,7 +169,7 @@ fn least_stretch(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
         // What bridges a gap is a sheet of its own, after those of the shape.
         let Some(bins) = counts.get_mut(particles.sheets[index] as usize) else { continue };
         let last = bins.len() - 1;
-        bins[((f64::from(particles.shares[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
+        bins[((f64::from(particles.arc_fractions[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
     }
     let stretches = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
         let due = living * BINS as f64 * length / (total * counts.len() as f64);

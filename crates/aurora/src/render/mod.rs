@@ -1,10 +1,10 @@
 //! Rendering of the aurora in absolute luminance, through any lens.
 //!
-//! Field lines of a uniform field appear as meridians about the magnetic zenith ([`project`]: `field_lines`), so the
+//! Field lines of a uniform field appear as meridians about the magnetic zenith (`project`: `field_lines`), so the
 //! aurora is drawn on a chart of the sky in longitude and colatitude about that point (`chart`). Precipitation is
-//! binned by longitude and distance ([`bin`]); the emission profile of every field line is integrated along its
-//! meridian ([`integrate`]). Extinction and color are applied to the chart ([`shade`]), and the pixels of any lens
-//! sample it ([`prepared`]). The cost is linear in pixels and particles and independent of the shapes.
+//! binned by longitude and distance (`bin`); the emission profile of every field line is integrated along its
+//! meridian (`integrate`). Extinction and color are applied to the chart (`shade`), and the pixels of any lens
+//! sample it (`prepared`). The cost is linear in pixels and particles and independent of the shapes.
 
 pub(crate) mod bin;
 mod emitted_light;

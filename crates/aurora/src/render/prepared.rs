@@ -166,7 +166,7 @@ impl PixelBatch {
         let mut directions = Directions::new(camera, x, y);
         let mut batch = Self { length: directions.normalize(), in_view: directions.seen, ..Self::default() };
         let [xs, ys, zs] = directions.axes;
-        let [along, first, second] = field.single();
+        let [along, first, second] = field.axes_f32();
         for i in 0..PIXEL_BATCH {
             let direction = [xs[i], ys[i], zs[i]];
             let (x, y) = (dot(first, direction), dot(second, direction));
@@ -212,7 +212,7 @@ impl PreparedAurora<'_> {
             for x in [x, x + PIXEL_BATCH] {
                 let Some(direction) = self.view.camera.direction(DVec2::new(x as f64, y as f64)) else { return false };
                 let direction = direction.normalize();
-                let [along, first, second] = self.field.to_field_frame(direction);
+                let [along, first, second] = self.field.field_frame_components(direction);
                 let colatitude = math::atan2(math::hypot(first, second), along) as f32;
                 let longitude = math::atan2(second, first) as f32;
                 // Relative to the first corner, so that the region is not split at the seam of longitude.

@@ -17,7 +17,7 @@ use crate::{
 /// Motion per instant in units of the particles' spread, and the maximum number of instants; the rest is added to the
 /// spread.
 const SPREADS_PER_INSTANT: f64 = 3.0;
-const MOST_INSTANTS: f64 = 16.0;
+const MAX_INSTANTS: f64 = 16.0;
 /// Instants of a long exposure, each with its own particles and afterglow.
 const LONG_INSTANTS: usize = 16;
 
@@ -45,7 +45,7 @@ impl Aurora {
         let light = self.light(self.simulation(), view.shutter.middle());
         let distance_km = rms_speed(self.simulation()) * view.shutter.duration();
         let count =
-            (2.0 * distance_km / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
+            (2.0 * distance_km / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
         let now = self.simulation().time();
         let offsets_s = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
         Sources::new(

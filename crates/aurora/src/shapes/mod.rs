@@ -32,5 +32,8 @@ pub use sequence::Sequence;
 pub use shape::{Shape, Sheet};
 pub use strokes::intersection::{SegmentId, count_crossings, first_crossing};
 
+/// Altitude of the drawn plane, km.
+pub(crate) const FOOT_ALTITUDE_KM: f64 = 100.0;
+
 #[cfg(test)]
 mod tests;

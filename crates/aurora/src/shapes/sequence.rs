@@ -11,7 +11,7 @@ use super::{
 };
 use crate::shapes::{
     interpolation::{
-        control_points::{TrackedControlPoints, drawn_shapes, follow},
+        control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
         gap::{self, Bridge, Gap, GapFlux},
         spline_track::{Knot, ShapeTiming, find_velocities},
     },
@@ -95,7 +95,7 @@ impl Sequence {
         let timing = timing(shapes)?;
         let drawn = drawn_shapes(shapes, extent_km, assets)?;
         let sequence = |evenness: f64| {
-            let mut tracked = follow((shapes, &drawn), motion, extent_km, evenness)?;
+            let mut tracked = track_control_points((shapes, &drawn), motion, extent_km, evenness)?;
             let closed = loop_s.is_some() && tracked.is_closed;
             find_velocities(&mut tracked.tracks, &timing, closed);
             let sequence =

@@ -13,11 +13,11 @@ const STIFFNESS: f64 = 0.1;
 /// Particles per task.
 const TASK: usize = 4096;
 /// Relaxation factor per step of the support radius.
-const FOLLOWING: f64 = 0.1;
+const SUPPORT_RELAXATION: f64 = 0.1;
 /// Minimum and maximum support radius, cells.
 const SUPPORT_CELLS: [f64; 2] = [0.02, 2.0];
 /// Minimum mass of a particle that is fading in.
-const LEAST_MASS: f32 = 0.05;
+const MIN_MASS: f32 = 0.05;
 
 /// SPH repulsion with reusable buffers.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ impl Repulsion {
         self.force.accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
         let count = self.densities.len().max(1) as f64;
         let mean = self.densities.iter().map(|density| f64::from(*density)).sum::<f64>() / count;
-        support_km + FOLLOWING * (self.support_km(mean) - support_km)
+        support_km + SUPPORT_RELAXATION * (self.support_km(mean) - support_km)
     }
 }
 
@@ -97,7 +97,7 @@ impl Repulsion {
 fn particle_masses(fades: &[f32], masses: &mut Vec<f32>) {
     masses.resize(fades.len(), 0.0);
     for (mass, fade) in masses.iter_mut().zip(fades) {
-        *mass = fade.fma(1.0 - LEAST_MASS, LEAST_MASS);
+        *mass = fade.fma(1.0 - MIN_MASS, MIN_MASS);
     }
 }
 

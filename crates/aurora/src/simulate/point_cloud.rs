@@ -6,7 +6,8 @@ use bansho_base::{
 };
 
 use super::{AuroraParticles, AuroraSimulation};
-use crate::render::project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM};
+use crate::shapes::FOOT_ALTITUDE_KM;
+use bansho_base::world::sky::EARTH_RADIUS_KM;
 
 /// Half of the interval of the finite-difference velocity, s.
 const MOMENT_S: f64 = 1e-3;

@@ -17,7 +17,7 @@ const TABLE_COUNT: f64 = 75.0;
 const TASK: usize = 4096;
 /// Intervals are filled by this factor more than the table says: until the next update they stretch by up to a half and
 /// particles move on.
-const AHEAD: f64 = 1.35;
+const FILL_FACTOR: f64 = 1.35;
 
 /// Position and velocity of a new particle, km and km/s.
 type Birth = (DVec2, [f32; 2]);
@@ -165,7 +165,7 @@ impl Relocation {
     ) -> Vec<Birth> {
         let [below, most] =
             [self.parameters.births_below, self.parameters.births_at_most].map(|count| count / TABLE_COUNT);
-        let lack = |interval: &ArcInterval| (AHEAD * below * interval.target_count - interval.count).max(0.0);
+        let lack = |interval: &ArcInterval| (FILL_FACTOR * below * interval.target_count - interval.count).max(0.0);
         let lacks: Vec<f64> = intervals.all().iter().map(lack).collect();
         let lacking: f64 = lacks.iter().sum();
         if lacking <= 0.0 {
@@ -192,7 +192,7 @@ impl Relocation {
 
     /// Remaining capacity for new particles.
     fn room(&self, living: usize) -> f64 {
-        (MOST_PARTICLES * self.count - living as f64).max(0.0)
+        (MAX_PARTICLE_FACTOR * self.count - living as f64).max(0.0)
     }
 
     /// Removes the surplus over the requested count, from intervals with more than their target.
@@ -218,7 +218,7 @@ impl Relocation {
 }
 
 /// Maximum number of particles relative to the requested count.
-const MOST_PARTICLES: f64 = 4.0;
+const MAX_PARTICLE_FACTOR: f64 = 4.0;
 
 /// Near cells: scatter count and potential compared with their means over all cells.
 pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {

@@ -176,5 +176,5 @@ fn read_map<const ALTITUDES: usize>(
     layout: &AfterglowMap<ALTITUDES>,
 ) -> Result<AfterglowMap<ALTITUDES>, SnapshotError> {
     let (tile_positions, values) = (reader.list::<u32>()?, reader.list::<f32>()?);
-    layout.from_arrays(&tile_positions, &values).ok_or(SnapshotError::Damaged)
+    layout.with_arrays(&tile_positions, &values).ok_or(SnapshotError::Damaged)
 }

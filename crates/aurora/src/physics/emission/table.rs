@@ -52,7 +52,7 @@ impl Emission {
 
     /// The table for the thesis's hard-sphere tracks and its rules of emission.
     #[must_use]
-    pub fn of_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
         Self::from_photons(air, Deposition::from_hard_spheres(air, spectrum), photons)
     }
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn hard_spheres_shine_where_nature_does_not() {
-        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::of_hard_spheres(atmosphere(), ARC));
+        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::from_hard_spheres(atmosphere(), ARC));
         let peak_km = |table: &Emission, energy_ev: f64, emitter: Emitter| {
             let profile = table.profile(energy_ev);
             let light = |level: &usize| profile[*level][emitter.index()];

@@ -30,7 +30,7 @@ const SPREAD_PER_SPACING: f64 = 1.2;
 /// Afterglow cells without particles are skipped below this fraction of a typical cell.
 const FAINTEST: f32 = 2e-4;
 /// The same with single collisions, whose noise masks more; the skipped light is a hundredth of the afterglow.
-const FAINTEST_FALLING: f32 = 1e-2;
+const FAINTEST_WITH_COLLISIONS: f32 = 1e-2;
 /// Offset between the random-number counters of a particle at successive instants.
 const PER_INSTANT: u32 = 0x9e37_79b9;
 /// 1000 W, the power of one mW/m^2 on one km^2.
@@ -166,7 +166,7 @@ impl Sources {
     /// Sources while the shutter is open.
     pub(crate) fn new(light: &EmissionInputs, field: &FieldLines, moments: &SampleTimes) -> Self {
         let by_collisions = light.parameters.sampling == Sampling::CollisionRenderer;
-        let faintest = if by_collisions { FAINTEST_FALLING } else { FAINTEST };
+        let faintest = if by_collisions { FAINTEST_WITH_COLLISIONS } else { FAINTEST };
         let afterglow = light.afterglow;
         let column = light.emission.column(light.energy_ev);
         let spread = math::hypot(light.spread_km(), moments.smear_km);
@@ -246,8 +246,8 @@ impl EmissionInputs<'_> {
     pub(crate) fn spread_km(&self) -> f64 {
         let own = match (self.parameters.blur, self.parameters.spread_km) {
             (Blur::Pixels, _) => 0.0,
-            (Blur::Kilometres, Auto::Set(spread)) => spread,
-            (Blur::Kilometres, Auto::Auto) => SPREAD_PER_SPACING * self.spacing_km,
+            (Blur::Kilometers, Auto::Set(spread)) => spread,
+            (Blur::Kilometers, Auto::Auto) => SPREAD_PER_SPACING * self.spacing_km,
         };
         math::hypot(own, self.lateral_spread_km).max(1e-3)
     }

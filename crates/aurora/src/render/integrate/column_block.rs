@@ -83,7 +83,7 @@ impl ColumnBlock {
         }
         for column in 0..BLOCK_COLUMNS {
             let unit = chart.longitude_cos_sin(index * BLOCK_COLUMNS + column);
-            self.meridians[column] = field.meridian(unit).single();
+            self.meridians[column] = field.meridian(unit).coefficients_f32();
             for (values, value) in self.units.iter_mut().zip(unit) {
                 values[column] = value as f32;
             }

@@ -91,7 +91,7 @@ impl EmissionProfiles {
         self.tables[table_index].get_or_init(|| {
             let profile = self.emission.profile(table_energy_ev(table_index));
             if self.red_by_altitude {
-                MipTables::of_heights(&red_by_altitude(&profile))
+                MipTables::from_red_altitudes(&red_by_altitude(&profile))
             } else {
                 MipTables::new(&profile)
             }
@@ -110,7 +110,7 @@ impl MipTables {
     }
 
     /// The same for red light by altitude.
-    fn of_heights(profile: &[PerEmitter<f64>]) -> Self {
+    fn from_red_altitudes(profile: &[PerEmitter<f64>]) -> Self {
         let top_km = top_km(profile, RED_ALTITUDES - 1);
         let heights: [usize; RED_ALTITUDES] = std::array::from_fn(|height| height);
         Self { values: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
@@ -156,17 +156,19 @@ fn downsampled(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
 }
 
 fn top_km(profile: &[PerEmitter<f64>], emitter: usize) -> f32 {
-    let passed = passed((0..LEVELS).rev(), profile, emitter);
-    level_altitude_km(LEVELS - 1 - passed.min(LEVELS - 2)).min(HIGHEST_KM) as f32
+    let levels_within_cutoff = levels_within_cutoff((0..LEVELS).rev(), profile, emitter);
+    level_altitude_km(LEVELS - 1 - levels_within_cutoff.min(LEVELS - 2)).min(HIGHEST_KM) as f32
 }
 
 fn bottom_km(profile: &[PerEmitter<f64>], emitters: &[usize]) -> f32 {
-    let bottom = |emitter: &usize| level_altitude_km(passed(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32;
+    let bottom = |emitter: &usize| {
+        level_altitude_km(levels_within_cutoff(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32
+    };
     emitters.iter().map(bottom).fold(f32::INFINITY, f32::min)
 }
 
 /// Number of levels, in iteration order, within the cutoff fraction.
-fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
+fn levels_within_cutoff(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
     let light = |level: usize| profile[level][emitter];
     let whole: f64 = (0..LEVELS).map(light).sum();
     let mut sum = 0.0;

@@ -244,7 +244,7 @@ mod tests {
             let field = FieldLines::new(dip_deg, 0.0, DVec3::ZERO);
             for (longitude, distance) in [(0.3, 15.0), (1.6, 60.0), (-1.5, 150.0), (-1.6, 400.0), (-1.2, 900.0)] {
                 let (sin, cos) = math::sin_cos(longitude);
-                let meridian = field.meridian([cos, sin]).single();
+                let meridian = field.meridian([cos, sin]).coefficients_f32();
                 let line = ProjectedFieldLine::new(&meridian, distance, &projection);
                 for first_km in [82.0, 130.0, 400.0] {
                     let altitudes_km: [f32; LANES] = std::array::from_fn(|i| first_km + 3.0 * i as f32);

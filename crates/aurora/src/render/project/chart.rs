@@ -15,10 +15,10 @@ pub(crate) const STRIP_COLUMNS: usize = 16;
 /// Samples per side of the picture for the coverage.
 const SAMPLES_PER_SIDE: usize = 24;
 /// Maximum number of columns and of rows.
-const MOST: f64 = 16_384.0;
+const MAX_SIZE: f64 = 16_384.0;
 /// Maximum chart cells per pixel: more occur only where a camera zooms or pans far during the exposure, which blurs
 /// them.
-const MOST_PER_PIXEL: f64 = 16.0;
+const MAX_CELLS_PER_PIXEL: f64 = 16.0;
 /// Minimum sine of the elevation that is drawn.
 const MIN_SINE_ELEVATION: f64 = -0.35;
 
@@ -75,7 +75,7 @@ impl Coverage {
             colatitude: [if around { 0.0 } else { least - margin }.max(0.0), (greatest + margin).min(PI)],
             pixel,
         };
-        let most = MOST_PER_PIXEL * camera.size[0] * camera.size[1];
+        let most = MAX_CELLS_PER_PIXEL * camera.size[0] * camera.size[1];
         coverage.pixel = pixel.max(math::sqrt(coverage.area() / most));
         coverage
     }
@@ -117,12 +117,12 @@ impl Chart {
         let [middle, reach] = coverage.longitude;
         let wraps = reach >= PI;
         let range = 2.0 * reach;
-        let columns = (range * widest / column).min(MOST).ceil() as usize;
+        let columns = (range * widest / column).min(MAX_SIZE).ceil() as usize;
         let columns = columns.max(1).next_multiple_of(STRIP_COLUMNS);
         let column_step = if wraps { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
         // Aligned to multiples of the step, so that the chart does not crawl as the camera turns.
         let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
-        let row = row.max((greatest - least) / MOST);
+        let row = row.max((greatest - least) / MAX_SIZE);
         let first_row = (least / row).floor();
         let rows = ((greatest / row).ceil() - first_row).max(2.0) as usize;
         Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, wraps }
@@ -255,8 +255,8 @@ mod tests {
         let [still, angle] = cells([50.0, 50.0]);
         assert!((1.0..4.0).contains(&still) && angle == 1.0, "{still} {angle}");
         let [zoomed, angle] = cells([170.0, 0.1]);
-        assert!(zoomed < 1.3 * MOST_PER_PIXEL && angle == 1.0, "{zoomed} {angle}");
+        assert!(zoomed < 1.3 * MAX_CELLS_PER_PIXEL && angle == 1.0, "{zoomed} {angle}");
         let [narrow, angle] = cells([0.2, 170.0]);
-        assert!(narrow < 1.3 * MOST_PER_PIXEL, "{narrow} {angle}");
+        assert!(narrow < 1.3 * MAX_CELLS_PER_PIXEL, "{narrow} {angle}");
     }
 }

@@ -7,8 +7,7 @@ use bansho_base::math::{self, DVec2, DVec3, MulAdd, approximations};
 
 pub(crate) use bansho_base::world::sky::EARTH_RADIUS_KM;
 
-/// Altitude of the drawn plane, km.
-pub(crate) const FOOT_ALTITUDE_KM: f64 = 100.0;
+pub(crate) use crate::shapes::FOOT_ALTITUDE_KM;
 /// Minimum dip angle, degrees: nearer the magnetic equator there are no auroras and field lines would not reach the
 /// ground.
 const MIN_DIP_DEG: f64 = 30.0;
@@ -63,7 +62,7 @@ impl FieldLines {
         for axis in 0..3 {
             position[axis] = up[axis].fma(SHELL, -observer[axis]);
         }
-        let [along, first, second] = self.single();
+        let [along, first, second] = self.axes_f32();
         FootPoint { across: [dot(first, position), dot(second, position)], vertical_cosine: dot(along, up).max(0.05) }
     }
 
@@ -91,13 +90,13 @@ impl FieldLines {
 
     /// The axes along the field and across it in single precision.
     #[inline(always)]
-    pub(crate) fn single(&self) -> [[f32; 3]; 3] {
+    pub(crate) fn axes_f32(&self) -> [[f32; 3]; 3] {
         let [first, second] = self.across;
         [self.along.as_vec3().to_array(), first.as_vec3().to_array(), second.as_vec3().to_array()]
     }
 
     /// Cosine of the colatitude, and the two components across the field, of a direction.
-    pub(crate) fn to_field_frame(&self, direction: DVec3) -> [f64; 3] {
+    pub(crate) fn field_frame_components(&self, direction: DVec3) -> [f64; 3] {
         [direction.dot(self.along), direction.dot(self.across[0]), direction.dot(self.across[1])]
     }
 
@@ -132,7 +131,7 @@ impl Meridian {
     /// In single precision: squared distance of the observer from the Earth's center minus the squared Earth radius,
     /// and its components outward and along the field.
     #[inline(always)]
-    pub(crate) fn single(&self) -> [f32; 3] {
+    pub(crate) fn coefficients_f32(&self) -> [f32; 3] {
         [self.squared, self.outward, self.along].map(|value| value as f32)
     }
 }
@@ -226,7 +225,7 @@ mod tests {
         let longitude = math::atan2(foot[1], foot[0]);
         for position in [90.0, 150.0, 400.0] {
             let seen = field.across[0] * foot[0] + field.across[1] * foot[1] + field.along * position;
-            let [_, x, y] = field.to_field_frame(seen.normalize());
+            let [_, x, y] = field.field_frame_components(seen.normalize());
             assert!((math::atan2(y, x) - longitude).abs() < 1e-9);
         }
     }

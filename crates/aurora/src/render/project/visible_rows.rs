@@ -31,7 +31,7 @@ impl VisibleRowTest {
     pub(crate) fn new(chart: &Chart, field: &FieldLines) -> Self {
         // Only the outward component depends on the longitude.
         let [[squared, first, along], [_, second, _]] =
-            [[1.0, 0.0], [0.0, 1.0]].map(|unit| field.meridian(unit).single());
+            [[1.0, 0.0], [0.0, 1.0]].map(|unit| field.meridian(unit).coefficients_f32());
         let unit = |row: f64| {
             let (sine, cosine) = math::sin_cos((chart.colatitude(0) + row * chart.row_step).clamp(0.0, PI));
             [sine as f32, cosine as f32]

@@ -128,7 +128,7 @@ fn arc(count: usize) -> Vec<AfterglowCell<1>> {
 }
 
 fn colatitude_and_longitude(field: &FieldLines, direction: DVec3) -> [f32; 2] {
-    let [along, x, y] = field.to_field_frame(direction);
+    let [along, x, y] = field.field_frame_components(direction);
     [math::atan2(math::hypot(x, y), along) as f32, math::atan2(y, x) as f32]
 }
 

@@ -6,7 +6,7 @@ use bansho_base::math::{DVec2, lerp};
 use crate::shapes::geometry::polyline::{Polyline, length_fractions};
 
 /// Maximum number of points for the exact algorithm: two merged sheets with the maximum number of control points.
-const MOST_POINTS: usize = 1024;
+const MAX_POINTS: usize = 1024;
 /// Candidate slots on the target per control point.
 const SLOTS_PER_POINT: usize = 8;
 /// Minimum and maximum number of slots between successive control points.
@@ -68,14 +68,14 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     fractions
 }
 
-/// [`warp`] for at most [`MOST_POINTS`] evenly chosen points, since its cost is quadratic; the others are interpolated
+/// [`warp`] for at most [`MAX_POINTS`] evenly chosen points, since its cost is quadratic; the others are interpolated
 /// by arc length.
 fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
-    if points.len() <= MOST_POINTS {
+    if points.len() <= MAX_POINTS {
         return warp(points, target, range, evenness);
     }
-    let chosen: Vec<usize> = (0..MOST_POINTS).map(|index| index * last / (MOST_POINTS - 1)).collect();
+    let chosen: Vec<usize> = (0..MAX_POINTS).map(|index| index * last / (MAX_POINTS - 1)).collect();
     let few: Vec<DVec2> = chosen.iter().map(|&point| points[point]).collect();
     let found = warp(&few, target, range, evenness);
     let mut all = vec![found[0]];

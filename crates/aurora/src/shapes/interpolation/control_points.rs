@@ -22,7 +22,7 @@ use crate::shapes::{
 const SAME_KM: f64 = 1e-3;
 
 /// Maximum number of control points of all shapes: about 200 MB.
-const MOST_POINTS: usize = 4_000_000;
+const MAX_POINTS: usize = 4_000_000;
 
 /// Control-point tracks, and the tracks of each sheet.
 #[derive(Clone, Debug, Default)]
@@ -60,7 +60,7 @@ pub(crate) fn drawn_shapes(
 /// # Errors
 ///
 /// A shape with the wrong number of sheets; too many control points.
-pub(crate) fn follow(
+pub(crate) fn track_control_points(
     (shapes, drawn): (&[ShapeParameters], &[Vec<DrawnSheet>]),
     motion: &MotionParameters,
     extent_km: f64,
@@ -113,9 +113,9 @@ pub(crate) fn follow(
 
 /// Checks the number of control points up to shape `index`.
 fn check_count(found: usize, index: usize) -> Result<(), ShapeError> {
-    let kind = ShapeErrorKind::TooManyPoints { found, most: MOST_POINTS };
+    let kind = ShapeErrorKind::TooManyPoints { found, most: MAX_POINTS };
     let error = || ShapeError { key: format!("shapes.{index}.sheets"), kind };
-    if found > MOST_POINTS { Err(error()) } else { Ok(()) }
+    if found > MAX_POINTS { Err(error()) } else { Ok(()) }
 }
 
 /// The target of a chain of strands.
@@ -134,7 +134,7 @@ fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
     let near = |a: &DVec2, b: &DVec2| a.distance(*b) < 1e-6 * extent_km;
     let same_sheet = |(a, b): (&DrawnSheet, &DrawnSheet)| {
         let [first, last] = [a, b].map(|sheet| sheet.line.resample(SAMPLES));
-        first.iter().zip(&last).all(|(a, b)| near(a, b)) && a.factors.are_those_of(&b.factors)
+        first.iter().zip(&last).all(|(a, b)| near(a, b)) && a.factors.approximately_equals(&b.factors)
     };
     first.len() == last.len() && first.iter().zip(last).all(same_sheet)
 }

@@ -11,7 +11,7 @@ use crate::shapes::{Sheet, geometry::polyline::cumulative_lengths};
 const BRIDGED_KM: f64 = 40.0;
 /// Length over which the flux fades toward a gap, km, and its maximum as a fraction of the sheet.
 const FADE_KM: f64 = 60.0;
-const FADE_SHARE: f64 = 0.35;
+const MAX_FADE_FRACTION: f64 = 0.35;
 /// Fraction of the transition, on the side of the maximum width, over which ends change between drawn and dark.
 const DARKENING: f64 = 0.15;
 
@@ -58,7 +58,7 @@ impl GapFlux {
 pub(crate) fn fade_toward_gap(sheet: &mut Sheet, at_end: bool, fraction: f64) {
     let lengths = cumulative_lengths(&sheet.points);
     let whole = lengths.last().copied().unwrap_or(0.0);
-    let fade_km = FADE_KM.min(FADE_SHARE * whole);
+    let fade_km = FADE_KM.min(MAX_FADE_FRACTION * whole);
     for (flux, length) in sheet.flux.iter_mut().zip(&lengths) {
         let from_end = if at_end { whole - length } else { *length };
         let risen = if fade_km > 0.0 { smoothstep(0.0, fade_km, from_end) } else { 1.0 };

@@ -148,18 +148,18 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
 }
 
 /// The test is skipped with more sheets.
-const MOST_SHEETS: usize = 40;
+const MAX_SHEETS: usize = 40;
 /// Tested points of a sheet, in quarters of its points.
-const PLACES: [usize; 3] = [1, 2, 3];
+const TESTED_QUARTERS: [usize; 3] = [1, 2, 3];
 /// Maximum distance relative to the motion.
-const NEAR: f64 = 1.5;
+const MAX_RELATIVE_DISTANCE: f64 = 1.5;
 
 /// Whether a sheet of `before` is on the other side of another sheet in `after`; both shapes have the same control
 /// points.
 pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
     let count = before.sheets.len();
     let alike = |(a, b): (&Sheet, &Sheet)| a.points.len() == b.points.len();
-    if count > MOST_SHEETS || count != after.sheets.len() || !before.sheets.iter().zip(&after.sheets).all(alike) {
+    if count > MAX_SHEETS || count != after.sheets.len() || !before.sheets.iter().zip(&after.sheets).all(alike) {
         return false;
     }
     let pairs =
@@ -167,11 +167,11 @@ pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
     pairs().any(|(own, other)| {
         let [own, other] = [own, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
         let moved = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-        PLACES.iter().any(|quarters| {
+        TESTED_QUARTERS.iter().any(|quarters| {
             let point = own.map(|points| points[quarters * (points.len() - 1) / 4]);
             let sides = [0, 1].map(|moment| signed_distance(point[moment], other[moment]));
             let [Some(was), Some(is)] = sides else { return false };
-            was * is < 0.0 && was.abs() + is.abs() < NEAR * (moved + point[0].distance(point[1]))
+            was * is < 0.0 && was.abs() + is.abs() < MAX_RELATIVE_DISTANCE * (moved + point[0].distance(point[1]))
         })
     })
 }

@@ -17,7 +17,7 @@ const SAME_KM: f64 = 1e-6;
 const DEFAULT_FORM_LENGTH: f64 = 0.6;
 
 /// Maximum number of sheets of a shape.
-const MOST_SHEETS: usize = 256;
+const MAX_SHEETS: usize = 256;
 
 /// A sheet in its drawn direction.
 #[derive(Clone, Debug)]
@@ -84,8 +84,8 @@ pub(crate) fn drawn_sheets(
     let mut sheets = Vec::new();
     for (entry, parameters) in entries.iter().enumerate() {
         draw_entry(parameters, entry, context, assets, &mut sheets)?;
-        if sheets.len() > MOST_SHEETS {
-            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), most: MOST_SHEETS };
+        if sheets.len() > MAX_SHEETS {
+            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), most: MAX_SHEETS };
             return Err(context.error(".sheets", kind));
         }
     }
@@ -254,7 +254,7 @@ impl FluxEnergyFactors {
     }
 
     /// Whether both are equal at sampled positions.
-    pub(crate) fn are_those_of(&self, other: &Self) -> bool {
+    pub(crate) fn approximately_equals(&self, other: &Self) -> bool {
         const SAMPLES: usize = 512;
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
         let same_at = |fraction: f64| {
@@ -278,6 +278,6 @@ mod factors_tests {
         assert_eq!([0.1, 0.9].map(|fraction| (soft.at(fraction)[0] - 0.5).abs() < 1e-12), [true; 2]);
         assert_eq!([0.2, 0.5, 0.8].map(|fraction| soft.at(fraction)), [[1.0; 2]; 3]);
         assert_eq!([0.0, 0.5, 1.0].map(|fraction| factors(0.0).at(fraction)), [[1.0; 2]; 3]);
-        assert!(soft.are_those_of(&factors(0.2)) && !soft.are_those_of(&factors(0.1)));
+        assert!(soft.approximately_equals(&factors(0.2)) && !soft.approximately_equals(&factors(0.1)));
     }
 }

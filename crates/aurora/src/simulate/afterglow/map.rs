@@ -193,7 +193,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
     }
 
     /// Inverse of [`Self::to_arrays`] for a map of this layout; `None` for inconsistent arrays.
-    pub(crate) fn from_arrays(&self, positions: &[u32], values: &[f32]) -> Option<Self> {
+    pub(crate) fn with_arrays(&self, positions: &[u32], values: &[f32]) -> Option<Self> {
         let cells = values.as_chunks::<ALTITUDES>().0;
         let (tiles, rest) = cells.as_chunks::<{ 2 * TILE_CELLS }>();
         if tiles.len() != positions.len() || !rest.is_empty() || cells.len() * ALTITUDES != values.len() {
@@ -424,8 +424,8 @@ mod tests {
             assert!((power - 4.0 * math::exp(-20.0 / lifetime)).abs() < 1e-5, "{lifetime} s: {power}");
         }
         let (positions, values) = map.to_arrays();
-        assert_eq!(map.from_arrays(&positions, &values), Some(map.clone()));
-        assert_eq!(map.from_arrays(&positions, &values[1..]), None);
+        assert_eq!(map.with_arrays(&positions, &values), Some(map.clone()));
+        assert_eq!(map.with_arrays(&positions, &values[1..]), None);
     }
 
     #[test]
@@ -488,9 +488,9 @@ mod tests {
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);
         let (positions, values) = map.to_arrays();
-        assert_eq!(map.from_arrays(&positions, &values), Some(map.clone()));
-        assert_eq!(map.from_arrays(&positions[..1], &values), None);
-        assert_eq!(map.from_arrays(&[positions[0], positions[0]], &values), None);
-        assert_eq!(map.from_arrays(&[u32::MAX, positions[1]], &values), None);
+        assert_eq!(map.with_arrays(&positions, &values), Some(map.clone()));
+        assert_eq!(map.with_arrays(&positions[..1], &values), None);
+        assert_eq!(map.with_arrays(&[positions[0], positions[0]], &values), None);
+        assert_eq!(map.with_arrays(&[u32::MAX, positions[1]], &values), None);
     }
 }

@@ -16,7 +16,7 @@ const NODES_PER_PARTICLE: f64 = 0.05;
 /// Minimum nodes per task.
 const TASK: usize = 256;
 /// Maximum relative difference of the charge between a sheet's edge and its middle.
-const MOST_TILT: f64 = 0.9;
+const MAX_TILT: f64 = 0.9;
 
 /// Charge per scattered particle as a function of the position along the sheets, linear between nodes; 1 on a long,
 /// straight, isolated sheet.
@@ -109,7 +109,7 @@ impl SheetCharge {
                 potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
             // A tilt a of the charge lowers one edge relative to the other by 2/3 a density L^2.
             let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
-            *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);
+            *tilt = (*tilt + change).clamp(-MAX_TILT, MAX_TILT);
         };
         self.nodes.par_iter_mut().zip(&mut self.tilts).with_min_len(TASK).enumerate().for_each(adjust);
     }

@@ -19,9 +19,9 @@ const PIECES_PER_THICKNESS: f64 = 4.0;
 const NEAR_PIECES: f64 = 2.0;
 /// Maximum segments of all sheets, per particle and in total, and the minimum of that limit; never fewer than one per
 /// control segment.
-const MOST_PIECES: f64 = 20_000.0;
+const MAX_SEGMENTS: f64 = 20_000.0;
 const PIECES_PER_PARTICLE: f64 = 0.05;
-const FEW_PIECES: f64 = 2_000.0;
+const MIN_MAX_SEGMENTS: f64 = 2_000.0;
 /// Normalization: gradient noise rarely exceeds half of its range.
 const SWING: f64 = 2.0;
 
@@ -44,7 +44,7 @@ impl FoldModel {
         let fold = if parameters.amplitude_km > 0.0 { parameters.scale_km / PIECES_PER_FOLD } else { f64::INFINITY };
         // Detail finer than a fraction of the thickness is not visible.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
-        let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(FEW_PIECES, MOST_PIECES);
+        let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(MIN_MAX_SEGMENTS, MAX_SEGMENTS);
         Self { noise, piece_km, most_pieces, half_km: aurora.extent_km / 2.0, parameters }
     }
 
