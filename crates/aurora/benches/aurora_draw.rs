@@ -77,7 +77,7 @@ fn splat(aurora: &Aurora, view: &View) -> f32 {
     for index in (0..particles.len()).step_by(SPLATTED) {
         for collision in 0..100 {
             let altitude = 95.0 + 1.5 * f64::from(collision);
-            let place = particles.place(index);
+            let place = particles.position(index);
             let point = DVec3::new(place.x, altitude, place.y + 0.23 * (altitude - 100.0)) * 1e3;
             let Some(seen) = view.camera.project(point) else { continue };
             for y in seen.pixel.y as i64 - REACH..=seen.pixel.y as i64 + REACH {
@@ -101,7 +101,7 @@ fn draw(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("aurora 1280x720, 120,000 particles");
     group.sample_size(10).measurement_time(Duration::from_secs(3));
     group.bench_function("profile", |bencher| bencher.iter(|| frame(black_box(&mean), &north)));
-    let single = aurora(Sampling::Collisions);
+    let single = aurora(Sampling::CollisionRenderer);
     group.bench_function("collisions", |bencher| bencher.iter(|| frame(black_box(&single), &north)));
     group.bench_function("naive: a Gaussian for each point", |bencher| {
         bencher.iter_custom(|iterations| {

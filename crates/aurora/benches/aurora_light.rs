@@ -6,12 +6,12 @@ use bansho_base::math::random::Key;
 
 use bansho_aurora::physics::{
     atmosphere::atmosphere,
-    emission::{Emission, excitation::photons_per_ion_pair, table::colour_of},
+    emission::{Emission, excitation::photons_per_ion_pair, table::color_of},
     precipitation::{
-        FallLibrary, Falls,
-        electron_track::VARIANTS,
+        TrackLibrary, TrackSampler,
+        electron_track::TRACKS_PER_ENERGY,
         energy_grid::{self, node_energy_ev},
-        fang2010::{AirLayer, Monoenergetic},
+        fang2010::{AirLayer, MonoenergeticBeam},
         spectrum::ARC,
     },
 };
@@ -22,17 +22,17 @@ const PARTICLES: u64 = 1000;
 /// The light of a column of a spectrum from the formulas: every energy, every level.
 fn column_by_formula(energy_ev: f64) -> [f64; 3] {
     let (node, _) = energy_grid::locate(energy_ev);
-    let shares = ARC.shares(node);
+    let shares = ARC.flux_fractions(node);
     let mut kilorayleigh = [0.0; 4];
     for air in atmosphere().levels() {
         let layer = AirLayer::new(air);
         let spectrum = shares.iter().enumerate().filter(|(_, share)| **share > 1e-12);
         let pairs: f64 =
-            spectrum.map(|(node, share)| share * Monoenergetic::new(node_energy_ev(node)).ionisation(&layer)).sum();
+            spectrum.map(|(node, share)| share * MonoenergeticBeam::new(node_energy_ev(node)).ionization(&layer)).sum();
         let photons = photons_per_ion_pair(air);
         kilorayleigh = std::array::from_fn(|i| kilorayleigh[i] + photons[i] * pairs * 1e-10);
     }
-    colour_of(kilorayleigh)
+    color_of(kilorayleigh)
 }
 
 fn tables(criterion: &mut Criterion) {
@@ -40,33 +40,33 @@ fn tables(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("aurora light");
     group.sample_size(10);
     group.bench_function("open", |bencher| bencher.iter(|| black_box(Emission::new(atmosphere(), ARC))));
-    group.bench_function("column/table", |bencher| bencher.iter(|| table.column_colour(black_box(4321.0))));
+    group.bench_function("column/table", |bencher| bencher.iter(|| table.column_color(black_box(4321.0))));
     group.bench_function("column/naive: formulas", |bencher| bencher.iter(|| column_by_formula(black_box(4321.0))));
     group.finish();
 }
 
 fn falls(criterion: &mut Criterion) {
     let table = Emission::new(atmosphere(), ARC);
-    let falls = Falls::new(table.deposition(), 0.002);
+    let falls = TrackSampler::new(table.deposition(), 0.002);
     let key = Key::new(1, "aurora");
     let node = energy_grid::locate(10_001.0).0;
-    let library = FallLibrary::new(&falls, node..=node, key);
+    let library = TrackLibrary::new(&falls, node..=node, key);
     let mut group = criterion.benchmark_group("aurora falls of 1000 particles, 10 keV");
     group.sample_size(10);
     group.bench_function("library", |bencher| {
         bencher.iter(|| {
             let particles = 0..PARTICLES;
             particles
-                .flat_map(|particle| library.fall(node, particle as u32 % VARIANTS))
-                .fold(0.0, |sum, collision| sum + collision.altitude_km + collision.offset_km[0])
+                .flat_map(|particle| library.track(node, particle as u32 % TRACKS_PER_ENERGY))
+                .fold(0.0, |sum, collision| sum + collision.altitude_km + collision.transverse_km[0])
         });
     });
     group.bench_function("naive: every fall drawn", |bencher| {
         bencher.iter(|| {
             let particles = 0..PARTICLES;
             particles
-                .flat_map(|particle| falls.fall(node, key, particle))
-                .fold(0.0, |sum, collision| sum + collision.altitude_km + collision.offset_km[0])
+                .flat_map(|particle| falls.sample_track(node, key, particle))
+                .fold(0.0, |sum, collision| sum + collision.altitude_km + collision.transverse_km[0])
         });
     });
     group.finish();

@@ -11,7 +11,7 @@ use bansho_base::{
     },
 };
 
-use bansho_aurora::shapes::{MotionParameters, Neighbourhood, Segments, Sequence, Shape, first_crossing};
+use bansho_aurora::shapes::{MotionParameters, NearestSegmentGrid, Sequence, Shape, SheetSampler, first_crossing};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// A spiral of `count` points that nowhere meets itself.
@@ -62,7 +62,7 @@ fn scatter(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("aurora scatter 120,000");
     group.sample_size(10);
     group.bench_function("along the segments", |bencher| {
-        let segments = Segments::new(&shape);
+        let segments = SheetSampler::new(&shape);
         bencher.iter(|| {
             (0..PARTICLES).filter_map(|index| segments.sample(uniforms(index)[0])).map(|s| s.point.x).sum::<f64>()
         });
@@ -78,9 +78,9 @@ fn rejection(shape: &Shape) -> f64 {
     let high = points().fold(DVec2::NEG_INFINITY, DVec2::max) + REACH_KM;
     let near = |point: DVec2| {
         shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2)).any(|pair| {
-            let way = pair[1] - pair[0];
-            let share = ((point - pair[0]).dot(way) / way.length_squared()).clamp(0.0, 1.0);
-            point.distance_squared(pair[0] + way * share) <= REACH_KM * REACH_KM
+            let distance = pair[1] - pair[0];
+            let fraction = ((point - pair[0]).dot(distance) / distance.length_squared()).clamp(0.0, 1.0);
+            point.distance_squared(pair[0] + distance * fraction) <= REACH_KM * REACH_KM
         })
     };
     let random = |index: u64| {
@@ -94,7 +94,7 @@ fn neighbourhood(criterion: &mut Criterion) {
     let shape = shape();
     let mut group = criterion.benchmark_group("aurora in-between shape");
     group.bench_function("neighbourhood of reach 6 km", |bencher| {
-        bencher.iter(|| Neighbourhood::new(black_box(&shape), REACH_KM));
+        bencher.iter(|| NearestSegmentGrid::new(black_box(&shape), REACH_KM));
     });
     group.finish();
 }

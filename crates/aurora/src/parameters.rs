@@ -1,14 +1,19 @@
-//! What a scene says of an aurora. Symbols and equation numbers are those of Sekiguchi's thesis.
+//! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
-use bansho_base::parameters::{Auto, Length, Range, animated::Animated};
+use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
+use crate::physics::atmosphere::atmosphere;
+use crate::physics::emission::Emission;
+use crate::physics::extinction::Extinction;
+use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
+use crate::physics::precipitation::spectrum::ARC;
+use crate::physics::precipitation::{Spectrum, TrackModel};
+use bansho_base::host::once::get_or_make;
+use bansho_base::parameters::animated::Animated;
+use bansho_base::parameters::{Auto, Length, Range};
+use std::sync::OnceLock;
 
-use super::{
-    render::DrawingParameters,
-    shapes::{MotionParameters, ShapeParameters},
-};
-use crate::physics::precipitation::{Spectrum, spectrum::ARC};
-
-const SHARE: Range = Range::new(0.0, 1.0);
+/// Range of a fraction.
+const FRACTION: Range = Range::new(0.0, 1.0);
 
 bansho_base::choice! {
     /// How the energies of the electrons are spread.
@@ -153,7 +158,7 @@ bansho_base::parameters! {
         /// How much the energy of the electrons varies with the rays: bright ones reach lower. The standard deviation of its logarithm.
         energy: f64 = 0.05, limits(Range::new(0.0, 2.0));
         /// Depth of black rays: thin gaps that run along the sheet.
-        black_rays: f64 = 0.0, limits(SHARE);
+        black_rays: f64 = 0.0, limits(FRACTION);
         /// Distance from one black ray to the next.
         black_scale_km: f64 = 8.0, limits(Range::new(0.1, 1000.0)), unit("km");
     }
@@ -179,7 +184,7 @@ bansho_base::parameters! {
     /// Patches of the sheet that brighten and fade.
     pub struct PulsationParameters {
         /// How far they fade: 0 not at all, 1 to nothing.
-        depth: f64 = 0.0, limits(SHARE);
+        depth: f64 = 0.0, limits(FRACTION);
         /// Time from bright to bright.
         period_s: f64 = 8.0, limits(Range::new(0.05, 1e5)), unit("s");
         /// Length of a patch along the sheet.
@@ -237,7 +242,7 @@ impl AuroraParameters {
         self.extent_km / self.field.cells as f64
     }
 
-    /// L_thr, km: how far from the line a sheet reaches to each side.
+    /// L_thr, km: half the thickness of a sheet.
     #[must_use]
     pub fn half_thickness_km(&self) -> f64 {
         match self.thickness_km {
@@ -245,4 +250,117 @@ impl AuroraParameters {
             Auto::Set(thickness) => thickness / 2.0,
         }
     }
+}
+
+bansho_base::choice! {
+    /// How the falls of the electrons become light.
+    pub enum Sampling {
+        /// By the mean of infinitely many falls: no noise.
+        Profile = "profile",
+        /// By single collisions, as in the thesis (2.4).
+        CollisionRenderer = "collisions",
+    }
+}
+
+impl TrackModel {
+    /// The emission table for a spectrum.
+    #[must_use]
+    pub fn emission(self, spectrum: Spectrum) -> Emission {
+        match self {
+            Self::Fang => Emission::new(atmosphere(), spectrum),
+            Self::HardSphereAtmosphere => Emission::from_hard_spheres(atmosphere(), spectrum),
+        }
+    }
+
+    /// The table for a spectrum that a scene can select, computed once per process.
+    pub(crate) fn shared_emission(self, shape: SpectrumShape) -> &'static Emission {
+        static TABLES: [OnceLock<Emission>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
+            [const { OnceLock::new() }; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
+        let index = self as usize * SpectrumShape::CHOICES.len() + shape as usize;
+        get_or_make(&TABLES[index], || self.emission(shape.spectrum()))
+    }
+}
+
+bansho_base::choice! {
+    /// How single collisions are smoothed to light.
+    pub enum Blur {
+        /// On the sky, across the field, as far as `spread_km` says: a near ray is wider than a far one.
+        Kilometers = "km",
+        /// In the picture, by `blur_radii`, wherever they are, as in the thesis (2.28).
+        Pixels = "pixels",
+    }
+}
+
+bansho_base::parameters! {
+    /// Radii (standard deviations) of the thesis's blur, eq. (2.28), which depend on the line alone; it does not say how large they are.
+    pub struct BlurParameters {
+        /// Of the green line of oxygen, 557.7 nm.
+        green_px: f64 = 1.5, limits(Range::new(0.0, 100.0)), unit("pixels");
+        /// Of its red lines, 630.0 and 636.4 nm.
+        red_px: f64 = 4.0, limits(Range::new(0.0, 100.0)), unit("pixels");
+        /// Of the bands of N2+, 391.4 to 470.9 nm.
+        violet_px: f64 = 1.0, limits(Range::new(0.0, 100.0)), unit("pixels");
+        /// Of the bands of N2, 670.5 nm among them.
+        deep_red_px: f64 = 1.0, limits(Range::new(0.0, 100.0)), unit("pixels");
+    }
+}
+
+/// Maximum deflection by a collision. Collisions spread by a few long steps at high altitude, the mean profile by a
+/// Gaussian patch of the same width; where it exceeds a few km the two pictures differ.
+pub(crate) const MAX_WOBBLE: f64 = 0.05;
+
+bansho_base::parameters! {
+    /// How the light of an aurora is drawn.
+    pub struct DrawingParameters {
+        /// By the mean fall, or by collisions.
+        sampling: Sampling = Sampling::Profile;
+        /// What stops the electrons: measured air, or the thesis's hard spheres.
+        fall: TrackModel = TrackModel::Fang;
+        /// Where light is smoothed: on the sky in km, or in the picture in pixels.
+        blur: Blur = Blur::Kilometers;
+        /// Radii of the blur in pixels.
+        blur_radii: BlurParameters = BlurParameters::default();
+        /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbours are, and rays stay sharp.
+        spread_km: Auto<f64> = Auto::Auto, limits(Range::new(0.005, 100.0)), unit("km");
+        /// How far a collision turns an electron from the field: rms tangent of the angle, the vector omega of (2.21) and (2.24).
+        wobble: f64 = 0.002, limits(Range::new(0.0, MAX_WOBBLE));
+        /// The air below, which dims what is low in the sky.
+        air: Extinction = Extinction::default();
+    }
+}
+
+/// Relative rounding error that is accepted.
+const RELATIVE_ROUNDING: f64 = 1e-9;
+
+/// Checks the energy at every point of every sheet's curve against the range of the tables.
+///
+/// # Errors
+///
+/// The first point where a sheet's factor takes the aurora's energy out of the range.
+pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeError> {
+    let energy_ev = parameters.energy_ev.bounds();
+    for (shape, of) in parameters.shapes.iter().enumerate() {
+        for (entry, sheet) in of.sheets.iter().enumerate() {
+            if let Some((point, kind)) = outside(sheet, entry + 1, energy_ev) {
+                return Err(ShapeError { key: format!("shapes.{shape}.sheets.{entry}.energy.{point}"), kind });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The first point of a sheet's energy curve outside the tables. The curve does not overshoot its points.
+fn outside(sheet: &SheetParameters, number: usize, [low, high]: [f64; 2]) -> Option<(usize, ShapeErrorKind)> {
+    let of_point = |(point, [at, factor]): (usize, &[f64; 2])| {
+        let (least, greatest) = (low * factor, high * factor);
+        let energy_ev = if greatest > HIGHEST_EV * (1.0 + RELATIVE_ROUNDING) {
+            greatest
+        } else if least < LOWEST_EV * (1.0 - RELATIVE_ROUNDING) {
+            least
+        } else {
+            return None;
+        };
+        Some((point, ShapeErrorKind::EnergyOutside { sheet: number, at: *at, energy_ev }))
+    };
+    sheet.energy.points().iter().enumerate().find_map(of_point)
 }

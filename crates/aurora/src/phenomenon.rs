@@ -22,27 +22,28 @@ use bansho_base::{
 };
 
 use super::{
-    AuroraParameters, energy_range,
+    AuroraParameters,
+    parameters::check_energies,
     render::Sampling,
-    shapes::{Sequence, ShapeFault, ShapeFaultKind},
+    shapes::{Sequence, ShapeError, ShapeErrorKind},
     simulate::AuroraSimulation,
 };
 use crate::{
     physics::{
         emission::{Emission, Emitter, LINES, Line},
-        precipitation::{energy_grid::HIGHEST_EV, lateral_spread::wander_km},
+        precipitation::{energy_grid::HIGHEST_EV, lateral_spread::lateral_spread_km},
     },
     render::{
-        bin::sources::{Light, nearest_node},
-        integrate::emission_profile::Profiles,
+        bin::sources::{EmissionInputs, nearest_node},
+        integrate::emission_profile::EmissionProfiles,
         maps::MAPS,
         prepared::{DEPTHS, PreparedAurora},
         project::field_lines::FieldLines,
-        shade::attenuation::Shading,
+        shade::attenuation::EmitterColors,
         shutter,
     },
     simulate::point_cloud::point_cloud,
-    single_collisions::collision_pass::Collisions,
+    single_collisions::collision_pass::CollisionRenderer,
 };
 
 /// Sheets are thin: their bright parts seen aslant beside what looks straight up through one.
@@ -72,19 +73,19 @@ pub struct Aurora {
 #[derive(Clone, Debug)]
 struct Working {
     simulation: AuroraSimulation,
-    profiles: Arc<Profiles>,
-    red_profiles: Arc<Profiles>,
-    shading: Arc<Shading>,
-    collisions: Option<Arc<Collisions>>,
+    profiles: Arc<EmissionProfiles>,
+    red_profiles: Arc<EmissionProfiles>,
+    emitter_colors: Arc<EmitterColors>,
+    collisions: Option<Arc<CollisionRenderer>>,
 }
 
 /// Longest dissolve in a loop, s: by then particles have gone a long way along their sheets.
 const LONGEST_DISSOLVE_S: f64 = 10.0;
 
 /// Makes what is keyed repeat after `turn` seconds, and room in the preroll for half the dissolve that it gives.
-fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, ShapeFault> {
+fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, ShapeError> {
     if let Some(key) = parameters.close_loop(turn) {
-        return Err(ShapeFault { key, kind: ShapeFaultKind::LoopJumps { seconds: turn } });
+        return Err(ShapeError { key, kind: ShapeErrorKind::LoopJumps { seconds: turn } });
     }
     let dissolve = turn.min(LONGEST_DISSOLVE_S);
     parameters.preroll_s += 0.5 * dissolve;
@@ -96,7 +97,7 @@ fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, Shape
 fn brightest(parameters: &AuroraParameters, emission: &Emission, factors: &[[f64; 2]]) -> f64 {
     let (flux, energy_ev) = (parameters.flux_mw_per_m2.bounds()[1], parameters.energy_ev.bounds()[0]);
     let luminance = |[flux_factor, energy_factor]: &[f64; 2]| {
-        let column = emission.column_colour(energy_ev * energy_factor).map(|value| value as f32);
+        let column = emission.column_color(energy_ev * energy_factor).map(|value| value as f32);
         flux * flux_factor * f64::from(color::luminance(column))
     };
     factors.iter().map(luminance).fold(0.0, f64::max)
@@ -113,11 +114,11 @@ impl Aurora {
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
-    ) -> Result<Self, ShapeFault> {
+    ) -> Result<Self, ShapeError> {
         constructions::count("aurora");
         let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
         let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
-        energy_range::check(&parameters)?;
+        check_energies(&parameters)?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
         let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);
@@ -140,17 +141,17 @@ impl Aurora {
     fn set_to_work(&self) -> Working {
         let simulation = AuroraSimulation::new(self.parameters.clone(), self.sequence.clone(), &self.name, self.seed);
         let (parameters, emission) = (simulation.parameters(), simulation.emission());
-        let by_collisions = parameters.drawing.sampling == Sampling::Collisions;
+        let by_collisions = parameters.drawing.sampling == Sampling::CollisionRenderer;
         let hardest = self.sequence.factors().fold(1.0, |most: f64, [_, energy]| most.max(energy));
         let hardest = (hardest * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
         let hardest = nearest_node(hardest) + SPECTRUM_NODES;
         let key = Key::new(self.seed, &self.name);
-        let collisions = || Collisions::new(emission, &parameters.drawing, hardest, key);
+        let collisions = || CollisionRenderer::new(emission, &parameters.drawing, hardest, key);
         Working {
             collisions: by_collisions.then(|| Arc::new(collisions())),
-            profiles: Arc::new(Profiles::new(emission)),
-            red_profiles: Arc::new(Profiles::of_red_by_height(emission)),
-            shading: Arc::new(Shading::new(&parameters.drawing.air)),
+            profiles: Arc::new(EmissionProfiles::new(emission)),
+            red_profiles: Arc::new(EmissionProfiles::red_by_altitude(emission)),
+            emitter_colors: Arc::new(EmitterColors::new(&parameters.drawing.air)),
             simulation,
         }
     }
@@ -167,41 +168,41 @@ impl Aurora {
         self.working.get_mut().map(|working| &mut working.simulation)
     }
 
-    pub(super) fn profiles(&self) -> &Profiles {
+    pub(super) fn profiles(&self) -> &EmissionProfiles {
         &self.working().profiles
     }
 
-    /// Red light alone, by its heights in place of the emitters.
-    pub(super) fn red_profiles(&self) -> &Profiles {
+    /// Red light alone, by its heights in position of the emitters.
+    pub(super) fn red_profiles(&self) -> &EmissionProfiles {
         &self.working().red_profiles
     }
 
-    pub(super) fn shading(&self) -> &Shading {
-        &self.working().shading
+    pub(super) fn emitter_colors(&self) -> &EmitterColors {
+        &self.working().emitter_colors
     }
 
     /// What single collisions are drawn from, where they are asked for.
-    pub(super) fn collisions(&self) -> Option<&Collisions> {
+    pub(super) fn collisions(&self) -> Option<&CollisionRenderer> {
         self.working().collisions.as_deref()
     }
 
-    /// The magnetic field about an observer at a place in m.
+    /// The magnetic field about an observer at a position in m.
     pub(super) fn field_lines(&self, place: DVec3) -> FieldLines {
         FieldLines::new(self.parameters.dip_deg, self.parameters.declination_deg, place)
     }
 
     /// What the light of a state of its simulation is made from at a time, s.
-    pub(super) fn light<'a>(&self, simulation: &'a AuroraSimulation, t: f64) -> Light<'a> {
+    pub(super) fn light<'a>(&self, simulation: &'a AuroraSimulation, t: f64) -> EmissionInputs<'a> {
         let parameters = simulation.parameters();
         let energy_ev = parameters.energy_ev.at(t);
-        Light {
+        EmissionInputs {
             particles: simulation.particles(),
-            glow: simulation.afterglow(),
+            afterglow: simulation.afterglow(),
             emission: simulation.emission(),
             parameters: &parameters.drawing,
             spacing_km: simulation.spacing_km(),
             energy_ev,
-            wander_km: wander_km(parameters.drawing.fall, parameters.drawing.wobble, energy_ev),
+            lateral_spread_km: lateral_spread_km(parameters.drawing.fall, parameters.drawing.wobble, energy_ev),
         }
     }
 }
@@ -276,7 +277,7 @@ impl Describe for AuroraParameters {
         match Aurora::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
             Ok(aurora) => Ok(Arc::new(aurora)),
             Err(fault) => Err(match fault.kind {
-                ShapeFaultKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
+                ShapeErrorKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
                 other => BuildError::new(fault.key, other),
             }),
         }
@@ -312,7 +313,7 @@ impl Phenomenon for Aurora {
 
 impl Run for Aurora {
     fn publish(&self, _shutter: Shutter) -> Publication {
-        Publication { lights: self.lamp().into_iter().collect(), ..Publication::default() }
+        Publication { lights: self.directional_light().into_iter().collect(), ..Publication::default() }
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

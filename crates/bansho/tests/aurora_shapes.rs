@@ -17,7 +17,7 @@ use planned::Planned;
 
 use bansho_aurora::{
     AuroraParameters,
-    shapes::{FRAME_S, Neighbourhood, Sequence, Shape},
+    shapes::{FRAME_S, NearestSegmentGrid, Sequence, Shape},
     simulate::AuroraSimulation,
 };
 
@@ -58,7 +58,7 @@ fn sequence(scene: usize) -> Sequence {
 
 /// Greatest distance of any control point of one shape from the other.
 fn farthest(from: &Shape, to: &Shape) -> f64 {
-    let near = Neighbourhood::new(to, 50.0);
+    let near = NearestSegmentGrid::new(to, 50.0);
     let points = from.sheets.iter().flat_map(|sheet| &sheet.points);
     points.map(|&point| near.distance(point).unwrap_or(50.0)).fold(0.0, f64::max)
 }
@@ -99,7 +99,7 @@ fn the_scenes_have_as_many_sheets_as_the_thesis_tells() {
 #[test]
 fn the_fold_of_scene_1_leaves_a_gap() {
     let sequence = sequence(1);
-    let last = Neighbourhood::new(&sequence.at(sequence.duration()), 60.0);
+    let last = NearestSegmentGrid::new(&sequence.at(sequence.duration()), 60.0);
     assert!(last.distance(DVec2::new(95.0, -213.0)).is_none_or(|distance| distance > 45.0));
 }
 
@@ -124,7 +124,7 @@ fn shares_within(simulation: &AuroraSimulation, places: &[([f64; 2], f64)]) -> V
     let particles = simulation.particles();
     let (count, power) = (particles.len() as f64, particles.power_w());
     let within = |(middle, radius): &([f64; 2], f64)| {
-        let inside = |index: &usize| particles.place(*index).distance(DVec2::from(*middle)) < *radius;
+        let inside = |index: &usize| particles.position(*index).distance(DVec2::from(*middle)) < *radius;
         let inside: Vec<usize> = (0..particles.len()).filter(inside).collect();
         let own: f64 = inside.iter().map(|index| f64::from(particles.powers_w[*index])).sum();
         [inside.len() as f64 / count, own / power]
@@ -173,7 +173,7 @@ fn least_stretch(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
         // What bridges a gap is a sheet of its own, after those of the shape.
         let Some(bins) = counts.get_mut(particles.sheets[index] as usize) else { continue };
         let last = bins.len() - 1;
-        bins[((f64::from(particles.shares[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
+        bins[((f64::from(particles.arc_fractions[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
     }
     let stretches = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
         let due = living * BINS as f64 * length / (total * counts.len() as f64);

@@ -1,19 +1,19 @@
-//! The air in which auroras shine, 80 to 800 km, from NRLMSISE-00 (Picone et al. 2002, J. Geophys. Res. 107, 1468).
+//! The atmosphere from 80 to 800 km, from NRLMSISE-00 (Picone et al. 2002, J. Geophys. Res. 107, 1468).
 
 use std::sync::LazyLock;
 
 use bansho_base::math;
 
-/// An ordinary auroral night: a comment, a header, then altitude in km and the seven numbers of [`Air`].
+/// Table for a typical auroral night: a comment, a header, then altitude in km and the seven fields of [`Air`].
 const TABLE_TEXT: &str = include_str!("data/nrlmsise00.csv");
 
 /// Altitude of the lowest level, km.
 pub const LOWEST_KM: f64 = 80.0;
 /// Altitude of the highest level, km.
 pub const HIGHEST_KM: f64 = 800.0;
-/// Levels of every table over altitude: one each km, both ends included.
+/// Levels of every altitude table: one per km, both ends included.
 pub const LEVELS: usize = 721;
-/// Distance of two levels, m.
+/// Distance between two levels, m.
 pub const LEVEL_SPACING: f64 = 1000.0;
 
 /// The air at one altitude.
@@ -50,10 +50,10 @@ impl Air {
         self.n2 + self.o2 + self.o
     }
 
-    /// The air between two others, every quantity geometrically: densities fall exponentially with altitude.
-    fn between(&self, above: &Self, part: f64) -> Self {
+    /// Interpolates every quantity logarithmically: densities fall exponentially with altitude.
+    fn interpolate(&self, above: &Self, fraction: f64) -> Self {
         let (low, high) = (self.fields(), above.fields());
-        Self::from_fields(std::array::from_fn(|i| math::exp(math::lerp(math::ln(low[i]), math::ln(high[i]), part))))
+        Self::from_fields(std::array::from_fn(|i| math::exp(math::lerp(math::ln(low[i]), math::ln(high[i]), fraction))))
     }
 }
 
@@ -63,7 +63,7 @@ pub struct Atmosphere {
     levels: Vec<Air>,
 }
 
-/// The atmosphere of all auroras, read at first use.
+/// The atmosphere that all auroras share, parsed on first use.
 #[must_use]
 pub fn atmosphere() -> &'static Atmosphere {
     static ATMOSPHERE: LazyLock<Atmosphere> = LazyLock::new(Atmosphere::new);
@@ -77,7 +77,7 @@ impl Atmosphere {
             let altitude_km = level_altitude_km(level);
             let above = rows.partition_point(|(row_km, _)| *row_km <= altitude_km).clamp(1, rows.len() - 1);
             let ((low_km, low), (high_km, high)) = (&rows[above - 1], &rows[above]);
-            low.between(high, (altitude_km - low_km) / (high_km - low_km))
+            low.interpolate(high, (altitude_km - low_km) / (high_km - low_km))
         });
         Self { levels: levels.collect() }
     }
@@ -88,11 +88,11 @@ impl Atmosphere {
         &self.levels
     }
 
-    /// The air at an altitude, held to 80-800 km; logarithmic between levels.
+    /// The air at an altitude, clamped to 80-800 km; logarithmic interpolation between levels.
     #[must_use]
     pub fn at(&self, altitude_km: f64) -> Air {
-        let (level, part) = locate_level(altitude_km);
-        self.levels[level].between(&self.levels[level + 1], part)
+        let (level, fraction) = locate_level(altitude_km);
+        self.levels[level].interpolate(&self.levels[level + 1], fraction)
     }
 }
 
@@ -102,12 +102,12 @@ pub fn level_altitude_km(level: usize) -> f64 {
     LOWEST_KM + level as f64
 }
 
-/// The level below an altitude and the part of the way to the next; held to 80-800 km.
+/// The level below an altitude and the interpolation fraction toward the next; clamped to 80-800 km.
 #[must_use]
 pub fn locate_level(altitude_km: f64) -> (usize, f64) {
-    let place = (altitude_km - LOWEST_KM).clamp(0.0, (LEVELS - 1) as f64);
-    let level = (place as usize).min(LEVELS - 2);
-    (level, place - level as f64)
+    let coordinate = (altitude_km - LOWEST_KM).clamp(0.0, (LEVELS - 1) as f64);
+    let level = (coordinate as usize).min(LEVELS - 2);
+    (level, coordinate - level as f64)
 }
 
 /// Whether an altitude lies within the levels.
@@ -119,7 +119,7 @@ pub fn covers(altitude_km: f64) -> bool {
 /// Altitude in km and air of each row of the table.
 fn read_rows() -> Vec<(f64, Air)> {
     let rows = TABLE_TEXT.lines().skip(2).map(|line| {
-        // The table is compiled in and a test reads every field of it: a NaN cannot be.
+        // The table is compiled in and a test parses every field, so NaN cannot occur.
         let mut fields = line.split(',').map(|field| field.parse().unwrap_or(f64::NAN));
         let mut next = || fields.next().unwrap_or(f64::NAN);
         (next(), Air::from_fields(std::array::from_fn(|_| next())))

@@ -1,4 +1,5 @@
-//! The light held against what is observed: figures that a command can print and a test can check.
+//! Calibration: compares the model's brightness, line ratios and peak altitudes with observations. `bansho calibrate`
+//! prints it and tests check it.
 
 use std::fmt;
 
@@ -9,21 +10,22 @@ use super::{
 };
 use crate::physics::precipitation::spectrum::ARC;
 
-/// Share of N2+ ions, band and pairs in the column of Fang et al.: rayleighs of 427.8 nm per mW m^-2, by energy in keV.
-const BLUE_OF_FANG: [(f64, f64); 4] = [(1.0, 250.0), (3.0, 294.0), (10.0, 307.0), (30.0, 304.0)];
-/// Altitude of the greatest deposition of Fang et al., km, by energy in keV.
-const PEAKS_OF_FANG: [(f64, f64); 4] = [(1.0, 158.35), (3.0, 122.23), (10.0, 104.68), (30.0, 95.194)];
-/// Energies of the figures, keV.
+/// 427.8 nm brightness for the column ionization of Fang et al., R per mW m^-2, by energy in keV: pairs times the
+/// fraction of N2+(B) times the band's branching ratio.
+const FANG_427_RAYLEIGH: [(f64, f64); 4] = [(1.0, 250.0), (3.0, 294.0), (10.0, 307.0), (30.0, 304.0)];
+/// Altitude of the deposition peak of Fang et al., km, by energy in keV.
+const FANG_PEAK_KM: [(f64, f64); 4] = [(1.0, 158.35), (3.0, 122.23), (10.0, 104.68), (30.0, 95.194)];
+/// Energies of the table rows, keV.
 const ENERGIES_KEV: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0];
 
-/// Figures of one energy.
+/// Column quantities for one energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct ColumnMetrics {
     /// The energy that names the spectrum: its central or characteristic one, keV.
     pub energy_kev: f64,
-    /// Altitude of the greatest deposition, km.
+    /// Altitude of the deposition peak, km.
     pub deposition_peak_km: f64,
-    /// Altitude of the greatest emission by emitter, km.
+    /// Altitude of the emission peak of each emitter, km.
     pub peaks_km: [f64; 4],
     /// I(427.8), R per mW m^-2.
     pub blue_rayleigh: f64,
@@ -31,101 +33,113 @@ pub struct Figures {
     pub green_to_blue: f64,
     /// I(630.0) / I(427.8).
     pub red_to_blue: f64,
-    /// Share of the red light from above 200 km.
+    /// Fraction of the red light from above 200 km.
     pub red_above_200_km: f64,
-    /// Photons of the whole first positive system to those of 557.7 nm.
+    /// Ratio of the photons of the whole first positive system to those of 557.7 nm.
     pub first_positive_to_green: f64,
-    /// Mean lifetime of the red light, s.
+    /// Emission-weighted mean lifetime of the red light, s.
     pub red_lifetime: f64,
 }
 
-/// One demand on the light.
+/// One requirement and the value that was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Check {
-    /// What is demanded.
-    pub demand: String,
-    /// What was found.
+pub struct CalibrationCheck {
+    /// What is required.
+    pub requirement: String,
+    /// The value that was found.
     pub found: f64,
-    /// Least and greatest that is allowed.
+    /// Allowed minimum and maximum.
     pub allowed: [f64; 2],
 }
 
-impl Check {
-    /// Whether the demand is met.
+impl CalibrationCheck {
+    /// Whether the value is within the allowed range.
     #[must_use]
     pub fn holds(&self) -> bool {
         (self.allowed[0]..=self.allowed[1]).contains(&self.found)
     }
 }
 
-/// Figures of a spectrum by energy, rising.
+/// Column quantities of one spectrum, by ascending energy.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpectrumFigures {
-    /// What scenes call the spectrum.
+pub struct SpectrumMetrics {
+    /// Name of the spectrum in scene files.
     pub spectrum: &'static str,
-    /// Figures of each energy.
-    pub figures: Vec<Figures>,
+    /// One row per energy.
+    pub metrics: Vec<ColumnMetrics>,
 }
 
-/// Figures and demands. `Display` prints both as tables.
+/// All tables and checks. `Display` prints them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Figures of each spectrum, the default one first.
-    pub spectra: Vec<SpectrumFigures>,
-    /// All demands.
-    pub checks: Vec<Check>,
+    /// Tables of each spectrum, the default first.
+    pub spectra: Vec<SpectrumMetrics>,
+    /// All checks.
+    pub checks: Vec<CalibrationCheck>,
 }
 
-/// A spectrum, and at which of its energies it is held against what is observed.
-struct Claim {
+/// A spectrum and the energies at which it is compared with observations.
+struct SpectrumBounds {
     name: &'static str,
     spectrum: Spectrum,
-    /// Mean energy beside the one that names it: brightness and colours are observed by mean energy.
-    mean: f64,
-    /// The energy that carries most of the flux beside the one that names it.
-    most: f64,
-    /// Least mean energy at which green light peaks below 120 km, keV.
+    /// Ratio of the mean energy to the nominal one: observed brightness and colors are given by mean energy.
+    mean_ratio: f64,
+    /// Ratio of the energy at the peak of the energy flux to the nominal one.
+    peak_flux_ratio: f64,
+    /// Minimum mean energy at which the green emission peaks below 120 km, keV.
     low_green_kev: f64,
 }
 
-const CLAIMS: [Claim; 3] = [
-    Claim { name: "arc", spectrum: ARC, mean: 1.0, most: 1.0, low_green_kev: 3.0 },
-    // 3 keV alone deposits at 122 km; only a spread of energies brings the green peak below 120 km.
-    Claim { name: "single", spectrum: Spectrum::Monoenergetic, mean: 1.0, most: 1.0, low_green_kev: 5.0 },
-    // Energy flux E^2 exp(-E / E_0), on a logarithmic scale E^3 exp(-E / E_0).
-    Claim { name: "maxwellian", spectrum: Spectrum::Maxwellian, mean: 2.0, most: 3.0, low_green_kev: 3.0 },
+const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
+    SpectrumBounds { name: "arc", spectrum: ARC, mean_ratio: 1.0, peak_flux_ratio: 1.0, low_green_kev: 3.0 },
+    // 3 keV alone peaks at 122 km; only a spread of energies moves the green peak below 120 km.
+    SpectrumBounds {
+        name: "single",
+        spectrum: Spectrum::Monoenergetic,
+        mean_ratio: 1.0,
+        peak_flux_ratio: 1.0,
+        low_green_kev: 5.0,
+    },
+    // Energy flux is E^2 exp(-E / E_0), per logarithmic interval E^3 exp(-E / E_0).
+    SpectrumBounds {
+        name: "maxwellian",
+        spectrum: Spectrum::Maxwellian,
+        mean_ratio: 2.0,
+        peak_flux_ratio: 3.0,
+        low_green_kev: 3.0,
+    },
 ];
 
-/// Measures the light of all spectra.
+/// Computes and checks all spectra.
 #[must_use]
 pub fn calibrate(air: &Atmosphere) -> Calibration {
     let (mut spectra, mut checks) = (Vec::new(), check_violet());
-    for claim in &CLAIMS {
-        let figures = measure(air, claim.spectrum);
-        checks.extend(figures.iter().flat_map(|figure| check_colours(claim, figure)));
-        checks.extend(check_peaks(claim, &figures));
-        checks.extend(check_slopes(claim, &figures));
-        spectra.push(SpectrumFigures { spectrum: claim.name, figures });
+    for bounds in &SPECTRUM_BOUNDS {
+        let metrics = measure(air, bounds.spectrum);
+        checks.extend(metrics.iter().flat_map(|metrics_row| check_colors(bounds, metrics_row)));
+        checks.extend(check_peaks(bounds, &metrics));
+        checks.extend(check_slopes(bounds, &metrics));
+        spectra.push(SpectrumMetrics { spectrum: bounds.name, metrics });
     }
     Calibration { spectra, checks }
 }
 
-/// The figures of a spectrum.
+/// Column quantities of a spectrum.
 #[must_use]
-pub fn measure(air: &Atmosphere, spectrum: Spectrum) -> Vec<Figures> {
+pub fn measure(air: &Atmosphere, spectrum: Spectrum) -> Vec<ColumnMetrics> {
     let table = Emission::new(air, spectrum);
-    ENERGIES_KEV.into_iter().map(|energy_kev| figures_at(&table, energy_kev)).collect()
+    ENERGIES_KEV.into_iter().map(|energy_kev| metrics_at(&table, energy_kev)).collect()
 }
 
-fn figures_at(table: &Emission, energy_kev: f64) -> Figures {
+fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
     let energy_ev = energy_kev * 1e3;
     let profile = table.profile(energy_ev);
     let [green, red, blue, first_positive] = table.column(energy_ev).kilorayleigh;
     let red_at = |level: usize| profile[level][Emitter::OxygenRed.index()];
     let above = (0..LEVELS).filter(|level| level_altitude_km(*level) >= 200.0).map(red_at).sum::<f64>();
-    Figures {
+    ColumnMetrics {
         energy_kev,
-        deposition_peak_km: peak_km(|level| table.deposition().ionisation(energy_ev, level_altitude_km(level))),
+        deposition_peak_km: peak_km(|level| table.deposition().ionization(energy_ev, level_altitude_km(level))),
         peaks_km: std::array::from_fn(|i| peak_km(|level| profile[level][i])),
         blue_rayleigh: blue * 1e3,
         green_to_blue: green / blue,
@@ -136,98 +150,104 @@ fn figures_at(table: &Emission, energy_kev: f64) -> Figures {
     }
 }
 
-/// Altitude of the level with the greatest value, km.
+/// Altitude of the level with the maximum value, km.
 fn peak_km(value: impl Fn(usize) -> f64) -> f64 {
     let values: Vec<f64> = (0..LEVELS).map(value).collect();
     let greatest = (0..LEVELS).fold(0, |best, level| if values[level] > values[best] { level } else { best });
     level_altitude_km(greatest)
 }
 
-fn check(demand: String, found: f64, allowed: [f64; 2]) -> Check {
-    Check { demand, found, allowed }
+fn requirement(requirement: String, found: f64, allowed: [f64; 2]) -> CalibrationCheck {
+    CalibrationCheck { requirement, found, allowed }
 }
 
-/// Ratio of the bands of N2+, whatever the spectrum.
-fn check_violet() -> Vec<Check> {
+/// Ratio of the N2+ bands, which does not depend on the spectrum.
+fn check_violet() -> Vec<CalibrationCheck> {
     let violet = LINES.iter().find(|line| line.name.contains("391.4"));
     violet
-        .map(|line| check("I(391.4)/I(427.8)".to_owned(), line.photons, [3.28 * 0.95, 3.28 * 1.05]))
+        .map(|line| requirement("I(391.4)/I(427.8)".to_owned(), line.photons, [3.28 * 0.95, 3.28 * 1.05]))
         .into_iter()
         .collect()
 }
 
-/// Demands on the column of one energy.
-fn check_colours(claim: &Claim, figure: &Figures) -> Vec<Check> {
-    let (kev, mean_kev) = (figure.energy_kev, claim.mean * figure.energy_kev);
-    let of = |what: &str| format!("{}: {what} at {kev} keV", claim.name);
-    let mut checks = vec![check(of("red above 200 km"), figure.red_above_200_km, [0.5, 1.0])];
+/// Checks of the column for one energy.
+fn check_colors(bounds: &SpectrumBounds, metrics_row: &ColumnMetrics) -> Vec<CalibrationCheck> {
+    let (kev, mean_kev) = (metrics_row.energy_kev, bounds.mean_ratio * metrics_row.energy_kev);
+    let of = |what: &str| format!("{}: {what} at {kev} keV", bounds.name);
+    let mut checks = vec![requirement(of("red above 200 km"), metrics_row.red_above_200_km, [0.5, 1.0])];
     if (1.0..=30.0).contains(&mean_kev) {
-        checks.push(check(of("I(557.7)/I(427.8)"), figure.green_to_blue, [2.5, 7.0]));
+        checks.push(requirement(of("I(557.7)/I(427.8)"), metrics_row.green_to_blue, [2.5, 7.0]));
     }
     if mean_kev <= 1.0 {
-        checks.push(check(of("I(630.0)/I(427.8)"), figure.red_to_blue, [2.0, f64::INFINITY]));
+        checks.push(requirement(of("I(630.0)/I(427.8)"), metrics_row.red_to_blue, [2.0, f64::INFINITY]));
     }
     if mean_kev >= 10.0 {
-        checks.push(check(of("I(630.0)/I(427.8)"), figure.red_to_blue, [0.0, 0.5]));
+        checks.push(requirement(of("I(630.0)/I(427.8)"), metrics_row.red_to_blue, [0.0, 0.5]));
     }
-    for (_, rayleigh) in BLUE_OF_FANG.into_iter().filter(|(energy_kev, _)| *energy_kev == kev) {
-        checks.push(check(of("I(427.8) to Fang's column"), figure.blue_rayleigh / rayleigh, [0.75, 1.25]));
+    for (_, rayleigh) in FANG_427_RAYLEIGH.into_iter().filter(|(energy_kev, _)| *energy_kev == kev) {
+        checks.push(requirement(of("I(427.8) to Fang's column"), metrics_row.blue_rayleigh / rayleigh, [0.75, 1.25]));
     }
     checks
 }
 
-fn check_peaks(claim: &Claim, figures: &[Figures]) -> Vec<Check> {
-    let low_green = claim.low_green_kev..=10.0;
-    let green = figures.iter().filter(|figure| low_green.contains(&(claim.mean * figure.energy_kev))).map(|figure| {
-        check(
-            format!("{}: green peak at {} keV, km", claim.name, figure.energy_kev),
-            figure.peaks_km[0],
-            [100.0, 120.0],
-        )
-    });
-    let deposited = PEAKS_OF_FANG.into_iter().flat_map(|(kev, peak_km)| {
-        let at = figures.iter().find(|figure| claim.most * figure.energy_kev == kev);
-        at.map(|figure| {
-            let demand = format!("{}: deposition peak at {} keV beside Fang's, km", claim.name, figure.energy_kev);
-            check(demand, figure.deposition_peak_km - peak_km, [-4.0, 4.0])
+fn check_peaks(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
+    let low_green = bounds.low_green_kev..=10.0;
+    let green = metrics
+        .iter()
+        .filter(|metrics_row| low_green.contains(&(bounds.mean_ratio * metrics_row.energy_kev)))
+        .map(|metrics_row| {
+            requirement(
+                format!("{}: green peak at {} keV, km", bounds.name, metrics_row.energy_kev),
+                metrics_row.peaks_km[0],
+                [100.0, 120.0],
+            )
+        });
+    let deposited = FANG_PEAK_KM.into_iter().flat_map(|(kev, peak_km)| {
+        let at = metrics.iter().find(|metrics_row| bounds.peak_flux_ratio * metrics_row.energy_kev == kev);
+        at.map(|metrics_row| {
+            let text = format!("{}: deposition peak at {} keV beside Fang's, km", bounds.name, metrics_row.energy_kev);
+            requirement(text, metrics_row.deposition_peak_km - peak_km, [-4.0, 4.0])
         })
     });
     green.chain(deposited).collect()
 }
 
-/// Both ratios fall from each energy to the next above a mean of 1 keV.
-fn check_slopes(claim: &Claim, figures: &[Figures]) -> Vec<Check> {
-    let pairs = figures.windows(2).filter(|pair| claim.mean * pair[0].energy_kev >= 1.0);
+/// Both ratios decrease with energy above a mean of 1 keV.
+fn check_slopes(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
+    let pairs = metrics.windows(2).filter(|pair| bounds.mean_ratio * pair[0].energy_kev >= 1.0);
     let falls = pairs.flat_map(|pair| {
         let changes = |what: &str| {
-            format!("{}: {what} changes from {} to {} keV by", claim.name, pair[0].energy_kev, pair[1].energy_kev)
+            format!("{}: {what} changes from {} to {} keV by", bounds.name, pair[0].energy_kev, pair[1].energy_kev)
         };
         let [green, red] = [pair[1].green_to_blue / pair[0].green_to_blue, pair[1].red_to_blue / pair[0].red_to_blue];
-        [check(changes("I(557.7)/I(427.8)"), green, [0.0, 1.0]), check(changes("I(630.0)/I(427.8)"), red, [0.0, 0.8])]
+        [
+            requirement(changes("I(557.7)/I(427.8)"), green, [0.0, 1.0]),
+            requirement(changes("I(630.0)/I(427.8)"), red, [0.0, 0.8]),
+        ]
     });
     falls.collect()
 }
 
-impl fmt::Display for SpectrumFigures {
+impl fmt::Display for SpectrumMetrics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let spectrum = self.spectrum;
         writeln!(
             f,
             "  keV  deposited  557.7  630.0  427.8 peak km   R(427.8)   G/B    R/B  red>200  1P/G  red tau s  \"{spectrum}\""
         )?;
-        for figure in &self.figures {
-            let [green, red, blue, _] = figure.peaks_km;
+        for metrics_row in &self.metrics {
+            let [green, red, blue, _] = metrics_row.peaks_km;
             writeln!(
                 f,
                 "{:5} {:10} {green:6} {red:6} {blue:6} {:18.0} {:6.2} {:6.3} {:7.2} {:6.1} {:9.1}",
-                figure.energy_kev,
-                figure.deposition_peak_km,
-                figure.blue_rayleigh,
-                figure.green_to_blue,
-                figure.red_to_blue,
-                figure.red_above_200_km,
-                figure.first_positive_to_green,
-                figure.red_lifetime,
+                metrics_row.energy_kev,
+                metrics_row.deposition_peak_km,
+                metrics_row.blue_rayleigh,
+                metrics_row.green_to_blue,
+                metrics_row.red_to_blue,
+                metrics_row.red_above_200_km,
+                metrics_row.first_positive_to_green,
+                metrics_row.red_lifetime,
             )?;
         }
         Ok(())
@@ -242,7 +262,7 @@ impl fmt::Display for Calibration {
         for check in &self.checks {
             let [least, greatest] = check.allowed;
             let verdict = if check.holds() { "holds" } else { "FAILS" };
-            writeln!(f, "{verdict}  {}: {:.4} in [{least:.4}, {greatest:.4}]", check.demand, check.found)?;
+            writeln!(f, "{verdict}  {}: {:.4} in [{least:.4}, {greatest:.4}]", check.requirement, check.found)?;
         }
         Ok(())
     }
@@ -258,16 +278,16 @@ mod tests {
     #[test]
     fn every_demand_holds() {
         let calibration = calibrate(atmosphere());
-        // Red heights, green and red ratios, brightness, green and deposition peaks, slopes; and the ratio of the bands.
+        // Red altitudes, green and red ratios, brightness, green and deposition peaks, slopes; and the ratio of the bands.
         let (arc, single) = (8 + 7 + 2 + 3 + 4 + 3 + 4 + 12, 8 + 7 + 2 + 3 + 4 + 2 + 4 + 12);
         let maxwellian = 8 + 6 + 1 + 4 + 4 + 3 + 2 + 14;
         assert_eq!(calibration.checks.len(), arc + single + maxwellian + 1, "{calibration}");
-        assert!(calibration.checks.iter().all(Check::holds), "{calibration}");
+        assert!(calibration.checks.iter().all(CalibrationCheck::holds), "{calibration}");
     }
 
     #[test]
     fn a_broken_demand_is_said() {
-        let broken = check("nothing".to_owned(), 2.0, [0.0, 1.0]);
+        let broken = requirement("nothing".to_owned(), 2.0, [0.0, 1.0]);
         let printed = Calibration { spectra: Vec::new(), checks: vec![broken] }.to_string();
         assert!(printed.contains("FAILS  nothing: 2.0000 in [0.0000, 1.0000]"), "{printed}");
     }
@@ -296,8 +316,8 @@ mod tests {
         assert_eq!(rows.len(), 5);
         for row in &rows {
             let energy_kev = row[0].trim_end_matches(" keV").parse().unwrap();
-            let figures = figures_at(&table, energy_kev);
-            let Figures { deposition_peak_km, peaks_km, blue_rayleigh, green_to_blue, .. } = figures;
+            let metrics = metrics_at(&table, energy_kev);
+            let ColumnMetrics { deposition_peak_km, peaks_km, blue_rayleigh, green_to_blue, .. } = metrics;
             let spread_km = table.column(energy_kev * 1e3).spread_km[Emitter::OxygenRed.index()];
             let found = [
                 deposition_peak_km,
@@ -306,9 +326,9 @@ mod tests {
                 blue_rayleigh,
                 1e-3 * green_to_blue * blue_rayleigh,
                 green_to_blue,
-                figures.red_to_blue,
-                100.0 * figures.red_above_200_km,
-                figures.red_lifetime,
+                metrics.red_to_blue,
+                100.0 * metrics.red_above_200_km,
+                metrics.red_lifetime,
                 spread_km,
             ];
             for (cell, found) in row[1..].iter().zip(found) {
@@ -342,7 +362,7 @@ mod tests {
     #[test]
     fn what_is_not_claimed_is_as_the_page_says() {
         let at = |spectrum: Spectrum, kev: f64| {
-            measure(atmosphere(), spectrum).into_iter().find(|figure| figure.energy_kev == kev).unwrap()
+            measure(atmosphere(), spectrum).into_iter().find(|metrics_row| metrics_row.energy_kev == kev).unwrap()
         };
         assert_eq!(at(Spectrum::Monoenergetic, 3.0).peaks_km[0], 122.0);
         let [one, ten, thirty] = [1.0, 10.0, 30.0].map(|kev| at(Spectrum::Maxwellian, kev));

@@ -3,4 +3,5 @@
 pub mod atmosphere;
 pub mod calibration;
 pub mod emission;
+pub mod extinction;
 pub mod precipitation;

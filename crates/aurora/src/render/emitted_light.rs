@@ -1,4 +1,4 @@
-//! The aurora as a light: what it shines on ground and rain.
+//! Illumination of ground and rain by the aurora, as one directional light.
 
 use bansho_base::{
     math::{self, DVec2, DVec3},
@@ -7,37 +7,38 @@ use bansho_base::{
 
 use super::Aurora;
 use crate::render::{
-    project::field_lines::{EARTH_RADIUS_KM, FOOT_KM},
-    shade::attenuation::Shading,
+    project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM},
+    shade::attenuation::EmitterColors,
 };
 
 use fearless_simd::{Level, dispatch};
 
-/// Particles that are asked for their light, about.
-const ASKED: usize = 2048;
-/// Altitude from which the light of all heights seems to come, km.
+/// Approximate number of particles that are sampled.
+const MAX_SAMPLED_PARTICLES: usize = 2048;
+/// Effective altitude of the emission, km.
 const ALTITUDE_KM: f64 = 125.0;
 /// Power of one mW/m^2 on one km^2, W.
 const W_PER_UNIT: f64 = 1e3;
 
-/// Where the light above a place of the drawn plane seems to come from, km: over a round Earth, that far along the shell at 100 km.
-fn toward_km(place: DVec2) -> DVec3 {
-    let (sin, cos) = math::sin_cos(place.length() / (EARTH_RADIUS_KM + FOOT_KM));
-    let level = place.normalize_or_zero() * sin;
+/// Apparent position of the light above a position of the drawn plane, km: along the shell at 100 km of a spherical
+/// Earth.
+fn toward_km(position: DVec2) -> DVec3 {
+    let (sin, cos) = math::sin_cos(position.length() / (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM));
+    let level = position.normalize_or_zero() * sin;
     DVec3::new(level.x, cos, level.y) * (EARTH_RADIUS_KM + ALTITUDE_KM) - DVec3::Y * EARTH_RADIUS_KM
 }
 
 impl Aurora {
-    /// One light from where most of it comes, as bright as all of it on a plane that faces it, for what stands on the ground below the
-    /// drawn square's middle; none where nothing shines. Each place has the colour of its own electrons, and what lies below the horizon
-    /// lights nothing.
-    pub(crate) fn lamp(&self) -> Option<Light> {
+    /// One directional light from the weighted mean direction, with the irradiance of the whole aurora on a plane that
+    /// faces it, for receivers on the ground below the drawn square's center; `None` where nothing shines. Each
+    /// particle has the color of its own electron energy; particles below the horizon are skipped.
+    pub(crate) fn directional_light(&self) -> Option<Light> {
         let (emission, particles) = (self.simulation().emission(), self.simulation().particles());
         let level = Level::new();
-        let stride = particles.len().div_ceil(ASKED).max(1);
-        let (mut way, mut sum) = (DVec3::ZERO, DVec3::ZERO);
+        let stride = particles.len().div_ceil(MAX_SAMPLED_PARTICLES).max(1);
+        let (mut direction_sum, mut sum) = (DVec3::ZERO, DVec3::ZERO);
         for index in (0..particles.len()).step_by(stride) {
-            let toward = toward_km(particles.place(index));
+            let toward = toward_km(particles.position(index));
             let squared = toward.length_squared();
             let direction = toward / math::sqrt(squared);
             let elevation = direction.y as f32;
@@ -46,15 +47,14 @@ impl Aurora {
             }
             let column =
                 emission.column(f64::from(particles.energies_ev[index])).kilorayleigh.map(|value| value as f32);
-            // A patch of 1 mW/m^2 over 1 km^2 at 1 km has 1 sr and the column's brightness.
-            let share = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
-            let colour: [f32; 4] =
-                dispatch!(level, simd => self.shading().arriving(simd, &column, Shading::place(elevation)).into());
-            let [red, green, blue, _] = colour.map(f64::from);
-            sum += DVec3::new(red, green, blue) * share;
-            way += direction * (share * green.max(0.0));
+            // A patch of 1 mW/m^2 over 1 km^2 at 1 km subtends 1 sr and has the column's brightness.
+            let solid_angle = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
+            let color: [f32; 4] = dispatch!(level, simd => self.emitter_colors().attenuated(simd, &column, EmitterColors::table_coordinate(elevation)).into());
+            let [red, green, blue, _] = color.map(f64::from);
+            sum += DVec3::new(red, green, blue) * solid_angle;
+            direction_sum += direction * (solid_angle * green.max(0.0));
         }
-        let toward = way.try_normalize()?;
+        let toward = direction_sum.try_normalize()?;
         Some(Light { emitter: Emitter::Directional { toward }, intensity: sum.to_array().map(|value| value as f32) })
     }
 }
@@ -87,18 +87,18 @@ mod tests {
             shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
             ..AuroraParameters::default()
         };
-        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap().lamp()
+        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap().directional_light()
     }
 
     #[test]
-    fn sheets_with_their_own_energy_shine_in_their_own_colour() {
-        let colour = |energy_ev, factor| {
+    fn sheets_with_their_own_energy_shine_in_their_own_color() {
+        let color = |energy_ev, factor| {
             let [red, green, blue] = lamp(energy_ev, factor, 50.0).unwrap().intensity;
             [red / green, blue / green]
         };
-        let (soft, same) = (colour(500.0, 1.0), colour(5000.0, 0.1));
+        let (soft, same) = (color(500.0, 1.0), color(5000.0, 0.1));
         assert!((0..2).all(|i| (soft[i] / same[i] - 1.0).abs() < 0.02), "{soft:?} {same:?}");
-        assert!(colour(5000.0, 1.0)[0] < 0.8 * same[0], "soft electrons give more red");
+        assert!(color(5000.0, 1.0)[0] < 0.8 * same[0], "soft electrons give more red");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! The cells that move the particles, as pictures (thesis, figures 2.10 to 2.12, 2.14, 3.14): what stands where lines
-//! of sight pass the plane that the shapes are drawn on.
+//! AOVs of the simulation grid (thesis, figures 2.10 to 2.12, 2.14, 3.14), sampled where lines of sight intersect the
+//! drawn plane.
 
 use bansho_base::{
     math::DVec2,
@@ -12,7 +12,7 @@ const fn of_cells(name: &'static str, unit: &'static str, doc: &'static str) -> 
     AovDescriptor { name, unit, doc, rule: AovRule::Sum }
 }
 
-/// What the maps hold.
+/// Descriptors of the maps.
 pub(crate) const MAPS: [AovDescriptor; 4] = [
     of_cells(
         "scatter_count",
@@ -36,27 +36,27 @@ pub(crate) const MAPS: [AovDescriptor; 4] = [
     ),
 ];
 
-/// The maps of a moment.
-pub(super) struct Maps<'a> {
+/// The maps of one state.
+pub(super) struct CellMaps<'a> {
     simulation: &'a AuroraSimulation,
     particle_counts: Grid2,
 }
 
-impl<'a> Maps<'a> {
+impl<'a> CellMaps<'a> {
     pub(super) fn new(simulation: &'a AuroraSimulation) -> Self {
         Self { simulation, particle_counts: simulation.particle_counts() }
     }
 
-    /// The values of [`MAPS`] at a place of the drawn plane, km.
-    pub(super) fn at(&self, place: DVec2) -> [f32; MAPS.len()] {
+    /// The values of [`MAPS`] at a position of the drawn plane, km.
+    pub(super) fn at(&self, position: DVec2) -> [f32; MAPS.len()] {
         let potential = self.simulation.potential();
-        let Some([column, row]) = potential.cell(place.to_array()) else { return [0.0; MAPS.len()] };
+        let Some([column, row]) = potential.cell(position.to_array()) else { return [0.0; MAPS.len()] };
         let count = |counts: &Grid2| counts.at(column as isize, row as isize) as f32;
         [
             count(self.simulation.scatter_counts()),
             count(&self.particle_counts),
-            potential.sample(place.to_array()) as f32,
-            self.simulation.potential_noise(place) as f32,
+            potential.sample(position.to_array()) as f32,
+            self.simulation.potential_noise(position) as f32,
         ]
     }
 }

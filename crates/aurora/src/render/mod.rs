@@ -1,14 +1,13 @@
-//! The picture of an aurora: absolute light of particles and afterglow, through any lens.
+//! Rendering of the aurora in absolute luminance, through any lens.
 //!
-//! Field lines are seen as meridians about the magnetic zenith (`geometry`), so that an aurora is drawn on a `chart` of
-//! the sky in longitude and colatitude about that point. Precipitation is summed up by longitude and distance
-//! (`footprint`); then the light of every field line runs along its meridian (`meridians`), its altitudes from tables
-//! (`profile`). The chart is dimmed and coloured by the air below (`shading`, `seen`), and what a pixel of any lens shows
-//! is looked up on it (`prepared`). The cost grows with pixels and particles, not with shapes.
+//! Field lines of a uniform field appear as meridians about the magnetic zenith (`project`: `field_lines`), so the
+//! aurora is drawn on a chart of the sky in longitude and colatitude about that point (`chart`). Precipitation is
+//! binned by longitude and distance (`bin`); the emission profile of every field line is integrated along its
+//! meridian (`integrate`). Extinction and color are applied to the chart (`shade`), and the pixels of any lens
+//! sample it (`prepared`). The cost is linear in pixels and particles and independent of the shapes.
 
 pub(crate) mod bin;
 mod emitted_light;
-pub mod extinction;
 pub(crate) mod integrate;
 pub(crate) mod maps;
 pub(crate) mod prepared;
@@ -19,6 +18,7 @@ pub(crate) mod shutter;
 mod tests;
 
 pub use super::{
-    drawing_parameters::{Blur, BlurParameters, DrawingParameters, FallModel, Sampling},
+    parameters::{Blur, BlurParameters, DrawingParameters, Sampling},
     phenomenon::Aurora,
 };
+pub use crate::physics::precipitation::TrackModel;

@@ -1,4 +1,4 @@
-//! One frame of an aurora: from its chart to pixels.
+//! A prepared frame: builds the charts and samples them for pixels.
 
 use std::{ops::Range, sync::OnceLock};
 
@@ -13,37 +13,37 @@ use bansho_base::{
     },
 };
 
-use super::{Aurora, Blur, maps::Maps};
+use super::{Aurora, Blur, maps::CellMaps};
 use crate::{
     phenomenon::{BRIGHTNESSES, brightnesses},
     physics::emission::{Emitter, PerEmitter},
     render::{
-        bin::{source_bins::Footprint, sources::Sources},
-        integrate::{column_block::GROUP, columns::Meridians},
+        bin::{source_bins::SourceBins, sources::Sources},
+        integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer},
         project::{
-            chart::{Chart, Coverage, STRIP},
+            chart::{Chart, Coverage, STRIP_COLUMNS},
             field_lines::{EARTH_RADIUS_KM, FieldLines, dot},
         },
-        shade::{attenuation::Shading, chart_sampler::Sampler},
+        shade::{attenuation::EmitterColors, chart_sampler::ChartSampler},
     },
     simulate::AuroraSimulation,
-    single_collisions::blur::Blurred,
+    single_collisions::blur::BlurredImage,
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-/// Pixels that are worked on at once.
-pub(crate) const BATCH: usize = 16;
-/// Altitude whose distance is an aurora's depth, km.
+/// Pixels per batch.
+pub(crate) const PIXEL_BATCH: usize = 16;
+/// Altitude that defines the aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
-/// Fainter than this is no aurora to a depth, kR.
+/// Minimum brightness for a depth value, kR.
 const FAINTEST: f32 = 0.05;
 
 const TAU: f32 = std::f32::consts::TAU;
 
-/// The depths at which auroras are drawn, m: behind the highest mountain, before the sky.
+/// Depth range of auroras, m: behind terrain, in front of the sky.
 pub(crate) const DEPTHS: DepthInterval = DepthInterval { near: 2e4, far: 1e10 };
 
-/// A frame, ready to draw in strips.
+/// A frame that is ready to be drawn in strips.
 pub(crate) struct PreparedAurora<'a> {
     aurora: &'a Aurora,
     view: &'a View,
@@ -52,24 +52,24 @@ pub(crate) struct PreparedAurora<'a> {
     field: FieldLines,
     /// Sine of the horizon's elevation.
     horizon: f32,
-    /// Distance of the observer from the Earth's middle, km.
+    /// Distance of the observer from the Earth's center, km.
     from_middle: f32,
-    /// What pixels look up.
-    shown: Shown,
-    /// Light by emitter on a sharp and a coarser chart, where it is measured.
-    measured: Option<[Meridians; 2]>,
-    /// What radiates each brightness that is measured, and its photons for each counted one.
+    /// Image that pixels sample.
+    displayed: DisplayedLight,
+    /// Brightness by emitter on the sharp and the soft chart, kept if AOVs are requested.
+    measured: Option<[ColumnBuffer; 2]>,
+    /// Emitter of each brightness AOV, and its photons per counted photon.
     brightnesses: Vec<(Emitter, f64)>,
-    /// Made where they are asked for.
-    maps: OnceLock<Maps<'a>>,
+    /// Created on first use.
+    maps: OnceLock<CellMaps<'a>>,
 }
 
-/// An aurora's light as pixels look it up.
-enum Shown {
-    /// A chart of colours.
-    Seen(Meridians),
-    /// Light by emitter, where the blur is one of the picture.
-    Blurred(Blurred),
+/// Light in the form that pixels sample.
+enum DisplayedLight {
+    /// A chart of colors.
+    Chart(ColumnBuffer),
+    /// Brightness by emitter, blurred in the picture.
+    BlurredImage(BlurredImage),
 }
 
 impl<'a> PreparedAurora<'a> {
@@ -77,19 +77,20 @@ impl<'a> PreparedAurora<'a> {
         let field = aurora.field_lines(view.camera.position);
         let sources = aurora.sources(view, &field);
         check(observer)?;
-        let charts = Charts { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
+        let charts = ChartBuilder { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
         let drawing = &aurora.simulation().parameters().drawing;
         let measured = view.measured.then(|| [sharp.clone(), soft.clone()]);
-        let shown = if drawing.blur == Blur::Pixels {
+        let displayed = if drawing.blur == Blur::Pixels {
             let samplers = [sharp.sampler(), soft.sampler()];
-            Shown::Blurred(Blurred::new(view, &field, &samplers, &drawing.blur_radii))
+            DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &drawing.blur_radii))
         } else {
-            Shown::Seen(sharp.seen(&soft, &field, aurora.shading()))
+            DisplayedLight::Chart(sharp.composite(&soft, &field, aurora.emitter_colors()))
         };
-        // What is blurred in the picture is blurred at one instant.
-        let cameras = if matches!(shown, Shown::Blurred(_)) { vec![view.camera] } else { view.cameras() };
+        // A blur in the picture is computed at one instant.
+        let cameras =
+            if matches!(displayed, DisplayedLight::BlurredImage(_)) { vec![view.camera] } else { view.cameras() };
         Ok(Self {
             aurora,
             view,
@@ -98,7 +99,7 @@ impl<'a> PreparedAurora<'a> {
             horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
             from_middle: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
-            shown,
+            displayed,
             measured,
             brightnesses: brightnesses().collect(),
             maps: OnceLock::new(),
@@ -106,67 +107,67 @@ impl<'a> PreparedAurora<'a> {
     }
 }
 
-/// What the charts of a frame have in common.
-pub(super) struct Charts<'a> {
+/// Shared inputs of the charts of a frame.
+pub(super) struct ChartBuilder<'a> {
     pub(super) aurora: &'a Aurora,
     pub(super) field: &'a FieldLines,
     pub(super) coverage: Coverage,
 }
 
-impl Charts<'_> {
+impl ChartBuilder<'_> {
     /// The chart of light with fine detail.
-    pub(super) fn sharp(&self, sources: &Sources) -> Meridians {
+    pub(super) fn sharp(&self, sources: &Sources) -> ColumnBuffer {
         let (pixel, [spread_km, _]) = (self.coverage.pixel, sources.spread_km);
-        // The angle at which the spread is seen from the nearest place where such light is.
+        // The angle of the spread at the minimum distance of such light.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let sorted = |strip| Footprint::new(&sources.sharp, (&chart, strip), self.field, spread_km);
+        let sorted = |strip| SourceBins::new(&sources.sharp, (&chart, strip), self.field, spread_km);
         let Some(collisions) = self.aurora.collisions() else {
-            let footprint = sorted(STRIP);
-            return Meridians::new(chart, self.field, self.aurora.profiles(), &footprint);
+            let source_bins = sorted(STRIP_COLUMNS);
+            return ColumnBuffer::new(chart, self.field, self.aurora.profiles(), &source_bins);
         };
-        let footprint = sorted(GROUP);
+        let source_bins = sorted(BLOCK_COLUMNS);
         let step = (self.aurora.simulation().time() / AuroraSimulation::STEP_S).round() as i64 as u32;
-        collisions.draw(chart, self.field, &footprint, step)
+        collisions.draw(chart, self.field, &source_bins, step)
     }
 
-    /// The coarser chart of light that lingers and spreads.
-    pub(super) fn soft(&self, sources: &Sources) -> Meridians {
+    /// The coarser chart of the red afterglow.
+    pub(super) fn soft(&self, sources: &Sources) -> ColumnBuffer {
         let (pixel, [_, spread_km]) = (self.coverage.pixel, sources.spread_km);
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
-        // To the side it is as smooth as its sources, but upward it changes with the air.
+        // Laterally it is as smooth as its sources, vertically it follows the atmosphere.
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
-        let footprint = Footprint::new(&sources.soft, (&chart, STRIP), self.field, spread_km);
-        // Always by the mean fall: in a cell that shines for a minute thousands of falls have come together.
-        let mut picture = Meridians::new(chart, self.field, self.aurora.red_profiles(), &footprint);
-        picture.add_up_heights();
+        let source_bins = SourceBins::new(&sources.soft, (&chart, STRIP_COLUMNS), self.field, spread_km);
+        // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
+        let mut picture = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &source_bins);
+        picture.sum_red_altitudes();
         picture
     }
 }
 
-/// Directions of a batch of pixels in the field's frame, and what is needed of them.
+/// Directions of a batch of pixels in the field frame.
 #[derive(Default)]
-pub(crate) struct Batch {
+pub(crate) struct PixelBatch {
     /// Colatitude and longitude about the magnetic zenith.
-    pub(crate) colatitude: [f32; BATCH],
-    pub(crate) longitude: [f32; BATCH],
+    pub(crate) colatitude: [f32; PIXEL_BATCH],
+    pub(crate) longitude: [f32; PIXEL_BATCH],
     /// Sine of the elevation.
-    sine: [f32; BATCH],
+    sine: [f32; PIXEL_BATCH],
     /// Length of the direction that [`Camera::direction`] gives.
-    length: [f32; BATCH],
-    /// Whether the lens sees anything there.
-    seen: [bool; BATCH],
+    length: [f32; PIXEL_BATCH],
+    /// Whether the lens maps the pixel to a direction.
+    in_view: [bool; PIXEL_BATCH],
 }
 
-impl Batch {
+impl PixelBatch {
     /// Pixels from `x` on in row `y`.
     #[inline(always)]
     pub(crate) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
         let mut directions = Directions::new(camera, x, y);
-        let mut batch = Self { length: directions.normalize(), seen: directions.seen, ..Self::default() };
+        let mut batch = Self { length: directions.normalize(), in_view: directions.seen, ..Self::default() };
         let [xs, ys, zs] = directions.axes;
-        let [along, first, second] = field.single();
-        for i in 0..BATCH {
+        let [along, first, second] = field.axes_f32();
+        for i in 0..PIXEL_BATCH {
             let direction = [xs[i], ys[i], zs[i]];
             let (x, y) = (dot(first, direction), dot(second, direction));
             batch.colatitude[i] = approximations::atan2(x.fma(x, y * y).sqrt(), dot(along, direction));
@@ -179,42 +180,42 @@ impl Batch {
 
 impl PreparedAurora<'_> {
     #[inline(always)]
-    fn rows<S: Simd>(&self, simd: S, slice: &DepthInterval, strip: &mut Strip) {
-        let sampler = match &self.shown {
-            Shown::Seen(chart) => Some(chart.sampler()),
-            Shown::Blurred(_) => None,
+    fn draw_rows<S: Simd>(&self, simd: S, depths_shown: &DepthInterval, strip: &mut Strip) {
+        let sampler = match &self.displayed {
+            DisplayedLight::Chart(chart) => Some(chart.sampler()),
+            DisplayedLight::BlurredImage(_) => None,
         };
         let rect = strip.rect;
-        // Batches lie on the picture's own grid, so that a crop changes no pixel; those of one column follow each
-        // other, since they look up the same part of the chart.
-        let mut x = rect.x / BATCH * BATCH;
+        // Batches are aligned to the picture's grid, so that crops are identical; batches of a column are consecutive
+        // because they sample nearby parts of the chart.
+        let mut x = rect.x / PIXEL_BATCH * PIXEL_BATCH;
         while x < rect.right() {
             let measured = !strip.aovs.is_empty();
             if measured || !sampler.as_ref().is_some_and(|sampler| self.is_dark(sampler, x, [rect.y, rect.bottom()])) {
                 for y in rect.y..rect.bottom() {
-                    self.batch(simd, sampler.as_ref(), slice, strip, [x, y]);
+                    self.draw_batch(simd, sampler.as_ref(), depths_shown, strip, [x, y]);
                 }
             }
-            x += BATCH;
+            x += PIXEL_BATCH;
         }
     }
 
-    /// Whether there is surely no light in the batches from `x` on between two rows, by the sky between their corners and as far again as that
-    /// may bend.
-    fn is_dark(&self, sampler: &Sampler, x: usize, rows: [usize; 2]) -> bool {
+    /// Conservative test whether the batches at `x` between two rows are dark, from the chart bounds of their corners
+    /// plus the maximum curvature.
+    fn is_dark(&self, sampler: &ChartSampler, x: usize, rows: [usize; 2]) -> bool {
         if self.cameras.len() > 1 {
             return false;
         }
         let (mut longitudes, mut colatitudes) = ([f32::INFINITY, -f32::INFINITY], [f32::INFINITY, -f32::INFINITY]);
         let mut middle = None;
         for y in rows {
-            for x in [x, x + BATCH] {
+            for x in [x, x + PIXEL_BATCH] {
                 let Some(direction) = self.view.camera.direction(DVec2::new(x as f64, y as f64)) else { return false };
                 let direction = direction.normalize();
-                let [along, first, second] = self.field.turned(direction);
+                let [along, first, second] = self.field.field_frame_components(direction);
                 let colatitude = math::atan2(math::hypot(first, second), along) as f32;
                 let longitude = math::atan2(second, first) as f32;
-                // About the first one's, so that no part is torn where longitudes begin anew.
+                // Relative to the first corner, so that the region is not split at the seam of longitude.
                 let about = *middle.get_or_insert(longitude);
                 let turned = longitude - about;
                 let longitude = longitude - (turned * (1.0 / TAU)).round() * TAU;
@@ -224,7 +225,7 @@ impl PreparedAurora<'_> {
         }
         let size = ((longitudes[1] - longitudes[0]) * math::sin(f64::from(colatitudes[1])) as f32)
             .max(colatitudes[1] - colatitudes[0]);
-        // Near the magnetic zenith corners say little.
+        // Near the magnetic zenith the corners are not a bound.
         if colatitudes[0] < 4.0 * size || longitudes[1] - longitudes[0] > 0.5 {
             return false;
         }
@@ -236,98 +237,98 @@ impl PreparedAurora<'_> {
     }
 
     #[inline(always)]
-    fn batch<S: Simd>(
+    fn draw_batch<S: Simd>(
         &self,
         simd: S,
-        sampler: Option<&Sampler>,
-        slice: &DepthInterval,
+        sampler: Option<&ChartSampler>,
+        depths_shown: &DepthInterval,
         strip: &mut Strip,
         [x, y]: [usize; 2],
     ) {
         let rect = strip.rect;
-        let inside = rect.x.max(x) - x..rect.right().min(x + BATCH) - x;
+        let inside = rect.x.max(x) - x..rect.right().min(x + PIXEL_BATCH) - x;
         let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
-        let share = 1.0 / self.cameras.len() as f32;
+        let camera_weight = 1.0 / self.cameras.len() as f32;
         for camera in &self.cameras {
-            let batch = Batch::new(camera, &self.field, x, y);
-            let (mut sky, mut depths) = self.sky(&batch, share);
-            if sky == [0.0; BATCH] {
+            let batch = PixelBatch::new(camera, &self.field, x, y);
+            let (mut sky, mut depths) = self.sky_coverage(&batch, camera_weight);
+            if sky == [0.0; PIXEL_BATCH] {
                 continue;
             }
-            let colours = self.look_up(simd, sampler, &batch, [x, y]);
-            if strip.aovs.is_empty() && colours == [[0.0; 4]; BATCH] {
+            let colors = self.look_up(simd, sampler, &batch, [x, y]);
+            if strip.aovs.is_empty() && colors == [[0.0; 4]; PIXEL_BATCH] {
                 continue;
             }
-            hide(&mut sky, &depths, slice, strip, (first, inside.clone()));
-            let mut planes = [[0.0; BATCH]; 3];
-            for i in 0..BATCH {
-                let [red, green, blue, brightness] = colours[i];
+            mask_occluded(&mut sky, &depths, depths_shown, strip, (first, inside.clone()));
+            let mut planes = [[0.0; PIXEL_BATCH]; 3];
+            for i in 0..PIXEL_BATCH {
+                let [red, green, blue, brightness] = colors[i];
                 (planes[0][i], planes[1][i], planes[2][i]) = (sky[i] * red, sky[i] * green, sky[i] * blue);
-                depths[i] = if sky[i] * brightness > FAINTEST * share { depths[i] } else { f32::INFINITY };
+                depths[i] = if sky[i] * brightness > FAINTEST * camera_weight { depths[i] } else { f32::INFINITY };
             }
             let [red, green, blue] = &planes;
             let radiance = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
             strip.add_row_behind(first, radiance, None, &depths[inside.clone()]);
             if !strip.aovs.is_empty() {
-                self.measure(simd, camera, &batch, (strip, first), ([x, y], &inside), (&sky, share));
+                self.measure(simd, camera, &batch, (strip, first), ([x, y], &inside), (&sky, camera_weight));
             }
         }
     }
 
-    /// Colours and brightness of a batch.
+    /// Colors and brightness of a batch.
     #[inline(always)]
     fn look_up<S: Simd>(
         &self,
         simd: S,
-        sampler: Option<&Sampler>,
-        batch: &Batch,
+        sampler: Option<&ChartSampler>,
+        batch: &PixelBatch,
         [x, y]: [usize; 2],
-    ) -> [[f32; 4]; BATCH] {
-        let mut colours = [[0.0; 4]; BATCH];
-        match (&self.shown, sampler) {
-            (Shown::Blurred(blurred), _) => {
+    ) -> [[f32; 4]; PIXEL_BATCH] {
+        let mut colors = [[0.0; 4]; PIXEL_BATCH];
+        match (&self.displayed, sampler) {
+            (DisplayedLight::BlurredImage(blurred), _) => {
                 let light = blurred.batch(x, y);
-                for i in 0..BATCH {
-                    let place = Shading::place(batch.sine[i]);
-                    colours[i] = self.aurora.shading().arriving(simd, &light[i], place).into();
+                for i in 0..PIXEL_BATCH {
+                    let position = EmitterColors::table_coordinate(batch.sine[i]);
+                    colors[i] = self.aurora.emitter_colors().attenuated(simd, &light[i], position).into();
                 }
             }
-            (Shown::Seen(_), Some(sampler)) => {
-                sampler.add(simd, &batch.longitude, &batch.colatitude, &mut colours);
+            (DisplayedLight::Chart(_), Some(sampler)) => {
+                sampler.add(simd, &batch.longitude, &batch.colatitude, &mut colors);
             }
-            (Shown::Seen(_), None) => {}
+            (DisplayedLight::Chart(_), None) => {}
         }
-        colours
+        colors
     }
 
-    /// How much of each pixel is sky, times `share`, and the depth of an aurora there, m.
+    /// Sky coverage of each pixel times `camera_weight`, and the depth of an aurora there, m.
     #[inline(always)]
-    fn sky(&self, batch: &Batch, share: f32) -> ([f32; BATCH], [f32; BATCH]) {
-        let (mut sky, mut depths) = ([0.0; BATCH], [0.0; BATCH]);
-        for i in 0..BATCH {
+    fn sky_coverage(&self, batch: &PixelBatch, camera_weight: f32) -> ([f32; PIXEL_BATCH], [f32; PIXEL_BATCH]) {
+        let (mut sky, mut depths) = ([0.0; PIXEL_BATCH], [0.0; PIXEL_BATCH]);
+        for i in 0..PIXEL_BATCH {
             let pixels = (batch.sine[i] - self.horizon) * self.view.camera.focal_pixels as f32;
-            let above = (pixels + 0.5).clamp(0.0, 1.0) * share;
-            sky[i] = if batch.seen[i] { above } else { 0.0 };
+            let above = (pixels + 0.5).clamp(0.0, 1.0) * camera_weight;
+            sky[i] = if batch.in_view[i] { above } else { 0.0 };
             depths[i] = self.depth(batch.sine[i]) / batch.length[i];
         }
         (sky, depths)
     }
 
-    /// Adds what the AOVs tell of a batch, of which the pixels `inside` stand in the strip from number `first` on.
+    /// Accumulates the AOVs of a batch; its pixels `inside` start at index `first` of the strip.
     #[inline(always)]
     fn measure<S: Simd>(
         &self,
         simd: S,
         camera: &Camera,
-        batch: &Batch,
+        batch: &PixelBatch,
         (strip, first): (&mut Strip, usize),
         ([x, y], inside): ([usize; 2], &Range<usize>),
-        (sky, share): (&[f32; BATCH], f32),
+        (sky, camera_weight): (&[f32; PIXEL_BATCH], f32),
     ) {
-        let mut light = [[0.0; 4]; BATCH];
-        match &self.shown {
-            Shown::Blurred(blurred) => light = blurred.batch(x, y),
-            Shown::Seen(_) => {
+        let mut light = [[0.0; 4]; PIXEL_BATCH];
+        match &self.displayed {
+            DisplayedLight::BlurredImage(blurred) => light = blurred.batch(x, y),
+            DisplayedLight::Chart(_) => {
                 for chart in self.measured.iter().flatten() {
                     chart.sampler().add(simd, &batch.longitude, &batch.colatitude, &mut light);
                 }
@@ -336,11 +337,11 @@ impl PreparedAurora<'_> {
         for i in inside.clone().filter(|i| sky[*i] > 0.0) {
             let direction = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
             let seen = light[i].map(|value| sky[i] * value);
-            self.measure_pixel(strip, first + i - inside.start, &seen, direction, share);
+            self.measure_pixel(strip, first + i - inside.start, &seen, direction, camera_weight);
         }
     }
 
-    /// Adds what the AOVs tell of a pixel.
+    /// Accumulates the AOVs of a pixel.
     #[inline(never)]
     fn measure_pixel(
         &self,
@@ -348,19 +349,19 @@ impl PreparedAurora<'_> {
         index: usize,
         light: &PerEmitter<f32>,
         direction: Option<DVec3>,
-        share: f32,
+        camera_weight: f32,
     ) {
         for (plane, (emitter, photons)) in strip.aovs.iter_mut().zip(&self.brightnesses) {
             plane.add(index, light[emitter.index()] * *photons as f32, 1.0);
         }
-        let maps = self.maps.get_or_init(|| Maps::new(self.aurora.simulation()));
-        let Some(place) = direction.and_then(|direction| self.field.drawn(direction)) else { return };
-        for (plane, value) in strip.aovs.iter_mut().skip(BRIGHTNESSES).zip(maps.at(place)) {
-            plane.add(index, value, share);
+        let maps = self.maps.get_or_init(|| CellMaps::new(self.aurora.simulation()));
+        let Some(position) = direction.and_then(|direction| self.field.foot_position(direction)) else { return };
+        for (plane, value) in strip.aovs.iter_mut().skip(BRIGHTNESSES).zip(maps.at(position)) {
+            plane.add(index, value, camera_weight);
         }
     }
 
-    /// Distance of the aurora in a direction of that elevation, m.
+    /// Distance of the aurora in a direction with this sine of elevation, m.
     #[inline(always)]
     fn depth(&self, sine: f32) -> f32 {
         const SHELL: f32 = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
@@ -370,19 +371,19 @@ impl PreparedAurora<'_> {
     }
 }
 
-/// Leaves no sky where an aurora at those depths lies outside the slice or behind the plate; pixels `inside` stand in the strip from number
-/// `first` on.
+/// Clears the sky coverage where the aurora's depth is outside the slice or behind the plate; pixels `inside` start at
+/// index `first` of the strip.
 #[inline(always)]
-fn hide(
-    sky: &mut [f32; BATCH],
-    depths: &[f32; BATCH],
-    slice: &DepthInterval,
+fn mask_occluded(
+    sky: &mut [f32; PIXEL_BATCH],
+    depths: &[f32; PIXEL_BATCH],
+    depths_shown: &DepthInterval,
     strip: &Strip,
     (first, inside): (usize, Range<usize>),
 ) {
-    for i in 0..BATCH {
+    for i in 0..PIXEL_BATCH {
         let depth = f64::from(depths[i]);
-        sky[i] = if depth >= slice.near && depth < slice.far { sky[i] } else { 0.0 };
+        sky[i] = if depth >= depths_shown.near && depth < depths_shown.far { sky[i] } else { 0.0 };
     }
     if strip.has_plate() {
         for i in inside.clone() {
@@ -392,13 +393,17 @@ fn hide(
 }
 
 impl Prepared for PreparedAurora<'_> {
-    fn bounds(&self, slice: &DepthInterval) -> Rect {
-        if slice.overlaps(&DEPTHS) { Rect::of_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
+    fn bounds(&self, depths_shown: &DepthInterval) -> Rect {
+        if depths_shown.overlaps(&DEPTHS) {
+            Rect::of_size(self.view.size[0], self.view.size[1])
+        } else {
+            Rect::default()
+        }
     }
 
-    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        if slice.overlaps(&DEPTHS) {
-            dispatch!(self.level, simd => self.rows(simd, slice, strip));
+    fn draw(&self, depths_shown: &DepthInterval, strip: &mut Strip) {
+        if depths_shown.overlaps(&DEPTHS) {
+            dispatch!(self.level, simd => self.draw_rows(simd, depths_shown, strip));
         }
     }
 }

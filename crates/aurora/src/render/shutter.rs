@@ -1,4 +1,4 @@
-//! What shines while the shutter is open: one state of the simulation that is drawn out, or in a long exposure the mean of many.
+//! Motion blur: one extrapolated state of the simulation, or in a long exposure the mean of many states.
 
 use bansho_base::{
     math,
@@ -8,52 +8,57 @@ use bansho_base::{
 use super::Aurora;
 use crate::{
     render::{
-        bin::sources::{Moments, Sources},
+        bin::sources::{SampleTimes, Sources},
         project::field_lines::FieldLines,
     },
     simulate::AuroraSimulation,
 };
 
-/// Motion of particles while the shutter is open that one instant stands for, beside their own spread, and the most instants: what is left
-/// between two instants adds to that spread.
+/// Motion per instant in units of the particles' spread, and the maximum number of instants; the rest is added to the
+/// spread.
 const SPREADS_PER_INSTANT: f64 = 3.0;
-const MOST_INSTANTS: f64 = 16.0;
+const MAX_INSTANTS: f64 = 16.0;
 /// Instants of a long exposure, each with its own particles and afterglow.
 const LONG_INSTANTS: usize = 16;
 
-/// Whether an exposure is so long that particles do not merely go straight on in it: more than a step on each side of a state.
+/// Whether an exposure is too long for linear extrapolation: more than a step on each side of a state.
 pub(crate) fn is_long(shutter: Shutter) -> bool {
     shutter.duration() > 2.0 * AuroraSimulation::STEP_S
 }
 
-/// Steps until the state is the last one not after a time, s.
+/// Steps to the last state not after time `t`, s.
 pub(crate) fn step_until(simulation: &mut AuroraSimulation, t: f64) {
-    // A millionth of a step forgives rounding.
+    // Tolerance for rounding, a millionth of a step.
     while simulation.time() + (1.0 - 1e-6) * AuroraSimulation::STEP_S <= t {
         simulation.step();
     }
 }
 
 impl Aurora {
-    /// What shines while the shutter of a view is open.
+    /// Sources while the shutter of a view is open.
     pub(super) fn sources(&self, view: &View, field: &FieldLines) -> Sources {
         if is_long(view.shutter) { self.long_exposure(view, field) } else { self.short_exposure(view, field) }
     }
 
-    /// The state's particles wherever they get while the shutter is open, and its afterglow.
+    /// Extrapolated particles of the current state, and its afterglow.
     fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
         let light = self.light(self.simulation(), view.shutter.middle());
-        let way = rms_speed(self.simulation()) * view.shutter.duration();
-        let count = (2.0 * way / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MOST_INSTANTS) as usize;
+        let distance_km = rms_speed(self.simulation()) * view.shutter.duration();
+        let count =
+            (2.0 * distance_km / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
         let now = self.simulation().time();
-        let later = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
-        Sources::new(&light, field, &Moments { later, first: 0, smear_km: smear_km(way / count as f64) })
+        let offsets_s = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
+        Sources::new(
+            &light,
+            field,
+            &SampleTimes { offsets_s, first_index: 0, smear_km: smear_km(distance_km / count as f64) },
+        )
     }
 
-    /// The mean of the states that come while the shutter is open.
+    /// Mean of the states during the exposure.
     ///
-    /// They begin with that of [`Run, Stepped::drawn_from`](bansho_base::phenomenon::Phenomenon::drawn_from); in a loop, where two runs
-    /// are drawn at the time of the shutter's middle, with that one.
+    /// It starts at the state of [`Stepped::time_for`](bansho_base::phenomenon::Stepped::time_for); in a
+    /// loop, where two runs are drawn at the shutter's middle, with that one.
     fn long_exposure(&self, view: &View, field: &FieldLines) -> Sources {
         let mut simulation = self.simulation().clone();
         let (shutter, now) = (view.shutter, simulation.time());
@@ -62,9 +67,13 @@ impl Aurora {
         for instant in 0..LONG_INSTANTS {
             let t = begin - shutter.open + shutter.instant(instant, LONG_INSTANTS);
             step_until(&mut simulation, t);
-            let way = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
+            let distance_km = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
             let first = instant as u32;
-            let moments = Moments { later: vec![t - simulation.time()], first, smear_km: smear_km(way) };
+            let moments = SampleTimes {
+                offsets_s: vec![t - simulation.time()],
+                first_index: first,
+                smear_km: smear_km(distance_km),
+            };
             mean.add(&Sources::new(&self.light(&simulation, t), field, &moments), 1.0 / LONG_INSTANTS as f32);
         }
         mean
@@ -78,9 +87,9 @@ fn rms_speed(simulation: &AuroraSimulation) -> f64 {
     math::sqrt(squares / particles.len().max(1) as f64)
 }
 
-/// Standard deviation of an even spread over a way, along each of the two directions.
-fn smear_km(way: f64) -> f64 {
-    way * math::sqrt(1.0 / 24.0)
+/// Standard deviation, per direction, of a uniform distribution over a distance in a random direction.
+fn smear_km(distance_km: f64) -> f64 {
+    distance_km * math::sqrt(1.0 / 24.0)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Named forms that an aurora takes, each a heading along the sheet.
+//! Named auroral forms, each defined by its heading along the sheet.
 
 use bansho_base::math::{self, DVec2, lerp, saturate, smoothstep};
 
@@ -24,12 +24,12 @@ bansho_base::choice! {
     }
 }
 
-/// Pieces of a form's line.
+/// Segments of a form's line.
 const PIECES: usize = 256;
 
 impl Form {
-    /// How far it bends unless told, degrees.
-    fn usual_bend_deg(self) -> f64 {
+    /// Default bend, degrees.
+    fn default_bend_deg(self) -> f64 {
         match self {
             Self::Arc => 40.0,
             Self::Band => 38.0,
@@ -42,7 +42,7 @@ impl Form {
         }
     }
 
-    fn usual_count(self) -> i64 {
+    fn default_count(self) -> i64 {
         match self {
             Self::Arc | Self::SShape | Self::Spiral | Self::Surge | Self::Peel => 1,
             Self::Fold => 2,
@@ -50,20 +50,21 @@ impl Form {
         }
     }
 
-    /// Heading at the share `s` of the length, in bends, 0 toward east, positive toward south.
+    /// Heading at the fraction `s` of the length, in units of the bend: 0 is east, positive is south.
     fn heading(self, s: f64, count: f64) -> f64 {
         let wave = |turns: f64| math::sin(std::f64::consts::TAU * turns);
         match self {
             Self::Arc => s - 0.5,
             Self::Band => wave(count * s) * (0.65 + 0.35 * wave(0.31 + 0.7 * s)),
-            // 0 at the ends, 1 in the middle, whose part runs back.
+            // 0 at the ends and 1 in the middle, which runs backward.
             Self::SShape => wave(0.5 * s) * wave(0.5 * s),
-            // An Euler spiral after a straight part: its curvature only grows, so that it cannot meet itself.
+            // An Euler spiral after a straight section: its curvature increases monotonically, so it cannot cross
+            // itself.
             Self::Spiral => {
                 let wound = saturate((s - 0.15) / 0.85);
                 wound * wound
             }
-            // The sine-generated curve of meanders (Langbein & Leopold 1966), quiet at both ends.
+            // The sine-generated curve of meanders (Langbein & Leopold 1966), attenuated at both ends.
             Self::Fold => wave(count * s) * smoothstep(0.0, 0.2, s) * smoothstep(0.0, 0.2, 1.0 - s),
             Self::Surge => {
                 let rise = smoothstep(0.2, 0.4, s) - 2.3 * smoothstep(0.45, 0.85, s);
@@ -79,8 +80,8 @@ impl Form {
 
     /// The form's line of length 1 about the origin, x east and z south.
     pub(super) fn line(self, bend_deg: Option<f64>, count: Option<i64>) -> Vec<DVec2> {
-        let bend = bend_deg.unwrap_or_else(|| self.usual_bend_deg()).to_radians();
-        let count = count.unwrap_or_else(|| self.usual_count()) as f64;
+        let bend = bend_deg.unwrap_or_else(|| self.default_bend_deg()).to_radians();
+        let count = count.unwrap_or_else(|| self.default_count()) as f64;
         let mut at = DVec2::ZERO;
         let mut line = vec![at];
         for piece in 0..PIECES {

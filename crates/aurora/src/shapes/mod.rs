@@ -1,13 +1,12 @@
-//! The aurora's foot as an artist draws it, and as it moves (thesis, 2.2.1 and 2.2.2).
+//! The sheets of the aurora as drawn curves, and their interpolation in time (thesis, 2.2.1 and 2.2.2).
 //!
-//! A scene lists shapes; each has sheets, and says what splits and merges on the way to it. [`Sequence`] is the shape at any time.
+//! A scene lists key shapes; each has sheets, splits and merges. [`Sequence`] is the shape at any time.
 //!
-//! Geometry is in km in the plane at 100 km altitude: x east, z south, the observer's nadir at the origin. Points are
+//! Coordinates are km in the plane at 100 km altitude: x east, z south, the observer's zenith at the origin. Points are
 //! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
 
 pub(crate) mod correspondence;
-mod default_shapes;
-mod fault;
+mod error;
 mod form;
 pub(crate) mod geometry;
 pub(crate) mod interpolation;
@@ -16,22 +15,25 @@ mod sequence;
 mod shape;
 pub(crate) mod strokes;
 
-pub use fault::{ShapeFault, ShapeFaultKind};
+pub use error::{ShapeError, ShapeErrorKind};
 pub use form::Form;
-pub(crate) use geometry::polyline::lengths;
+pub(crate) use geometry::polyline::cumulative_lengths;
 pub use geometry::{
-    nearest_segment::Neighbourhood,
-    segments::{Sample, Segments},
+    nearest_segment::NearestSegmentGrid,
+    segments::{SheetSample, SheetSampler},
 };
 pub use interpolation::gap::Bridge;
 pub use parameters::{
     Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,
     Spacing, SplitParameters,
 };
-pub(crate) use sequence::Listing;
+pub(crate) use sequence::ControlPointIds;
 pub use sequence::Sequence;
 pub use shape::{Shape, Sheet};
 pub use strokes::intersection::{SegmentId, count_crossings, first_crossing};
+
+/// Altitude of the drawn plane, km.
+pub(crate) const FOOT_ALTITUDE_KM: f64 = 100.0;
 
 #[cfg(test)]
 mod tests;

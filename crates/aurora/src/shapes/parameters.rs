@@ -1,13 +1,10 @@
-//! What a scene says of the aurora's shapes.
-
-use bansho_base::{
-    math::curve::{Curve, Interpolation},
-    parameters::{AssetPath, Auto, CurveLimits, Length, Range},
-};
+//! Parameters of the shapes, and the default shapes.
 
 use super::form::Form;
+use bansho_base::math::curve::{Curve, Interpolation};
+use bansho_base::parameters::{AssetPath, Auto, CurveLimits, Length, Range};
 
-/// A frame of the thesis, s (table 3.2: a step of 0.0333 s); `_frames` count these, whatever the picture's frame rate.
+/// Frame duration of the thesis, s (table 3.2: 0.0333 s); parameters in `_frames` are in this unit.
 pub const FRAME_S: f64 = 1.0 / 30.0;
 
 /// Frames from shape to shape (table 3.2).
@@ -19,7 +16,7 @@ pub(super) const TRANSITION_S: f64 = TRANSITION_FRAMES * FRAME_S;
 const KM: Range = Range::new(-20_000.0, 20_000.0);
 const DEGREES: Range = Range::new(-3600.0, 3600.0);
 
-/// A factor that is 1 all along the sheet.
+/// A constant factor of 1.
 fn even() -> Curve {
     Curve::new(vec![[0.0, 1.0]], Interpolation::Monotone).expect("one finite point is a curve")
 }
@@ -163,4 +160,69 @@ impl MotionParameters {
             (Auto::Auto, Correspondence::Automatic) => 96,
         }
     }
+}
+
+/// Side of the square of the default shapes, km.
+const DRAWN_EXTENT_KM: f64 = 600.0;
+
+/// Default strokes from west to east, [east, south] in km: two curtains in the north.
+const DEFAULT_FIRST: [[[f64; 2]; 8]; 2] = [
+    [
+        [-290., -250.],
+        [-180., -215.],
+        [-90., -190.],
+        [-20., -200.],
+        [40., -225.],
+        [110., -215.],
+        [190., -180.],
+        [290., -190.],
+    ],
+    [
+        [-200., -120.],
+        [-130., -95.],
+        [-60., -88.],
+        [-10., -105.],
+        [50., -120.],
+        [110., -105.],
+        [160., -80.],
+        [215., -85.],
+    ],
+];
+/// The same curtains with their waves moved and deepened.
+const DEFAULT_SECOND: [[[f64; 2]; 8]; 2] = [
+    [
+        [-290., -225.],
+        [-190., -190.],
+        [-110., -205.],
+        [-40., -240.],
+        [30., -225.],
+        [100., -185.],
+        [190., -200.],
+        [290., -220.],
+    ],
+    [
+        [-215., -95.],
+        [-140., -85.],
+        [-75., -110.],
+        [-20., -125.],
+        [45., -100.],
+        [100., -80.],
+        [155., -100.],
+        [210., -115.],
+    ],
+];
+
+/// Two slowly waving curtains, scaled to a square of that side.
+pub(super) fn default_shapes(extent_km: f64) -> Vec<ShapeParameters> {
+    let scale = extent_km / DRAWN_EXTENT_KM;
+    let curtain = |stroke: &[[f64; 2]; 8]| SheetParameters {
+        points: Some(stroke.iter().map(|point| point.map(|km| km * scale)).collect()),
+        ..SheetParameters::default()
+    };
+    let shape = |strokes: &[[[f64; 2]; 8]; 2]| ShapeParameters {
+        after_s: Some(20.0),
+        sheets: strokes.iter().map(curtain).collect(),
+        ..ShapeParameters::default()
+    };
+    vec![ShapeParameters { after_s: None, ..shape(&DEFAULT_FIRST) }, shape(&DEFAULT_SECOND), shape(&DEFAULT_FIRST)]
 }

@@ -1,4 +1,4 @@
-//! The aurora's shape at any time.
+//! The shape as a function of time.
 
 use bansho_base::{
     host::assets::Assets,
@@ -6,98 +6,100 @@ use bansho_base::{
 };
 
 use super::{
-    Correspondence, FRAME_S, MotionParameters, Shape, ShapeFault, ShapeFaultKind, ShapeParameters, Sheet,
+    Correspondence, FRAME_S, MotionParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,
     parameters::TRANSITION_S,
 };
 use crate::shapes::{
     interpolation::{
-        control_points::{Followed, drawn_shapes, follow},
+        control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
         gap::{self, Bridge, Gap, GapFlux},
-        spline_track::{Knot, Timing, find_velocities},
+        spline_track::{Knot, ShapeTiming, find_velocities},
     },
-    strokes::passing::passes,
+    strokes::intersection::passes,
 };
 use rayon::prelude::*;
 
-/// Weights of even spacing against nearness, the favourite first: others are tried where sheets would cross themselves on the way.
+/// Weights of uniform spacing against distance, in order of preference: later ones are tried where sheets cross during
+/// a transition.
 const EVENNESS: [f64; 4] = [0.01, 0.03, 0.1, 1.0];
 
-/// Moments of each transition at which that is looked at.
+/// Times per transition at which crossings are counted.
 const CHECKED_MOMENTS: usize = 32;
 
-/// The shapes of a scene and all in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
+/// All key shapes and in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
 ///
-/// A shape is a continuous function of time, also where sheets split and merge. Points that a spline would carry beyond the drawn
-/// square stop at its border.
+/// The shape is continuous in time, also at splits and merges. Points are clamped to the drawn square.
 #[derive(Clone, Debug)]
 pub struct Sequence {
-    followed: Followed,
-    timing: Timing,
+    tracked: TrackedControlPoints,
+    timing: ShapeTiming,
     half_km: f64,
-    /// The shape on whose way sheets first pass through each other.
+    /// The first shape whose transition has sheets that pass through each other.
     crossing: Option<usize>,
     loop_s: Option<f64>,
 }
 
-/// The control points of the shape at a time: one that goes on keeps its number, whichever sheet it is listed in and where.
+/// Ids of the control points of the shape at a time; a control point keeps its id in whichever sheet and position it is
+/// listed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Listing<'a> {
-    /// Their numbers, sheet by sheet.
+pub(crate) struct ControlPointIds<'a> {
+    /// Ids by sheet.
     pub(crate) sheets: &'a [Vec<usize>],
-    /// How many turns of a loop are over in which all shapes are passed; then those of the last shape are those of the first again.
-    pub(crate) turn: i64,
-    /// Each of the last shape that lies where one of the first does, and that one, in order.
-    again: &'a [[usize; 2]],
+    /// Number of completed cycles of a loop through all shapes; then ids of the last shape are replaced by those of the
+    /// first.
+    pub(crate) cycle: i64,
+    /// Sorted pairs of coincident tracks of the last and the first shape.
+    repeated: &'a [[usize; 2]],
 }
 
-impl<'a> Listing<'a> {
-    /// Control points without a sequence.
+impl<'a> ControlPointIds<'a> {
+    /// Ids without a sequence.
     #[cfg(test)]
     pub(crate) fn alone(sheets: &'a [Vec<usize>]) -> Self {
-        Self { sheets, turn: 0, again: &[] }
+        Self { sheets, cycle: 0, repeated: &[] }
     }
 
-    /// What a control point becomes when a turn of the loop is over.
-    pub(crate) fn after_turn(&self, track: usize) -> Option<usize> {
-        let index = self.again.binary_search_by_key(&track, |pair| pair[0]).ok()?;
-        Some(self.again[index][1])
+    /// Id of a control point in the next cycle of the loop.
+    pub(crate) fn after_cycle(&self, track: usize) -> Option<usize> {
+        let index = self.repeated.binary_search_by_key(&track, |pair| pair[0]).ok()?;
+        Some(self.repeated[index][1])
     }
 }
 
-/// A time among the shapes: at one of them, or at a share of the way from one to the next.
-enum Moment {
+/// A time within the sequence: at a key shape, or at a fraction between two.
+enum SequencePosition {
     At(usize),
     Between(usize, f64),
 }
 
 impl Sequence {
-    /// The sequence of `shapes` on a drawn square of side `extent_km`; two curtains that wave where there is no shape.
+    /// The sequence of `shapes` on a drawn square of side `extent_km`; the default shapes if there are none.
     ///
-    /// With `loop_s` it repeats after that time, in which all of it passes: round and round if the last shape is the first
-    /// again, there and back if not.
+    /// With `loop_s` it repeats after that time: cyclically if the last shape equals the first, else back and forth.
     ///
     /// # Errors
-    /// Shapes that are no aurora's, at their sheet and point; see [`ShapeFaultKind`].
+    ///
+    /// Invalid shapes, with sheet and point; see [`ShapeErrorKind`].
     pub fn new(
         shapes: &[ShapeParameters],
         motion: &MotionParameters,
         extent_km: f64,
         assets: &dyn Assets,
         loop_s: Option<f64>,
-    ) -> Result<Self, ShapeFault> {
+    ) -> Result<Self, ShapeError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
-            return Err(ShapeFault { key: "loop".into(), kind: ShapeFaultKind::LoopLength { seconds } });
+            return Err(ShapeError { key: "loop".into(), kind: ShapeErrorKind::LoopLength { seconds } });
         }
-        let usual = super::default_shapes::shapes(extent_km);
-        let shapes = if shapes.is_empty() { &usual[..] } else { shapes };
+        let default_shapes = super::parameters::default_shapes(extent_km);
+        let shapes = if shapes.is_empty() { &default_shapes[..] } else { shapes };
         let timing = timing(shapes)?;
         let drawn = drawn_shapes(shapes, extent_km, assets)?;
         let sequence = |evenness: f64| {
-            let mut followed = follow((shapes, &drawn), motion, extent_km, evenness)?;
-            let closed = loop_s.is_some() && followed.returns;
-            find_velocities(&mut followed.tracks, &timing, closed);
+            let mut tracked = track_control_points((shapes, &drawn), motion, extent_km, evenness)?;
+            let closed = loop_s.is_some() && tracked.is_closed;
+            find_velocities(&mut tracked.tracks, &timing, closed);
             let sequence =
-                Self { followed, timing: timing.clone(), half_km: extent_km / 2.0, crossing: None, loop_s: None };
+                Self { tracked, timing: timing.clone(), half_km: extent_km / 2.0, crossing: None, loop_s: None };
             Ok((sequence.crossings(), sequence))
         };
         let mut best = sequence(EVENNESS[0])?;
@@ -115,83 +117,84 @@ impl Sequence {
         Ok(Self { loop_s, crossing, ..best.1 })
     }
 
-    /// When each shape of the scene is reached, s, without a loop.
+    /// Arrival time of each key shape, s, without a loop.
     pub fn arrivals(&self) -> &[f64] {
         &self.timing.arrivals
     }
 
-    /// How long all of it takes, s, without a loop.
+    /// Total duration, s, without a loop.
     pub fn duration(&self) -> f64 {
         self.timing.departures[self.timing.departures.len() - 1]
     }
 
-    /// The shape at time `t`, s. Before the first shape and after the last, these stay. Toward gaps that open or close its flux fades.
+    /// The shape at time `t`, s, constant before the first and after the last key shape. The flux fades toward gaps.
     pub fn at(&self, t: f64) -> Shape {
-        let (index, share) = match self.moment(t) {
-            Moment::At(index) => {
-                return self.shape(&self.followed.shapes[index], |track| self.followed.tracks[track].knot(index));
+        let (index, fraction) = match self.moment(t) {
+            SequencePosition::At(index) => {
+                return self.shape(&self.tracked.shapes[index], |track| self.tracked.tracks[track].knot(index));
             }
-            Moment::Between(index, share) => (index, share),
+            SequencePosition::Between(index, fraction) => (index, fraction),
         };
-        let between = |track: usize| self.followed.tracks[track].between(index, share, &self.timing);
-        let mut shape = self.shape(&self.followed.strands[index], between);
-        for gap in &self.followed.gaps[index] {
-            let (state, _) = self.gap(gap, index, share);
+        let between = |track: usize| self.tracked.tracks[track].between(index, fraction, &self.timing);
+        let mut shape = self.shape(&self.tracked.strands[index], between);
+        for gap in &self.tracked.gaps[index] {
+            let (state, _) = self.gap(gap, index, fraction);
             for (sheet, at_end) in gap.ends.iter().filter_map(|end| self.end(*end, index)) {
-                gap::fade(&mut shape.sheets[sheet], at_end, state.ends);
+                gap::fade_toward_gap(&mut shape.sheets[sheet], at_end, state.ends);
             }
         }
         shape
     }
 
-    /// Who the control points of [`Self::at`] are that time.
-    pub(crate) fn listing(&self, t: f64) -> Listing<'_> {
+    /// Ids of the control points of [`Self::at`].
+    pub(crate) fn control_point_ids(&self, t: f64) -> ControlPointIds<'_> {
         let sheets = match self.moment(t) {
-            Moment::At(index) => &self.followed.shapes[index],
-            Moment::Between(index, _) => &self.followed.strands[index],
+            SequencePosition::At(index) => &self.tracked.shapes[index],
+            SequencePosition::Between(index, _) => &self.tracked.strands[index],
         };
-        let turns = self.loop_s.filter(|_| self.followed.returns).map_or(0.0, |loop_s| (t / loop_s).floor());
-        Listing { sheets, turn: turns as i64, again: &self.followed.again }
+        let turns = self.loop_s.filter(|_| self.tracked.is_closed).map_or(0.0, |loop_s| (t / loop_s).floor());
+        ControlPointIds { sheets, cycle: turns as i64, repeated: &self.tracked.repeated }
     }
 
-    /// What passes over narrow gaps between the sheets of [`Self::at`] that time.
+    /// Bridges over narrow gaps between the sheets of [`Self::at`].
     pub fn bridges(&self, t: f64) -> Vec<Bridge> {
-        let Moment::Between(index, share) = self.moment(t) else { return Vec::new() };
+        let SequencePosition::Between(index, fraction) = self.moment(t) else { return Vec::new() };
         let bridge = |gap: &Gap| {
-            let (state, knots) = self.gap(gap, index, share);
+            let (state, knots) = self.gap(gap, index, fraction);
             let ends = [self.end(gap.ends[0], index)?, self.end(gap.ends[1], index)?];
-            let mean = |value: usize| 0.5 * (knots[0].values[value] + knots[1].values[value]);
+            let mean = |value: usize| 0.5 * (knots[0].factors[value] + knots[1].factors[value]);
             let bridge = Bridge { ends, flux: mean(0) * state.across, energy: mean(1) };
             (bridge.flux > 0.0).then_some(bridge)
         };
-        self.followed.gaps[index].iter().filter_map(bridge).collect()
+        self.tracked.gaps[index].iter().filter_map(bridge).collect()
     }
 
-    /// Where a time lies among the shapes.
-    fn moment(&self, t: f64) -> Moment {
+    /// Position of a time within the sequence.
+    fn moment(&self, t: f64) -> SequencePosition {
         let t = self.phase(t);
         let next = self.timing.arrivals.partition_point(|&arrival| arrival <= t).max(1);
         let index = next - 1;
         let departure = self.timing.departures[index];
         if t <= departure || next == self.timing.arrivals.len() {
-            return Moment::At(index);
+            return SequencePosition::At(index);
         }
-        Moment::Between(index, (t - departure) / (self.timing.arrivals[next] - departure))
+        SequencePosition::Between(index, (t - departure) / (self.timing.arrivals[next] - departure))
     }
 
-    /// A gap on the way from shape `index`, and its two ends.
-    fn gap(&self, gap: &Gap, index: usize, share: f64) -> (GapFlux, [Knot; 2]) {
-        let tracks = gap.ends.map(|track| &self.followed.tracks[track]);
+    /// State of a gap in the transition from shape `index`, and its two ends.
+    fn gap(&self, gap: &Gap, index: usize, fraction: f64) -> (GapFlux, [Knot; 2]) {
+        let tracks = gap.ends.map(|track| &self.tracked.tracks[track]);
         let width = |[a, b]: [Knot; 2]| a.position.distance(b.position);
-        let now = tracks.map(|track| track.between(index, share, &self.timing));
+        let now = tracks.map(|track| track.between(index, fraction, &self.timing));
         let widest = tracks.map(|track| track.knot(index + usize::from(gap.opens)));
-        let from_closed = if gap.opens { share } else { 1.0 - share };
+        let from_closed = if gap.opens { fraction } else { 1.0 - fraction };
         (GapFlux::new(width(now), width(widest), from_closed), now)
     }
 
-    /// The strand on the way from shape `index` that a control point ends, and whether it does so at its end or at its start.
+    /// The strand in the transition from shape `index` with this control point at an end, and whether it is the last
+    /// point.
     fn end(&self, track: usize, index: usize) -> Option<(usize, bool)> {
-        let strands = self.followed.strands[index].iter().enumerate();
+        let strands = self.tracked.strands[index].iter().enumerate();
         let mut ends = strands.filter_map(|(number, strand)| {
             let at_end = strand.last() == Some(&track);
             (at_end || strand.first() == Some(&track)).then_some((number, at_end))
@@ -199,36 +202,36 @@ impl Sequence {
         ends.next()
     }
 
-    /// The ways of all control points from shape `index` to the next: where each leaves and where it arrives, km. They are listed
-    /// strand by strand: a sheet that splits is two strands, two that merge are two still. Empty for the last shape.
-    pub fn ways(&self, index: usize) -> Vec<Vec<[DVec2; 2]>> {
-        let way = |&track: &usize| [index, index + 1].map(|knot| self.followed.tracks[track].knot(knot).position);
-        let strands = self.followed.strands.get(index).into_iter().flatten();
-        strands.map(|strand| strand.iter().map(way).collect()).collect()
+    /// Start and end positions of all control points in the transition from shape `index`, km, by strand: a splitting
+    /// sheet has two strands, two merging sheets are still two. Empty for the last shape.
+    pub fn control_point_paths(&self, index: usize) -> Vec<Vec<[DVec2; 2]>> {
+        let path = |&track: &usize| [index, index + 1].map(|knot| self.tracked.tracks[track].knot(knot).position);
+        let strands = self.tracked.strands.get(index).into_iter().flatten();
+        strands.map(|strand| strand.iter().map(path).collect()).collect()
     }
 
-    /// The times at which sheets are looked at on their way from each shape to the next, s, and the shape from which that leads.
+    /// Times at which transitions are checked for crossings, s, with the index of the shape before.
     fn checked_times(&self) -> Vec<(usize, f64)> {
-        let Timing { arrivals, departures } = &self.timing;
+        let ShapeTiming { arrivals, departures } = &self.timing;
         let of_way = |index: usize| {
             let span = arrivals[index + 1] - departures[index];
-            let share = |moment: usize| (moment as f64 + 0.5) / CHECKED_MOMENTS as f64;
-            (0..CHECKED_MOMENTS).map(move |moment| (index, departures[index] + share(moment) * span))
+            let fraction = |moment: usize| (moment as f64 + 0.5) / CHECKED_MOMENTS as f64;
+            (0..CHECKED_MOMENTS).map(move |moment| (index, departures[index] + fraction(moment) * span))
         };
         (0..arrivals.len() - 1).flat_map(of_way).collect()
     }
 
-    /// How many segments cross in the in-between shapes at those times, all added up.
+    /// Total number of crossings at these times.
     fn crossings(&self) -> usize {
         self.checked_times().into_par_iter().map(|(_, time)| self.at(time).crossings()).sum()
     }
 
-    /// The shape of the scene, counted from 0, on whose way sheets first pass through each other or themselves, where they do.
+    /// The first shape, counted from 0, whose transition has sheets that cross each other or themselves.
     pub fn crossing(&self) -> Option<usize> {
         self.crossing
     }
 
-    /// The same, as it is found.
+    /// Computes [`Self::crossing`].
     fn first_crossing(&self) -> Option<usize> {
         let mut before: Option<(usize, Shape)> = None;
         for (index, time) in self.checked_times() {
@@ -242,17 +245,17 @@ impl Sequence {
         None
     }
 
-    /// Factors of flux and of energy of every control point at every shape of the scene; those of in-between shapes lie between them.
+    /// Flux and energy factors of every control point at every key shape; those of in-between shapes are between them.
     pub fn factors(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
-        self.followed.tracks.iter().flat_map(|track| &track.knots).map(|knot| knot.values)
+        self.tracked.tracks.iter().flat_map(|track| &track.knots).map(|knot| knot.factors)
     }
 
-    /// Time within the sequence.
+    /// Time within the sequence, with the loop applied.
     fn phase(&self, t: f64) -> f64 {
         let Some(loop_s) = self.loop_s else { return t };
         let turns = t / loop_s;
         let turn = turns - turns.floor();
-        if self.followed.returns {
+        if self.tracked.is_closed {
             turn * self.duration()
         } else {
             0.5 * self.duration() * (1.0 - math::cos(std::f64::consts::TAU * turn))
@@ -265,8 +268,8 @@ impl Sequence {
             let mut sheet = Sheet::default();
             for knot in tracks.iter().map(|&track| knot(track)) {
                 sheet.points.push(knot.position.clamp(-half, half));
-                sheet.flux.push(knot.values[0]);
-                sheet.energy.push(knot.values[1]);
+                sheet.flux.push(knot.factors[0]);
+                sheet.energy.push(knot.factors[1]);
             }
             sheet
         };
@@ -274,25 +277,25 @@ impl Sequence {
     }
 }
 
-/// When each shape is reached and left.
-fn timing(shapes: &[ShapeParameters]) -> Result<Timing, ShapeFault> {
-    let mut timing = Timing { arrivals: Vec::new(), departures: Vec::new() };
+/// Arrival and departure times of each shape.
+fn timing(shapes: &[ShapeParameters]) -> Result<ShapeTiming, ShapeError> {
+    let mut timing = ShapeTiming { arrivals: Vec::new(), departures: Vec::new() };
     for (index, shape) in shapes.iter().enumerate() {
-        let fault = |key: &str, kind| ShapeFault { key: format!("shapes.{index}.{key}"), kind };
+        let error = |key: &str, kind| ShapeError { key: format!("shapes.{index}.{key}"), kind };
         let after = match (shape.after_s, shape.after_frames) {
-            (Some(_), Some(_)) => return Err(fault("after_frames", ShapeFaultKind::SecondsAndFrames)),
+            (Some(_), Some(_)) => return Err(error("after_frames", ShapeErrorKind::SecondsAndFrames)),
             (Some(seconds), None) => seconds,
             (None, Some(frames)) => frames * FRAME_S,
             (None, None) => TRANSITION_S,
         };
         let timed = [("after_s", shape.after_s.is_none()), ("after_frames", shape.after_frames.is_none())];
         if let Some((key, _)) = timed.into_iter().find(|(_, none)| index == 0 && !none) {
-            return Err(fault(key, ShapeFaultKind::FirstShapeIsThere));
+            return Err(error(key, ShapeErrorKind::TimeBeforeFirstShape));
         }
         let changes =
             [("split", shape.split.is_empty()), ("merge", shape.merge.is_empty()), ("link", shape.link.is_empty())];
         if let Some((key, _)) = changes.into_iter().find(|(_, none)| index == 0 && !none) {
-            return Err(fault(key, ShapeFaultKind::NothingBefore));
+            return Err(error(key, ShapeErrorKind::ChangeBeforeFirstShape));
         }
         let arrival = timing.departures.last().map_or(0.0, |departure| departure + after);
         timing.arrivals.push(arrival);

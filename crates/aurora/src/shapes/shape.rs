@@ -1,11 +1,11 @@
-//! The aurora's foot at one moment.
+//! A shape: all sheets at one time.
 
 use bansho_base::math::DVec2;
 
 /// One sheet: control points joined by segments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
-    /// Control points, km: x east, y south. At least two; neighbours may coincide while a split opens or a merge closes.
+    /// Control points, km: x east, y south. At least two; neighbors may coincide while a split opens or a merge closes.
     pub points: Vec<DVec2>,
     /// Factor of the aurora's flux at each control point.
     pub flux: Vec<f64>,
@@ -22,7 +22,7 @@ impl AsRef<[DVec2]> for Sheet {
 /// All sheets of an aurora at one moment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shape {
-    /// Its sheets. Which one stands where in the list changes only when a shape of the scene is reached or left.
+    /// Its sheets; their order changes only at key shapes.
     pub sheets: Vec<Sheet>,
 }
 
@@ -33,7 +33,7 @@ impl Shape {
         self.sheets.iter().map(length).sum()
     }
 
-    /// How many pairs of segments cross: 0 for the shapes of a scene, perhaps more on the way between two that lie badly.
+    /// Number of crossing pairs of segments: 0 for key shapes, possibly more for in-between shapes.
     pub fn crossings(&self) -> usize {
         super::count_crossings(&self.sheets)
     }

@@ -52,7 +52,7 @@ fn points(shape: &Shape) -> Vec<Vec<[f64; 2]>> {
 /// Greatest distance from a point of one shape to the other, both ways.
 fn apart(a: &Shape, b: &Shape) -> f64 {
     let one_way = |from: &Shape, to: &Shape| {
-        let near = Neighbourhood::new(to, 30.0);
+        let near = NearestSegmentGrid::new(to, 30.0);
         let all = from.sheets.iter().flat_map(|sheet| &sheet.points);
         all.map(|&point| near.distance(point).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
     };
@@ -182,9 +182,9 @@ fn loops_close_whether_the_sequence_returns_or_not() {
     // Half way round it is at the middle shape or at the last one.
     assert!((there_and_back.at(3.0).sheets[0].points[0].y - 20.0).abs() < 1e-9);
     assert!((round.at(2.0).sheets[0].points[0].y - 80.0).abs() < 1e-9);
-    let fault =
+    let error =
         Sequence::new(&begun(&shapes), &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
-    assert_eq!(fault.unwrap_err().to_string(), "loop: a loop of 0 s; allowed: more than 0");
+    assert_eq!(error.unwrap_err().to_string(), "loop: a loop of 0 s; allowed: more than 0");
 }
 
 fn random_shape(key: Key, case: u64, step: u32, sheets: usize) -> ShapeParameters {
@@ -229,11 +229,11 @@ fn random_sequences_stay_finite_and_inside() {
                 assert!(sheet.points.len() >= 2 && sheet.flux.len() == sheet.points.len());
                 assert!(sheet.points.iter().all(|point| point.abs().max_element() <= EXTENT_KM / 2.0), "case {case}");
             }
-            let segments = Segments::new(&shape);
+            let segments = SheetSampler::new(&shape);
             assert!(
                 segments
                     .sample(0.3)
-                    .is_some_and(|sample| sample.point.is_finite() && (0.0..=1.0).contains(&sample.share))
+                    .is_some_and(|sample| sample.point.is_finite() && (0.0..=1.0).contains(&sample.fraction))
             );
         }
         if loop_s.is_none() {
@@ -255,14 +255,14 @@ fn long_strokes_are_checked() {
     assert!(smooth.at(0.0).length() > 1000.0);
     let crossed: Vec<[f64; 2]> =
         (0..10_000).map(|index| turn(index, 300.0 - (index as f64 - 5000.0).abs() * 0.04)).collect();
-    let fault = Sequence::new(
+    let error = Sequence::new(
         &begun(&[shape(vec![sheet(&crossed)])]),
         &MotionParameters::default(),
         EXTENT_KM,
         &MemoryAssets::default(),
         None,
     );
-    assert!(matches!(fault.unwrap_err().kind, ShapeFaultKind::CrossesItself { sheet: 1, .. }));
+    assert!(matches!(error.unwrap_err().kind, ShapeErrorKind::CrossesItself { sheet: 1, .. }));
 }
 
 /// A sheet that comes back to where it was, but with another flux there, is not the first again: that flux is reached, and in a loop
@@ -290,7 +290,7 @@ fn a_shape_that_returns_with_another_flux_is_another() {
     assert!((turn.at(4.0).sheets[0].points[0].y - 50.0).abs() < 1e-6, "round, not there and back");
 }
 
-/// Sheets that are told to exchange places pass through each other on the way to the second shape; those that stay do not.
+/// Sheets that are told to exchange positions pass through each other on the way to the second shape; those that stay do not.
 #[test]
 fn sheets_that_exchange_places_are_known_to_cross() {
     assert_eq!(linked(vec![]).unwrap().crossing(), None);
@@ -340,13 +340,13 @@ fn more_control_points_than_can_be_held_are_refused() {
         |index: usize| SheetParameters { copies: 32, spacing_km: 1.0, ..straight(-200.0, 200.0, 33.0 * index as f64) };
     let full = shape((0..8).map(row).collect());
     let motion = MotionParameters { control_points: Auto::Set(512), ..MotionParameters::default() };
-    let fault = Sequence::new(&begun(&vec![full; 32]), &motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
-    assert_eq!(fault.key, "shapes.30.sheets");
-    assert_eq!(fault.kind, ShapeFaultKind::TooManyPoints { found: 31 * 256 * 512, most: 4_000_000 });
+    let error = Sequence::new(&begun(&vec![full; 32]), &motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
+    assert_eq!(error.key, "shapes.30.sheets");
+    assert_eq!(error.kind, ShapeErrorKind::TooManyPoints { found: 31 * 256 * 512, most: 4_000_000 });
 }
 
 /// Two sheets that stay where they are, with links to the second shape.
-fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeFault> {
+fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeError> {
     let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
     let shapes = [shape(sheets.clone()), ShapeParameters { link, ..shape(sheets) }];
     let motion = MotionParameters { control_points: Auto::Set(11), ..MotionParameters::default() };
@@ -359,7 +359,8 @@ fn link(from: i64, to: i64, point: Option<[f64; 2]>) -> LinkParameters {
 
 #[test]
 fn linked_sheets_become_what_they_are_linked_to() {
-    let [straight, exchanged] = [vec![], vec![link(1, 2, None)]].map(|links| linked(links).unwrap().ways(0));
+    let [straight, exchanged] =
+        [vec![], vec![link(1, 2, None)]].map(|links| linked(links).unwrap().control_point_paths(0));
     assert!(straight.iter().flatten().all(|[from, to]| from.distance(*to) < 1e-6));
     assert!(
         exchanged.iter().flatten().all(|[from, to]| (from.y - to.y).abs() > 49.9),
@@ -369,13 +370,14 @@ fn linked_sheets_become_what_they_are_linked_to() {
 
 #[test]
 fn linked_points_arrive_where_they_are_linked_to() {
-    let ways = linked(vec![link(1, 1, Some([0.3, 0.5])), link(1, 1, Some([0.8, 0.9]))]).unwrap().ways(0);
+    let ways = linked(vec![link(1, 1, Some([0.3, 0.5])), link(1, 1, Some([0.8, 0.9]))]).unwrap().control_point_paths(0);
     let arrives = |from: f64| ways[0].iter().find(|way| (way[0].x - from).abs() < 1e-6).map(|way| way[1].x);
     for (from, to) in [(-200.0, -200.0), (-80.0, 0.0), (120.0, 160.0), (200.0, 200.0)] {
         assert!(arrives(from).is_some_and(|x| (x - to).abs() < 1e-6), "{from}: {:?}", arrives(from));
     }
     assert!(ways[1].iter().all(|[from, to]| from.distance(*to) < 1e-6), "the other stays");
-    let turned = linked(vec![link(1, 1, Some([0.3, 0.7])), link(1, 1, Some([0.8, 0.2]))]).unwrap().ways(0);
+    let turned =
+        linked(vec![link(1, 1, Some([0.3, 0.7])), link(1, 1, Some([0.8, 0.2]))]).unwrap().control_point_paths(0);
     assert!((turned[0][0][1].x - 200.0).abs() < 1e-6, "points that arrive in the other order turn the sheet round");
 }
 
@@ -385,21 +387,21 @@ fn impossible_links_are_refused() {
     let missing = refused(&[link(1, 3, None)]);
     assert_eq!(
         (missing.key.as_str(), missing.kind),
-        ("shapes.1.link.0", ShapeFaultKind::NoSuchTarget { sheet: 3, count: 2 })
+        ("shapes.1.link.0", ShapeErrorKind::NoSuchTarget { sheet: 3, count: 2 })
     );
     let twice = refused(&[link(1, 2, None), link(2, 2, None)]);
-    assert_eq!((twice.key.as_str(), twice.kind), ("shapes.1.link.1", ShapeFaultKind::LinkedTwice { sheet: 2 }));
+    assert_eq!((twice.key.as_str(), twice.kind), ("shapes.1.link.1", ShapeErrorKind::LinkedTwice { sheet: 2 }));
     let half = LinkParameters { arrives: Some(0.5), ..LinkParameters::default() };
-    assert_eq!(refused(&[half]).kind, ShapeFaultKind::HalfALink);
+    assert_eq!(refused(&[half]).kind, ShapeErrorKind::ArrivalWithoutPoint);
     let nowhere = refused(&[link(1, 1, None), LinkParameters { at: Some(0.5), ..link(2, 2, None) }]);
-    assert_eq!((nowhere.key.as_str(), nowhere.kind), ("shapes.1.link.1", ShapeFaultKind::NowhereToArrive));
+    assert_eq!((nowhere.key.as_str(), nowhere.kind), ("shapes.1.link.1", ShapeErrorKind::PointWithoutArrival));
     let passing = [[0.2, 0.3], [0.5, 0.8], [0.8, 0.6]].map(|point| link(1, 1, Some(point)));
-    assert_eq!(refused(&passing).kind, ShapeFaultKind::LinksCross);
+    assert_eq!(refused(&passing).kind, ShapeErrorKind::LinksCross);
     let first =
         [ShapeParameters { link: vec![link(1, 1, None)], after_s: None, ..shape(vec![straight(0.0, 9.0, 0.0)]) }];
-    let fault =
+    let error =
         Sequence::new(&first, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
-    assert_eq!(fault.kind, ShapeFaultKind::NothingBefore);
+    assert_eq!(error.kind, ShapeErrorKind::ChangeBeforeFirstShape);
 }
 
 #[test]
@@ -409,8 +411,8 @@ fn the_first_shape_takes_no_time_to_come() {
         ("shapes.0.after_frames", ShapeParameters { after_frames: Some(2.0), ..ShapeParameters::default() }),
     ] {
         let shapes = [first, ShapeParameters::default()];
-        let fault = Sequence::new(&shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None);
-        let fault = fault.unwrap_err();
-        assert_eq!((fault.key.as_str(), fault.kind), (key, ShapeFaultKind::FirstShapeIsThere));
+        let error = Sequence::new(&shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None);
+        let error = error.unwrap_err();
+        assert_eq!((error.key.as_str(), error.kind), (key, ShapeErrorKind::TimeBeforeFirstShape));
     }
 }

@@ -1,10 +1,10 @@
-//! The aurora's particles and the field that moves them (thesis, 2.2.3 and 2.3).
+//! Simulation of the particles and of the field that moves them (thesis, 2.2.3 and 2.3).
 //!
-//! [`AuroraSimulation`] steps them: a field pulls them toward the in-between shape, they push each other apart, and whenever the
-//! shape is renewed some are born where they are missing and die where they are strays.
+//! [`AuroraSimulation`] advances them: the [`field`] attracts them to the in-between shape, `forces` has the repulsion
+//! and integration, `relocation` creates and removes particles when the shape is updated, `energy_flux` assigns their
+//! power, [`afterglow`] keeps the delayed light.
 
 pub mod afterglow;
-mod arc_intervals;
 mod energy_flux;
 pub mod field;
 mod forces;

@@ -1,4 +1,4 @@
-//! The particles for other programs.
+//! Export of the particles as a point cloud.
 
 use bansho_base::{
     geometry::point_cloud::{PointCloud, Quantity},
@@ -6,23 +6,24 @@ use bansho_base::{
 };
 
 use super::{AuroraParticles, AuroraSimulation};
-use crate::render::project::field_lines::{EARTH_RADIUS_KM, FOOT_KM};
+use crate::shapes::FOOT_ALTITUDE_KM;
+use bansho_base::world::sky::EARTH_RADIUS_KM;
 
-/// Half of the time over which a velocity is taken, s.
+/// Half of the interval of the finite-difference velocity, s.
 const MOMENT_S: f64 = 1e-3;
 
-/// Where the particles pass 100 km altitude, `later` seconds after their step: x east, y up, z south, as the camera has
-/// it.
-pub(crate) fn point_cloud(particles: &AuroraParticles, later: f64) -> PointCloud {
-    let later = later.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
+/// Particle positions at 100 km altitude, `offset_s` seconds after their step: x east, y up, z south, as for the
+/// camera.
+pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64) -> PointCloud {
+    let offset_s = offset_s.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
     let [us, ws] = &particles.velocities;
-    let place = |index: usize, time: f64| {
+    let position_at = |index: usize, time: f64| {
         let velocity = DVec2::new(f64::from(us[index]), f64::from(ws[index]));
-        on_shell(particles.place(index) + velocity * time)
+        on_shell(particles.position(index) + velocity * time)
     };
-    let velocity = |index: usize| (place(index, MOMENT_S) - place(index, -MOMENT_S)) / (2.0 * MOMENT_S);
+    let velocity = |index: usize| (position_at(index, MOMENT_S) - position_at(index, -MOMENT_S)) / (2.0 * MOMENT_S);
     PointCloud {
-        positions: (0..particles.len()).map(|index| place(index, later).as_vec3().to_array()).collect(),
+        positions: (0..particles.len()).map(|index| position_at(index, offset_s).as_vec3().to_array()).collect(),
         velocities: (0..particles.len()).map(|index| velocity(index).as_vec3().to_array()).collect(),
         quantities: [(Quantity::Energy, &particles.energies_ev), (Quantity::Power, &particles.powers_w)]
             .map(|(quantity, values)| (quantity, values.clone()))
@@ -30,13 +31,13 @@ pub(crate) fn point_cloud(particles: &AuroraParticles, later: f64) -> PointCloud
     }
 }
 
-/// A place of the drawn plane, km, on the shell that it is spread over, m: as far from the middle along it.
-fn on_shell(place: DVec2) -> DVec3 {
-    const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_KM);
-    let distance = place.length();
+/// Maps a position of the drawn plane, km, to the spherical shell at 100 km, m.
+fn on_shell(position_at: DVec2) -> DVec3 {
+    const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM);
+    let distance = position_at.length();
     let (sin, cos) = math::sin_cos(1e3 * distance / SHELL_M);
-    let level = place.normalize_or_zero() * (sin * SHELL_M);
-    DVec3::new(level.x, cos * SHELL_M - 1e3 * EARTH_RADIUS_KM, level.y)
+    let horizontal = position_at.normalize_or_zero() * (sin * SHELL_M);
+    DVec3::new(horizontal.x, cos * SHELL_M - 1e3 * EARTH_RADIUS_KM, horizontal.y)
 }
 
 #[cfg(test)]

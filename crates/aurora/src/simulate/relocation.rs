@@ -1,39 +1,28 @@
-//! Births and deaths when the in-between shape is renewed (thesis, 2.3.4 and table 3.3).
+//! Relocation: births and deaths when the in-between shape is updated (thesis, 2.3.4 and table 3.3).
 
-use bansho_base::math::{
-    DVec2,
-    random::{Key, Purpose, uniform},
-};
-
-use super::{
-    AuroraParticles,
-    arc_intervals::{Stretch, Stretches},
-};
-use crate::{
-    AuroraParameters, RelocationParameters,
-    simulate::{
-        field::{
-            scatter::Scattered,
-            sheet_field::{Field, full_count},
-        },
-        sheets::refined_shape::Course,
-    },
-};
+use super::AuroraParticles;
+use crate::simulate::field::sheet_charge::ScatteredParticle;
+use crate::simulate::field::sheet_field::{ElectricField, full_cell_count};
+use crate::simulate::sheets::refined_shape::RefinedShape;
+use crate::{AuroraParameters, RelocationParameters};
+use bansho_base::math::DVec2;
+use bansho_base::math::random::{Key, Purpose, uniform};
 use rayon::prelude::*;
 
 const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");
-/// The counts of table 3.3 are taken as those of a near cell that holds this many particles on average.
+/// Average number of particles per near cell that the counts of table 3.3 refer to.
 const TABLE_COUNT: f64 = 75.0;
-/// Particles that a task of the thread pool finds the cells of, at least.
+/// Minimum particles per task.
 const TASK: usize = 4096;
-/// By so much more is a stretch filled than the table says: until the next renewal it stretches by up to a half, and its particles move on.
-const AHEAD: f64 = 1.35;
+/// Intervals are filled by this factor more than the table says: until the next update they stretch by up to a half and
+/// particles move on.
+const FILL_FACTOR: f64 = 1.35;
 
-/// Place and velocity of a particle that is born, km and km/s.
+/// Position and velocity of a new particle, km and km/s.
 type Birth = (DVec2, [f32; 2]);
 
-/// Table 3.3 for a number of particles, and the random numbers of births.
+/// Parameters of table 3.3 and the random key.
 #[derive(Clone, Debug)]
 pub(super) struct Relocation {
     parameters: RelocationParameters,
@@ -42,9 +31,9 @@ pub(super) struct Relocation {
     key: Key,
 }
 
-/// Particles of each cell, those that stay alive.
-struct Residents {
-    /// Where the list of each cell begins, and where the last one ends.
+/// Living particles of each cell.
+struct CellOccupants {
+    /// Start of each cell's list, and the total.
     starts: Vec<u32>,
     indices: Vec<u32>,
 }
@@ -59,79 +48,86 @@ impl Relocation {
         }
     }
 
-    /// Lets strays and the surplus die and fills what is thin, by the shape, its scattered particles and the field from before the renewal.
+    /// Removes strays and surplus particles and adds missing ones, by the shape, scatter and field from before the
+    /// update.
     pub(super) fn relocate(
         &self,
         particles: &mut AuroraParticles,
-        (field, course, scattered): (&Field, &Course, &[Scattered]),
+        (field, refined, scattered): (&ElectricField, &RefinedShape, &[ScatteredParticle]),
         renewal: u32,
         next_id: &mut u64,
     ) {
         let near = near_cells(field, &self.parameters);
-        let scale = self.scale(&self.shares(field, &near));
-        let homes = (0..particles.len()).into_par_iter().with_min_len(TASK);
-        let homes: Vec<Option<usize>> = homes.map(|i| home(particles, field, i)).collect();
-        for (index, home) in homes.iter().enumerate() {
-            particles.dying[index] |= !home.is_some_and(|cell| near[cell]);
+        let scale = self.scale(&self.coverage(field, &near));
+        let cells = (0..particles.len()).into_par_iter().with_min_len(TASK);
+        let cells: Vec<Option<usize>> = cells.map(|i| cell_of_particle(particles, field, i)).collect();
+        for (index, cell) in cells.iter().enumerate() {
+            particles.dying[index] |= !cell.is_some_and(|cell| near[cell]);
         }
-        let residents = Residents::new(particles, &homes, near.len());
-        self.cull(particles, &residents, course, scale);
+        let occupants = CellOccupants::new(particles, &cells, near.len());
+        self.remove_excess(particles, &occupants, refined, scale);
         let births = if self.parameters.scaled {
-            let mut stretches = Stretches::new(course, scattered, self.count);
-            stretches.fill(particles);
-            let births = self.births_along(&mut stretches, scattered, particles.len(), renewal);
-            self.thin(particles, &mut stretches, renewal);
+            let mut intervals = ArcIntervals::new(refined, scattered, self.count);
+            intervals.fill(particles);
+            let births = self.births_by_interval(&mut intervals, scattered, particles.len(), renewal);
+            self.remove_surplus(particles, &mut intervals, renewal);
             births
         } else {
-            self.births_by_cell(particles, &residents, (field, course), &near, *next_id, renewal)
+            self.births_by_cell(particles, &occupants, (field, refined), &near, *next_id, renewal)
         };
-        for (place, velocity) in births {
-            particles.push(*next_id, place, velocity, 0.0);
+        for (position, velocity) in births {
+            particles.push(*next_id, position, velocity, 0.0);
             *next_id += 1;
         }
     }
 
-    /// How much of a whole cell the sheets cover of each near cell, from 0 to 1; 0 in others. All near cells count as whole where the table
-    /// is taken to the letter.
-    fn shares(&self, field: &Field, near: &[bool]) -> Vec<f64> {
-        let full = full_count(&field.counts).max(f64::MIN_POSITIVE);
-        let share = |(count, near): (&f64, &bool)| match (near, self.parameters.scaled) {
+    /// Fraction of each near cell that the sheets cover, 0 to 1; 0 in other cells. 1 in all near cells if the table is
+    /// applied literally.
+    fn coverage(&self, field: &ElectricField, near: &[bool]) -> Vec<f64> {
+        let full = full_cell_count(&field.counts).max(f64::MIN_POSITIVE);
+        let fraction = |(count, near): (&f64, &bool)| match (near, self.parameters.scaled) {
             (false, _) => 0.0,
             (true, false) => 1.0,
             (true, true) => (count / full).min(1.0),
         };
-        field.counts.values().iter().zip(near).map(share).collect()
+        field.counts.values().iter().zip(near).map(fraction).collect()
     }
 
-    /// What the counts of the table are multiplied by.
-    fn scale(&self, shares: &[f64]) -> f64 {
-        let cells = shares.iter().sum::<f64>().max(1.0);
+    /// Scale factor of the table's counts.
+    fn scale(&self, coverage: &[f64]) -> f64 {
+        let cells = coverage.iter().sum::<f64>().max(1.0);
         if self.parameters.scaled { self.count / (cells * TABLE_COUNT) } else { 1.0 }
     }
 
-    /// In every cell with too many, those farthest from the shape die.
-    fn cull(&self, particles: &mut AuroraParticles, residents: &Residents, course: &Course, scale: f64) {
+    /// Removes the particles farthest from the shape in cells with too many.
+    fn remove_excess(
+        &self,
+        particles: &mut AuroraParticles,
+        occupants: &CellOccupants,
+        refined: &RefinedShape,
+        scale: f64,
+    ) {
         let most = self.parameters.deaths_above * scale;
-        for cell in 0..residents.starts.len() - 1 {
-            let list = residents.of(cell);
+        for cell in 0..occupants.starts.len() - 1 {
+            let list = occupants.of(cell);
             let excess = (list.len() as f64 - most).min(self.parameters.deaths_at_most * scale).ceil();
             if excess < 1.0 {
                 continue;
             }
-            let distance = |index: u32| course.distance(particles.place(index as usize)).unwrap_or(f64::INFINITY);
+            let distance = |index: u32| refined.distance(particles.position(index as usize)).unwrap_or(f64::INFINITY);
             let mut farthest: Vec<(f64, u32)> = list.iter().map(|index| (distance(*index), *index)).collect();
             farthest.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
             farthest.iter().take(excess as usize).for_each(|entry| particles.dying[entry.1 as usize] = true);
         }
     }
 
-    /// In every near cell with too few, the deficit appears at random, with the mean velocity of the cells around: places and velocities, by
-    /// the letter of the table.
+    /// Adds the deficit of near cells at random positions with the mean velocity of the neighboring cells: the literal
+    /// table.
     fn births_by_cell(
         &self,
         particles: &AuroraParticles,
-        residents: &Residents,
-        (field, course): (&Field, &Course),
+        occupants: &CellOccupants,
+        (field, refined): (&ElectricField, &RefinedShape),
         near: &[bool],
         first_id: u64,
         renewal: u32,
@@ -140,112 +136,116 @@ impl Relocation {
         let origin = DVec2::from(field.counts.origin());
         let mut births = Vec::new();
         for cell in (0..near.len()).filter(|cell| near[*cell]) {
-            let lack = self.parameters.births_below - residents.of(cell).len() as f64;
+            let lack = self.parameters.births_below - occupants.of(cell).len() as f64;
             let deficit = lack.min(self.parameters.births_at_most).round();
             if deficit < 1.0 {
                 continue;
             }
-            let velocity = residents.mean_velocity(particles, cell, columns);
+            let velocity = occupants.mean_velocity(particles, cell, columns);
             let corner = DVec2::new((cell % columns) as f64, (cell / columns) as f64);
             for _ in 0..deficit.min(self.room(particles.len() + births.len())) as u64 {
                 let id = first_id + births.len() as u64;
                 let [u, v, ..] = self.key.words(id, renewal, BIRTH).map(|word| f64::from(uniform(word)));
-                let place = origin + (corner + DVec2::new(u, v)) * field.counts.spacing();
-                births.push((course.held(place, self.half_thickness), velocity));
+                let position = origin + (corner + DVec2::new(u, v)) * field.counts.spacing();
+                births.push((refined.clamp_distance(position, self.half_thickness), velocity));
             }
         }
         births
     }
 
-    /// Where a stretch of the sheets holds too few, the deficit appears among the places of its scattered particles, with the mean velocity
-    /// there. All together are as many as the table gives to all near cells at most; where they are born is where they lack. Cells would not
-    /// see that: where sheets bend, a full limb passes through the cells of an empty one.
-    fn births_along(
+    /// Adds the deficit of intervals at the positions of their scattered particles, with the local mean velocity. The
+    /// total is limited to what the table allows for all near cells. Unlike cells, intervals detect an empty part of a
+    /// sheet next to a full one.
+    fn births_by_interval(
         &self,
-        stretches: &mut Stretches,
-        scattered: &[Scattered],
+        intervals: &mut ArcIntervals,
+        scattered: &[ScatteredParticle],
         living: usize,
         renewal: u32,
     ) -> Vec<Birth> {
         let [below, most] =
             [self.parameters.births_below, self.parameters.births_at_most].map(|count| count / TABLE_COUNT);
-        let lack = |stretch: &Stretch| (AHEAD * below * stretch.due - stretch.found).max(0.0);
-        let lacks: Vec<f64> = stretches.all().iter().map(lack).collect();
+        let lack = |interval: &ArcInterval| (FILL_FACTOR * below * interval.target_count - interval.count).max(0.0);
+        let lacks: Vec<f64> = intervals.all().iter().map(lack).collect();
         let lacking: f64 = lacks.iter().sum();
         if lacking <= 0.0 {
             return Vec::new();
         }
         let given = (most * self.count).min(self.room(living)).min(lacking) / lacking;
-        let chance = |(lack, stretch): (&f64, &mut Stretch)| given * lack / stretch.scattered.max(1.0);
-        let chances: Vec<f64> = lacks.iter().zip(stretches.all()).map(chance).collect();
-        let velocities: Vec<[f32; 2]> = (0..chances.len()).map(|index| stretches.velocity(index)).collect();
+        let chance = |(lack, interval): (&f64, &mut ArcInterval)| given * lack / interval.scattered.max(1.0);
+        let chances: Vec<f64> = lacks.iter().zip(intervals.all()).map(chance).collect();
+        let velocities: Vec<[f32; 2]> = (0..chances.len()).map(|index| intervals.velocity(index)).collect();
         let mut births = Vec::new();
         for (number, particle) in scattered.iter().enumerate() {
-            let Some(index) = stretches.index(particle.sheet, particle.share).filter(|index| chances[*index] > 0.0)
+            let Some(index) =
+                intervals.index(particle.sheet, particle.arc_fraction).filter(|index| chances[*index] > 0.0)
             else {
                 continue;
             };
             if f64::from(self.key.uniforms(number as u64, renewal, BIRTH)[0]) < chances[index] {
-                births.push((particle.place, velocities[index]));
-                stretches.all()[index].found += 1.0;
+                births.push((particle.position, velocities[index]));
+                intervals.all()[index].count += 1.0;
             }
         }
         births
     }
 
-    /// How many more particles may be born among so many.
+    /// Remaining capacity for new particles.
     fn room(&self, living: usize) -> f64 {
-        (MOST_PARTICLES * self.count - living as f64).max(0.0)
+        (MAX_PARTICLE_FACTOR * self.count - living as f64).max(0.0)
     }
 
-    /// Lets the surplus over the wanted count die, in the stretches that hold more than their share.
-    fn thin(&self, particles: &mut AuroraParticles, stretches: &mut Stretches, renewal: u32) {
-        let living: f64 = stretches.all().iter().map(|stretch| stretch.found).sum();
-        let excess = |stretch: &Stretch| (stretch.found - stretch.due).max(0.0);
-        let excesses: Vec<f64> = stretches.all().iter().map(excess).collect();
-        let share = (living - self.count) / excesses.iter().sum::<f64>().max(1.0);
-        if share <= 0.0 {
+    /// Removes the surplus over the requested count, from intervals with more than their target.
+    fn remove_surplus(&self, particles: &mut AuroraParticles, intervals: &mut ArcIntervals, renewal: u32) {
+        let living: f64 = intervals.all().iter().map(|interval| interval.count).sum();
+        let excess = |interval: &ArcInterval| (interval.count - interval.target_count).max(0.0);
+        let excesses: Vec<f64> = intervals.all().iter().map(excess).collect();
+        let fraction = (living - self.count) / excesses.iter().sum::<f64>().max(1.0);
+        if fraction <= 0.0 {
             return;
         }
-        let chance = |(excess, stretch): (&f64, &mut Stretch)| (share * excess / stretch.found.max(1.0)) as f32;
-        let chances: Vec<f32> = excesses.iter().zip(stretches.all()).map(chance).collect();
+        let chance =
+            |(excess, interval): (&f64, &mut ArcInterval)| (fraction * excess / interval.count.max(1.0)) as f32;
+        let chances: Vec<f32> = excesses.iter().zip(intervals.all()).map(chance).collect();
         for (index, dying) in particles.dying.iter_mut().enumerate().filter(|(_, dying)| !**dying) {
-            let Some(stretch) = stretches.index(particles.sheets[index], particles.shares[index]) else { continue };
-            let chance = chances[stretch];
+            let Some(interval) = intervals.index(particles.sheets[index], particles.arc_fractions[index]) else {
+                continue;
+            };
+            let chance = chances[interval];
             *dying = chance > 0.0 && self.key.uniforms(particles.ids[index], renewal, THINNING)[0] < chance;
         }
     }
 }
 
-/// However many births the table asks for, there are never more particles than this many times their number.
-const MOST_PARTICLES: f64 = 4.0;
+/// Maximum number of particles relative to the requested count.
+const MAX_PARTICLE_FACTOR: f64 = 4.0;
 
-/// Cells that are near the shape: their scatter count is high and their potential low enough, beside the means over all cells.
-pub(super) fn near_cells(field: &Field, table: &RelocationParameters) -> Vec<bool> {
+/// Near cells: scatter count and potential compared with their means over all cells.
+pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
     let (counts, potential) = (field.counts.values(), field.potential.values());
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (least, greatest) = (table.count * mean(counts), table.potential * mean(potential));
-    // An empty shape has no near cells, whatever the shares.
+    // An empty shape has no near cells, whatever the thresholds.
     let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
     counts.iter().zip(potential).map(near).collect()
 }
 
 /// The cell that a particle is in.
-fn home(particles: &AuroraParticles, field: &Field, index: usize) -> Option<usize> {
-    field.counts.index(particles.place(index).to_array())
+fn cell_of_particle(particles: &AuroraParticles, field: &ElectricField, index: usize) -> Option<usize> {
+    field.counts.index(particles.position(index).to_array())
 }
 
-impl Residents {
-    fn new(particles: &AuroraParticles, homes: &[Option<usize>], cells: usize) -> Self {
-        let live = || homes.iter().enumerate().filter(|(index, _)| !particles.dying[*index]);
+impl CellOccupants {
+    fn new(particles: &AuroraParticles, cells_of: &[Option<usize>], cells: usize) -> Self {
+        let live = || cells_of.iter().enumerate().filter(|(index, _)| !particles.dying[*index]);
         let mut starts = vec![0_u32; cells + 1];
-        live().filter_map(|(_, home)| *home).for_each(|cell| starts[cell + 1] += 1);
+        live().filter_map(|(_, cell)| *cell).for_each(|cell| starts[cell + 1] += 1);
         for cell in 0..cells {
             starts[cell + 1] += starts[cell];
         }
         let mut ends = starts.clone();
         let mut indices = vec![0; starts[cells] as usize];
-        for (index, cell) in live().filter_map(|(index, home)| Some((index, (*home)?))) {
+        for (index, cell) in live().filter_map(|(index, cell)| Some((index, (*cell)?))) {
             indices[ends[cell] as usize] = index as u32;
             ends[cell] += 1;
         }
@@ -256,7 +256,7 @@ impl Residents {
         &self.indices[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// Mean velocity of those in the cell and the eight around it; rest where there is nobody.
+    /// Mean velocity in the 3 x 3 cells around; 0 if they are empty.
     fn mean_velocity(&self, particles: &AuroraParticles, cell: usize, columns: usize) -> [f32; 2] {
         let (mut sum, mut count) = ([0.0_f64; 2], 0.0);
         for list in cells_around(cell, columns, self.starts.len() - 1).map(|cell| self.of(cell)) {
@@ -269,10 +269,93 @@ impl Residents {
     }
 }
 
-/// A cell and the eight around it, of so many in rows of `columns`.
+/// The 3 x 3 cells around a cell of a grid with `columns` columns.
 fn cells_around(cell: usize, columns: usize, cells: usize) -> impl Iterator<Item = usize> {
-    let around = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
+    let around = |position: usize, count: usize| position.saturating_sub(1)..(position + 2).min(count);
     let across = around(cell % columns, columns);
     around(cell / columns, cells / columns)
         .flat_map(move |row| across.clone().map(move |column| row * columns + column))
+}
+
+/// Number of intervals of all sheets: half as long as those for which half the target density is guaranteed.
+const INTERVALS: f64 = 100.0;
+/// Minimum target count per interval, against sampling noise.
+const MIN_INTERVAL_COUNT: f64 = 32.0;
+
+/// Intervals of about equal length, sheet by sheet.
+#[derive(Clone, Debug)]
+pub(super) struct ArcIntervals {
+    /// Start of each sheet's intervals, and the total.
+    starts: Vec<usize>,
+    all: Vec<ArcInterval>,
+}
+
+/// State of an interval.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ArcInterval {
+    /// Target number of particles, in proportion to its length.
+    pub(super) target_count: f64,
+    /// Number of scattered particles: below the target where another sheet is close by.
+    pub(super) scattered: f64,
+    /// Number of living particles, and the sum of their velocities, km/s.
+    pub(super) count: f64,
+    momentum: [f64; 2],
+}
+
+impl ArcIntervals {
+    /// Intervals of a shape for a number of particles, with their scatter counts.
+    pub(super) fn new(refined: &RefinedShape, scattered: &[ScatteredParticle], count: f64) -> Self {
+        let lengths = refined.sheet_lengths();
+        let whole = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let number = INTERVALS.min(count / MIN_INTERVAL_COUNT);
+        let mut intervals = Self { all: Vec::new(), starts: vec![0] };
+        for fraction in lengths.into_iter().map(|length| length / whole) {
+            let own = (number * fraction).round().max(1.0);
+            let interval = ArcInterval { target_count: count * fraction / own, ..ArcInterval::default() };
+            intervals.all.extend(std::iter::repeat_n(interval, own as usize));
+            intervals.starts.push(intervals.all.len());
+        }
+        for particle in scattered {
+            if let Some(index) = intervals.index(particle.sheet, particle.arc_fraction) {
+                intervals.all[index].scattered += 1.0;
+            }
+        }
+        intervals
+    }
+
+    /// Counts the particles.
+    pub(super) fn fill(&mut self, particles: &AuroraParticles) {
+        for index in (0..particles.len()).filter(|index| !particles.dying[*index]) {
+            let Some(interval) = self.index(particles.sheets[index], particles.arc_fractions[index]) else { continue };
+            let interval = &mut self.all[interval];
+            interval.count += 1.0;
+            for (sum, speeds) in interval.momentum.iter_mut().zip(&particles.velocities) {
+                *sum += f64::from(speeds[index]);
+            }
+        }
+    }
+
+    /// Index of the interval at a fraction of a sheet's length; `None` for a missing sheet.
+    pub(super) fn index(&self, sheet: u32, fraction: f32) -> Option<usize> {
+        let (first, end) = (*self.starts.get(sheet as usize)?, *self.starts.get(sheet as usize + 1)?);
+        let coordinate = f64::from(fraction) * (end - first) as f64;
+        Some(first + (coordinate as usize).min(end - first - 1))
+    }
+
+    /// All of them, sheet by sheet.
+    pub(super) fn all(&mut self) -> &mut [ArcInterval] {
+        &mut self.all
+    }
+
+    /// Mean velocity in an interval and its neighbors on the sheet, km/s; 0 if they are empty.
+    pub(super) fn velocity(&self, index: usize) -> [f32; 2] {
+        let sheet = self.starts.partition_point(|start| *start <= index);
+        let beside = index.saturating_sub(1).max(self.starts[sheet - 1])..(index + 2).min(self.starts[sheet]);
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        for interval in &self.all[beside] {
+            count += interval.count;
+            sum = [0, 1].map(|axis| sum[axis] + interval.momentum[axis]);
+        }
+        sum.map(|sum| if count > 0.0 { (sum / count) as f32 } else { 0.0 })
+    }
 }

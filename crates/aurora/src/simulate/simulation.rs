@@ -1,4 +1,4 @@
-//! The simulation: what it is made of and what a step does.
+//! The simulation: state and step.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use bansho_base::{
 
 use super::{
     AuroraParticles,
-    afterglow::{Afterglow, Fading},
-    energy_flux::Precipitation,
+    afterglow::{Afterglow, AfterglowDecay},
+    energy_flux::EnergyFlux,
     field::Grid2,
-    forces::{Mover, Repulsion},
+    forces::{Integrator, Repulsion},
     relocation::{Relocation, near_cells},
     snapshot,
 };
@@ -22,57 +22,57 @@ use crate::{
     shapes::{FRAME_S, Sequence},
     simulate::{
         field::{
-            scatter::{Scattered, scatter},
-            sheet_field::{Field, FieldMaker},
+            sheet_charge::{ScatteredParticle, scatter},
+            sheet_field::{ElectricField, FieldBuilder},
         },
         sheets::{
-            arc_length::Along,
-            refined_shape::{Course, Folding},
+            arc_length::ArcLengthMap,
+            refined_shape::{FoldModel, RefinedShape},
         },
     },
 };
 
-/// How far from the sheets particles still know where on them they are, beside L_thr.
+/// Maximum distance of sheet queries relative to L_thr.
 const REACH: f64 = 3.0;
 
 /// An aurora's particles, afterglow and field, stepped by frames of 1/30 s.
 #[derive(Clone, Debug)]
 pub struct AuroraSimulation {
     emission: Emission,
-    fading: Fading,
-    making: Making,
+    decay: AfterglowDecay,
+    targets: TargetBuilder,
     relocation: Relocation,
     repulsion: Repulsion,
-    mover: Mover,
-    precipitation: Precipitation,
+    integrator: Integrator,
+    energy_flux: EnergyFlux,
     state: SimulationState,
-    /// The in-between shape that the particles are drawn to, and what follows from it alone.
+    /// The in-between shape that attracts the particles, and data derived from it.
     target: Target,
 }
 
-/// What in-between shapes are made from.
+/// Builds targets from the sequence.
 #[derive(Clone, Debug)]
-struct Making {
+struct TargetBuilder {
     key: Key,
     parameters: AuroraParameters,
     sequence: Arc<Sequence>,
-    folding: Folding,
-    fields: FieldMaker,
+    fold_model: FoldModel,
+    fields: FieldBuilder,
 }
 
-/// What a step changes.
+/// State that a step changes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SimulationState {
     pub(super) steps: u64,
     pub(super) next_id: u64,
     /// Support radius h of the repulsion, km.
     pub(super) support_km: f64,
-    /// The coordinate along the sheets as they are now.
-    pub(super) along: Along,
-    /// The same for the in-between shape that particles are drawn to, and the time of that shape, s.
-    pub(super) target_along: Along,
+    /// Arc-length map of the current sheets.
+    pub(super) arc_map: ArcLengthMap,
+    /// Arc-length map of the target shape, and its time, s.
+    pub(super) target_arc_map: ArcLengthMap,
     pub(super) target_time: f64,
-    /// How many renewals there have been.
+    /// Number of updates of the target.
     pub(super) renewals: u32,
     pub(super) particles: AuroraParticles,
     pub(super) afterglow: Afterglow,
@@ -80,45 +80,50 @@ pub(super) struct SimulationState {
 
 #[derive(Clone, Debug)]
 struct Target {
-    course: Course,
-    /// The particles that were scattered about it.
-    scattered: Vec<Scattered>,
-    field: Field,
+    refined: RefinedShape,
+    /// Scattered particles of the shape.
+    scattered: Vec<ScatteredParticle>,
+    field: ElectricField,
     /// delta_0, particles per km^2.
     rest_density: f64,
 }
 
-impl Making {
-    /// The course of the shape at a time, by the coordinate along it.
-    fn course(&self, along: &Along, time: f64) -> Course {
+impl TargetBuilder {
+    /// The refined shape at a time, with its arc-length map.
+    fn refined_shape(&self, arc_map: &ArcLengthMap, time: f64) -> RefinedShape {
         let reach = REACH * self.parameters.half_thickness_km();
         let (shape, bridges) = (self.sequence.at(time), self.sequence.bridges(time));
-        Course::new((&shape, &bridges), along, &self.folding, time, reach)
+        RefinedShape::new((&shape, &bridges), arc_map, &self.fold_model, time, reach)
     }
 
-    /// The coordinate along the sheets at a time that `before` have become.
-    fn follow(&self, before: &Along, time: f64) -> Along {
-        before.follow(&self.sequence.at(time), &self.sequence.listing(time))
+    /// The arc-length map at a time, transferred from `before`.
+    fn transfer_arc_map(&self, before: &ArcLengthMap, time: f64) -> ArcLengthMap {
+        before.transfer(&self.sequence.at(time), &self.sequence.control_point_ids(time))
     }
 
-    /// The target that a state speaks of.
+    /// The target of a state.
     fn target(&self, state: &SimulationState) -> Target {
-        let course = self.course(&state.target_along, state.target_time);
+        let refined = self.refined_shape(&state.target_arc_map, state.target_time);
         let count = self.parameters.particles.count as usize;
-        let scattered = scatter(&course, self.parameters.half_thickness_km(), count, self.key, state.renewals);
-        let field = self.fields.make(&course, &scattered, state.target_time);
+        let scattered = scatter(&refined, self.parameters.half_thickness_km(), count, self.key, state.renewals);
+        let field = self.fields.build(&refined, &scattered, state.target_time);
         let near = near_cells(&field, &self.parameters.particles.relocation);
         let near = near.into_iter().filter(|near| *near).count().max(1) as f64;
         let cell = self.parameters.cell_km();
-        Target { course, scattered, field, rest_density: count as f64 / (near * cell * cell) }
+        Target { refined, scattered, field, rest_density: count as f64 / (near * cell * cell) }
     }
 }
 
-/// Forces and motion; particles appear and vanish, and those that have vanished are gone.
-fn advance(state: &mut SimulationState, target: &Target, (repulsion, mover): (&mut Repulsion, &Mover), fade_s: f64) {
-    state.support_km = repulsion.find(&mut state.particles, state.support_km, target.rest_density);
+/// Forces, integration and fading; particles that have faded out are removed.
+fn advance(
+    state: &mut SimulationState,
+    target: &Target,
+    (repulsion, integrator): (&mut Repulsion, &Integrator),
+    fade_s: f64,
+) {
+    state.support_km = repulsion.compute_accelerations(&mut state.particles, state.support_km, target.rest_density);
     let particles = &mut state.particles;
-    mover.advance(particles, &target.field, &repulsion.accelerations);
+    integrator.advance(particles, &target.field, &repulsion.accelerations);
     let step = if fade_s > 0.0 { (FRAME_S / fade_s) as f32 } else { 1.0 };
     for (fade, dying) in particles.fades.iter_mut().zip(&particles.dying) {
         *fade = if *dying { *fade - step } else { (*fade + step).min(1.0) };
@@ -133,135 +138,137 @@ impl AuroraSimulation {
     /// Length of a step, s.
     pub const STEP_S: f64 = FRAME_S;
 
-    /// The aurora `name` at the beginning of its preroll: particles evenly about the first shape, at rest.
+    /// The aurora `name` at the start of its preroll: particles uniformly about the first shape, at rest.
     #[must_use]
     pub fn new(parameters: AuroraParameters, sequence: impl Into<Arc<Sequence>>, name: &str, seed: u64) -> Self {
         let sequence = sequence.into();
         let key = Key::new(seed, name);
         let time = -parameters.preroll_s;
-        let along = Along::begin(&sequence.at(time), &sequence.listing(time));
+        let arc_map = ArcLengthMap::from_lengths(&sequence.at(time), &sequence.control_point_ids(time));
         let repulsion = Repulsion::new(&parameters);
-        let precipitation = Precipitation::new(&parameters, key);
+        let energy_flux = EnergyFlux::new(&parameters, key);
         let mut state = SimulationState {
             steps: 0,
             next_id: 0,
             support_km: parameters.cell_km(),
-            target_along: along.clone(),
-            along,
+            target_arc_map: arc_map.clone(),
+            arc_map,
             target_time: time,
             renewals: 0,
             particles: AuroraParticles::default(),
             afterglow: Afterglow::new(parameters.extent_km, parameters.cell_km()),
         };
-        let (folding, fields) = (Folding::new(&parameters, key), FieldMaker::new(&parameters, key));
-        let making = Making { key, parameters, sequence, folding, fields };
-        let target = making.target(&state);
+        let (fold_model, fields) = (FoldModel::new(&parameters, key), FieldBuilder::new(&parameters, key));
+        let targets = TargetBuilder { key, parameters, sequence, fold_model, fields };
+        let target = targets.target(&state);
         for (id, particle) in target.scattered.iter().enumerate() {
-            state.particles.push(id as u64, particle.place, [0.0; 2], 1.0);
+            state.particles.push(id as u64, particle.position, [0.0; 2], 1.0);
         }
         state.next_id = target.scattered.len() as u64;
         state.support_km = repulsion.support_km(target.rest_density);
-        let rays = precipitation.rays(&target.course, time);
-        precipitation.share_out(&mut state.particles, (&target.course, &rays), time);
-        state.afterglow.settle(&state.particles);
-        let parameters = &making.parameters;
+        let rays = energy_flux.ray_table(&target.refined, time);
+        energy_flux.distribute_power(&mut state.particles, (&target.refined, &rays), time);
+        state.afterglow.fill_steady_state(&state.particles);
+        let parameters = &targets.parameters;
         let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);
         Self {
-            fading: Fading::new(emission, Self::STEP_S * parameters.time_lapse),
+            decay: AfterglowDecay::new(emission, Self::STEP_S * parameters.time_lapse),
             emission: emission.clone(),
             relocation: Relocation::new(parameters, key),
-            mover: Mover::new(parameters),
+            integrator: Integrator::new(parameters),
             repulsion,
-            precipitation,
-            making,
+            energy_flux,
+            targets,
             state,
             target,
         }
     }
 
-    /// Renews the in-between shape: births and deaths by the one before, then the field of the new one. It is the shape of the
-    /// next renewal, so that particles are there when the shape is.
+    /// Updates the target: births and deaths by the previous one, then the field of the new one. It is the shape at the
+    /// time of the next update, so that particles arrive in time.
     fn renew(&mut self, frames: u64) {
         let (state, target) = (&mut self.state, &self.target);
         self.relocation.relocate(
             &mut state.particles,
-            (&target.field, &target.course, &target.scattered),
+            (&target.field, &target.refined, &target.scattered),
             state.renewals,
             &mut state.next_id,
         );
         state.renewals += 1;
-        state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
-        state.target_along = self.making.follow(&state.along, state.target_time);
-        self.target = self.making.target(&self.state);
+        state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
+        state.target_arc_map = self.targets.transfer_arc_map(&state.arc_map, state.target_time);
+        self.target = self.targets.target(&self.state);
     }
 
     /// Time of the state, s.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.state.steps as f64 * Self::STEP_S - self.making.parameters.preroll_s
+        self.state.steps as f64 * Self::STEP_S - self.targets.parameters.preroll_s
     }
 
-    /// Steps to [`Self::STEP_S`] later.
+    /// Advances by [`Self::STEP_S`].
     pub fn step(&mut self) {
-        let frames = self.making.parameters.motion.renew_frames.round().max(1.0) as u64;
+        let frames = self.targets.parameters.motion.renew_frames.round().max(1.0) as u64;
         if self.state.steps.is_multiple_of(frames) {
             self.renew(frames);
         }
-        let time = (self.state.steps + 1) as f64 * Self::STEP_S - self.making.parameters.preroll_s;
-        let Self { making, repulsion, mover, state, target, precipitation, fading, .. } = self;
-        let before = state.along.clone();
-        // Where the sheets will be does not depend on the particles, and is found beside them.
-        let (_, (along, course, rays)) = rayon::join(
-            || advance(state, target, (repulsion, mover), making.parameters.particles.fade_s),
+        let time = (self.state.steps + 1) as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
+        let Self { targets, repulsion, integrator, state, target, energy_flux, decay, .. } = self;
+        let before = state.arc_map.clone();
+        // The sheets do not depend on the particles and are computed in parallel.
+        let (_, (arc_map, refined, rays)) = rayon::join(
+            || advance(state, target, (repulsion, integrator), targets.parameters.particles.fade_s),
             || {
-                let mut along = making.follow(&before, time);
-                along.relax(Self::STEP_S);
-                let course = making.course(&along, time);
-                let rays = precipitation.rays(&course, time);
-                (along, course, rays)
+                let mut arc_map = targets.transfer_arc_map(&before, time);
+                arc_map.relax(Self::STEP_S);
+                let refined = targets.refined_shape(&arc_map, time);
+                let rays = energy_flux.ray_table(&refined, time);
+                (arc_map, refined, rays)
             },
         );
         state.steps += 1;
-        state.along = along;
-        precipitation.share_out(&mut state.particles, (&course, &rays), time);
-        state.afterglow.step(&state.particles, fading);
+        state.arc_map = arc_map;
+        energy_flux.distribute_power(&mut state.particles, (&refined, &rays), time);
+        state.afterglow.step(&state.particles, decay);
     }
 
-    /// The state as bytes.
+    /// Serializes the state.
     #[must_use]
     pub fn snapshot(&self) -> Vec<u8> {
         snapshot::write(&self.state)
     }
 
-    /// Returns to a state that [`Self::snapshot`] of an aurora with the same parameters gave.
+    /// Restores a state from [`Self::snapshot`] of an aurora with the same parameters.
     ///
     /// # Errors
-    /// The bytes are not such a state; nothing is changed then.
+    ///
+    /// Invalid bytes; the state is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let mut state = snapshot::read(bytes, &self.state)?;
-        let time = state.steps as f64 * Self::STEP_S - self.making.parameters.preroll_s;
-        let (now, then) = (self.making.sequence.listing(time), self.making.sequence.listing(state.target_time));
-        if !state.along.take_listing(&now) || !state.target_along.take_listing(&then) {
+        let time = state.steps as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
+        let (now, then) =
+            (self.targets.sequence.control_point_ids(time), self.targets.sequence.control_point_ids(state.target_time));
+        if !state.arc_map.take_control_point_ids(&now) || !state.target_arc_map.take_control_point_ids(&then) {
             return Err(SnapshotError::Damaged);
         }
         self.state = state;
-        self.target = self.making.target(&self.state);
+        self.target = self.targets.target(&self.state);
         Ok(())
     }
 
-    /// The sheets as they are now, with their folds.
+    /// The current sheets with folds.
     #[cfg(test)]
-    pub(super) fn course(&self) -> Course {
-        self.making.course(&self.state.along, self.time())
+    pub(super) fn refined_shape(&self) -> RefinedShape {
+        self.targets.refined_shape(&self.state.arc_map, self.time())
     }
 
     /// Its parameters.
     #[must_use]
     pub fn parameters(&self) -> &AuroraParameters {
-        &self.making.parameters
+        &self.targets.parameters
     }
 
-    /// Light by energy and altitude for its spectrum.
+    /// Emission table of its spectrum.
     #[must_use]
     pub fn emission(&self) -> &Emission {
         &self.emission
@@ -273,12 +280,12 @@ impl AuroraSimulation {
         &self.state.particles
     }
 
-    /// Mean distance of neighbouring particles, km: the side of a square that holds one.
+    /// Mean distance between neighboring particles, km: the side of a square with one particle.
     pub(crate) fn spacing_km(&self) -> f64 {
-        (std::f64::consts::PI / self.making.parameters.particles.neighbours).sqrt() * self.state.support_km
+        (std::f64::consts::PI / self.targets.parameters.particles.neighbours).sqrt() * self.state.support_km
     }
 
-    /// Where green and red linger.
+    /// Afterglow of the green and the red line.
     #[must_use]
     pub fn afterglow(&self) -> &Afterglow {
         &self.state.afterglow
@@ -291,23 +298,23 @@ impl AuroraSimulation {
         &self.target.field.potential
     }
 
-    /// How many particles were scattered into each cell about the in-between shape, N(i, j) (thesis, figure 2.10).
+    /// Scattered particles per cell of the in-between shape, N(i, j) (thesis, figure 2.10).
     #[must_use]
     pub fn scatter_counts(&self) -> &Grid2 {
         &self.target.field.counts
     }
 
-    /// What noise adds to the potential at a place, km^2/s^2 (thesis, figure 2.11).
+    /// Noise in the potential at a position, km^2/s^2 (thesis, figure 2.11).
     #[must_use]
-    pub fn potential_noise(&self, place: DVec2) -> f64 {
-        let noisy = self.target.field.sample(place.x as f32, place.y as f32).potential;
-        f64::from(noisy) - self.potential().sample(place.to_array())
+    pub fn potential_noise(&self, position: DVec2) -> f64 {
+        let noisy = self.target.field.sample(position.x as f32, position.y as f32).potential;
+        f64::from(noisy) - self.potential().sample(position.to_array())
     }
 
-    /// How many particles are in each cell now (thesis, figure 2.14).
+    /// Particles per cell (thesis, figure 2.14).
     #[must_use]
     pub fn particle_counts(&self) -> Grid2 {
         let particles = self.particles();
-        self.making.fields.sum((0..particles.len()).map(|index| (particles.place(index), 1.0)))
+        self.targets.fields.sum_by_cell((0..particles.len()).map(|index| (particles.position(index), 1.0)))
     }
 }

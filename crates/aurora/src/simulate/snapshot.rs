@@ -1,29 +1,29 @@
-//! The state as bytes and back: a version, then numbers and lists, each list with its length before it.
+//! Serialization of the state: a version, then little-endian numbers and length-prefixed arrays.
 
 use bansho_base::{math::DVec2, phenomenon::SnapshotError};
 
 use super::{
     AuroraParticles,
-    afterglow::{Afterglow, GlowMap},
-    particles::NUMBERS,
+    afterglow::{Afterglow, AfterglowMap},
+    particles::FLOAT_ARRAYS,
     simulation::SimulationState,
 };
-use crate::simulate::sheets::arc_length::Along;
+use crate::simulate::sheets::arc_length::ArcLengthMap;
 
 const VERSION: u32 = 3;
-/// Counts below this are exact as times.
-const COUNTED: u64 = 1 << 53;
+/// Counts below this are exact in f64.
+const MAX_EXACT_COUNT: u64 = 1 << 53;
 
-/// Numbers that stand in a snapshot.
-trait Item: Copy {
+/// Numbers in a snapshot.
+trait SnapshotValue: Copy {
     const SIZE: usize;
     fn put(self, bytes: &mut Vec<u8>);
     fn get(bytes: &[u8]) -> Option<Self>;
 }
 
-macro_rules! items {
+macro_rules! impl_snapshot_value {
     ($($Type:ty),*) => {$(
-        impl Item for $Type {
+        impl SnapshotValue for $Type {
             const SIZE: usize = size_of::<Self>();
             fn put(self, bytes: &mut Vec<u8>) {
                 bytes.extend(self.to_le_bytes());
@@ -34,28 +34,28 @@ macro_rules! items {
         }
     )*};
 }
-items!(u8, u32, u64, f32, f64);
+impl_snapshot_value!(u8, u32, u64, f32, f64);
 
-fn put_list<T: Item>(bytes: &mut Vec<u8>, values: &[T]) {
+fn put_list<T: SnapshotValue>(bytes: &mut Vec<u8>, values: &[T]) {
     (values.len() as u64).put(bytes);
     values.iter().for_each(|value| value.put(bytes));
 }
 
-/// What is left to read.
-struct Source<'a>(&'a [u8]);
+/// Remaining bytes.
+struct SnapshotReader<'a>(&'a [u8]);
 
-impl Source<'_> {
+impl SnapshotReader<'_> {
     fn take(&mut self, count: usize) -> Result<&[u8], SnapshotError> {
         let (head, rest) = self.0.split_at_checked(count).ok_or(SnapshotError::Damaged)?;
         self.0 = rest;
         Ok(head)
     }
 
-    fn item<T: Item>(&mut self) -> Result<T, SnapshotError> {
+    fn item<T: SnapshotValue>(&mut self) -> Result<T, SnapshotError> {
         T::get(self.take(T::SIZE)?).ok_or(SnapshotError::Damaged)
     }
 
-    fn list<T: Item>(&mut self) -> Result<Vec<T>, SnapshotError> {
+    fn list<T: SnapshotValue>(&mut self) -> Result<Vec<T>, SnapshotError> {
         let count = usize::try_from(self.item::<u64>()?).map_err(|_| SnapshotError::Damaged)?;
         let bytes = self.take(count.checked_mul(T::SIZE).ok_or(SnapshotError::Damaged)?)?;
         bytes.chunks_exact(T::SIZE).map(|item| T::get(item).ok_or(SnapshotError::Damaged)).collect()
@@ -70,81 +70,81 @@ pub(super) fn write(state: &SimulationState) -> Vec<u8> {
     state.support_km.put(&mut bytes);
     state.target_time.put(&mut bytes);
     state.renewals.put(&mut bytes);
-    write_along(&mut bytes, &state.along);
-    write_along(&mut bytes, &state.target_along);
+    write_arc_map(&mut bytes, &state.arc_map);
+    write_arc_map(&mut bytes, &state.target_arc_map);
     write_particles(&mut bytes, &state.particles);
-    for (places, values) in [state.afterglow.green.to_lists(), state.afterglow.red.to_lists()] {
-        put_list(&mut bytes, &places);
+    for (tile_positions, values) in [state.afterglow.green.to_arrays(), state.afterglow.red.to_arrays()] {
+        put_list(&mut bytes, &tile_positions);
         put_list(&mut bytes, &values);
     }
     bytes
 }
 
-/// The state in `bytes`, whose afterglow has the layout of `like`.
-pub(super) fn read(bytes: &[u8], like: &SimulationState) -> Result<SimulationState, SnapshotError> {
-    let mut source = Source(bytes);
-    let found = source.item::<u32>()?;
+/// Deserializes a state whose afterglow has the same layout as `layout`.
+pub(super) fn read(bytes: &[u8], layout: &SimulationState) -> Result<SimulationState, SnapshotError> {
+    let mut reader = SnapshotReader(bytes);
+    let found = reader.item::<u32>()?;
     if found != VERSION {
         return Err(SnapshotError::Version { found, known: VERSION });
     }
     let state = SimulationState {
-        steps: source.item()?,
-        next_id: source.item()?,
-        support_km: source.item()?,
-        target_time: source.item()?,
-        renewals: source.item()?,
-        along: read_along(&mut source)?,
-        target_along: read_along(&mut source)?,
-        particles: read_particles(&mut source)?,
+        steps: reader.item()?,
+        next_id: reader.item()?,
+        support_km: reader.item()?,
+        target_time: reader.item()?,
+        renewals: reader.item()?,
+        arc_map: read_arc_map(&mut reader)?,
+        target_arc_map: read_arc_map(&mut reader)?,
+        particles: read_particles(&mut reader)?,
         afterglow: Afterglow {
-            green: read_map(&mut source, &like.afterglow.green)?,
-            red: read_map(&mut source, &like.afterglow.red)?,
+            green: read_map(&mut reader, &layout.afterglow.green)?,
+            red: read_map(&mut reader, &layout.afterglow.red)?,
         },
     };
-    if source.0.is_empty() && is_possible(&state) { Ok(state) } else { Err(SnapshotError::Damaged) }
+    if reader.0.is_empty() && is_possible(&state) { Ok(state) } else { Err(SnapshotError::Damaged) }
 }
 
-/// Whether a state has only numbers, and counts that can go on.
+/// Validates a state: finite numbers and counts within range.
 fn is_possible(state: &SimulationState) -> bool {
-    let finite = |along: &Along| {
-        along.sheets.iter().flatten().all(|coordinate| coordinate.is_finite())
-            && along.points.iter().flatten().all(|point| point.is_finite())
+    let is_finite = |arc_map: &ArcLengthMap| {
+        arc_map.coordinates.iter().flatten().all(|coordinate| coordinate.is_finite())
+            && arc_map.points.iter().flatten().all(|point| point.is_finite())
     };
-    let numbers = state.particles.numbers();
-    [state.steps, state.next_id].iter().all(|count| *count < COUNTED)
+    let arrays = state.particles.float_arrays();
+    [state.steps, state.next_id].iter().all(|count| *count < MAX_EXACT_COUNT)
         && u64::from(state.renewals) <= state.steps
         && state.renewals < u32::MAX
         && state.support_km.is_finite()
         && state.support_km > 0.0
         && state.target_time.is_finite()
-        && finite(&state.along)
-        && finite(&state.target_along)
-        && numbers.iter().all(|values| values.iter().all(|value| value.is_finite()))
+        && is_finite(&state.arc_map)
+        && is_finite(&state.target_arc_map)
+        && arrays.iter().all(|values| values.iter().all(|value| value.is_finite()))
 }
 
-fn write_along(bytes: &mut Vec<u8>, along: &Along) {
-    (along.sheets.len() as u64).put(bytes);
-    for ((coordinates, turned), points) in along.sheets.iter().zip(&along.turned).zip(&along.points) {
+fn write_arc_map(bytes: &mut Vec<u8>, arc_map: &ArcLengthMap) {
+    (arc_map.coordinates.len() as u64).put(bytes);
+    for ((coordinates, reversed), points) in arc_map.coordinates.iter().zip(&arc_map.reversed).zip(&arc_map.points) {
         put_list(bytes, coordinates);
-        put_list(bytes, &turned.iter().map(|turned| u8::from(*turned)).collect::<Vec<_>>());
+        put_list(bytes, &reversed.iter().map(|reversed| u8::from(*reversed)).collect::<Vec<_>>());
         let flat: Vec<f64> = points.iter().flat_map(|point| point.to_array()).collect();
         put_list(bytes, &flat);
     }
 }
 
-fn read_along(source: &mut Source) -> Result<Along, SnapshotError> {
-    let mut along = Along::default();
-    for _ in 0..source.item::<u64>()? {
-        let (coordinates, turned) = (source.list::<f64>()?, source.list::<u8>()?);
-        let flat = source.list::<f64>()?;
-        if flat.len() != 2 * coordinates.len() || turned.len() != coordinates.len() {
+fn read_arc_map(reader: &mut SnapshotReader) -> Result<ArcLengthMap, SnapshotError> {
+    let mut arc_map = ArcLengthMap::default();
+    for _ in 0..reader.item::<u64>()? {
+        let (coordinates, reversed) = (reader.list::<f64>()?, reader.list::<u8>()?);
+        let flat = reader.list::<f64>()?;
+        if flat.len() != 2 * coordinates.len() || reversed.len() != coordinates.len() {
             return Err(SnapshotError::Damaged);
         }
-        along.turned.push(turned.iter().map(|turned| *turned != 0).collect());
-        along.points.push(flat.chunks_exact(2).map(DVec2::from_slice).collect());
-        along.sheets.push(coordinates);
+        arc_map.reversed.push(reversed.iter().map(|reversed| *reversed != 0).collect());
+        arc_map.points.push(flat.chunks_exact(2).map(DVec2::from_slice).collect());
+        arc_map.coordinates.push(coordinates);
     }
-    Ok(along)
+    Ok(arc_map)
 }
 
 fn write_particles(bytes: &mut Vec<u8>, particles: &AuroraParticles) {
@@ -152,18 +152,18 @@ fn write_particles(bytes: &mut Vec<u8>, particles: &AuroraParticles) {
     let dying: Vec<u8> = particles.dying.iter().map(|dying| u8::from(*dying)).collect();
     put_list(bytes, &dying);
     put_list(bytes, &particles.sheets);
-    particles.numbers().into_iter().for_each(|values| put_list(bytes, values));
+    particles.float_arrays().into_iter().for_each(|values| put_list(bytes, values));
 }
 
-fn read_particles(source: &mut Source) -> Result<AuroraParticles, SnapshotError> {
-    let mut particles = AuroraParticles { ids: source.list()?, ..AuroraParticles::default() };
-    particles.dying = source.list::<u8>()?.iter().map(|dying| *dying != 0).collect();
-    particles.sheets = source.list()?;
-    for values in particles.numbers_mut() {
-        *values = source.list()?;
+fn read_particles(reader: &mut SnapshotReader) -> Result<AuroraParticles, SnapshotError> {
+    let mut particles = AuroraParticles { ids: reader.list()?, ..AuroraParticles::default() };
+    particles.dying = reader.list::<u8>()?.iter().map(|dying| *dying != 0).collect();
+    particles.sheets = reader.list()?;
+    for values in particles.float_arrays_mut() {
+        *values = reader.list()?;
     }
     let count = particles.ids.len();
-    let lengths: [usize; NUMBERS] = particles.numbers().map(Vec::len);
+    let lengths: [usize; FLOAT_ARRAYS] = particles.float_arrays().map(Vec::len);
     let whole = lengths.iter().all(|length| *length == count)
         && particles.dying.len() == count
         && particles.sheets.len() == count
@@ -171,10 +171,10 @@ fn read_particles(source: &mut Source) -> Result<AuroraParticles, SnapshotError>
     if whole { Ok(particles) } else { Err(SnapshotError::Damaged) }
 }
 
-fn read_map<const HEIGHTS: usize>(
-    source: &mut Source,
-    like: &GlowMap<HEIGHTS>,
-) -> Result<GlowMap<HEIGHTS>, SnapshotError> {
-    let (places, values) = (source.list::<u32>()?, source.list::<f32>()?);
-    like.with_lists(&places, &values).ok_or(SnapshotError::Damaged)
+fn read_map<const ALTITUDES: usize>(
+    reader: &mut SnapshotReader,
+    layout: &AfterglowMap<ALTITUDES>,
+) -> Result<AfterglowMap<ALTITUDES>, SnapshotError> {
+    let (tile_positions, values) = (reader.list::<u32>()?, reader.list::<f32>()?);
+    layout.with_arrays(&tile_positions, &values).ok_or(SnapshotError::Damaged)
 }

@@ -1,7 +1,7 @@
-//! The thesis's blur (2.28): in the picture, by Gaussians whose radii in pixels depend on the line alone.
+//! The thesis's blur (2.28): Gaussians in the picture whose radii in pixels depend on the line only.
 //!
-//! A sum of equal Gaussians is one blur of the sum of points. So the whole picture is looked up on the charts, with a
-//! margin, and every emitter's light is blurred along rows and then along columns.
+//! A sum of equal Gaussians is one blur of the sum of points. The whole picture with a margin is sampled from the
+//! charts, and each emitter is blurred separably along rows and columns.
 
 use bansho_base::{
     camera::Camera,
@@ -11,69 +11,69 @@ use bansho_base::{
 };
 
 use crate::{
-    drawing_parameters::BlurParameters,
+    parameters::BlurParameters,
     physics::emission::{EMITTERS, Emitter, PerEmitter},
     render::{
-        prepared::{BATCH, Batch},
+        prepared::{PIXEL_BATCH, PixelBatch},
         project::field_lines::FieldLines,
-        shade::chart_sampler::Sampler,
+        shade::chart_sampler::ChartSampler,
     },
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Reach of a Gaussian beside its standard deviation.
-const REACH: f64 = 3.0;
-/// Standard deviation that light on the charts has already, pixels: that of the smallest patch.
-const HAD: f64 = 0.6;
+/// Support of the kernel in standard deviations.
+const KERNEL_SIGMAS: f64 = 3.0;
+/// Standard deviation that the charts already have, pixels: that of the smallest patch.
+const CHART_SIGMA: f64 = 0.6;
 
-/// A picture of light by emitter, kR.
-pub(crate) struct Blurred {
+/// A picture of brightness by emitter, kR.
+pub(crate) struct BlurredImage {
     light: Vec<PerEmitter<f32>>,
-    /// Pixels in a row, those of the margin among them, and the margin.
+    /// Row length including margins, and the margin, pixels.
     width: usize,
     margin: usize,
 }
 
-/// Weights by emitter from the middle outward.
-struct Kernel(Vec<PerEmitter<f32>>);
+/// Weights by emitter from the center outward.
+struct BlurKernel(Vec<PerEmitter<f32>>);
 
-impl Kernel {
+impl BlurKernel {
     fn new(radii: &BlurParameters) -> Self {
         let sigmas = EMITTERS.map(|emitter| radii.pixels(emitter));
         let most = sigmas.into_iter().fold(0.0, f64::max);
-        let count = (REACH * most).ceil() as usize + 1;
+        let count = (KERNEL_SIGMAS * most).ceil() as usize + 1;
         let by_emitter = sigmas.map(|sigma| {
-            let left = math::sqrt((sigma * sigma - HAD * HAD).max(1e-4));
-            let gaussian = |away: usize| math::exp(-0.5 * math::pow(away as f64 / left, 2.0));
+            let left = math::sqrt((sigma * sigma - CHART_SIGMA * CHART_SIGMA).max(1e-4));
+            let gaussian = |distance: usize| math::exp(-0.5 * math::pow(distance as f64 / left, 2.0));
             let whole = 2.0 * (0..count).map(gaussian).sum::<f64>() - 1.0;
-            (0..count).map(|away| (gaussian(away) / whole) as f32).collect::<Vec<_>>()
+            (0..count).map(|distance| (gaussian(distance) / whole) as f32).collect::<Vec<_>>()
         });
-        Self((0..count).map(|away| std::array::from_fn(|emitter| by_emitter[emitter][away])).collect())
+        Self((0..count).map(|distance| std::array::from_fn(|emitter| by_emitter[emitter][distance])).collect())
     }
 
     fn reach(&self) -> usize {
         self.0.len() - 1
     }
 
-    /// The weighted sum about the middle of places that lie `stride` apart.
+    /// Convolution at an index, with elements `stride` apart.
     #[inline(always)]
     fn sum<S: Simd>(&self, simd: S, light: &[PerEmitter<f32>], middle: usize, stride: usize) -> PerEmitter<f32> {
         let mut sum = FourLanes::simd_from(simd, self.0[0]) * FourLanes::simd_from(simd, light[middle]);
-        for (away, weights) in self.0.iter().enumerate().skip(1) {
-            let before = FourLanes::simd_from(simd, light[middle - away * stride]);
-            let after = FourLanes::simd_from(simd, light[middle + away * stride]);
+        for (distance, weights) in self.0.iter().enumerate().skip(1) {
+            let before = FourLanes::simd_from(simd, light[middle - distance * stride]);
+            let after = FourLanes::simd_from(simd, light[middle + distance * stride]);
             sum = (before + after).fma(FourLanes::simd_from(simd, *weights), sum);
         }
         sum.into()
     }
 }
 
-impl Blurred {
+impl BlurredImage {
     /// The whole picture of a view.
-    pub(crate) fn new(view: &View, field: &FieldLines, samplers: &[Sampler; 2], radii: &BlurParameters) -> Self {
+    pub(crate) fn new(view: &View, field: &FieldLines, samplers: &[ChartSampler; 2], radii: &BlurParameters) -> Self {
         let level = Level::new();
-        let kernel = Kernel::new(radii);
+        let kernel = BlurKernel::new(radii);
         let margin = kernel.reach();
         let [width, height] = view.size.map(|side| side + 2 * margin);
         let camera = view.camera.with_overscan(margin);
@@ -97,11 +97,11 @@ impl Blurred {
         Self { light, width, margin }
     }
 
-    /// The light of pixels from `x` on in row `y`; that of the last where the picture ends.
+    /// Pixels from `x` on in row `y`; clamped at the picture's edge.
     #[inline(always)]
-    pub(crate) fn batch(&self, x: usize, y: usize) -> [PerEmitter<f32>; BATCH] {
+    pub(crate) fn batch(&self, x: usize, y: usize) -> [PerEmitter<f32>; PIXEL_BATCH] {
         let row = &self.light[y * self.width..(y + 1) * self.width];
-        let mut light = [[0.0; 4]; BATCH];
+        let mut light = [[0.0; 4]; PIXEL_BATCH];
         for (i, light) in light.iter_mut().enumerate() {
             *light = row[(x + i + self.margin).min(self.width - 1)];
         }
@@ -109,13 +109,13 @@ impl Blurred {
     }
 }
 
-/// Light by emitter of a row as the charts have it.
+/// Brightness by emitter of a picture row, sampled from the charts.
 #[inline(always)]
 fn look_up<S: Simd>(
     simd: S,
     camera: &Camera,
     field: &FieldLines,
-    samplers: &[Sampler; 2],
+    samplers: &[ChartSampler; 2],
     y: usize,
     width: usize,
     light: &mut Vec<PerEmitter<f32>>,
@@ -123,13 +123,13 @@ fn look_up<S: Simd>(
     light.clear();
     let mut x = 0;
     while x < width {
-        let batch = Batch::new(camera, field, x, y);
-        let mut found = [[0.0; 4]; BATCH];
+        let batch = PixelBatch::new(camera, field, x, y);
+        let mut found = [[0.0; 4]; PIXEL_BATCH];
         for sampler in samplers {
             sampler.add(simd, &batch.longitude, &batch.colatitude, &mut found);
         }
-        light.extend_from_slice(&found[..BATCH.min(width - x)]);
-        x += BATCH;
+        light.extend_from_slice(&found[..PIXEL_BATCH.min(width - x)]);
+        x += PIXEL_BATCH;
     }
 }
 

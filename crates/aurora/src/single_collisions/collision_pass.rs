@@ -1,7 +1,7 @@
-//! The picture of single collisions, as in the thesis (2.4): every source sends random falls down its field line.
+//! Renders single collisions as in the thesis (2.4): each source sends random electron tracks down its field line.
 //!
-//! Heights and places along the line of sight are random; to the side each point has the smooth edge of its source, so
-//! that rays are as sharp as those of the mean. That mean is [`Meridians`], but for the noise.
+//! Altitudes are random; laterally each point has the smooth kernel of its source, so rays are as sharp as in the mean
+//! profile. The expected value is [`ColumnBuffer::new`].
 
 use std::{
     ops::Range,
@@ -14,10 +14,10 @@ use bansho_base::math::{
 };
 
 use super::{
-    quantile_matched::EvenedFalls,
-    rasterize::Trace,
-    splat::{BATCH, LitRows, Points},
-    track_table::{FallBatch, FallTable},
+    quantile_matched::QuantileMatchedTracks,
+    rasterize::TrackRasterizer,
+    rasterize::{RowRange, SPLAT_LANES, SplatBatch},
+    track_table::{CollisionBatch, TrackTable},
 };
 use crate::{
     physics::{
@@ -25,22 +25,22 @@ use crate::{
         emission::{Emission, PerEmitter},
         precipitation::{
             Deposition,
-            electron_track::{Collision, FallLibrary, Falls},
+            electron_track::{Collision, TrackLibrary, TrackSampler},
             energy_grid::{NODES, node_energy_ev},
-            hard_sphere::{DEFAULT_RADIUS, HardSphere},
-            lateral_spread::wander_km,
+            hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
+            lateral_spread::lateral_spread_km,
         },
     },
     render::{
-        DrawingParameters, FallModel,
-        bin::source_bins::{Footprint, Patch, REACH, Source},
+        DrawingParameters, TrackModel,
+        bin::source_bins::{FieldLineSource, PatchWeights, REACH, SourceBins},
         integrate::{
-            column_block::{GROUP, Group},
-            columns::{LightStrip, Meridians},
+            column_block::{BLOCK_COLUMNS, ColumnBlock},
+            columns::{ColumnBuffer, ColumnStrip},
         },
         project::{
-            altitude_polynomial::{Descent, Descents, LineOfFall, altitudes_km},
-            chart::{Chart, Finder, STRIP},
+            altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials, altitudes_km},
+            chart::{Chart, ChartProjection, STRIP_COLUMNS},
             field_lines::FieldLines,
         },
     },
@@ -49,274 +49,299 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
-/// Batches of random deviations.
+/// Batches of random lateral deviations.
 const DEVIATIONS: usize = 256;
-/// Sources whose falls are looked up together: what is far away in memory is then waited for once.
-const AHEAD: usize = 32;
-/// Batches of a fall that are placed before any of them is added, for the processor finds no other work while sums wait.
-const AT_ONCE: usize = 8;
-/// Nearer to the observer's own field line than so many reaches, points are placed anew for every column; and nearer
-/// than so many, each by its own root and divisions.
-const NEAR: f32 = 4.0;
-const SINGLE: f32 = 16.0;
+/// Sources whose tracks are looked up together, to overlap their cache misses.
+const LOOKAHEAD_SOURCES: usize = 32;
+/// Batches of a track that are projected before any is accumulated, to hide the latency of the sums.
+const PIPELINED_BATCHES: usize = 8;
+/// Sources nearer to the observer's field line than this many kernel supports are projected for every column, and
+/// nearer than the second number exactly instead of by polynomials.
+const PER_COLUMN_REACHES: f32 = 4.0;
+const EXACT_REACHES: f32 = 16.0;
 
-/// What falls are drawn from.
+/// Precomputed tables for single collisions.
 #[derive(Clone, Debug)]
-pub(crate) struct Collisions {
+pub(crate) struct CollisionRenderer {
     key: Key,
-    falls: FallTable,
+    tracks: TrackTable,
     deposition: Deposition,
-    /// Counting photons for each ion pair by source.
+    /// Counted photons per ion pair, by level.
     photons: Vec<PerEmitter<f32>>,
-    descents: Descents,
-    /// kR of ion pairs that a collision of a node's fall stands for, per mW/m^2.
+    descents: RowPolynomialBasis,
+    /// Brightness of ion pairs per collision of a node's track, kR per mW/m^2.
     pairs: Vec<f32>,
-    /// Squared reach by which the collisions of a node's falls wander, km^2.
-    wander_squared: Vec<f32>,
-    /// Deviations with the density of a source's edge, in reaches.
-    deviations: Vec<[f32; BATCH]>,
+    /// Squared support due to the deflections of a node's tracks, km^2.
+    spread_squared: Vec<f32>,
+    /// Deviations with the density of a source's kernel, in units of its support.
+    deviations: Vec<[f32; SPLAT_LANES]>,
 }
 
-impl Collisions {
-    /// Falls of electrons of all energies up to that of a node.
+impl CollisionRenderer {
+    /// Tracks for all energies up to that of a node.
     pub(crate) fn new(emission: &Emission, drawing: &DrawingParameters, highest: usize, key: Key) -> Self {
         let deviation = |index: usize| {
-            // The sum of three uniforms nearly has that density; its variance is made the same, 1/7.
+            // The sum of three uniforms approximates that density; scaled to its variance, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
             (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt()
         };
-        let deviations = |batch: usize| std::array::from_fn(|lane| deviation(batch * BATCH + lane));
+        let deviations = |batch: usize| std::array::from_fn(|lane| deviation(batch * SPLAT_LANES + lane));
         let highest = highest.min(NODES - 1);
         let levels = emission.photons_per_ion_pair().iter().copied();
         let photons = levels.chain([[0.0; 4]]);
-        let (deposition, wobble) = (emission.deposition(), drawing.wobble);
+        let (deposition, deflection) = (emission.deposition(), drawing.wobble);
         let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
-        let falls = match drawing.fall {
-            FallModel::Fang => measured_falls(&Falls::new(deposition, wobble), highest, key),
-            FallModel::HardSphere => {
-                let falls = hard_sphere_falls(deposition, wobble, highest, key);
-                pairs.iter_mut().zip(&falls).for_each(|(pairs, falls)| *pairs *= falls.share);
-                FallTable::new(highest + 1, |node, variant| falls[node].fall(variant).iter().map(with_light).collect())
+        let tracks = match drawing.fall {
+            TrackModel::Fang => fang_tracks(&TrackSampler::new(deposition, deflection), highest, key),
+            TrackModel::HardSphereAtmosphere => {
+                let tracks = hard_sphere_tracks(deposition, deflection, highest, key);
+                pairs.iter_mut().zip(&tracks).for_each(|(pairs, tracks)| *pairs *= tracks.energy_weight);
+                TrackTable::new(highest + 1, |node, variant| {
+                    tracks[node].track(variant).iter().map(with_light).collect()
+                })
             }
         };
-        let wander = |node| REACH * wander_km(drawing.fall, wobble, node_energy_ev(node)) as f32;
+        let wander = |node| REACH * lateral_spread_km(drawing.fall, deflection, node_energy_ev(node)) as f32;
         Self {
             key,
-            falls,
+            tracks,
             deposition: emission.deposition().clone(),
             photons: photons.map(|photons| photons.map(|value| value as f32)).collect(),
-            descents: Descents::new(),
+            descents: RowPolynomialBasis::new(),
             pairs,
-            wander_squared: (0..NODES).map(|node| wander(node) * wander(node)).collect(),
+            spread_squared: (0..NODES).map(|node| wander(node) * wander(node)).collect(),
             deviations: (0..DEVIATIONS).map(deviations).collect(),
         }
     }
 
-    /// The picture of sources that are sorted by [`GROUP`]s of columns, at a step of the simulation: other steps have other falls.
-    pub(crate) fn draw(&self, chart: Chart, field: &FieldLines, footprint: &Footprint, step: u32) -> Meridians {
+    /// Renders sources that are sorted by [`BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
+    pub(crate) fn draw(&self, chart: Chart, field: &FieldLines, source_bins: &SourceBins, step: u32) -> ColumnBuffer {
         let level = Level::new();
-        let mut picture = Meridians::dark(chart);
-        let (chart, groups) = picture.strips(GROUP);
-        let pass = CollisionPass { collisions: self, chart, finder: chart.finder(), footprint, step };
-        // The fullest first, whichever thread is free: the last ones, for which others wait, are soon drawn.
-        let mut groups: Vec<_> = groups.map(|group| (footprint.count(group.number), group)).collect();
-        groups.sort_by_key(|(count, _)| *count);
-        let groups = Mutex::new(groups);
-        let next = || groups.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut picture = ColumnBuffer::zeros(chart);
+        let (chart, blocks) = picture.strips(BLOCK_COLUMNS);
+        let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), source_bins, step };
+        // Largest block first (LPT scheduling), for load balance.
+        let mut blocks: Vec<_> = blocks.map(|block| (source_bins.count(block.number), block)).collect();
+        blocks.sort_by_key(|(count, _)| *count);
+        let blocks = Mutex::new(blocks);
+        let next = || blocks.lock().unwrap_or_else(PoisonError::into_inner).pop();
         (0..rayon::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
-            let mut own = None;
-            while let Some((_, group)) = next() {
-                let own = own.get_or_insert_with(|| Workspace::new(chart));
-                dispatch!(level, simd => pass.group(simd, group, field, own));
+            let mut scratch = None;
+            while let Some((_, block)) = next() {
+                let scratch = scratch.get_or_insert_with(|| CollisionScratch::new(chart));
+                dispatch!(level, simd => pass.draw_block(simd, block, field, scratch));
             }
         });
         picture
     }
 
-    /// The fall of a source.
+    /// The track of a source.
     #[inline(always)]
-    fn fall(&self, source: Source, step: u32) -> Fall<'_> {
-        let [a, b, c, d] = self.key.words(u64::from(source.key), step, SOURCE);
-        let below = (source.node as usize).min(NODES - 2);
-        let about = below + usize::from(uniform(a) < source.node - below as f32);
-        // What is beyond the falls is drawn as the hardest of them: their number of collisions and the light of each belong together.
-        let node = self.deposition.draw_node_about(about, uniform_f64(b, d)).min(self.falls.highest());
-        let batches = self.falls.fall(node, c);
-        Fall {
+    fn track(&self, source: FieldLineSource, step: u32) -> SourceTrack<'_> {
+        let [a, b, c, d] = self.key.words(u64::from(source.random_key), step, SOURCE);
+        let below = (source.energy_node as usize).min(NODES - 2);
+        let about = below + usize::from(uniform(a) < source.energy_node - below as f32);
+        // Energies above the tables use the highest node: its collision count and weight belong together.
+        let node = self.deposition.sample_node_around(about, uniform_f64(b, d)).min(self.tracks.highest_node());
+        let batches = self.tracks.track(node, c);
+        SourceTrack {
             source,
             batches,
             pairs: self.pairs[node],
-            wander_squared: self.wander_squared[node],
-            first: (c >> 8) as usize / BATCH,
+            spread_squared: self.spread_squared[node],
+            first: (c >> 8) as usize / SPLAT_LANES,
         }
     }
 }
 
-/// Falls after Fang et al. up to those of the highest node.
-fn measured_falls(falls: &Falls, highest: usize, key: Key) -> FallTable {
-    let library = FallLibrary::new(falls, 0..=highest, key);
-    FallTable::new(highest + 1, |node, variant| library.fall(node, variant).iter().map(with_light).collect())
+/// Tracks after Fang et al. up to the highest node.
+fn fang_tracks(tracks: &TrackSampler, highest: usize, key: Key) -> TrackTable {
+    let library = TrackLibrary::new(tracks, 0..=highest, key);
+    TrackTable::new(highest + 1, |node, variant| library.track(node, variant).iter().map(with_light).collect())
 }
 
-/// Falls through hard spheres for each node up to the highest.
-fn hard_sphere_falls(deposition: &Deposition, wobble: f64, highest: usize, key: Key) -> Vec<EvenedFalls> {
-    let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, wobble);
-    let heights = Falls::new(deposition, 0.0);
-    (0..=highest).into_par_iter().map(|node| EvenedFalls::new(&spheres, &heights, node, key)).collect()
+/// Hard-sphere tracks for each node up to the highest.
+fn hard_sphere_tracks(
+    deposition: &Deposition,
+    deflection: f64,
+    highest: usize,
+    key: Key,
+) -> Vec<QuantileMatchedTracks> {
+    let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, deflection);
+    let heights = TrackSampler::new(deposition, 0.0);
+    (0..=highest).into_par_iter().map(|node| QuantileMatchedTracks::new(&spheres, &heights, node, key)).collect()
 }
 
-/// A collision and the mean light of its level.
+/// A collision and its photon row, its level.
 fn with_light(collision: &Collision) -> (Collision, u16) {
     (*collision, collision.level as u16)
 }
 
-/// The random fall of a source.
-struct Fall<'a> {
-    source: Source,
-    batches: &'a [FallBatch],
-    /// kR of ion pairs that a collision stands for, per mW/m^2.
+/// The random track of a source.
+struct SourceTrack<'a> {
+    source: FieldLineSource,
+    batches: &'a [CollisionBatch],
+    /// Brightness of ion pairs per collision, kR per mW/m^2.
     pairs: f32,
-    /// Squared reach by which its collisions wander, km^2.
-    wander_squared: f32,
-    /// Number of its first batch of deviations, any.
+    /// Squared support due to its deflections, km^2.
+    spread_squared: f32,
+    /// Index of its first batch of deviations (modulo).
     first: usize,
 }
 
-/// What a thread keeps from source to source.
-struct Workspace {
-    group: Group,
-    trace: Trace,
-    points: [Points; AT_ONCE],
+/// Buffers that a thread reuses.
+struct CollisionScratch {
+    block: ColumnBlock,
+    rasterizer: TrackRasterizer,
+    points: [SplatBatch; PIPELINED_BATCHES],
 }
 
-impl Workspace {
+impl CollisionScratch {
     fn new(chart: &Chart) -> Self {
-        Self { group: Group::new(chart), trace: Trace::new(chart.rows), points: [Points::NONE; AT_ONCE] }
-    }
-}
-
-/// A field line as it is seen.
-enum SeenLine<'a> {
-    ByPolynomials(&'a Descent),
-    Exactly(LineOfFall<'a>),
-}
-
-impl SeenLine<'_> {
-    /// Rows of collisions so far from the line in km, and how bright they are seen.
-    #[inline(always)]
-    fn points<S: Simd>(&self, batch: &FallBatch, offsets: Lanes<S>) -> [Lanes<S>; 2] {
-        match self {
-            Self::ByPolynomials(descent) => descent.points(Lanes::from_slice(offsets.simd, &batch.places), offsets),
-            Self::Exactly(line) => line.points(&altitudes_km(&batch.places), offsets),
+        Self {
+            block: ColumnBlock::new(chart),
+            rasterizer: TrackRasterizer::new(chart.rows),
+            points: [SplatBatch::NONE; PIPELINED_BATCHES],
         }
     }
 }
 
-/// What the points of a strip have in common.
+/// A field line's projection.
+enum LineProjection<'a> {
+    Polynomial(&'a RowPolynomials),
+    Exact(ProjectedFieldLine<'a>),
+}
+
+impl LineProjection<'_> {
+    /// Rows of collisions at offsets from the line in km, and their brightness factors.
+    #[inline(always)]
+    fn points<S: Simd>(&self, batch: &CollisionBatch, offsets: Lanes<S>) -> [Lanes<S>; 2] {
+        match self {
+            Self::Polynomial(descent) => {
+                descent.points(Lanes::from_slice(offsets.simd, &batch.altitude_coordinates), offsets)
+            }
+            Self::Exact(line) => line.points(&altitudes_km(&batch.altitude_coordinates), offsets),
+        }
+    }
+}
+
+/// Shared inputs of all blocks.
 struct CollisionPass<'a> {
-    collisions: &'a Collisions,
+    collisions: &'a CollisionRenderer,
     chart: &'a Chart,
-    finder: Finder,
-    footprint: &'a Footprint<'a>,
+    projection: ChartProjection,
+    source_bins: &'a SourceBins<'a>,
     step: u32,
 }
 
 impl CollisionPass<'_> {
-    /// Draws columns beside each other, every source once for all of them.
+    /// Rasterizes a block: each source once for all its columns.
     #[inline(always)]
-    fn group<S: Simd>(&self, simd: S, strip: LightStrip, field: &FieldLines, own: &mut Workspace) {
-        let entries = own.group.begin(strip.number, self.chart, self.footprint, field);
-        let (mut sources, mut falls) = (Vec::with_capacity(AHEAD), Vec::with_capacity(AHEAD));
-        for entries in entries.chunks(AHEAD) {
+    fn draw_block<S: Simd>(&self, simd: S, strip: ColumnStrip, field: &FieldLines, scratch: &mut CollisionScratch) {
+        let entries = scratch.block.begin(strip.number, self.chart, self.source_bins, field);
+        let (mut sources, mut tracks) = (Vec::with_capacity(LOOKAHEAD_SOURCES), Vec::with_capacity(LOOKAHEAD_SOURCES));
+        for entries in entries.chunks(LOOKAHEAD_SOURCES) {
             sources.clear();
             for entry in entries {
-                sources.push(*self.footprint.source(entry.source));
+                sources.push(*self.source_bins.source(entry.source));
             }
-            falls.clear();
+            tracks.clear();
             for source in &sources {
-                falls.push(self.collisions.fall(*source, self.step));
+                tracks.push(self.collisions.track(*source, self.step));
             }
-            for (entry, fall) in entries.iter().zip(&falls) {
-                self.source(simd, entry.columns(), fall, own);
+            for (entry, track) in entries.iter().zip(&tracks) {
+                self.splat_source(simd, entry.columns(), track, scratch);
             }
         }
-        own.group.write(strip, self.chart.rows);
-        own.group.end(entries);
+        scratch.block.write(strip, self.chart.rows);
+        scratch.block.recycle(entries);
     }
 
     #[inline(always)]
-    fn source<S: Simd>(&self, simd: S, columns: Range<usize>, fall: &Fall, own: &mut Workspace) {
-        let source = &fall.source;
+    fn splat_source<S: Simd>(
+        &self,
+        simd: S,
+        columns: Range<usize>,
+        track: &SourceTrack,
+        scratch: &mut CollisionScratch,
+    ) {
+        let source = &track.source;
         let [green, red, prompt] = source.power;
         let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
-        let weights = powers * (fall.pairs / self.chart.row_step as f32);
-        // Seen from afar its meridian is that of all columns.
-        let shared = source.distance() >= NEAR * source.reach;
+        let weights = powers * (track.pairs / self.chart.row_step as f32);
+        // A distant source has nearly the same meridian in all columns.
+        let shared = source.distance() >= PER_COLUMN_REACHES * source.reach;
         if shared {
-            self.place(simd, fall, (columns.start + columns.end) / 2, own);
+            self.rasterize_at_column(simd, track, (columns.start + columns.end) / 2, scratch);
         }
-        for from in columns.clone().step_by(STRIP) {
-            let patch = Patch::new(source, self.chart, &own.group.units(from));
-            for column in from..columns.end.min(from + STRIP) {
-                let share = patch.side[column - from];
-                if share <= 0.0 {
+        for from in columns.clone().step_by(STRIP_COLUMNS) {
+            let patch = PatchWeights::new(source, self.chart, &scratch.block.units(from));
+            for column in from..columns.end.min(from + STRIP_COLUMNS) {
+                let weight = patch.column_weights[column - from];
+                if weight <= 0.0 {
                     continue;
                 }
                 if !shared {
-                    self.place(simd, fall, column, own);
+                    self.rasterize_at_column(simd, track, column, scratch);
                 }
-                own.group.add(column, &own.trace, weights * share);
+                scratch.block.add(column, &scratch.rasterizer, weights * weight);
             }
         }
     }
 
-    /// Places the collisions of a fall down a line, as a column sees it.
+    /// Projects and rasterizes a track for a column.
     #[inline(always)]
-    fn place<S: Simd>(&self, simd: S, fall: &Fall, column: usize, own: &mut Workspace) {
-        let Workspace { group, trace, points } = own;
-        trace.clear();
-        let (meridian, distance) = group.seen_by(column, &fall.source);
-        let line = LineOfFall::new(meridian, distance, &self.finder);
-        let reach = fall.source.reach.max(self.footprint.bins().least_reach(distance));
-        if distance < SINGLE * reach {
-            self.add(simd, fall, (reach, 0.0), &SeenLine::Exactly(line), (trace, points));
+    fn rasterize_at_column<S: Simd>(
+        &self,
+        simd: S,
+        track: &SourceTrack,
+        column: usize,
+        scratch: &mut CollisionScratch,
+    ) {
+        let CollisionScratch { block, rasterizer, points } = scratch;
+        rasterizer.reset();
+        let (meridian, distance) = block.meridian_and_distance(column, &track.source);
+        let line = ProjectedFieldLine::new(meridian, distance, &self.projection);
+        let reach = track.source.reach.max(self.source_bins.bins().min_reach(distance));
+        if distance < EXACT_REACHES * reach {
+            self.add(simd, track, (reach, 0.0), &LineProjection::Exact(line), (rasterizer, points));
             return;
         }
-        let seen = group.descent(simd, column, distance, (&self.collisions.descents, &self.finder));
-        let (descent, beyond) = (&seen.descent, distance - seen.distance);
-        if descent.shows(reach + beyond.abs(), self.chart.rows) {
-            self.add(simd, fall, (reach, beyond), &SeenLine::ByPolynomials(descent), (trace, points));
+        let cached = block.cached_projection(simd, column, distance, (&self.collisions.descents, &self.projection));
+        let (descent, distance_offset) = (&cached.descent, distance - cached.distance);
+        if descent.may_be_visible(reach + distance_offset.abs(), self.chart.rows) {
+            self.add(simd, track, (reach, distance_offset), &LineProjection::Polynomial(descent), (rasterizer, points));
         }
     }
 
-    /// Adds the collisions of a fall that reaches so far to both sides of its field line, which lies so far beyond the line that is
-    /// given, km.
+    /// Rasterizes a track with half-width `reach` about a field line that is `distance_offset` km from the projected
+    /// line.
     #[inline(always)]
     fn add<S: Simd>(
         &self,
         simd: S,
-        fall: &Fall,
-        (reach, beyond): (f32, f32),
-        line: &SeenLine,
-        (trace, points): (&mut Trace, &mut [Points; AT_ONCE]),
+        track: &SourceTrack,
+        (reach, distance_offset): (f32, f32),
+        line: &LineProjection,
+        (rasterizer, points): (&mut TrackRasterizer, &mut [SplatBatch; PIPELINED_BATCHES]),
     ) {
         let last = (self.chart.rows - 1) as f32;
-        // A source reaches as far as its collisions wander too, and those do so by themselves.
-        let own_reach = reach.fma(reach, -fall.wander_squared).max(0.0).sqrt();
-        let mut lit = LitRows::new(simd);
-        let mut deviations = fall.first;
-        for batches in fall.batches.chunks(AT_ONCE) {
+        // The kernel's support includes the spread by deflections, which the collisions have already.
+        let own_reach = reach.fma(reach, -track.spread_squared).max(0.0).sqrt();
+        let mut row_range = RowRange::new(simd);
+        let mut deviations = track.first;
+        for batches in track.batches.chunks(PIPELINED_BATCHES) {
             for (batch, points) in batches.iter().zip(&mut *points) {
                 let deviation = Lanes::from_slice(simd, &self.collisions.deviations[deviations % DEVIATIONS]);
                 deviations += 1;
-                let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, beyond);
+                let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, distance_offset);
                 let offsets = deviation.fma(Lanes::splat(simd, own_reach), offsets);
-                points.place(line.points(batch, offsets), last, trace.odd_pairs(), &mut lit);
+                points.project(line.points(batch, offsets), last, rasterizer.odd_pairs(), &mut row_range);
             }
             for (batch, points) in batches.iter().zip(&*points) {
-                trace.add(simd, points, (&batch.lights, batch.count as usize), &self.collisions.photons);
+                rasterizer.add(simd, points, (&batch.photon_rows, batch.count as usize), &self.collisions.photons);
             }
         }
-        trace.finish(simd, &lit);
+        rasterizer.finish(simd, &row_range);
     }
 }

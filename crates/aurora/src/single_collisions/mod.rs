@@ -1,8 +1,8 @@
-//! The way of the thesis, where a scene selects it: electrons drawn collision by collision (2.28).
+//! Electrons drawn as single collisions, as in the thesis (2.4): selected by `drawing.sampling = "collisions"`; the
+//! blur (2.28) by `drawing.blur = "pixels"`.
 
 pub(crate) mod blur;
 pub(crate) mod collision_pass;
 pub mod quantile_matched;
 pub(crate) mod rasterize;
-pub(crate) mod splat;
 pub(crate) mod track_table;

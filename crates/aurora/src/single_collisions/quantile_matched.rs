@@ -1,51 +1,53 @@
-//! Falls through hard spheres, moved a little such that the few that are kept have the mean of them all.
+//! Hard-sphere tracks whose altitudes are quantile-matched, so that a few tracks have the mean of all.
 
 use bansho_base::math::random::Key;
 
 use crate::physics::precipitation::{
-    electron_track::{Collision, Falls, VARIANTS, collision_count},
+    electron_track::{Collision, TRACKS_PER_ENERGY, TrackSampler, collision_count},
     energy_grid::node_energy_ev,
-    hard_sphere::HardSphere,
+    hard_sphere::HardSphereAtmosphere,
 };
 
-/// Falls of one energy.
+/// Tracks of one energy.
 ///
-/// Chance changes how many of their collisions lie high up by tens of percent, and by as much what shines only there. So each collision is
-/// moved to where, on average, as much of the energy has been spent above as it has collisions above. What wanders keeps its offsets.
+/// A sample of tracks has a sampling error of tens of percent at high altitudes, where lines such as 630.0 nm are
+/// emitted. So the pooled collisions are sorted and moved to the quantiles of the mean profile. Lateral displacements
+/// are kept.
 #[derive(Clone, Debug)]
-pub struct EvenedFalls {
-    /// [`VARIANTS`] of them, each from its highest collision down.
-    falls: Vec<Vec<Collision>>,
-    /// Energy that each collision stands for beside the energy of a whole fall over its [`collision_count`]: more where some
-    /// leave the levels below.
-    pub share: f32,
+pub struct QuantileMatchedTracks {
+    /// [`TRACKS_PER_ENERGY`] of them, each from its highest collision down.
+    tracks: Vec<Vec<Collision>>,
+    /// Energy per collision relative to the energy over [`collision_count`]: more than 1 where some collisions lie
+    /// below the levels.
+    pub energy_weight: f32,
 }
 
-impl EvenedFalls {
-    /// Falls of a node of the grid of energies, and their mean `heights`.
+impl QuantileMatchedTracks {
+    /// Tracks of a node of the energy grid, matched to the mean profile of `heights`.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
+    ///
+    /// If the node is not in the grid.
     #[must_use]
-    pub fn new(spheres: &HardSphere, heights: &Falls, node: usize, key: Key) -> Self {
-        let fall =
-            |variant| spheres.fall(node_energy_ev(node), key, (node as u64) << 32 | u64::from(variant)).collect();
-        let mut falls: Vec<Vec<Collision>> = (0..VARIANTS).map(fall).collect();
-        // Stable, so that each fall keeps its order where altitudes are equal.
-        let mut order: Vec<&mut Collision> = falls.iter_mut().flatten().collect();
+    pub fn new(spheres: &HardSphereAtmosphere, heights: &TrackSampler, node: usize, key: Key) -> Self {
+        let track =
+            |variant| spheres.track(node_energy_ev(node), key, (node as u64) << 32 | u64::from(variant)).collect();
+        let mut tracks: Vec<Vec<Collision>> = (0..TRACKS_PER_ENERGY).map(track).collect();
+        // A stable sort keeps the order within a track where altitudes are equal.
+        let mut order: Vec<&mut Collision> = tracks.iter_mut().flatten().collect();
         order.sort_by(|a, b| b.altitude_km.total_cmp(&a.altitude_km));
         let count = order.len();
-        for (collision, even) in order.into_iter().zip(heights.evenly(node, count)) {
+        for (collision, even) in order.into_iter().zip(heights.quantile_collisions(node, count)) {
             (collision.level, collision.altitude_km) = (even.level, even.altitude_km);
         }
-        let share = f64::from(VARIANTS * collision_count(node)) / count.max(1) as f64;
-        Self { falls, share: share as f32 }
+        let energy_weight = f64::from(TRACKS_PER_ENERGY * collision_count(node)) / count.max(1) as f64;
+        Self { tracks, energy_weight: energy_weight as f32 }
     }
 
-    /// One of them, any number.
+    /// One of them (any `variant`).
     #[must_use]
-    pub fn fall(&self, variant: u32) -> &[Collision] {
-        &self.falls[(variant % VARIANTS) as usize]
+    pub fn track(&self, variant: u32) -> &[Collision] {
+        &self.tracks[(variant % TRACKS_PER_ENERGY) as usize]
     }
 }
 
@@ -54,30 +56,32 @@ mod tests {
     use super::*;
     use crate::physics::{
         atmosphere::{LEVELS, atmosphere},
-        precipitation::{Deposition, hard_sphere::DEFAULT_RADIUS, spectrum::ARC},
+        precipitation::{Deposition, hard_sphere::DEFAULT_RADIUS_M, spectrum::ARC},
     };
 
     #[test]
     fn the_mean_is_the_profile_and_falls_go_down() {
-        let deposition = Deposition::of_hard_spheres(atmosphere(), ARC);
-        let (spheres, heights) = (HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0), Falls::new(&deposition, 0.0));
+        let deposition = Deposition::from_hard_spheres(atmosphere(), ARC);
+        let (spheres, heights) =
+            (HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0), TrackSampler::new(&deposition, 0.0));
         // The last energy is so great that some of its collisions lie below all levels.
         for node in [10, 32, 64, 96] {
-            let falls = EvenedFalls::new(&spheres, &heights, node, Key::new(6, "aurora"));
+            let tracks = QuantileMatchedTracks::new(&spheres, &heights, node, Key::new(6, "aurora"));
             let mut counts = [0.0; LEVELS];
-            for variant in 0..VARIANTS {
-                let fall = falls.fall(variant);
-                assert!(fall.windows(2).all(|pair| pair[1].level <= pair[0].level));
-                fall.iter().for_each(|collision| counts[collision.level as usize] += 1.0);
+            for variant in 0..TRACKS_PER_ENERGY {
+                let track = tracks.track(variant);
+                assert!(track.windows(2).all(|pair| pair[1].level <= pair[0].level));
+                track.iter().for_each(|collision| counts[collision.level as usize] += 1.0);
             }
-            let (count, profile) = (counts.iter().sum::<f64>(), deposition.monoenergetic(node));
+            let (count, profile) = (counts.iter().sum::<f64>(), deposition.monoenergetic_profile(node));
             let whole: f64 = profile.iter().sum();
             let (mut found, mut expected) = (0.0, 0.0);
             for level in (0..LEVELS).rev() {
                 (found, expected) = (found + counts[level] / count, expected + profile[level] / whole);
                 assert!((found - expected).abs() <= 1.001 / count, "{node} {level}: {found} for {expected}");
             }
-            let energies = count * f64::from(falls.share) / f64::from(VARIANTS * collision_count(node));
+            let energies =
+                count * f64::from(tracks.energy_weight) / f64::from(TRACKS_PER_ENERGY * collision_count(node));
             assert!((energies - 1.0).abs() < 1e-6);
         }
     }

@@ -1,89 +1,87 @@
-//! The light of one fall along its meridian, row by row, and how it is added to columns.
+//! Rasterizes one electron track to rows of a meridian and adds it to columns.
 //!
-//! A fall has a hundred collisions on as many rows, out of hundreds. So it is kept which rows have any: only those are added to columns, and
-//! only those are cleared.
+//! A track has about a hundred collisions in hundreds of rows, so the touched rows are recorded: only those are added
+//! and cleared.
 
-use fearless_simd::{Simd, prelude::*, u8x32, u16x16, u64x4};
-
-use bansho_base::math::simd::{FourLanes, HalfLanes, Lanes, Real};
-
-use super::splat::{BATCH, LitRows, Points};
 use crate::physics::emission::PerEmitter;
+use bansho_base::math::simd::{FourLanes, HalfLanes, LANES, Lanes, Real, nearest_whole, ramp};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, u8x32, u16x16, u64x4, u64x8};
 
 /// Rows that are added to a column at once, two pairs.
-pub(crate) const QUAD: usize = 4;
-/// Points in a row of code without a jump.
+pub(crate) const QUAD_ROWS: usize = 4;
+/// Points per unrolled, branch-free block.
 const UNROLLED: usize = 4;
-/// Numbers for each pair of rows, and for each four.
+/// Floats per pair of rows, and per quad.
 const PAIR_LIGHT: usize = 2 * 4;
-const QUAD_LIGHT: usize = QUAD * 4;
-/// Bytes of the first of two numbers for the four emitters of the upper row, those of the second for the lower one.
+const QUAD_LIGHT: usize = QUAD_ROWS * 4;
+/// Byte shuffle that broadcasts the first weight to the four emitters of the upper row and the second to the lower row.
 const SPREAD: [u8; 32] =
     [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7];
-/// Numbers of the first fours of rows, one a lane.
-const FIRST_QUADS: [u16; BATCH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// Lane indices.
+const FIRST_QUADS: [u16; SPLAT_LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Light of [`QUAD`] rows, in one line of the cache.
+/// Light of [`QUAD_ROWS`] rows, one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(crate) struct Quad(pub(crate) [f32; QUAD_LIGHT]);
+pub(crate) struct RowQuad(pub(crate) [f32; QUAD_LIGHT]);
 
-impl Quad {
+impl RowQuad {
     pub(crate) const DARK: Self = Self([0.0; QUAD_LIGHT]);
 }
 
-/// Photons of the collisions of one fall by row of the chart, and beyond them rows for points that are outside.
+/// Photons of one track by chart row, with extra rows below for points outside.
 ///
-/// A point adds to a pair of rows, one vector. Pairs whose upper row is even are kept apart from those where it is odd: any two are then the
-/// same place in memory or have none in common, and no sum waits for two others that hold a half of it each.
-pub(crate) struct Trace {
-    /// Even pairs, rows from 0 on; after them odd ones, rows from -1 on.
+/// A point adds to a pair of rows with one vector. Pairs with an even and an odd upper row have separate storage: two
+/// pairs are then identical or disjoint in memory, which avoids store-to-load forwarding stalls from partial overlap.
+pub(crate) struct TrackRasterizer {
+    /// Even pairs from row 0 on, then odd pairs from row -1 on.
     light: Vec<f32>,
-    /// Where they begin: at a line of the cache.
+    /// Offset to the first cache-line boundary.
     start: usize,
-    /// Whether each pair may have some: 0 or 1.
+    /// 1 if a pair was touched.
     touched: Vec<u8>,
-    /// Fours of rows.
+    /// Number of quads.
     height: usize,
-    /// The fours of rows that have light, and how many they are.
-    lit: Vec<u16>,
-    count: usize,
-    /// Their light, one after the other.
-    joined: Vec<Quad>,
+    /// Quads with light, and their number.
+    active: Vec<u16>,
+    active_count: usize,
+    /// Their light, contiguous.
+    merged: Vec<RowQuad>,
 }
 
-impl Trace {
+impl TrackRasterizer {
     pub(super) fn new(rows: usize) -> Self {
-        let height = rows.div_ceil(QUAD) + 1 + BATCH;
+        let height = rows.div_ceil(QUAD_ROWS) + 1 + SPLAT_LANES;
         let quads = 2 * height + 1;
         let light = vec![0.0; QUAD_LIGHT * (quads + 1)];
         Self {
-            start: light.as_ptr().align_offset(align_of::<Quad>()).min(QUAD_LIGHT),
+            start: light.as_ptr().align_offset(align_of::<RowQuad>()).min(QUAD_LIGHT),
             light,
-            touched: vec![0; 2 * (quads + BATCH)],
+            touched: vec![0; 2 * (quads + SPLAT_LANES)],
             height,
-            lit: vec![0; height + BATCH],
-            count: 0,
-            joined: vec![Quad::DARK; height],
+            active: vec![0; height + SPLAT_LANES],
+            active_count: 0,
+            merged: vec![RowQuad::DARK; height],
         }
     }
 
-    /// Number of the first odd pair.
+    /// Index of the first odd pair.
     #[inline(always)]
     pub(super) fn odd_pairs(&self) -> u32 {
         2 * self.height as u32
     }
 
-    /// The fours of rows that have light, from the uppermost on.
+    /// Quads with light, from the top.
     #[inline(always)]
-    pub(crate) fn quads(&self) -> &[u16] {
-        &self.lit[..self.count]
+    pub(crate) fn active_quads(&self) -> &[u16] {
+        &self.active[..self.active_count]
     }
 
-    /// Forgets the fall before.
+    /// Discards the previous track.
     #[inline(always)]
-    pub(super) fn clear(&mut self) {
-        self.count = 0;
+    pub(super) fn reset(&mut self) {
+        self.active_count = 0;
     }
 
     /// Adds the light of the first `count` points.
@@ -91,99 +89,99 @@ impl Trace {
     pub(super) fn add<S: Simd>(
         &mut self,
         simd: S,
-        points: &Points,
-        (lights, count): (&[u16; BATCH], usize),
+        points: &SplatBatch,
+        (lights, count): (&[u16; SPLAT_LANES], usize),
         photons: &[PerEmitter<f32>],
     ) {
         let light = self.light[self.start..].as_chunks_mut().0;
         let pairs = light.len().min(self.touched.len());
-        // As locals they stay in registers: what is written might else be taken for where they are.
-        let mut sums = Sums { light: &mut light[..pairs], touched: &mut self.touched[..pairs], photons };
-        if count < BATCH {
+        // Local references: else the compiler must assume that the stores alias the fields.
+        let mut sums = RowPairSums { light: &mut light[..pairs], touched: &mut self.touched[..pairs], photons };
+        if count < SPLAT_LANES {
             for lane in 0..count {
                 sums.add(simd, points, lane, lights[lane]);
             }
             return;
         }
-        for first in (0..BATCH).step_by(UNROLLED) {
+        for first in (0..SPLAT_LANES).step_by(UNROLLED) {
             for lane in first..first + UNROLLED {
                 sums.add(simd, points, lane, lights[lane]);
             }
         }
     }
 
-    /// Finds what rows have light, within those that may have some, and readies all else for the next fall.
+    /// Finds the touched quads within the row range, merges them, and clears the storage for the next track.
     #[inline(always)]
-    pub(super) fn finish<S: Simd>(&mut self, simd: S, rows: &LitRows<S>) {
-        self.find(simd, rows);
-        self.join(simd);
+    pub(super) fn finish<S: Simd>(&mut self, simd: S, rows: &RowRange<S>) {
+        self.find_active_quads(simd, rows);
+        self.merge_pairs(simd);
     }
 
-    /// Fours of rows any of whose five pairs is touched.
+    /// Collects the quads with any of their five pairs touched.
     #[inline(always)]
-    fn find<S: Simd>(&mut self, simd: S, rows: &LitRows<S>) {
+    fn find_active_quads<S: Simd>(&mut self, simd: S, rows: &RowRange<S>) {
         let [first, end] = rows.range();
-        let (first, end) = (first / QUAD, end.div_ceil(QUAD));
+        let (first, end) = (first / QUAD_ROWS, end.div_ceil(QUAD_ROWS));
         let (even, odd) = self.touched.split_at_mut(2 * self.height);
         let (quads, none) = (u16x16::from_slice(simd, &FIRST_QUADS), u8x32::splat(simd, 0));
-        self.count = 0;
-        for from in (first..end).step_by(BATCH) {
-            let even = &mut even[2 * from..][..2 * BATCH];
-            let odd = &mut odd[2 * from..][..2 * BATCH + 1];
-            // The second and third odd pair of a four are seen from one byte further on.
+        self.active_count = 0;
+        for from in (first..end).step_by(SPLAT_LANES) {
+            let even = &mut even[2 * from..][..2 * SPLAT_LANES];
+            let odd = &mut odd[2 * from..][..2 * SPLAT_LANES + 1];
+            // The second and third odd pair of a quad are at the next byte.
             let [own, odd_own, odd_next] =
-                [&*even, &odd[..2 * BATCH], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
+                [&*even, &odd[..2 * SPLAT_LANES], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
             let touched: u16x16<S> = (own | odd_own | odd_next).bitcast();
             none.store_slice(even);
-            none.store_slice(&mut odd[..2 * BATCH]);
+            none.store_slice(&mut odd[..2 * SPLAT_LANES]);
             let quads = quads + from as u16;
             let lit = touched.simd_gt(0) & quads.simd_lt(end as u16);
-            quads.compress(lit).store_slice(&mut self.lit[self.count..][..BATCH]);
-            self.count += lit.to_bitmask().count_ones() as usize;
+            quads.compress(lit).store_slice(&mut self.active[self.active_count..][..SPLAT_LANES]);
+            self.active_count += lit.to_bitmask().count_ones() as usize;
         }
     }
 
-    /// Joins the even and odd pairs of rows that have light, and clears them.
+    /// Merges even and odd pairs of touched quads and clears them.
     #[inline(always)]
-    fn join<S: Simd>(&mut self, simd: S) {
+    fn merge_pairs<S: Simd>(&mut self, simd: S) {
         let (even, odd) = self.light[self.start..].split_at_mut(QUAD_LIGHT * self.height);
         let (even, none) = (even.as_chunks_mut::<QUAD_LIGHT>().0, Lanes::splat(simd, 0.0));
-        for (quad, joined) in self.lit[..self.count].iter().zip(&mut self.joined) {
+        for (quad, merged) in self.active[..self.active_count].iter().zip(&mut self.merged) {
             let quad = *quad as usize;
-            // Odd pairs begin a row higher.
+            // Odd pairs start one row higher.
             let odd = odd.get_mut(QUAD_LIGHT * quad..QUAD_LIGHT * (quad + 1) + PAIR_LIGHT / 2);
             let (Some(even), Some(odd)) = (even.get_mut(quad), odd) else { continue };
             let sum = Lanes::from_slice(simd, even) + Lanes::from_slice(simd, &odd[PAIR_LIGHT / 2..]);
-            sum.store_slice(&mut joined.0);
+            sum.store_slice(&mut merged.0);
             none.store_slice(even);
-            // The row that is left belongs to the four below too, which is lit then.
+            // The remaining row belongs to the next quad too, which is then also active.
             none.store_slice(&mut odd[..QUAD_LIGHT]);
         }
     }
 
     /// Adds it with weights to a column.
     #[inline(always)]
-    pub(crate) fn add_to<S: Simd>(&self, column: &mut [Quad], weights: FourLanes<S>) {
+    pub(crate) fn add_to<S: Simd>(&self, column: &mut [RowQuad], weights: FourLanes<S>) {
         let two = weights.combine(weights);
         let four = two.combine(two);
-        for (quad, joined) in self.quads().iter().zip(&self.joined) {
+        for (quad, merged) in self.active_quads().iter().zip(&self.merged) {
             let Some(light) = column.get_mut(*quad as usize) else { continue };
-            let [own, all] = [&joined.0, &light.0].map(|light| Lanes::from_slice(four.simd, light));
+            let [own, all] = [&merged.0, &light.0].map(|light| Lanes::from_slice(four.simd, light));
             own.fma(four, all).store_slice(&mut light.0);
         }
     }
 }
 
-/// Where points are added up, and what shines there.
-struct Sums<'a> {
+/// Accumulation buffers and photon table.
+struct RowPairSums<'a> {
     light: &'a mut [[f32; PAIR_LIGHT]],
     touched: &'a mut [u8],
     photons: &'a [PerEmitter<f32>],
 }
 
-impl Sums<'_> {
+impl RowPairSums<'_> {
     #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, points: &Points, lane: usize, light: u16) {
+    fn add<S: Simd>(&mut self, simd: S, points: &SplatBatch, lane: usize, light: u16) {
         let pair = points.pairs[lane] as usize;
         let photons = self.photons.get(light as usize);
         let (Some(photons), Some(both), Some(touched)) =
@@ -199,6 +197,74 @@ impl Sums<'_> {
     }
 }
 
+/// Collisions per batch.
+pub(super) const SPLAT_LANES: usize = LANES;
+
+/// Row pairs of collisions and the weights of both rows. Collisions outside have weight 0 and a distinct pair each
+/// below the chart, to avoid dependent sums.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct SplatBatch {
+    /// Index of a pair: half its upper row if even; else half its lower row, offset by the first odd pair.
+    pub(super) pairs: [u32; SPLAT_LANES],
+    /// Two floats each, loaded as one word.
+    pub(super) weights: [u64; SPLAT_LANES],
+}
+
+/// Minimum and maximum row per lane.
+pub(super) struct RowRange<S: Simd> {
+    least: Lanes<S>,
+    greatest: Lanes<S>,
+}
+
+impl<S: Simd> RowRange<S> {
+    #[inline(always)]
+    pub(super) fn new(simd: S) -> Self {
+        Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
+    }
+
+    /// First row that may have light, and one past the last.
+    #[inline(always)]
+    pub(super) fn range(&self) -> [usize; 2] {
+        let (least, greatest) = (self.least.reduce_min(), self.greatest.reduce_max());
+        if greatest < least { [0; 2] } else { [least as usize, greatest as usize + 2] }
+    }
+}
+
+impl SplatBatch {
+    pub(super) const NONE: Self = Self { pairs: [0; SPLAT_LANES], weights: [0; SPLAT_LANES] };
+
+    /// Computes pairs and weights of points at rows, with brightness factors; rows outside 0 to `last` are masked.
+    #[inline(always)]
+    pub(super) fn project<S: Simd>(
+        &mut self,
+        [rows, brightness]: [Lanes<S>; 2],
+        last: f32,
+        odd_pairs: u32,
+        row_range: &mut RowRange<S>,
+    ) {
+        let (zero, end, outside) = (rows.broadcast(0.0), rows.broadcast(last), ramp(rows.simd, last + 1.0, 2.0));
+        let whole = rows.floor();
+        let (least, greatest) = (rows.broadcast(f32::INFINITY), rows.broadcast(-1.0));
+        row_range.least = row_range.least.simd_min(inside(rows, end, [whole, least]));
+        row_range.greatest = row_range.greatest.simd_max(inside(rows, end, [whole, greatest]));
+        let row = nearest_whole(inside(rows, end, [whole, outside]));
+        (((row + 1) >> 1) + (row & 1) * odd_pairs).store_slice(&mut self.pairs);
+        let weights = inside(rows, end, [brightness, zero]);
+        let lower = weights * (rows - whole);
+        let (first, second) = (weights - lower).interleave(lower);
+        let [first, second]: [u64x8<S>; 2] = [first.bitcast(), second.bitcast()];
+        first.store_slice(&mut self.weights[..SPLAT_LANES / 2]);
+        second.store_slice(&mut self.weights[SPLAT_LANES / 2..]);
+    }
+}
+
+/// Selects `within` where rows are in [0, end), else `without`.
+#[inline(always)]
+fn inside<S: Simd>(rows: Lanes<S>, end: Lanes<S>, [within, without]: [Lanes<S>; 2]) -> Lanes<S> {
+    rows.select_lt(rows.broadcast(0.0), without, rows.select_lt(end, within, without))
+}
+
 #[cfg(test)]
 mod tests {
     use fearless_simd::{Level, dispatch};
@@ -207,19 +273,24 @@ mod tests {
 
     const ROWS: usize = 150;
 
-    type Batch<'a> = (&'a [f32; BATCH], &'a [f32; BATCH], (&'a [u16; BATCH], usize), &'a [PerEmitter<f32>]);
+    type Batch<'a> =
+        (&'a [f32; SPLAT_LANES], &'a [f32; SPLAT_LANES], (&'a [u16; SPLAT_LANES], usize), &'a [PerEmitter<f32>]);
 
     /// A column with the light of points at rows, so bright, twice.
     #[inline(always)]
-    fn column_of<S: Simd>(simd: S, trace: &mut Trace, (rows, shown, lights, photons): Batch) -> Vec<Quad> {
-        let (mut points, mut lit) = (Points::NONE, LitRows::new(simd));
+    fn column_of<S: Simd>(
+        simd: S,
+        rasterizer: &mut TrackRasterizer,
+        (rows, shown, lights, photons): Batch,
+    ) -> Vec<RowQuad> {
+        let (mut points, mut lit) = (SplatBatch::NONE, RowRange::new(simd));
         let (rows, shown) = (Lanes::from_slice(simd, rows), Lanes::from_slice(simd, shown));
-        points.place([rows, shown], (ROWS - 1) as f32, trace.odd_pairs(), &mut lit);
-        trace.clear();
-        trace.add(simd, &points, lights, photons);
-        trace.finish(simd, &lit);
-        let mut column = vec![Quad::DARK; ROWS.div_ceil(QUAD)];
-        trace.add_to(&mut column, FourLanes::splat(simd, 2.0));
+        points.project([rows, shown], (ROWS - 1) as f32, rasterizer.odd_pairs(), &mut lit);
+        rasterizer.reset();
+        rasterizer.add(simd, &points, lights, photons);
+        rasterizer.finish(simd, &lit);
+        let mut column = vec![RowQuad::DARK; ROWS.div_ceil(QUAD_ROWS)];
+        rasterizer.add_to(&mut column, FourLanes::splat(simd, 2.0));
         column
     }
 
@@ -227,17 +298,17 @@ mod tests {
     #[test]
     fn points_light_the_two_rows_that_they_lie_between() {
         let photons = [[1.0, 2.0, 3.0, 4.0], [0.5, 0.0, 0.25, 8.0]];
-        let mut trace = Trace::new(ROWS);
+        let mut rasterizer = TrackRasterizer::new(ROWS);
         for fall in 0..20_u16 {
             let spread = 1.0 + 9.0 * f32::from(fall % 5);
-            let row = |lane: usize| 3.0 + 2.37 * f32::from(fall) + spread * (lane * 7 % BATCH) as f32 - 8.0;
-            let rows: [f32; BATCH] = std::array::from_fn(row);
-            let shown: [f32; BATCH] = std::array::from_fn(|lane| 0.5 + lane as f32);
-            let lights: [u16; BATCH] = std::array::from_fn(|lane| (lane % 2) as u16);
-            let count = BATCH - (fall % 4) as usize;
+            let row = |lane: usize| 3.0 + 2.37 * f32::from(fall) + spread * (lane * 7 % SPLAT_LANES) as f32 - 8.0;
+            let rows: [f32; SPLAT_LANES] = std::array::from_fn(row);
+            let shown: [f32; SPLAT_LANES] = std::array::from_fn(|lane| 0.5 + lane as f32);
+            let lights: [u16; SPLAT_LANES] = std::array::from_fn(|lane| (lane % 2) as u16);
+            let count = SPLAT_LANES - (fall % 4) as usize;
             let points = (&rows, &shown, (&lights, count), &photons[..]);
-            let column = dispatch!(Level::new(), simd => column_of(simd, &mut trace, points));
-            let plainest = bansho_base::dispatch_baseline!(simd => column_of(simd, &mut trace, points));
+            let column = dispatch!(Level::new(), simd => column_of(simd, &mut rasterizer, points));
+            let plainest = bansho_base::dispatch_baseline!(simd => column_of(simd, &mut rasterizer, points));
             assert!(column.iter().zip(&plainest).all(|(wide, plain)| wide.0 == plain.0), "the same on all machines");
             let mut expected = [[0.0_f32; 4]; ROWS + 1];
             for lane in 0..count {

@@ -3,7 +3,7 @@
 use anyhow::ensure;
 use bansho::aurora::physics::{
     atmosphere::atmosphere,
-    calibration::{Check, calibrate},
+    calibration::{CalibrationCheck, calibrate},
 };
 
 use crate::output::to_stdout;
@@ -12,7 +12,7 @@ use crate::output::to_stdout;
 pub(crate) fn run() -> anyhow::Result<()> {
     let calibration = calibrate(atmosphere());
     to_stdout(&calibration.to_string())?;
-    let failed = calibration.checks.iter().filter(|check| !Check::holds(check)).count();
+    let failed = calibration.checks.iter().filter(|check| !CalibrationCheck::holds(check)).count();
     ensure!(failed == 0, "{failed} of {} demands do not hold", calibration.checks.len());
     Ok(())
 }

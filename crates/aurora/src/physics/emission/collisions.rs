@@ -1,4 +1,5 @@
-//! Photons of single collisions: for Fang's falls such that their mean is the emission table, and the mean of the thesis's rules.
+//! Photons of single collisions: normalized so that the mean of the electron tracks is the emission table, and the
+//! thesis's quenching rules.
 
 use bansho_base::math;
 
@@ -10,36 +11,37 @@ use super::{
 };
 use crate::physics::{
     atmosphere::Air,
-    precipitation::{deposition::column, electron_track::collision_count},
+    precipitation::{deposition::column_ion_pairs, electron_track::collision_count},
 };
 
 /// k_b, J/K, and the atomic mass unit, kg.
 const BOLTZMANN: f64 = 1.380_649e-23;
 const ATOMIC_MASS: f64 = 1.660_539e-27;
-/// Radius of the molecules that quench in (2.25), m: half the distance at which N2 collides with N2.
+/// Radius of the quenching molecules in (2.25), m: half the distance of an N2-N2 collision.
 const MOLECULAR_RADIUS: f64 = 1.85e-10;
 
 impl Emission {
-    /// Brightness that each collision of a fall adds to the column it stands for, in kR of ion pairs per mW m^-2: times
+    /// Column brightness that one collision of a track stands for, in kR of ion pairs per mW m^-2. Multiplied by
     /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
     ///
     /// # Panics
-    /// For a node that is not of the grid of energies.
+    ///
+    /// If the node is not in the energy grid.
     #[must_use]
     pub fn ion_pairs_per_collision(&self, node: usize) -> f64 {
-        let pairs = column(self.deposition().monoenergetic(node));
+        let pairs = column_ion_pairs(self.deposition().monoenergetic_profile(node));
         pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
     }
 }
 
-/// Mean thermal speed of molecules of a mass in atomic units, m/s (2.26).
+/// Mean thermal speed of molecules with a mass in atomic units, m/s (2.26).
 #[must_use]
 pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
     math::sqrt(8.0 * BOLTZMANN * temperature / (std::f64::consts::PI * mass_u * ATOMIC_MASS))
 }
 
-/// Probability that a state is struck by a molecule before its mean lifetime is over (2.25). It quenches green light below 190 km, which
-/// nature does not: a molecule's touch seldom takes the energy.
+/// Probability that a collision de-excites a state within its mean lifetime (2.25). It suppresses green light below 190
+/// km, which is not observed: few collisions with a molecule quench O(1S).
 #[must_use]
 pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
     let mass_u = match emitter {
@@ -51,8 +53,9 @@ pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
     -math::exp_m1(-rate * natural_lifetime(emitter))
 }
 
-/// Counting photons of each emitter for each ion pair made in this air by the rules of the thesis (2.4.2): an atom or a molecule is struck
-/// by number density, then emits one line by production rate unless it is quenched (2.25). O2 gives nothing. The mean over all draws.
+/// Photons of each emitter per ion pair by the rules of the thesis (2.4.2): the target is chosen by number density and
+/// emits one line by production rate, unless it is quenched (2.25). O2 emits nothing. This is the expected value over
+/// all random choices.
 #[must_use]
 pub fn mean_hard_sphere_photons(air: &Air) -> PerEmitter<f64> {
     EMITTERS.map(|emitter| {
@@ -72,18 +75,18 @@ mod tests {
     use super::{super::PHOTONS_PER_KILORAYLEIGH, *};
     use crate::physics::{
         atmosphere::{LEVELS, atmosphere},
-        precipitation::{electron_track::Falls, spectrum::ARC},
+        precipitation::{electron_track::TrackSampler, spectrum::ARC},
     };
 
-    /// Light by level and emitter, kR per mW m^-2, of so many falls of a spectrum.
-    fn light(table: &Emission, falls: &Falls, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
+    /// Light by level and emitter, kR per mW m^-2, of so many tracks of a spectrum.
+    fn light(table: &Emission, tracks: &TrackSampler, energy_ev: f64, particles: u64) -> Vec<PerEmitter<f64>> {
         let key = Key::new(11, "aurora");
         let mut sum = vec![[0.0; 4]; LEVELS];
         for particle in 0..particles {
             let uniforms = key.uniforms(particle, 0, Purpose::named("energy")).map(f64::from);
-            let node = table.deposition().draw_node(energy_ev, [uniforms[0], uniforms[1]]);
+            let node = table.deposition().sample_node(energy_ev, [uniforms[0], uniforms[1]]);
             let pairs = table.ion_pairs_per_collision(node) / particles as f64;
-            for collision in falls.fall(node, key, particle) {
+            for collision in tracks.sample_track(node, key, particle) {
                 let level = collision.level as usize;
                 let photons = table.photons_per_ion_pair()[level];
                 sum[level] = std::array::from_fn(|i| sum[level][i] + photons[i] * pairs);
@@ -110,9 +113,9 @@ mod tests {
     #[test]
     fn the_mean_of_collisions_is_the_profile() {
         let table = Emission::new(atmosphere(), ARC);
-        let falls = Falls::new(table.deposition(), 0.02);
+        let tracks = TrackSampler::new(table.deposition(), 0.02);
         // 64 sets of 500 particles; a picture of 120,000 has a fifteenth of this noise.
-        let all = difference(&table, 4000.0, &light(&table, &falls, 4000.0, 32_000));
+        let all = difference(&table, 4000.0, &light(&table, &tracks, 4000.0, 32_000));
         assert!(all.iter().all(|difference| *difference < 0.03), "{all:?}");
     }
 
@@ -132,10 +135,10 @@ mod tests {
     /// What shines after a collision, drawn by the rules of the thesis.
     fn drawn(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
         use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
-        let place = uniforms[0] * air.number_density();
-        let struck = match place {
-            place if place < air.o => [OxygenGreen, OxygenRed],
-            place if place < air.o + air.n2 => [NitrogenIon, Nitrogen],
+        let species_draw = uniforms[0] * air.number_density();
+        let struck = match species_draw {
+            species_draw if species_draw < air.o => [OxygenGreen, OxygenRed],
+            species_draw if species_draw < air.o + air.n2 => [NitrogenIon, Nitrogen],
             _ => return None,
         };
         let rates = struck.map(|emitter| DIRECT_PHOTONS[emitter.index()]);

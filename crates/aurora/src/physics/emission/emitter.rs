@@ -1,4 +1,5 @@
-//! Excited states and their lines. Lines of one state share everything over altitude and time, so that four maps hold all the light.
+//! Excited states and their lines. Lines of one state have the same altitude profile and decay, so four maps store all
+//! the light.
 
 use std::sync::LazyLock;
 
@@ -7,21 +8,21 @@ use bansho_base::color::{ACESCG_FROM_XYZ, LUMINOUS_EFFICACY_LM_PER_W, line_xyz};
 use super::PHOTONS_PER_KILORAYLEIGH;
 
 /// Bands of the N2 first positive system in the visible (Vallance Jones 1974, table 4.12): a header, then upper and lower vibrational
-/// level, wavelength in nm, A in 1/s, share of the photons of the whole system.
+/// level, wavelength in nm, A in 1/s, fraction of the photons of the whole system.
 const FIRST_POSITIVE_TEXT: &str = include_str!("data/n2_1p_bands.csv");
 /// h c, J m (SI 2019, exact).
 const PLANCK_TIMES_LIGHT_SPEED: f64 = 6.626_070_15e-34 * 299_792_458.0;
 
-/// An excited state that radiates.
+/// An excited state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Emitter {
-    /// O(1S): green, after 0.75 s. Counted in photons of 557.7 nm.
+    /// O(1S): green, lifetime 0.75 s. Counted in photons of 557.7 nm.
     OxygenGreen,
-    /// O(1D): red, after 134 s where nothing strikes it before. Counted in photons of 630.0 nm.
+    /// O(1D): red, radiative lifetime 134 s, shorter where it is quenched. Counted in photons of 630.0 nm.
     OxygenRed,
-    /// N2+(B), first negative bands: violet and blue, at once. Counted in photons of 427.8 nm.
+    /// N2+(B), first negative bands: violet and blue, prompt. Counted in photons of 427.8 nm.
     NitrogenIon,
-    /// N2(B), first positive bands: deep red, at once. Counted in photons of the whole system, most of them infrared.
+    /// N2(B), first positive bands: deep red, prompt. Counted in photons of the whole system, most of them infrared.
     Nitrogen,
 }
 
@@ -35,13 +36,13 @@ pub const EMITTERS: PerEmitter<Emitter> =
 /// A spectral line or band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// Its name among observers.
+    /// Its usual name.
     pub name: &'static str,
     /// Wavelength in air, nm.
     pub wavelength_nm: f64,
-    /// The state that radiates it.
+    /// The upper state.
     pub emitter: Emitter,
-    /// Photons of this line for each photon in which the emitter is counted.
+    /// Photons of this line per photon in which the emitter is counted.
     pub photons: f64,
 }
 
@@ -49,8 +50,8 @@ const fn line(name: &'static str, wavelength_nm: f64, emitter: Emitter, photons:
     Line { name, wavelength_nm, emitter, photons }
 }
 
-/// The lines that can be measured by themselves. Ratios: 630.0/636.4 Sharpee & Slanger (2006); first negative bands and 670.5 nm, a band
-/// of the first positive system, Vallance Jones (1974).
+/// Lines that AOVs and tests measure separately. Ratios: 630.0/636.4 Sharpee & Slanger (2006); first negative bands and
+/// 670.5 nm, a band of the first positive system, Vallance Jones (1974).
 pub const LINES: [Line; 7] = [
     line("O 557.7 nm", 557.734, Emitter::OxygenGreen, 1.0),
     line("O 630.0 nm", 630.03, Emitter::OxygenRed, 1.0),
@@ -62,21 +63,21 @@ pub const LINES: [Line; 7] = [
 ];
 
 impl Emitter {
-    /// Its place in [`EMITTERS`].
+    /// Its index in [`EMITTERS`].
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// Absolute ACEScg of a kilorayleigh in its counting photons, all its lines and bands included; luminance in cd/m^2. The light lies
-    /// outside AP1: components may be negative, keep them until the view transform.
+    /// Absolute ACEScg color per kilorayleigh of the counted photons, all lines and bands included; luminance in
+    /// cd/m^2. The color is outside the AP1 gamut: components may be negative and are kept until the view transform.
     #[must_use]
-    pub fn colour_per_kilorayleigh(self) -> [f64; 3] {
-        static COLOURS: LazyLock<PerEmitter<[f64; 3]>> = LazyLock::new(|| EMITTERS.map(colour));
-        COLOURS[self.index()]
+    pub fn color_per_kilorayleigh(self) -> [f64; 3] {
+        static COLORS: LazyLock<PerEmitter<[f64; 3]>> = LazyLock::new(|| EMITTERS.map(color));
+        COLORS[self.index()]
     }
 
-    /// Wavelength and photons of each of its lines or bands, for each counting photon.
+    /// Wavelength and photons of each line or band, per counted photon.
     fn spectrum(self) -> Vec<(f64, f64)> {
         if self == Self::Nitrogen {
             return first_positive_bands();
@@ -86,14 +87,14 @@ impl Emitter {
 }
 
 impl Line {
-    /// Absolute ACEScg of a kilorayleigh of this line alone.
+    /// Absolute ACEScg color per kilorayleigh of this line alone.
     #[must_use]
-    pub fn colour_per_kilorayleigh(&self) -> [f64; 3] {
+    pub fn color_per_kilorayleigh(&self) -> [f64; 3] {
         ACESCG_FROM_XYZ.apply(absolute_xyz(self.wavelength_nm))
     }
 }
 
-fn colour(emitter: Emitter) -> [f64; 3] {
+fn color(emitter: Emitter) -> [f64; 3] {
     let sum = emitter.spectrum().into_iter().fold([0.0; 3], |sum: [f64; 3], (wavelength_nm, photons)| {
         let xyz = absolute_xyz(wavelength_nm);
         std::array::from_fn(|i| sum[i] + photons * xyz[i])
@@ -101,7 +102,8 @@ fn colour(emitter: Emitter) -> [f64; 3] {
     ACESCG_FROM_XYZ.apply(sum)
 }
 
-/// XYZ of a kilorayleigh at a wavelength, Y in cd/m^2: 10^13 photons m^-2 s^-1 into all directions (Hunten et al. 1956), (2.29).
+/// XYZ per kilorayleigh at a wavelength, Y in cd/m^2: 10^13 photons m^-2 s^-1 over the full sphere (Hunten et al.
+/// 1956), (2.29).
 fn absolute_xyz(wavelength_nm: f64) -> [f64; 3] {
     let photon = PLANCK_TIMES_LIGHT_SPEED / (wavelength_nm * 1e-9);
     let radiance = PHOTONS_PER_KILORAYLEIGH / (4.0 * std::f64::consts::PI) * photon;
@@ -110,7 +112,7 @@ fn absolute_xyz(wavelength_nm: f64) -> [f64; 3] {
 
 fn first_positive_bands() -> Vec<(f64, f64)> {
     let rows = FIRST_POSITIVE_TEXT.lines().skip(1).map(|row| {
-        // The table is compiled in and a test reads every field of it: a NaN cannot be.
+        // The table is compiled in and a test parses every field, so NaN cannot occur.
         let field = |column| row.split(',').nth(column).and_then(|field| field.parse().ok()).unwrap_or(f64::NAN);
         (field(2), field(4))
     });
@@ -122,28 +124,28 @@ mod tests {
     use super::*;
     use bansho_base::color::luminance;
 
-    fn luminance_of(colour: [f64; 3]) -> f64 {
-        luminance(colour.map(|value| value as f32)) as f64
+    fn luminance_of(color: [f64; 3]) -> f64 {
+        luminance(color.map(|value| value as f32)) as f64
     }
 
     #[test]
     fn bands_are_whole() {
         let bands = first_positive_bands();
         assert_eq!(bands.len(), 27);
-        assert!(bands.iter().all(|(nm, share)| (570.0..780.0).contains(nm) && *share > 0.0));
+        assert!(bands.iter().all(|(nm, weight)| (570.0..780.0).contains(nm) && *weight > 0.0));
         // 670.5 nm is one of them.
-        assert!(bands.iter().any(|(nm, share)| (nm - 670.5).abs() < 0.1 && (share - LINES[6].photons).abs() < 1e-9));
+        assert!(bands.iter().any(|(nm, weight)| (nm - 670.5).abs() < 0.1 && (weight - LINES[6].photons).abs() < 1e-9));
     }
 
     #[test]
     fn luminances_are_those_of_the_reference() {
         let mut compared = 0;
-        for row in include_str!("data/line_colours.csv").lines().skip(1) {
+        for row in include_str!("data/line_colors.csv").lines().skip(1) {
             let fields: Vec<&str> = row.split(',').collect();
             let number = |column: usize| fields[column].parse::<f64>().unwrap();
             if fields[2] == "CIE1931_2deg" && !fields[0].contains("composite") {
                 let line = LINES.iter().find(|line| (line.wavelength_nm - number(1)).abs() < 0.02).unwrap();
-                let found = luminance_of(line.colour_per_kilorayleigh());
+                let found = luminance_of(line.color_per_kilorayleigh());
                 assert!((found / number(19) - 1.0).abs() < 0.01, "{row}: {found}");
                 compared += 1;
             }
@@ -154,18 +156,18 @@ mod tests {
     #[test]
     fn composite_of_the_first_positive_bands_agrees_with_the_reference() {
         // 5.68975e-6 cd/m^2 per kR of the bands in 575-780 nm alone.
-        let visible: f64 = first_positive_bands().iter().map(|(_, share)| share).sum();
-        let found = luminance_of(Emitter::Nitrogen.colour_per_kilorayleigh()) / visible;
+        let visible: f64 = first_positive_bands().iter().map(|(_, weight)| weight).sum();
+        let found = luminance_of(Emitter::Nitrogen.color_per_kilorayleigh()) / visible;
         assert!((found / 5.68975e-6 - 1.0).abs() < 0.02, "{found}");
     }
 
     #[test]
     fn saturated_lines_lie_outside_the_working_space() {
-        let negative = |emitter: Emitter| emitter.colour_per_kilorayleigh().iter().any(|value| *value < 0.0);
+        let negative = |emitter: Emitter| emitter.color_per_kilorayleigh().iter().any(|value| *value < 0.0);
         assert!(negative(Emitter::OxygenGreen) || negative(Emitter::OxygenRed) || negative(Emitter::NitrogenIon));
-        let [r, g, b] = Emitter::OxygenGreen.colour_per_kilorayleigh();
+        let [r, g, b] = Emitter::OxygenGreen.color_per_kilorayleigh();
         assert!(g > r.max(b));
-        let [r, g, b] = Emitter::NitrogenIon.colour_per_kilorayleigh();
+        let [r, g, b] = Emitter::NitrogenIon.color_per_kilorayleigh();
         assert!(b > r.max(g));
     }
 }

@@ -1,4 +1,4 @@
-//! How long light lingers after the electrons have gone, and how far the excited atoms get before they radiate.
+//! Effective lifetime of the emission and diffusion of the excited atoms.
 
 use bansho_base::math;
 
@@ -8,9 +8,9 @@ use super::{
 };
 use crate::physics::atmosphere::Air;
 
-/// Gyroradius of an electron of 1 eV that runs across a field of 50 microtesla, m: sqrt(2 m E) / (e B).
+/// Gyroradius of an electron of 1 eV perpendicular to a field of 50 microtesla, m: sqrt(2 m E) / (e B).
 const GYRORADIUS_AT_1_EV: f64 = 0.067_4;
-/// States that live shorter than this radiate where they are made, s.
+/// States with a shorter lifetime radiate where they are excited, s.
 const PROMPT: f64 = 1e-3;
 
 /// Coefficient of diffusion of O through the air, m^2/s (Colegrove et al. 1966: 9.69e16 T^0.774 / n cm^2/s for O in N2).
@@ -19,17 +19,18 @@ pub fn diffusion_coefficient(air: &Air) -> f64 {
     9.69e18 * math::pow(air.temperature, 0.774) / air.number_density()
 }
 
-/// How long the light of one emitter lingers at an altitude, and how far its atoms get meanwhile.
+/// Lifetime of an emitter at an altitude and diffusion of its atoms within it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Persistence {
+pub struct LifetimeAndDiffusion {
     /// Mean lifetime, s: the light decays as exp(-t / lifetime).
     pub lifetime: f64,
-    /// Variance along each direction of the way from excitation to radiation, m^2.
+    /// Variance of the displacement from excitation to emission per direction, m^2.
     pub diffusion_variance: f64,
 }
 
-impl Persistence {
-    /// Of an emitter in this air. Excited atoms diffuse while they live, by a variance of 2 D tau, which shows in the red line alone.
+impl LifetimeAndDiffusion {
+    /// Of an emitter in this air. Excited atoms diffuse during their lifetime, with variance 2 D tau; it is visible in
+    /// the red line only.
     #[must_use]
     pub fn new(emitter: Emitter, air: &Air) -> Self {
         let lifetime = lifetime(emitter, air);
@@ -37,8 +38,8 @@ impl Persistence {
         Self { lifetime, diffusion_variance: if moves { 2.0 * diffusion_coefficient(air) * lifetime } else { 0.0 } }
     }
 
-    /// Standard deviation along each direction across the field of the places where light leaves, about the field line of electrons of an
-    /// energy, m: they gyrate, and the atoms diffuse. A wind would carry all of them alike: that is no blur.
+    /// Standard deviation of the emission position about the field line of electrons of an energy, per direction, m:
+    /// gyration and diffusion. Wind displaces all atoms alike and does not blur.
     #[must_use]
     pub fn spread(&self, energy_ev: f64) -> f64 {
         math::sqrt(GYRORADIUS_AT_1_EV * GYRORADIUS_AT_1_EV * energy_ev + self.diffusion_variance)
@@ -59,7 +60,7 @@ mod tests {
 
     #[test]
     fn spread_is_metres_for_prompt_light_and_kilometres_for_red() {
-        let root = |emitter, altitude_km| Persistence::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
+        let root = |emitter, altitude_km| LifetimeAndDiffusion::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
         assert!((root(Emitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
         assert!((10.0..100.0).contains(&root(Emitter::OxygenGreen, 110.0)));
         assert!((5e3..2e4).contains(&root(Emitter::OxygenRed, 250.0)));

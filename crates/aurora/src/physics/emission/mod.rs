@@ -1,21 +1,21 @@
-//! What struck atoms and molecules give back: how much light, for how long, how far from where they were struck, and in which colour.
+//! Emission of excited atoms and molecules: photons, lifetime, diffusion and color.
 //!
-//! [`emitter`] lists the excited states and their lines; [`quenching`] says how many of them radiate, [`excitation`] how many are made.
-//! [`table`] is the table of photons by energy and altitude, [`lifetime`] how light lingers and spreads, [`red_line_levels`]
-//! how red light does by height. [`collisions`] turns single
-//! collisions into photons, with the rules of the thesis beside. [`extinction`](crate::render::extinction) is what the air below takes away. [`calibration`](super::calibration) holds the
-//! whole against what is observed.
+//! [`emitter`] lists the excited states and their lines, [`quenching`] their radiated fraction, [`excitation`] their
+//! production. [`table`] is the table of photons by energy and altitude, [`lifetime`] the decay and diffusion,
+//! [`red_line_altitudes`] the altitude dependence of the red line's decay. [`collisions`] has the photons of single
+//! collisions and the rules of the thesis. [`extinction`](crate::physics::extinction) is the lower atmosphere.
+//! [`calibration`](super::calibration) compares all of it with observations.
 
 pub mod collisions;
 pub mod emitter;
 pub mod excitation;
 pub mod lifetime;
 pub mod quenching;
-pub mod red_line_levels;
+pub mod red_line_altitudes;
 pub mod table;
 
 pub use emitter::{EMITTERS, Emitter, LINES, Line, PerEmitter};
 pub use table::Emission;
 
-/// Photons m^-2 s^-1 of a column that make one kilorayleigh.
+/// Photon column emission rate of one kilorayleigh, m^-2 s^-1.
 pub const PHOTONS_PER_KILORAYLEIGH: f64 = 1e13;

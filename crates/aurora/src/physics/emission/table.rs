@@ -1,4 +1,4 @@
-//! The table of light: photons of each emitter by electron energy and altitude for a spectrum.
+//! The emission table: photons of each emitter by electron energy and altitude for a spectrum.
 
 use bansho_base::math::lerp;
 
@@ -7,89 +7,90 @@ use super::{
     collisions::mean_hard_sphere_photons,
     emitter::{EMITTERS, Emitter, PerEmitter},
     excitation::photons_per_ion_pair,
-    lifetime::Persistence,
-    red_line_levels::{RED_HEIGHTS, mean_lifetimes},
+    lifetime::LifetimeAndDiffusion,
+    red_line_altitudes::{RED_ALTITUDES, mean_lifetimes},
 };
 use crate::physics::{
     atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, covers, locate_level},
     precipitation::{
         Deposition, Spectrum,
-        deposition::Profile,
+        deposition::AltitudeProfile,
         energy_grid::{self, NODES, node_energy_ev},
     },
 };
 
-/// Light by altitude and energy, per unit of energy flux; all of it scales with the flux.
+/// Emission by altitude and energy per unit energy flux; it is linear in the flux.
 #[derive(Clone, Debug)]
 pub struct Emission {
     deposition: Deposition,
-    /// Counting photons of each emitter for each ion pair, by level.
+    /// Counted photons of each emitter per ion pair, by level.
     photons: Vec<PerEmitter<f64>>,
-    columns: Vec<Column>,
-    /// Mean lifetime of the red light of each of its heights by node, s.
-    red_lifetimes: Vec<[f64; RED_HEIGHTS]>,
+    columns: Vec<ColumnEmission>,
+    /// Mean lifetime of the red light for each of its altitudes, by node, s.
+    red_lifetimes: Vec<[f64; RED_ALTITUDES]>,
 }
 
-/// What a whole column shows, by emitter.
+/// Column-integrated quantities by emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Column {
-    /// Brightness seen along the column, kR per mW m^-2, in counting photons.
+pub struct ColumnEmission {
+    /// Column brightness, kR per mW m^-2, in counted photons.
     pub kilorayleigh: PerEmitter<f64>,
-    /// Mean lifetime of the light, s, weighted by emission.
+    /// Emission-weighted mean lifetime, s.
     pub lifetime: PerEmitter<f64>,
-    /// How far the light spreads across the field: standard deviation along each direction, km, at the altitude that halves the emission
-    /// (it grows with altitude, so this is the median).
+    /// Lateral spread of the light: standard deviation per direction, km, at the median altitude of the emission (it
+    /// increases with altitude, so this is its median).
     pub spread_km: PerEmitter<f64>,
 }
 
 impl Emission {
-    /// The table for a spectrum. A few milliseconds.
+    /// The table for a spectrum; takes a few milliseconds.
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(photons_per_ion_pair).collect();
-        Self::of(air, Deposition::new(air, spectrum), photons)
+        Self::from_photons(air, Deposition::new(air, spectrum), photons)
     }
 
-    /// The table of the thesis's fall through hard spheres, and of its rules for what shines after a collision.
+    /// The table for the thesis's hard-sphere tracks and its rules of emission.
     #[must_use]
-    pub fn of_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
-        Self::of(air, Deposition::of_hard_spheres(air, spectrum), photons)
+        Self::from_photons(air, Deposition::from_hard_spheres(air, spectrum), photons)
     }
 
-    fn of(air: &Atmosphere, deposition: Deposition, photons: Vec<PerEmitter<f64>>) -> Self {
+    fn from_photons(air: &Atmosphere, deposition: Deposition, photons: Vec<PerEmitter<f64>>) -> Self {
         let persistence: Vec<_> =
-            air.levels().iter().map(|air| EMITTERS.map(|emitter| Persistence::new(emitter, air))).collect();
+            air.levels().iter().map(|air| EMITTERS.map(|emitter| LifetimeAndDiffusion::new(emitter, air))).collect();
         let columns = (0..NODES)
-            .map(|node| column(&photons, &persistence, deposition.mixed(node), node_energy_ev(node)))
+            .map(|node| column(&photons, &persistence, deposition.spectrum_profile(node), node_energy_ev(node)))
             .collect();
         let red = Emitter::OxygenRed.index();
         let red_lifetimes = |node: usize| {
-            let light = photons.iter().zip(deposition.mixed(node)).map(|(photons, pairs)| photons[red] * pairs);
+            let light =
+                photons.iter().zip(deposition.spectrum_profile(node)).map(|(photons, pairs)| photons[red] * pairs);
             mean_lifetimes(light.zip(persistence.iter().map(|persistence| persistence[red].lifetime)))
         };
         let red_lifetimes = (0..NODES).map(red_lifetimes).collect();
         Self { deposition, photons, columns, red_lifetimes }
     }
 
-    /// The deposition beneath it.
+    /// The underlying ionization table.
     #[must_use]
     pub const fn deposition(&self) -> &Deposition {
         &self.deposition
     }
 
-    /// Counting photons of each emitter for each ion pair, by level of the atmosphere.
+    /// Counted photons of each emitter per ion pair, by level of the atmosphere.
     #[must_use]
     pub fn photons_per_ion_pair(&self) -> &[PerEmitter<f64>] {
         &self.photons
     }
 
-    /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, at each of the [`LEVELS`] levels, for the spectrum about an
-    /// energy; linear between levels.
+    /// Volume emission rate of each emitter, photons m^-3 s^-1 per mW m^-2, at each of the [`LEVELS`] levels, for the
+    /// spectrum about an energy; linear between levels.
     #[must_use]
     pub fn profile(&self, energy_ev: f64) -> Vec<PerEmitter<f64>> {
         let (node, mixing) = energy_grid::locate(energy_ev);
-        let (low, high) = (self.deposition.mixed(node), self.deposition.mixed(node + 1));
+        let (low, high) = (self.deposition.spectrum_profile(node), self.deposition.spectrum_profile(node + 1));
         let emission = |level: usize| {
             let pairs = lerp(low[level], high[level], mixing);
             self.photons[level].map(|photons| photons * pairs)
@@ -97,66 +98,71 @@ impl Emission {
         (0..LEVELS).map(emission).collect()
     }
 
-    /// Volume emission of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one altitude. Nothing
-    /// outside 80-800 km.
+    /// Volume emission rate of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one
+    /// altitude; 0 outside 80-800 km.
     #[must_use]
     pub fn at(&self, energy_ev: f64, altitude_km: f64) -> PerEmitter<f64> {
         if !covers(altitude_km) {
             return [0.0; 4];
         }
-        let (level, part) = locate_level(altitude_km);
+        let (level, fraction) = locate_level(altitude_km);
         let (node, mixing) = energy_grid::locate(energy_ev);
-        let pairs =
-            |level: usize| lerp(self.deposition.mixed(node)[level], self.deposition.mixed(node + 1)[level], mixing);
+        let pairs = |level: usize| {
+            lerp(
+                self.deposition.spectrum_profile(node)[level],
+                self.deposition.spectrum_profile(node + 1)[level],
+                mixing,
+            )
+        };
         let (below, above) = (pairs(level), pairs(level + 1));
-        std::array::from_fn(|i| lerp(below * self.photons[level][i], above * self.photons[level + 1][i], part))
+        std::array::from_fn(|i| lerp(below * self.photons[level][i], above * self.photons[level + 1][i], fraction))
     }
 
-    /// What the whole column shows for the spectrum about an energy: brightness linear between nodes, lifetime and spread too.
+    /// Column quantities for the spectrum about an energy, linear between energy nodes.
     #[must_use]
-    pub fn column(&self, energy_ev: f64) -> Column {
+    pub fn column(&self, energy_ev: f64) -> ColumnEmission {
         let (node, mixing) = energy_grid::locate(energy_ev);
         let (low, high) = (&self.columns[node], &self.columns[node + 1]);
         let between = |low: PerEmitter<f64>, high: PerEmitter<f64>| -> PerEmitter<f64> {
             std::array::from_fn(|i| lerp(low[i], high[i], mixing))
         };
-        Column {
+        ColumnEmission {
             kilorayleigh: between(low.kilorayleigh, high.kilorayleigh),
             lifetime: between(low.lifetime, high.lifetime),
             spread_km: between(low.spread_km, high.spread_km),
         }
     }
 
-    /// Mean lifetime of the red light of each of its [heights](super::red_line_levels), s, weighted by emission.
+    /// Mean lifetime of the red light of each of its [altitudes](super::red_line_altitudes), s, weighted by emission.
     #[must_use]
-    pub fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_HEIGHTS] {
+    pub fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_ALTITUDES] {
         let (node, mixing) = energy_grid::locate(energy_ev);
         let (low, high) = (self.red_lifetimes[node], self.red_lifetimes[node + 1]);
-        std::array::from_fn(|height| lerp(low[height], high[height], mixing))
+        std::array::from_fn(|altitude| lerp(low[altitude], high[altitude], mixing))
     }
 
-    /// Luminance in cd/m^2 of the column per mW m^-2: what a sheet seen end-on shows.
+    /// ACEScg color of the column, luminance in cd/m^2 per mW m^-2.
     #[must_use]
-    pub fn column_colour(&self, energy_ev: f64) -> [f64; 3] {
-        colour_of(self.column(energy_ev).kilorayleigh)
+    pub fn column_color(&self, energy_ev: f64) -> [f64; 3] {
+        color_of(self.column(energy_ev).kilorayleigh)
     }
 }
 
-/// Absolute ACEScg of kilorayleighs by emitter, luminance in cd/m^2.
+/// Absolute ACEScg color of kilorayleighs by emitter, luminance in cd/m^2.
 #[must_use]
-pub fn colour_of(kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
+pub fn color_of(kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
     EMITTERS.into_iter().zip(kilorayleigh).fold([0.0; 3], |sum: [f64; 3], (emitter, kilorayleigh)| {
-        let colour = emitter.colour_per_kilorayleigh();
-        std::array::from_fn(|i| sum[i] + kilorayleigh * colour[i])
+        let color = emitter.color_per_kilorayleigh();
+        std::array::from_fn(|i| sum[i] + kilorayleigh * color[i])
     })
 }
 
 fn column(
     photons: &[PerEmitter<f64>],
-    persistence: &[PerEmitter<Persistence>],
-    pairs: &Profile,
+    persistence: &[PerEmitter<LifetimeAndDiffusion>],
+    pairs: &AltitudeProfile,
     energy_ev: f64,
-) -> Column {
+) -> ColumnEmission {
     let of = |emitter: Emitter| {
         let light = |level: usize| photons[level][emitter.index()] * pairs[level];
         let whole: f64 = (0..LEVELS).map(light).sum();
@@ -171,7 +177,7 @@ fn column(
         [kilorayleigh, lifetimes / whole, at_half.spread(energy_ev) * 1e-3]
     };
     let columns = EMITTERS.map(of);
-    Column {
+    ColumnEmission {
         kilorayleigh: columns.map(|[kilorayleigh, ..]| kilorayleigh),
         lifetime: columns.map(|[_, lifetime, _]| lifetime),
         spread_km: columns.map(|[.., spread]| spread),
@@ -221,7 +227,7 @@ mod tests {
 
     #[test]
     fn hard_spheres_shine_where_nature_does_not() {
-        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::of_hard_spheres(atmosphere(), ARC));
+        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::from_hard_spheres(atmosphere(), ARC));
         let peak_km = |table: &Emission, energy_ev: f64, emitter: Emitter| {
             let profile = table.profile(energy_ev);
             let light = |level: &usize| profile[*level][emitter.index()];
@@ -239,7 +245,7 @@ mod tests {
     /// Red and blue beside green, linear on a screen, of the light from one altitude.
     fn beside_green(energy_ev: f64, altitude_km: f64) -> [f64; 2] {
         let emission = Emission::new(atmosphere(), ARC).at(energy_ev, altitude_km);
-        let [r, g, b] = bansho_base::color::SRGB_FROM_ACESCG.apply(colour_of(emission));
+        let [r, g, b] = bansho_base::color::SRGB_FROM_ACESCG.apply(color_of(emission));
         [r / g, b / g]
     }
 
@@ -257,7 +263,7 @@ mod tests {
 
     #[test]
     fn an_aurora_is_green_seen_whole() {
-        let [r, g, b] = Emission::new(atmosphere(), ARC).column_colour(5000.0);
+        let [r, g, b] = Emission::new(atmosphere(), ARC).column_color(5000.0);
         assert!(g > r.max(b) && g > 1e-4, "{r} {g} {b}");
     }
 }

@@ -1,4 +1,4 @@
-//! Single collisions of falling electrons, drawn such that the deposition of Fang et al. (2010) is their mean.
+//! Electron tracks as sequences of collisions whose mean is the ionization profile of Fang et al. (2010).
 
 use bansho_base::{
     math,
@@ -7,138 +7,146 @@ use bansho_base::{
 
 use super::{
     COLLISION_EV,
-    deposition::{Deposition, Profile},
+    deposition::{AltitudeProfile, Deposition},
     energy_grid::{NODES, node_energy_ev},
 };
 use crate::physics::atmosphere::{LEVELS, level_altitude_km};
 use rayon::prelude::*;
 
 const COLLISION: Purpose = Purpose::named("aurora collision");
-const VARIANT: Purpose = Purpose::named("aurora fall variant");
-/// The golden ratio: however many of its multiples there are, their fractions lie evenly in 1.
-const GOLDEN: f64 = 0.618_033_988_749_895;
+const TRACK_VARIANT: Purpose = Purpose::named("aurora fall variant");
+/// Conjugate of the golden ratio: the fractional parts of its multiples are a low-discrepancy sequence.
+const GOLDEN_RATIO_CONJUGATE: f64 = 0.618_033_988_749_895;
 
 /// A collision of an electron with an atom or a molecule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
-    /// Level of the atmosphere whose air is struck.
+    /// Level of the atmosphere in which it happens.
     pub level: u32,
-    /// Altitude, km: within a kilometre of the level.
+    /// Altitude, km, within one kilometer of the level.
     pub altitude_km: f32,
-    /// Displacement across the magnetic field since the fall began, km.
-    pub offset_km: [f32; 2],
+    /// Displacement across the magnetic field since the start of the track, km.
+    pub transverse_km: [f32; 2],
 }
 
-/// Falls of electrons of every energy of the grid.
+/// Samples electron tracks for every energy of the grid.
 #[derive(Clone, Debug)]
-pub struct Falls {
-    /// For each energy the share of its deposition above and at each level, from the top down.
-    cumulative: Vec<Profile>,
-    /// Tangent of the angle by which a collision turns an electron from the field, rms along each direction across.
-    wobble: f64,
+pub struct TrackSampler {
+    /// For each energy the cumulative fraction of its ionization from the top down to each level.
+    cumulative: Vec<AltitudeProfile>,
+    /// RMS tangent of the deflection per collision, per transverse direction.
+    deflection: f64,
 }
 
-/// Collisions until an electron of a node's energy has spent it: 100 eV each, at least one.
+/// Collisions until an electron of a node's energy has lost it: 100 eV each, at least one.
 #[must_use]
 pub fn collision_count(node: usize) -> u32 {
     (node_energy_ev(node) / COLLISION_EV).round().max(1.0) as u32
 }
 
-impl Falls {
-    /// Falls whose heights have the monoenergetic profiles of `deposition`; each collision turns the electron from the field by an angle
-    /// with a tangent of rms `wobble` (the vector omega of (2.21)).
+impl TrackSampler {
+    /// Tracks with the monoenergetic profiles of `deposition`; each collision deflects the electron by an angle with
+    /// RMS tangent `deflection` (the vector omega of (2.21)).
     #[must_use]
-    pub fn new(deposition: &Deposition, wobble: f64) -> Self {
-        Self { cumulative: (0..NODES).map(|node| from_the_top(deposition.monoenergetic(node))).collect(), wobble }
+    pub fn new(deposition: &Deposition, deflection: f64) -> Self {
+        Self {
+            cumulative: (0..NODES).map(|node| cumulative_from_top(deposition.monoenergetic_profile(node))).collect(),
+            deflection,
+        }
     }
 
-    /// The collisions of particle number `particle`, from the first and highest to the last, if its energy is that of `node`.
+    /// The collisions of particle number `particle` with the energy of `node`, from the highest to the lowest.
     ///
-    /// The k-th of n happens where between k/n and (k + 1)/n of the energy has been spent: the mean over particles is the profile, and
-    /// one fall already follows it. Within a level's reach the altitude is triangular, so that the mean is linear between levels.
+    /// Stratified sampling: the k-th of n collisions lies where between k/n and (k + 1)/n of the energy is lost. The
+    /// mean over particles is the profile, and each track follows it approximately. Within one kilometer of a level the
+    /// altitude has a triangular density, so the mean is linear between levels.
     ///
     /// # Panics
-    /// For a node that is not of the grid.
-    pub fn fall(&self, node: usize, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
-        self.descend(node, key, particle, |_, uniform| uniform)
+    ///
+    /// If the node is not in the grid.
+    pub fn sample_track(&self, node: usize, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
+        self.track_with(node, key, particle, |_, uniform| uniform)
     }
 
-    /// A fall whose k-th collision lies at `place(k, uniform)` in [0, 1) of its share of the energy.
-    fn descend(
+    /// A track whose k-th collision is at `quantile(k, uniform)` in [0, 1) of its stratum.
+    fn track_with(
         &self,
         node: usize,
         key: Key,
         particle: u64,
-        place: impl Fn(u32, f64) -> f64,
+        quantile: impl Fn(u32, f64) -> f64,
     ) -> impl Iterator<Item = Collision> {
         let cumulative = &self.cumulative[node];
         let count = collision_count(node);
         let mut from_top = 0;
-        let mut path = Path::default();
+        let mut path = TrackState::default();
         (0..count).map(move |number| {
             let words = key.words(particle, number, COLLISION);
-            let spent = (number as f64 + place(number, uniform_f64(words[0], 0))) / count as f64;
-            from_top = level_from_top(cumulative, from_top, spent);
+            let energy_fraction = (number as f64 + quantile(number, uniform_f64(words[0], 0))) / count as f64;
+            from_top = next_level_from_top(cumulative, from_top, energy_fraction);
             let level = LEVELS - 1 - from_top;
-            let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.wobble);
-            path.descend(level_altitude_km(level) + triangular(words[1]), turn);
+            let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
+            path.advance(level_altitude_km(level) + triangular(words[1]), turn);
             path.collision(level)
         })
     }
 }
 
-impl Falls {
-    /// Where so many collisions of a node lie, from the highest to the lowest, if each has an equal part of the energy.
+impl TrackSampler {
+    /// The altitudes of `count` collisions of a node at equally spaced quantiles, from the highest to the lowest.
     ///
-    /// It is at the same place in all parts, and at another for another node: high up, those of all energies are as far apart.
-    pub(crate) fn evenly(&self, node: usize, count: usize) -> impl Iterator<Item = Collision> {
+    /// The offset within the strata is the same for all collisions but differs between nodes, so the topmost collisions
+    /// of all energies are spread evenly.
+    pub(crate) fn quantile_collisions(&self, node: usize, count: usize) -> impl Iterator<Item = Collision> {
         let cumulative = &self.cumulative[node];
-        let place = (node as f64 * GOLDEN) % 1.0;
+        let quantile = (node as f64 * GOLDEN_RATIO_CONJUGATE) % 1.0;
         let mut from_top = 0;
         (0..count).map(move |number| {
-            let spent = (number as f64 + place) / count as f64;
-            from_top = level_from_top(cumulative, from_top, spent);
+            let energy_fraction = (number as f64 + quantile) / count as f64;
+            from_top = next_level_from_top(cumulative, from_top, energy_fraction);
             let before = from_top.checked_sub(1).map_or(0.0, |above| cumulative[above]);
-            let part = (spent - before) / (cumulative[from_top] - before).max(f64::MIN_POSITIVE);
+            let fraction = (energy_fraction - before) / (cumulative[from_top] - before).max(f64::MIN_POSITIVE);
             let level = LEVELS - 1 - from_top;
-            let altitude_km = (level_altitude_km(level) + down_a_triangle(part)) as f32;
-            Collision { level: level as u32, altitude_km, offset_km: [0.0; 2] }
+            let altitude_km = (level_altitude_km(level) + inverse_triangular_cdf(fraction)) as f32;
+            Collision { level: level as u32, altitude_km, transverse_km: [0.0; 2] }
         })
     }
 
-    /// One of the [`VARIANTS`] falls of a node: each takes another part of each share, in an order that changes with the collision.
-    fn variant(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
-        let place = move |number: u32, uniform: f64| {
-            let part = variant ^ (key.words(node as u64, number, VARIANT)[0] % VARIANTS);
-            (part as f64 + uniform) / VARIANTS as f64
+    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node: each takes another substratum, in a permutation that changes
+    /// with the collision.
+    fn stratified_track(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
+        let quantile = move |number: u32, uniform: f64| {
+            let fraction = variant ^ (key.words(node as u64, number, TRACK_VARIANT)[0] % TRACKS_PER_ENERGY);
+            (fraction as f64 + uniform) / TRACKS_PER_ENERGY as f64
         };
-        self.descend(node, key, (node as u64) << 32 | variant as u64, place)
+        self.track_with(node, key, (node as u64) << 32 | variant as u64, quantile)
     }
 }
 
-/// Falls made once, for particles to share: so many for each energy of a range that their mean is the profile.
+/// Precomputed tracks: so many for each energy of a range that their mean is the profile.
 #[derive(Clone, Debug)]
-pub struct FallLibrary {
+pub struct TrackLibrary {
     first_node: usize,
-    /// Where the falls of each node begin, and the end of all.
+    /// Start index of the tracks of each node, and the total.
     starts: Vec<usize>,
     collisions: Vec<Collision>,
 }
 
-/// Falls of each energy in a library: a power of two.
-pub const VARIANTS: u32 = 64;
+/// Tracks of each energy in a library: a power of two.
+pub const TRACKS_PER_ENERGY: u32 = 64;
 
-impl FallLibrary {
-    /// Falls for the nodes of a range of energies, by their key.
+impl TrackLibrary {
+    /// Tracks for a range of energy nodes.
     ///
     /// # Panics
-    /// For nodes that are not of the grid.
+    ///
+    /// If nodes are not in the grid.
     #[must_use]
-    pub fn new(falls: &Falls, nodes: std::ops::RangeInclusive<usize>, key: Key) -> Self {
+    pub fn new(sampler: &TrackSampler, nodes: std::ops::RangeInclusive<usize>, key: Key) -> Self {
         let first_node = *nodes.start();
         let by_node: Vec<Vec<Collision>> = nodes
             .into_par_iter()
-            .map(|node| (0..VARIANTS).flat_map(|v| falls.variant(node, v, key)).collect())
+            .map(|node| (0..TRACKS_PER_ENERGY).flat_map(|v| sampler.stratified_track(node, v, key)).collect())
             .collect();
         let mut starts = vec![0];
         starts.extend(by_node.iter().scan(0, |end, collisions| {
@@ -148,23 +156,24 @@ impl FallLibrary {
         Self { first_node, starts, collisions: by_node.concat() }
     }
 
-    /// One of the [`VARIANTS`] falls of a node, any number; the nearest node that the library has.
+    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node (any `variant`); of the nearest node that the library has.
     ///
     /// # Panics
+    ///
     /// If the library was made for an empty range.
     #[must_use]
-    pub fn fall(&self, node: usize, variant: u32) -> &[Collision] {
-        let place = node.saturating_sub(self.first_node).min(self.starts.len() - 2);
-        let (start, end) = (self.starts[place], self.starts[place + 1]);
-        let count = (end - start) / VARIANTS as usize;
-        let first = start + (variant % VARIANTS) as usize * count;
+    pub fn track(&self, node: usize, variant: u32) -> &[Collision] {
+        let quantile = node.saturating_sub(self.first_node).min(self.starts.len() - 2);
+        let (start, end) = (self.starts[quantile], self.starts[quantile + 1]);
+        let count = (end - start) / TRACKS_PER_ENERGY as usize;
+        let first = start + (variant % TRACKS_PER_ENERGY) as usize * count;
         &self.collisions[first..first + count]
     }
 }
 
-/// How many levels, the number `above` or more, lie above the one at which so much of the energy has been spent.
-fn level_from_top(cumulative: &Profile, above: usize, spent: f64) -> usize {
-    let passed = cumulative[above..LEVELS - 1].iter().take_while(|sum| **sum <= spent);
+/// Index from the top, at least `above`, of the level at which the fraction `spent` of the energy is lost.
+fn next_level_from_top(cumulative: &AltitudeProfile, above: usize, energy_fraction: f64) -> usize {
+    let passed = cumulative[above..LEVELS - 1].iter().take_while(|sum| **sum <= energy_fraction);
     above + passed.count()
 }
 
@@ -173,14 +182,14 @@ fn triangular(word: u32) -> f64 {
     uniform(word) as f64 + uniform(word << 16) as f64 - 1.0
 }
 
-/// Where in (-1, 1) a triangular density has such a part above.
-fn down_a_triangle(part: f64) -> f64 {
-    let part = part.clamp(0.0, 1.0);
-    if part < 0.5 { 1.0 - math::sqrt(2.0 * part) } else { math::sqrt(2.0 * (1.0 - part)) - 1.0 }
+/// Quantile function of the triangular density on (-1, 1), from the top.
+fn inverse_triangular_cdf(fraction: f64) -> f64 {
+    let fraction = fraction.clamp(0.0, 1.0);
+    if fraction < 0.5 { 1.0 - math::sqrt(2.0 * fraction) } else { math::sqrt(2.0 * (1.0 - fraction)) - 1.0 }
 }
 
-/// Running sums of a profile from the highest level down, as shares of the whole.
-fn from_the_top(profile: &Profile) -> Profile {
+/// Cumulative sums of a profile from the highest level down, normalized.
+fn cumulative_from_top(profile: &AltitudeProfile) -> AltitudeProfile {
     let whole: f64 = profile.iter().sum();
     let mut sum = 0.0;
     std::array::from_fn(|from_top| {
@@ -189,18 +198,19 @@ fn from_the_top(profile: &Profile) -> Profile {
     })
 }
 
-/// Where an electron is on its way down.
+/// State of an electron along its track.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Path {
+pub(super) struct TrackState {
     altitude_km: Option<f64>,
-    offset_km: [f64; 2],
+    transverse_km: [f64; 2],
 }
 
-impl Path {
-    /// Down to an altitude along the field turned by `turn` (tangents): (2.24) read as a step along the unit vector of L + omega.
-    pub(super) fn descend(&mut self, altitude_km: f64, turn: [f64; 2]) {
+impl TrackState {
+    /// Moves down to an altitude along the field deflected by `turn` (tangents): (2.24) read as a step along the unit
+    /// vector of L + omega.
+    pub(super) fn advance(&mut self, altitude_km: f64, turn: [f64; 2]) {
         let descent = self.altitude_km.map_or(0.0, |before| before - altitude_km).max(0.0);
-        self.offset_km = std::array::from_fn(|i| self.offset_km[i] + descent * turn[i]);
+        self.transverse_km = std::array::from_fn(|i| self.transverse_km[i] + descent * turn[i]);
         self.altitude_km = Some(altitude_km);
     }
 
@@ -208,7 +218,7 @@ impl Path {
         Collision {
             level: level as u32,
             altitude_km: self.altitude_km.unwrap_or_else(|| level_altitude_km(level)) as f32,
-            offset_km: self.offset_km.map(|offset| offset as f32),
+            transverse_km: self.transverse_km.map(|offset| offset as f32),
         }
     }
 }
@@ -218,15 +228,15 @@ mod tests {
     use super::{super::Spectrum, *};
     use crate::physics::{atmosphere::atmosphere, precipitation::energy_grid};
 
-    fn falls(wobble: f64) -> (Deposition, Falls) {
+    fn sampler(deflection: f64) -> (Deposition, TrackSampler) {
         let deposition = Deposition::new(atmosphere(), Spectrum::Monoenergetic);
-        let falls = Falls::new(&deposition, wobble);
-        (deposition, falls)
+        let sampler = TrackSampler::new(&deposition, deflection);
+        (deposition, sampler)
     }
 
     #[test]
     fn the_mean_of_many_falls_is_the_profile() {
-        let (deposition, falls) = falls(0.02);
+        let (deposition, sampler) = sampler(0.02);
         let key = Key::new(3, "aurora");
         // Shot noise of 200,000 and 2,000,000 collisions over the 200 and 60 levels that matter: 2.5 and 0.4 %.
         for (energy_ev, tolerance) in [(1e3, 0.04), (1e4, 0.01)] {
@@ -234,10 +244,12 @@ mod tests {
             let mut histogram = [0.0; LEVELS];
             let particles = 20_000;
             for particle in 0..particles {
-                falls.fall(node, key, particle).for_each(|collision| histogram[collision.level as usize] += 1.0);
+                sampler
+                    .sample_track(node, key, particle)
+                    .for_each(|collision| histogram[collision.level as usize] += 1.0);
             }
             let collisions = particles as f64 * collision_count(node) as f64;
-            let profile = deposition.monoenergetic(node);
+            let profile = deposition.monoenergetic_profile(node);
             let whole: f64 = profile.iter().sum();
             let difference: f64 =
                 (0..LEVELS).map(|level| (histogram[level] / collisions - profile[level] / whole).abs()).sum();
@@ -247,20 +259,22 @@ mod tests {
 
     #[test]
     fn a_library_has_the_profile_for_its_mean() {
-        let (deposition, falls) = falls(0.02);
-        let library = FallLibrary::new(&falls, 40..=70, Key::new(3, "aurora"));
+        let (deposition, sampler) = sampler(0.02);
+        let library = TrackLibrary::new(&sampler, 40..=70, Key::new(3, "aurora"));
         for node in [40, 55, 70] {
             let mut histogram = [0.0; LEVELS];
-            for variant in 0..VARIANTS {
-                let fall = library.fall(node, variant);
-                assert_eq!(fall.len(), collision_count(node) as usize);
-                assert!(fall.windows(2).all(|pair| pair[1].level <= pair[0].level));
-                fall.iter().for_each(|collision| histogram[collision.level as usize] += 1.0);
+            for variant in 0..TRACKS_PER_ENERGY {
+                let track = library.track(node, variant);
+                assert_eq!(track.len(), collision_count(node) as usize);
+                assert!(track.windows(2).all(|pair| pair[1].level <= pair[0].level));
+                track.iter().for_each(|collision| histogram[collision.level as usize] += 1.0);
             }
-            // Each part of each share has one collision: no running sum is off by more than one of them.
-            let all = (VARIANTS * collision_count(node)) as f64;
+            // Each part of each fraction has one collision: no running sum is off by more than one of them.
+            let all = (TRACKS_PER_ENERGY * collision_count(node)) as f64;
             let mut sum = 0.0;
-            for (from_top, expected) in from_the_top(deposition.monoenergetic(node)).into_iter().enumerate() {
+            for (from_top, expected) in
+                cumulative_from_top(deposition.monoenergetic_profile(node)).into_iter().enumerate()
+            {
                 sum += histogram[LEVELS - 1 - from_top];
                 assert!(
                     (sum / all - expected).abs() <= 1.0001 / all,
@@ -268,30 +282,30 @@ mod tests {
                 );
             }
         }
-        assert_eq!(library.fall(0, 5), library.fall(40, 5));
-        assert_eq!(library.fall(96, VARIANTS + 1), library.fall(70, 1));
+        assert_eq!(library.track(0, 5), library.track(40, 5));
+        assert_eq!(library.track(96, TRACKS_PER_ENERGY + 1), library.track(70, 1));
     }
 
     #[test]
     fn altitudes_are_linear_between_levels() {
-        let (deposition, falls) = falls(0.0);
-        // 10 keV: between the levels 104 and 108 km, in quarters of a kilometre.
+        let (deposition, sampler) = sampler(0.0);
+        // 10 keV: between the levels 104 and 108 km, in quarters of a kilometer.
         let node = energy_grid::locate(10_001.0).0;
-        let profile = deposition.monoenergetic(node);
+        let profile = deposition.monoenergetic_profile(node);
         let whole: f64 = profile.iter().sum();
         let mut counts = [0.0; 16];
         for particle in 0..20_000 {
-            for collision in falls.fall(node, Key::new(1, "a"), particle) {
-                let place = (collision.altitude_km as f64 - 104.0) * 4.0;
-                if (0.0..16.0).contains(&place) {
-                    counts[place as usize] += 1.0 / 2e6;
+            for collision in sampler.sample_track(node, Key::new(1, "a"), particle) {
+                let quantile = (collision.altitude_km as f64 - 104.0) * 4.0;
+                if (0.0..16.0).contains(&quantile) {
+                    counts[quantile as usize] += 1.0 / 2e6;
                 }
                 assert!((collision.altitude_km as f64 - level_altitude_km(collision.level as usize)).abs() <= 1.0);
             }
         }
         for (i, count) in counts.iter().enumerate() {
-            let (level, part) = (24 + i / 4, (i % 4) as f64 * 0.25 + 0.125);
-            let expected = (profile[level] * (1.0 - part) + profile[level + 1] * part) / whole * 0.25;
+            let (level, fraction) = (24 + i / 4, (i % 4) as f64 * 0.25 + 0.125);
+            let expected = (profile[level] * (1.0 - fraction) + profile[level + 1] * fraction) / whole * 0.25;
             // 30,000 to 50,000 collisions each: 0.5 %.
             assert!((count / expected - 1.0).abs() < 0.03, "{i}: {count} for {expected}");
         }
@@ -299,16 +313,16 @@ mod tests {
 
     #[test]
     fn falls_go_down_and_wander_in_proportion() {
-        let (_, falls) = falls(0.02);
+        let (_, sampler) = sampler(0.02);
         let node = energy_grid::locate(10_001.0).0;
         assert_eq!(collision_count(node), 100);
         let (mut squares, particles) = ([0.0; 2], 2000);
         for particle in 0..particles {
-            let path: Vec<_> = falls.fall(node, Key::new(1, "a"), particle).collect();
+            let path: Vec<_> = sampler.sample_track(node, Key::new(1, "a"), particle).collect();
             // But for the triangular reach of a level.
             assert!(path.windows(2).all(|pair| pair[1].level <= pair[0].level));
-            assert_eq!(path[0].offset_km, [0.0; 2]);
-            let last = path[path.len() - 1].offset_km.map(f64::from);
+            assert_eq!(path[0].transverse_km, [0.0; 2]);
+            let last = path[path.len() - 1].transverse_km.map(f64::from);
             squares = std::array::from_fn(|i| squares[i] + last[i] * last[i] / particles as f64);
         }
         assert!(squares[0] > 0.01 && (squares[0] / squares[1] - 1.0).abs() < 0.3, "{squares:?}");

@@ -1,7 +1,8 @@
-//! The deposition of Fang et al. (2010), "Parameterization of monoenergetic electron impact ionization", GRL 37, L22106.
+//! Ionization profiles of Fang et al. (2010), "Parameterization of monoenergetic electron impact ionization", GRL 37,
+//! L22106.
 //!
-//! For electrons of one energy, isotropic over the downward hemisphere, along a vertical field. At auroral dips (75 degrees and more) the
-//! slant lowers a profile by less than half a kilometre.
+//! For monoenergetic electrons, isotropic over the downward hemisphere, along a vertical field. At auroral dip angles
+//! (75 degrees and more) the inclination lowers a profile by less than half a kilometer.
 
 use bansho_base::math;
 
@@ -22,13 +23,13 @@ const COEFFICIENTS: [[f64; 4]; 8] = [
 /// Column that scales y in equation (1): 6e-6 g cm^-2, in kg m^-2.
 const COLUMN_SCALE: f64 = 6e-5;
 
-/// What the deposition at an altitude takes from the air, whatever the energy.
+/// The terms of the parameterization that depend on the air only.
 #[derive(Clone, Copy, Debug)]
 pub struct AirLayer {
     /// ln (rho H / 6e-6 g cm^-2)^0.7, of equation (1): y = 2/E times that power, E in keV.
     ln_column: f64,
-    /// Ion pairs, m^-3 s^-1 per mW m^-2, where the whole energy is spent over a scale height.
-    pairs_per_share: f64,
+    /// Ion pairs, m^-3 s^-1 per mW m^-2, for f(y) = 1.
+    pairs_at_unit_dissipation: f64,
 }
 
 impl AirLayer {
@@ -37,20 +38,20 @@ impl AirLayer {
     pub fn new(air: &Air) -> Self {
         Self {
             ln_column: 0.7 * math::ln(air.density * air.scale_height / COLUMN_SCALE),
-            pairs_per_share: EV_PER_S_PER_MW / ION_PAIR_EV / air.scale_height,
+            pairs_at_unit_dissipation: EV_PER_S_PER_MW / ION_PAIR_EV / air.scale_height,
         }
     }
 }
 
-/// Deposition by electrons of one energy.
+/// Ionization by monoenergetic electrons.
 #[derive(Clone, Debug)]
-pub struct Monoenergetic {
+pub struct MonoenergeticBeam {
     ln_energy: f64,
     /// C_1 to C_8, equation (5).
     coefficients: [f64; 8],
 }
 
-impl Monoenergetic {
+impl MonoenergeticBeam {
     /// For electrons of `energy_ev`, valid from 100 eV to 1 MeV.
     #[must_use]
     pub fn new(energy_ev: f64) -> Self {
@@ -59,18 +60,18 @@ impl Monoenergetic {
         Self { ln_energy, coefficients: COEFFICIENTS.map(|row| math::exp(cubic(row))) }
     }
 
-    /// The share of the energy that is spent over a scale height, f(y) of equations (3) and (4), by the logarithm of y.
-    fn share(&self, ln_y: f64) -> f64 {
+    /// Normalized energy dissipation f(y) of equations (3) and (4), from ln y.
+    fn dissipation_fraction(&self, ln_y: f64) -> f64 {
         let [c1, c2, c3, c4, c5, c6, c7, c8] = self.coefficients;
         let term = |a, b, c, d| a * math::exp(b * ln_y - c * math::exp(d * ln_y));
         term(c1, c2, c3, c4) + term(c5, c6, c7, c8)
     }
 
-    /// Ion pairs made each second, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
+    /// Ionization rate, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
     #[must_use]
-    pub fn ionisation(&self, layer: &AirLayer) -> f64 {
+    pub fn ionization(&self, layer: &AirLayer) -> f64 {
         let ln_y = std::f64::consts::LN_2 - self.ln_energy + layer.ln_column;
-        self.share(ln_y) * layer.pairs_per_share
+        self.dissipation_fraction(ln_y) * layer.pairs_at_unit_dissipation
     }
 }
 
@@ -88,11 +89,11 @@ mod tests {
     fn profiles_are_those_of_the_reference() {
         let mut compared = 0;
         for (column, energy_ev) in [(1, 1e3), (2, 3e3), (3, 1e4), (4, 3e4)] {
-            let beam = Monoenergetic::new(energy_ev);
+            let beam = MonoenergeticBeam::new(energy_ev);
             for row in rows(include_str!("data/fang2010_profiles.csv")) {
                 // Below this the wing is 1e-6 of the peak and less.
                 if row[column] > 1e4 {
-                    let q = beam.ionisation(&AirLayer::new(&atmosphere().at(row[0])));
+                    let q = beam.ionization(&AirLayer::new(&atmosphere().at(row[0])));
                     assert!((q / row[column] - 1.0).abs() < 1e-3, "{energy_ev} eV, {} km: {q}", row[0]);
                     compared += 1;
                 }
@@ -104,9 +105,9 @@ mod tests {
     #[test]
     fn peaks_and_columns_are_those_of_the_reference() {
         for row in rows(include_str!("data/fang2010_peaks.csv")) {
-            let beam = Monoenergetic::new(row[0] * 1e3);
+            let beam = MonoenergeticBeam::new(row[0] * 1e3);
             let profile: Vec<f64> =
-                atmosphere().levels().iter().map(|air| beam.ionisation(&AirLayer::new(air))).collect();
+                atmosphere().levels().iter().map(|air| beam.ionization(&AirLayer::new(air))).collect();
             let peak = (0..LEVELS).max_by(|a, b| profile[*a].total_cmp(&profile[*b])).unwrap();
             assert!((level_altitude_km(peak) - row[1]).abs() < 0.6, "{} keV: {peak}", row[0]);
             assert!((profile[peak] / row[2] - 1.0).abs() < 0.01);

@@ -1,4 +1,4 @@
-//! The fall of the thesis (section 2.4.1): electrons strike hard spheres, whatever their energy, until their energy is spent.
+//! Electron tracks of the thesis (section 2.4.1): collisions with hard spheres of one radius for all energies.
 
 use bansho_base::{
     math,
@@ -7,83 +7,87 @@ use bansho_base::{
 
 use super::{
     COLLISION_EV, EV_PER_S_PER_MW, ION_PAIR_EV,
-    deposition::Profile,
-    electron_track::{Collision, Path, collision_count},
+    deposition::AltitudeProfile,
+    electron_track::{Collision, TrackState, collision_count},
     energy_grid::{NODES, node_energy_ev},
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, level_altitude_km};
 
 const COLLISION: Purpose = Purpose::named("aurora hard-sphere collision");
 
-/// Radius of the spheres, m, that stops electrons of 10 keV near 105 km; the thesis does not give one. No radius serves all energies:
-/// with it 1 keV stops at 129 km, not 158 km.
-pub const DEFAULT_RADIUS: f64 = 3.2e-11;
+/// Radius of the spheres, m, that stops 10 keV electrons near 105 km; the thesis gives none. No radius fits all
+/// energies: with this one 1 keV electrons stop at 129 km instead of 158 km.
+pub const DEFAULT_RADIUS_M: f64 = 3.2e-11;
 
 /// An atmosphere of hard spheres.
 #[derive(Clone, Debug)]
-pub struct HardSphere {
-    /// Number of spheres above each level, from the top down, m^-2.
+pub struct HardSphereAtmosphere {
+    /// Column density of spheres above each level, from the top down, m^-2.
     columns: Vec<f64>,
     /// pi r^2, m^2.
     cross_section: f64,
-    wobble: f64,
+    deflection: f64,
 }
 
-impl HardSphere {
-    /// Spheres of `radius` in m, in number those of N2, O2 and O; `wobble` as for [`Falls`](super::electron_track::Falls::new).
+impl HardSphereAtmosphere {
+    /// Spheres of `radius` in m with the number density of N2, O2 and O; `deflection` as for
+    /// [`TrackSampler`](super::electron_track::TrackSampler::new).
     #[must_use]
-    pub fn new(air: &Atmosphere, radius: f64, wobble: f64) -> Self {
+    pub fn new(air: &Atmosphere, radius: f64, deflection: f64) -> Self {
         let mut above = None;
         let mut column = 0.0;
         let columns = air.levels().iter().rev().map(|air| {
             let density = air.number_density();
-            // Above the topmost level the air falls off with its scale height.
+            // Above the topmost level the density decreases with its scale height.
             column += above.map_or(density * air.scale_height, |above| LEVEL_SPACING * 0.5 * (above + density));
             above = Some(density);
             column
         });
-        Self { columns: columns.collect(), cross_section: std::f64::consts::PI * radius * radius, wobble }
+        Self { columns: columns.collect(), cross_section: std::f64::consts::PI * radius * radius, deflection }
     }
 
-    /// The collisions of particle number `particle`, until its energy is spent or it leaves the levels below.
+    /// The collisions of particle number `particle`, until its energy is lost or it leaves the levels.
     ///
-    /// (2.22) is read as `1 - exp(-n pi r^2 |L|)`, which stays below 1 in dense air; then the column to the next collision is exponential
-    /// and drawn at once, without steps.
-    pub fn fall(&self, energy_ev: f64, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
-        let mut path = Path::default();
+    /// (2.22) is read as `1 - exp(-n pi r^2 |L|)`, which stays below 1 in dense air. The column density to the next
+    /// collision is then exponentially distributed and is sampled directly, without steps.
+    pub fn track(&self, energy_ev: f64, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
+        let mut path = TrackState::default();
         let (mut column, mut from_top) = (0.0, 0);
         (0..(energy_ev / COLLISION_EV).round().max(1.0) as u32).map_while(move |number| {
             let words = key.words(particle, number, COLLISION);
-            let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.wobble);
+            let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
             let slant = math::sqrt(1.0 + turn[0] * turn[0] + turn[1] * turn[1]);
             column -= math::ln_1p(-uniform_f64(words[0], words[1])) / (self.cross_section * slant);
             while from_top < LEVELS && self.columns[from_top] < column {
                 from_top += 1;
             }
             let altitude_km = self.altitude_km(from_top, column)?;
-            path.descend(altitude_km, turn);
+            path.advance(altitude_km, turn);
             Some(path.collision((altitude_km - level_altitude_km(0)).round() as usize))
         })
     }
 
-    /// Ion pairs, m^-3 s^-1 per mW m^-2, for each energy of the grid and each level of the same air: the mean of all falls without wobble.
+    /// Ionization rate, m^-3 s^-1 per mW m^-2, for each energy node and level: the expected value over all undeflected
+    /// tracks.
     ///
-    /// An electron that has not struck its last sphere yet goes on; how many it strikes down to a column is a Poisson number.
+    /// The number of collisions above a column density is Poisson distributed; an electron contributes while it has
+    /// collisions left.
     #[must_use]
-    pub fn profiles(&self, air: &Atmosphere) -> Vec<Profile> {
+    pub fn profiles(&self, air: &Atmosphere) -> Vec<AltitudeProfile> {
         let counts: [u32; NODES] = std::array::from_fn(collision_count);
         let mut profiles = vec![[0.0; LEVELS]; NODES];
         for (level, air) in air.levels().iter().enumerate() {
-            let falling = fewer_than(&counts, self.columns[LEVELS - 1 - level] * self.cross_section);
+            let still_colliding = poisson_below(&counts, self.columns[LEVELS - 1 - level] * self.cross_section);
             let pairs_per_m = air.number_density() * self.cross_section * (COLLISION_EV / ION_PAIR_EV);
-            for (node, share) in falling.into_iter().enumerate() {
-                profiles[node][level] = EV_PER_S_PER_MW / node_energy_ev(node) * pairs_per_m * share;
+            for (node, fraction) in still_colliding.into_iter().enumerate() {
+                profiles[node][level] = EV_PER_S_PER_MW / node_energy_ev(node) * pairs_per_m * fraction;
             }
         }
         profiles
     }
 
-    /// Where the column is reached, between the level `from_top` and the one above; none below the lowest.
+    /// Altitude at which the column density is reached, between the level `from_top` and the one above; `None` below
+    /// the lowest level.
     fn altitude_km(&self, from_top: usize, column: f64) -> Option<f64> {
         let low = *self.columns.get(from_top)?;
         let low_km = level_altitude_km(LEVELS - 1 - from_top);
@@ -93,8 +97,8 @@ impl HardSphere {
     }
 }
 
-/// Probabilities that a Poisson number of that mean is below each of the counts, which ascend.
-fn fewer_than(counts: &[u32; NODES], mean: f64) -> [f64; NODES] {
+/// Probabilities that a Poisson variable of that mean is below each of the ascending counts.
+fn poisson_below(counts: &[u32; NODES], mean: f64) -> [f64; NODES] {
     let (mut number, mut log_probability, mut sum) = (0, -mean, 0.0);
     counts.map(|count| {
         while number < count {
@@ -113,9 +117,9 @@ mod tests {
 
     /// Mean altitude of the last collision, km.
     fn end_km(energy_ev: f64) -> f64 {
-        let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.02);
+        let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.02);
         let key = Key::new(1, "aurora");
-        let ends = (0..500).filter_map(|particle| spheres.fall(energy_ev, key, particle).last());
+        let ends = (0..500).filter_map(|particle| spheres.track(energy_ev, key, particle).last());
         ends.map(|collision| collision.altitude_km as f64).sum::<f64>() / 500.0
     }
 
@@ -127,20 +131,20 @@ mod tests {
 
     #[test]
     fn profiles_are_the_mean_of_many_falls() {
-        let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
+        let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0);
         let profiles = spheres.profiles(atmosphere());
         for node in [32, 64] {
-            let falls = 4000;
+            let tracks = 4000;
             let mut histogram = [0.0; LEVELS / 4 + 1];
-            for particle in 0..falls {
-                for collision in spheres.fall(node_energy_ev(node), Key::new(4, "aurora"), particle) {
-                    histogram[collision.level as usize / 4] += 1.0 / (falls * u64::from(collision_count(node))) as f64;
+            for particle in 0..tracks {
+                for collision in spheres.track(node_energy_ev(node), Key::new(4, "aurora"), particle) {
+                    histogram[collision.level as usize / 4] += 1.0 / (tracks * u64::from(collision_count(node))) as f64;
                 }
             }
             let whole: f64 = profiles[node].iter().sum();
             let expected = profiles[node].chunks(4).map(|levels| levels.iter().sum::<f64>() / whole);
             let difference: f64 = expected.zip(histogram).map(|(expected, found)| (expected - found).abs()).sum();
-            // Shot noise, and levels taken as a kilometre high.
+            // Shot noise, and levels taken as a kilometer high.
             assert!(difference < 0.05, "{node}: {difference}");
             // All of the energy that collisions take, but for what electrons of 1 keV leave above 800 km.
             let pairs = whole * LEVEL_SPACING * ION_PAIR_EV / EV_PER_S_PER_MW;
@@ -150,12 +154,12 @@ mod tests {
 
     #[test]
     fn collisions_are_poisson_in_the_column() {
-        let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
+        let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0);
         // Columns above 120 km hold on average column * pi r^2 collisions.
         let expected = spheres.columns[LEVELS - 1 - 40] * spheres.cross_section;
         let key = Key::new(2, "aurora");
         let counts = (0..4000).map(|particle| {
-            spheres.fall(1e5, key, particle).filter(|collision| collision.altitude_km > 120.0).count() as f64
+            spheres.track(1e5, key, particle).filter(|collision| collision.altitude_km > 120.0).count() as f64
         });
         let (sum, squares) = counts.fold((0.0, 0.0), |(sum, squares), count| (sum + count, squares + count * count));
         let (mean, variance) = (sum / 4000.0, squares / 4000.0 - sum * sum / 16e6);
@@ -165,9 +169,9 @@ mod tests {
 
     #[test]
     fn falls_end_above_the_ground_and_go_down() {
-        let spheres = HardSphere::new(atmosphere(), 1e-12, 0.1);
+        let spheres = HardSphereAtmosphere::new(atmosphere(), 1e-12, 0.1);
         for particle in 0..200 {
-            let path: Vec<_> = spheres.fall(1e6, Key::new(1, "b"), particle).collect();
+            let path: Vec<_> = spheres.track(1e6, Key::new(1, "b"), particle).collect();
             assert!(path.windows(2).all(|pair| pair[1].altitude_km <= pair[0].altitude_km));
             assert!(path.iter().all(|collision| (collision.level as usize) < LEVELS && collision.altitude_km >= 80.0));
         }

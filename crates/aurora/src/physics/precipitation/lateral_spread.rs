@@ -1,78 +1,81 @@
-//! How far collisions wander from the field line of their electron.
+//! Lateral spread of an electron's collisions about its field line.
 
 use std::sync::OnceLock;
 
 use bansho_base::{host::once::get_or_make, math, math::random::Key};
 
+use super::TrackModel;
 use super::{
     Deposition,
-    electron_track::{Collision, Falls, collision_count},
+    electron_track::{Collision, TrackSampler, collision_count},
     energy_grid::{self, NODES, node_energy_ev},
-    hard_sphere::{DEFAULT_RADIUS, HardSphere},
+    hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
     spectrum::ARC,
 };
-use crate::{physics::atmosphere::atmosphere, render::FallModel};
+use crate::physics::atmosphere::atmosphere;
 use rayon::prelude::*;
 
-/// Collisions of each energy that are looked at, about, and the fewest falls: a few long ones have much of the wandering.
-const COLLISIONS: u32 = 2000;
-const FEWEST_FALLS: u32 = 96;
-/// Falls are followed at every so many nodes of the grid of energies: from one to the next they differ little.
+/// Approximate number of sampled collisions per energy and the minimum number of tracks: a few long tracks dominate the
+/// variance.
+const COLLISIONS_PER_ENERGY: u32 = 2000;
+const MIN_TRACKS: u32 = 96;
+/// Tracks are sampled at every fourth energy node; the spread varies slowly between them.
 const STRIDE: usize = 4;
 const _: () = assert!((NODES - 1).is_multiple_of(STRIDE));
 
-/// The wandering of measured falls, and of those through hard spheres. Both go straight: what turns them adds to nothing but this.
-static FANG: OnceLock<ByEnergy> = OnceLock::new();
-static HARD_SPHERE: OnceLock<ByEnergy> = OnceLock::new();
+/// Spread of Fang and of hard-sphere tracks, for straight tracks: deflections change their altitudes only to second
+/// order.
+static FANG: OnceLock<SpreadByEnergy> = OnceLock::new();
+static HARD_SPHERE: OnceLock<SpreadByEnergy> = OnceLock::new();
 
-fn by_energy(fall: FallModel) -> &'static ByEnergy {
-    match fall {
-        FallModel::Fang => get_or_make(&FANG, || {
-            // Falls are those of one energy each, whatever the spectrum.
-            let falls = Falls::new(&Deposition::new(atmosphere(), ARC), 0.0);
-            ByEnergy::new(|node, key, particle| altitudes_km(falls.fall(node, key, particle)))
+fn by_energy(model: TrackModel) -> &'static SpreadByEnergy {
+    match model {
+        TrackModel::Fang => get_or_make(&FANG, || {
+            // Tracks are monoenergetic, so the spectrum does not matter.
+            let tracks = TrackSampler::new(&Deposition::new(atmosphere(), ARC), 0.0);
+            SpreadByEnergy::new(|node, key, particle| altitudes_km(tracks.sample_track(node, key, particle)))
         }),
-        FallModel::HardSphere => get_or_make(&HARD_SPHERE, || {
-            let spheres = HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.0);
-            ByEnergy::new(|node, key, particle| altitudes_km(spheres.fall(node_energy_ev(node), key, particle)))
+        TrackModel::HardSphereAtmosphere => get_or_make(&HARD_SPHERE, || {
+            let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0);
+            SpreadByEnergy::new(|node, key, particle| altitudes_km(spheres.track(node_energy_ev(node), key, particle)))
         }),
     }
 }
 
-/// Root mean square distance of the collisions of electrons of an energy from their field line, along one direction, km, where every
-/// collision turns them by a tangent of rms `wobble`.
-pub(crate) fn wander_km(fall: FallModel, wobble: f64, energy_ev: f64) -> f64 {
-    if wobble <= 0.0 { 0.0 } else { wobble * by_energy(fall).at(energy_ev) }
+/// RMS distance of the collisions of electrons of an energy from their field line, per direction, km, where each
+/// collision deflects by an RMS tangent of `deflection`.
+pub(crate) fn lateral_spread_km(model: TrackModel, deflection: f64, energy_ev: f64) -> f64 {
+    if deflection <= 0.0 { 0.0 } else { deflection * by_energy(model).at(energy_ev) }
 }
 
-/// Root mean square distances for a wobble of 1, km, at every [`STRIDE`]th node: they are in proportion to it.
-struct ByEnergy(Vec<f64>);
+/// RMS distance for a deflection of 1, km, at every [`STRIDE`]th node; it is proportional to the deflection.
+struct SpreadByEnergy(Vec<f64>);
 
-impl ByEnergy {
-    fn new(fall: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
+impl SpreadByEnergy {
+    fn new(model: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
         let key = Key::new(0, "aurora wander");
         let of_node = |node: usize| {
-            let falls = u64::from(COLLISIONS.div_ceil(collision_count(node)).max(FEWEST_FALLS));
-            let sum = (0..falls).map(|particle| variance_km2(&fall(node, key, particle))).sum::<f64>();
-            math::sqrt(sum / falls as f64)
+            let tracks = u64::from(COLLISIONS_PER_ENERGY.div_ceil(collision_count(node)).max(MIN_TRACKS));
+            let sum = (0..tracks).map(|particle| variance_km2(&model(node, key, particle))).sum::<f64>();
+            math::sqrt(sum / tracks as f64)
         };
         Self((0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect())
     }
 
     fn at(&self, energy_ev: f64) -> f64 {
-        let (node, part) = energy_grid::locate(energy_ev);
-        let place = (node as f64 + part) / STRIDE as f64;
-        let below = (place as usize).min(self.0.len() - 2);
-        math::lerp(self.0[below], self.0[below + 1], place - below as f64)
+        let (node, fraction) = energy_grid::locate(energy_ev);
+        let coordinate = (node as f64 + fraction) / STRIDE as f64;
+        let below = (coordinate as usize).min(self.0.len() - 2);
+        math::lerp(self.0[below], self.0[below + 1], coordinate - below as f64)
     }
 }
 
-fn altitudes_km(fall: impl Iterator<Item = Collision>) -> Vec<f64> {
-    fall.map(|collision| f64::from(collision.altitude_km)).collect()
+fn altitudes_km(model: impl Iterator<Item = Collision>) -> Vec<f64> {
+    model.map(|collision| f64::from(collision.altitude_km)).collect()
 }
 
-/// Mean square distance from the field line, along one direction, of collisions at those altitudes in km (from the first on), each of
-/// which turns the electron by a tangent of rms 1.
+/// Mean square distance from the field line, per direction, of collisions at these altitudes in km (highest first),
+/// each with an RMS deflection tangent of 1.
 fn variance_km2(altitudes_km: &[f64]) -> f64 {
     let (mut variance, mut sum) = (0.0, 0.0);
     for pair in altitudes_km.windows(2) {
@@ -99,28 +102,32 @@ mod tests {
     #[test]
     fn it_is_that_of_the_falls_that_are_drawn_at_every_energy() {
         let key = Key::new(4, "aurora");
-        for fall in [FallModel::Fang, FallModel::HardSphere] {
-            let emission = fall.emission(ARC);
+        for model in [TrackModel::Fang, TrackModel::HardSphereAtmosphere] {
+            let emission = model.emission(ARC);
             for energy_ev in [600.0, 5000.0, 40_000.0] {
                 let node = locate(energy_ev).0;
                 let (mut sum, mut count) = (0.0, 0.0);
                 let mut add = |collision: Collision| {
-                    let offset_km = f64::from(collision.offset_km[0]);
+                    let offset_km = f64::from(collision.transverse_km[0]);
                     sum += offset_km * offset_km;
                     count += 1.0;
                 };
                 for particle in 100..800 {
-                    match fall {
-                        FallModel::Fang => {
-                            Falls::new(emission.deposition(), 0.05).fall(node, key, particle).for_each(&mut add);
+                    match model {
+                        TrackModel::Fang => {
+                            TrackSampler::new(emission.deposition(), 0.05)
+                                .sample_track(node, key, particle)
+                                .for_each(&mut add);
                         }
-                        FallModel::HardSphere => HardSphere::new(atmosphere(), DEFAULT_RADIUS, 0.05)
-                            .fall(node_energy_ev(node), key, particle)
-                            .for_each(&mut add),
+                        TrackModel::HardSphereAtmosphere => {
+                            HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.05)
+                                .track(node_energy_ev(node), key, particle)
+                                .for_each(&mut add)
+                        }
                     }
                 }
-                let ratio = wander_km(fall, 0.05, node_energy_ev(node)) / math::sqrt(sum / count);
-                assert!((0.75..1.35).contains(&ratio), "{fall:?} {energy_ev}: {ratio}");
+                let ratio = lateral_spread_km(model, 0.05, node_energy_ev(node)) / math::sqrt(sum / count);
+                assert!((0.75..1.35).contains(&ratio), "{model:?} {energy_ev}: {ratio}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Sources of light, sorted by where their field lines are on the chart.
+//! Binning: light sources by longitude and distance of their field lines on the chart.
 
 pub(crate) mod source_bins;
 pub(crate) mod sources;

@@ -1,8 +1,8 @@
-//! Where the precipitation comes down, by longitude and distance from the observer's own field line.
+//! Bins of precipitation by longitude and distance from the observer's own field line.
 //!
-//! Every source is a small patch with a smooth edge, `(1 - r^2)^2` in each direction: broad enough for the chart's
-//! cells, so that none is ever seen alone. Sources are sorted into strips of columns, so that no two threads share a
-//! sum and every sum has one order.
+//! Every source is a patch with the separable kernel `(1 - r^2)^2`, wider than a chart cell so that single sources are
+//! not visible. Sources are sorted into strips of columns: each strip is summed by one thread in a fixed order, so
+//! results do not depend on the number of threads.
 
 use std::{f64::consts::LN_2, ops::Range};
 
@@ -14,51 +14,50 @@ use bansho_base::math::{
 use crate::render::{
     integrate::columns::ENTRY_PER_STEP,
     project::{
-        chart::{Chart, Finder, STRIP},
+        chart::{Chart, ChartProjection, STRIP_COLUMNS},
         field_lines::FieldLines,
-        visible_rows::ShownRows,
+        visible_rows::VisibleRowTest,
     },
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Sources that a task of the thread pool sorts.
+/// Sources per task.
 const TASK: usize = 4096;
-/// Altitude of the light whose bins are told apart, km: that of lower edges, which are several km high.
+/// Altitude for the width of bins, km: that of the lower border, the sharpest feature.
 const SCALE_KM: f64 = 100.0;
-/// By how much the altitude of a line of sight changes there from one far bin to the next, km; more only where a row is
-/// higher than that.
+/// Change of the altitude on a line of sight between neighboring far bins, km; more only where a chart row is taller.
 const STEP_KM: f64 = 1.0;
-/// Near bins within the reach of a patch, where each takes up as many rows of the chart as these are. Wider ones would blur the sides of
-/// thin sheets near the magnetic zenith.
+/// Near bins per kernel support, and the limits of their width in chart rows. Wider bins would blur the edges of thin
+/// sheets near the magnetic zenith.
 const BINS_PER_REACH: f64 = 5.0;
 const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
-/// Distances beyond this lie behind the horizon, km.
-const FARTHEST_KM: f64 = 3000.0;
-/// Least reach of a patch in cells, so that its sum does not depend on where between the cells it lies.
-const LEAST_CELLS: f32 = 1.6;
-/// Widths of a near bin that smoothed tables spread its light over at most: they reach two entries far, each less than twice as wide as
-/// asked for.
-const BLURRED_BINS: f32 = 4.0 * ENTRY_PER_STEP[1];
-/// `(1 - r^2)^2` has this integral over (-1, 1), inverted.
+/// Sources farther than this are below the horizon, km.
+const MAX_DISTANCE_KM: f64 = 3000.0;
+/// Minimum kernel support in cells, so that the sum does not depend on the subcell position.
+const MIN_REACH_CELLS: f32 = 1.6;
+/// Maximum width, in near bins, over which prefiltered tables spread a bin's light: their filter spans two entries,
+/// each less than twice as wide as requested.
+const SMOOTHING_BINS: f32 = 4.0 * ENTRY_PER_STEP[1];
+/// Normalization: one over the integral of `(1 - r^2)^2` over (-1, 1).
 const NORM: f32 = 15.0 / 16.0;
 
 /// Precipitation about one field line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Source {
-    /// The line's place across the field, km.
+pub(crate) struct FieldLineSource {
+    /// Position in the plane perpendicular to the field, km.
     pub(crate) across: [f32; 2],
-    /// How far the patch reaches, km: its standard deviation times [`REACH`].
+    /// Half-width of the kernel's support, km: standard deviation times [`REACH`].
     pub(crate) reach: f32,
-    /// Place of the electrons' energy among the nodes of the grid of energies.
-    pub(crate) node: f32,
+    /// Fractional index of the electron energy in the energy grid.
+    pub(crate) energy_node: f32,
     /// Power times the cosine to the vertical, 1000 W: for green, red and prompt light.
     pub(crate) power: [f32; 3],
-    /// What its random falls go by: the particle's birth or the cell's place, whatever else shines.
-    pub(crate) key: u32,
+    /// Random-number counter of its electron tracks: the particle's id or the cell's index.
+    pub(crate) random_key: u32,
 }
 
-impl Source {
+impl FieldLineSource {
     /// Distance from the observer's own field line, km.
     #[inline(always)]
     pub(crate) fn distance(&self) -> f32 {
@@ -67,201 +66,202 @@ impl Source {
     }
 }
 
-/// Reach of a patch for a standard deviation of 1.
+/// Half-width of the kernel's support for a standard deviation of 1.
 pub(crate) const REACH: f32 = 2.645_751_3;
 
-/// What the bins of a footprint hold: power for green, red and prompt light in 1000 W per km of width, and the sum of
-/// all times the node of their energy.
+/// Contents of a bin: power for green, red and prompt light in 1000 W per km of width, and their sum times the energy
+/// node.
 pub(crate) type Bin = [f32; 4];
 
-/// The sources of a picture, sorted by strips of so many columns of the chart.
-pub(crate) struct Footprint<'a> {
-    sources: &'a [Source],
-    /// What each of the tasks has sorted, in the order of the sources.
-    parts: Vec<Sorted>,
-    bins: Bins,
+/// The sources of a picture, sorted into strips of chart columns.
+pub(crate) struct SourceBins<'a> {
+    sources: &'a [FieldLineSource],
+    /// Output of each sorting task, in the order of the sources.
+    chunks: Vec<SortedSources>,
+    bins: DistanceBins,
 }
 
-/// Some of the sources, sorted by strips.
-struct Sorted {
-    /// Index of the first entry of every strip, and of the end.
+/// Part of the sources, sorted by strips.
+struct SortedSources {
+    /// Start index of each strip, and the total.
     starts: Vec<u32>,
-    entries: Vec<Entry>,
+    entries: Vec<StripEntry>,
 }
 
-/// A source that shows in a strip.
+/// A source that overlaps a strip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Entry {
-    /// Number of the source.
+pub(crate) struct StripEntry {
+    /// Index of the source.
     pub(crate) source: u32,
-    /// The first column of the strip that it may reach, and the one after the last.
+    /// First column of the strip within its support, and one past the last.
     columns: [u16; 2],
 }
 
-impl Entry {
-    /// The columns of the strip that it may reach.
+impl StripEntry {
+    /// Columns of the strip within its support.
     #[inline(always)]
     pub(crate) fn columns(&self) -> Range<usize> {
         self.columns[0] as usize..self.columns[1] as usize
     }
 }
 
-/// Columns that a source reaches: the first, which may lie before or behind the chart, and how many.
+/// Columns within a source's support: the first, which may be outside the chart, and their number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Span {
+struct ColumnSpan {
     first: i32,
     count: i32,
 }
 
-/// Bins of distance: of one width about the observer's own field line, from there on in proportion to the distance, so
-/// that from each to the next the altitude of a line of sight changes alike.
+/// Distance bins: of constant width near the observer's field line, then proportional to the distance, so that the
+/// altitude on a line of sight changes by a constant step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bins {
+pub(crate) struct DistanceBins {
     /// Width of near bins, km, and its inverse.
     width: f64,
     per_width: f64,
-    /// How far they go, km, and how many there are to there.
-    pub(crate) near_to: f64,
+    /// Distance at which far bins start, km, and the number of near bins.
+    pub(crate) near_limit_km: f64,
     near: f64,
-    /// Width of far bins for their distance, and how many there are from a distance to twice as far.
-    share: f64,
+    /// Width of far bins divided by their distance, and far bins per octave of distance.
+    relative_width: f64,
     per_octave: f64,
-    /// Place at which far bins would be at 1 km.
-    far_zero: f64,
-    /// How many there are.
+    /// Bin coordinate that far bins would have at 1 km.
+    far_offset: f64,
+    /// Number of bins.
     pub(crate) count: usize,
 }
 
-impl Bins {
+impl DistanceBins {
     /// Bins for patches of a standard deviation in km or more, on a chart with rows of `step` radians.
     pub(super) fn new(spread_km: f64, step: f64) -> Self {
         let row = step * SCALE_KM;
         let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(ROWS_PER_BIN[0] * row, ROWS_PER_BIN[1] * row);
-        let share = (STEP_KM / SCALE_KM).max(2.0 * step);
-        let near_to = (width / share).min(FARTHEST_KM);
-        let near = near_to / width;
-        let count = (near + math::ln(FARTHEST_KM / near_to) / share).ceil().max(1.0) as usize;
-        let per_octave = LN_2 / share;
-        let far_zero = near - per_octave * math::log2(near_to);
-        Self { width, per_width: 1.0 / width, near_to, near, share, per_octave, far_zero, count }
+        let relative_width = (STEP_KM / SCALE_KM).max(2.0 * step);
+        let near_limit_km = (width / relative_width).min(MAX_DISTANCE_KM);
+        let near = near_limit_km / width;
+        let count = (near + math::ln(MAX_DISTANCE_KM / near_limit_km) / relative_width).ceil().max(1.0) as usize;
+        let per_octave = LN_2 / relative_width;
+        let far_offset = near - per_octave * math::log2(near_limit_km);
+        Self { width, per_width: 1.0 / width, near_limit_km, near, relative_width, per_octave, far_offset, count }
     }
 
     /// Width of a bin at a distance, km.
     #[inline(always)]
-    fn width(&self, distance: f32) -> f32 {
-        (self.share as f32 * distance).max(self.width as f32)
+    fn bin_width(&self, distance: f32) -> f32 {
+        (self.relative_width as f32 * distance).max(self.width as f32)
     }
 
-    /// Place of a distance among the bins; 0 is the nearer edge of the first.
+    /// Fractional bin coordinate of a distance; 0 is the near edge of the first bin.
     #[inline(always)]
-    fn place(&self, distance: f32) -> f32 {
-        let far = approximations::log2(distance).fma(self.per_octave as f32, self.far_zero as f32);
-        if distance < self.near_to as f32 { distance * self.per_width as f32 } else { far }
+    fn coordinate(&self, distance: f32) -> f32 {
+        let far = approximations::log2(distance).fma(self.per_octave as f32, self.far_offset as f32);
+        if distance < self.near_limit_km as f32 { distance * self.per_width as f32 } else { far }
     }
 
-    /// Least reach of a patch along a meridian at a distance, km.
+    /// Minimum kernel support along a meridian at a distance, km.
     #[inline(always)]
-    pub(crate) fn least_reach(&self, distance: f32) -> f32 {
-        LEAST_CELLS * self.width(distance)
+    pub(crate) fn min_reach(&self, distance: f32) -> f32 {
+        MIN_REACH_CELLS * self.bin_width(distance)
     }
 
-    /// How far smoothed tables spread the light of a bin at a distance along its meridian, km.
+    /// Distance over which prefiltered tables spread the light of a bin along its meridian, km.
     #[inline(always)]
-    pub(crate) fn blurred_km(&self, distance: f32) -> f32 {
-        if distance < self.near_to as f32 { BLURRED_BINS * self.width as f32 } else { 0.0 }
+    pub(crate) fn smoothing_km(&self, distance: f32) -> f32 {
+        if distance < self.near_limit_km as f32 { SMOOTHING_BINS * self.width as f32 } else { 0.0 }
     }
 
-    /// Distance of a bin's middle, and its width, km.
+    /// Center and width of a bin, km.
     pub(crate) fn distance(&self, bin: usize) -> [f64; 2] {
-        let place = bin as f64 + 0.5;
-        if place < self.near {
-            return [place * self.width, self.width];
+        let coordinate = bin as f64 + 0.5;
+        if coordinate < self.near {
+            return [coordinate * self.width, self.width];
         }
-        let distance = self.near_to * math::exp((place - self.near) * self.share);
-        [distance, self.share * distance]
+        let distance = self.near_limit_km * math::exp((coordinate - self.near) * self.relative_width);
+        [distance, self.relative_width * distance]
     }
 }
 
-/// One strip's sums: bins of one column after those of another.
+/// Bins of one strip, column by column.
 #[derive(Default)]
-pub(crate) struct StripSums {
+pub(crate) struct StripBins {
     bins: Vec<Bin>,
-    /// First and last filled bin of each column, and one past it.
-    filled: [[usize; 2]; STRIP],
+    /// First non-empty bin of each column, and one past the last.
+    filled: [[usize; 2]; STRIP_COLUMNS],
 }
 
-impl StripSums {
-    /// The filled stretch of a column: number of its first bin, and the bins.
-    pub(crate) fn column(&self, column: usize, bins: &Bins) -> (usize, &[Bin]) {
+impl StripBins {
+    /// The non-empty bins of a column: index of the first, and the bins.
+    pub(crate) fn column(&self, column: usize, bins: &DistanceBins) -> (usize, &[Bin]) {
         let [first, end] = self.filled[column];
         (first, &self.bins[column * bins.count..][first..end.max(first)])
     }
 }
 
-impl<'a> Footprint<'a> {
-    /// Sorts sources, of this standard deviation in km or more, by strips of so many columns of a chart. What lies above or below all of
-    /// its rows is left out.
+impl<'a> SourceBins<'a> {
+    /// Sorts sources with at least this standard deviation in km into strips of chart columns. Sources outside the
+    /// visible rows are skipped.
     pub(crate) fn new(
-        sources: &'a [Source],
+        sources: &'a [FieldLineSource],
         (chart, strip): (&Chart, usize),
         field: &FieldLines,
         spread_km: f64,
     ) -> Self {
-        let (finder, level) = (chart.finder(), Level::new());
-        let bins = Bins::new(spread_km, chart.row_step);
-        let shown = ShownRows::new(chart, field);
-        let sorted = |(task, sources): (usize, &[Source])| {
-            let mut spans = vec![Span::default(); sources.len()];
-            dispatch!(level, _simd => find_spans(sources, chart, &finder, (&shown, &bins), &mut spans));
-            Sorted::new(&spans, task * TASK, chart, strip)
+        let (projection, level) = (chart.projection(), Level::new());
+        let bins = DistanceBins::new(spread_km, chart.row_step);
+        let shown = VisibleRowTest::new(chart, field);
+        let sorted = |(task, sources): (usize, &[FieldLineSource])| {
+            let mut spans = vec![ColumnSpan::default(); sources.len()];
+            dispatch!(level, _simd => find_column_spans(sources, chart, &projection, (&shown, &bins), &mut spans));
+            SortedSources::new(&spans, task * TASK, chart, strip)
         };
-        let parts = sources.par_chunks(TASK).enumerate().map(sorted).collect();
-        Self { sources, parts, bins }
+        let chunks = sources.par_chunks(TASK).enumerate().map(sorted).collect();
+        Self { sources, chunks, bins }
     }
 
     /// Bins of distance.
-    pub(crate) fn bins(&self) -> &Bins {
+    pub(crate) fn bins(&self) -> &DistanceBins {
         &self.bins
     }
 
-    /// What shows in a strip, in the order of the sources, part by part.
-    pub(crate) fn entries(&self, strip: usize) -> impl Iterator<Item = &[Entry]> {
-        self.parts.iter().map(move |part| &part.entries[part.starts[strip] as usize..part.starts[strip + 1] as usize])
+    /// Sources of a strip, in their original order, chunk by chunk.
+    pub(crate) fn entries(&self, strip: usize) -> impl Iterator<Item = &[StripEntry]> {
+        self.chunks.iter().map(move |part| &part.entries[part.starts[strip] as usize..part.starts[strip + 1] as usize])
     }
 
-    /// How many sources show in a strip.
+    /// Number of sources of a strip.
     pub(crate) fn count(&self, strip: usize) -> usize {
-        self.entries(strip).map(<[Entry]>::len).sum()
+        self.entries(strip).map(<[StripEntry]>::len).sum()
     }
 
-    /// A source by its number.
+    /// A source by its index.
     #[inline(always)]
-    pub(crate) fn source(&self, number: u32) -> &Source {
+    pub(crate) fn source(&self, number: u32) -> &FieldLineSource {
         &self.sources[number as usize]
     }
 
-    /// Adds up the sources of a strip whose columns have these cosines and sines.
+    /// Accumulates the sources of a strip whose columns have these cosines and sines.
     #[inline(always)]
-    pub(crate) fn sum<S: Simd>(
+    pub(crate) fn accumulate<S: Simd>(
         &self,
         simd: S,
         strip: usize,
         chart: &Chart,
-        units: &[[f32; STRIP]; 2],
-        sums: &mut StripSums,
+        units: &[[f32; STRIP_COLUMNS]; 2],
+        sums: &mut StripBins,
     ) {
         sums.bins.clear();
-        sums.bins.resize(STRIP * self.bins.count, [0.0; 4]);
-        sums.filled = [[usize::MAX, 0]; STRIP];
+        sums.bins.resize(STRIP_COLUMNS * self.bins.count, [0.0; 4]);
+        sums.filled = [[usize::MAX, 0]; STRIP_COLUMNS];
         for entries in self.entries(strip) {
             for entry in entries {
                 let source = self.source(entry.source);
-                let patch = Patch::new(source, chart, units);
+                let patch = PatchWeights::new(source, chart, units);
                 let span = patch.bins(source, &self.bins);
                 let [green, red, prompt] = source.power;
-                let weights = FourLanes::simd_from(simd, [green, red, prompt, (green + red + prompt) * source.node]);
+                let weights =
+                    FourLanes::simd_from(simd, [green, red, prompt, (green + red + prompt) * source.energy_node]);
                 for column in entry.columns() {
-                    span.add(column, weights * patch.side[column], &self.bins, sums);
+                    span.add(column, weights * patch.column_weights[column], &self.bins, sums);
                 }
             }
         }
@@ -271,22 +271,22 @@ impl<'a> Footprint<'a> {
     }
 }
 
-impl Sorted {
-    /// Sources from number `first` on, which reach these columns, by strips of so many.
-    fn new(spans: &[Span], first: usize, chart: &Chart, width: usize) -> Self {
+impl SortedSources {
+    /// Counting sort of sources, the first of which has index `first`, into strips of `width` columns.
+    fn new(spans: &[ColumnSpan], first: usize, chart: &Chart, width: usize) -> Self {
         let strips = chart.columns.div_ceil(width);
         let mut starts = vec![0_u32; strips + 1];
         for span in spans {
-            pieces(*span, chart, width, |strip, _| starts[strip + 1] += 1);
+            for_each_strip(*span, chart, width, |strip, _| starts[strip + 1] += 1);
         }
         for strip in 0..strips {
             starts[strip + 1] += starts[strip];
         }
         let mut next = starts.clone();
-        let mut entries = vec![Entry::default(); starts[strips] as usize];
+        let mut entries = vec![StripEntry::default(); starts[strips] as usize];
         for (span, source) in spans.iter().zip(first..) {
-            pieces(*span, chart, width, |strip, columns| {
-                entries[next[strip] as usize] = Entry { source: source as u32, columns };
+            for_each_strip(*span, chart, width, |strip, columns| {
+                entries[next[strip] as usize] = StripEntry { source: source as u32, columns };
                 next[strip] += 1;
             });
         }
@@ -296,52 +296,52 @@ impl Sorted {
 
 /// The columns that every source reaches.
 #[inline(always)]
-fn find_spans(
-    sources: &[Source],
+fn find_column_spans(
+    sources: &[FieldLineSource],
     chart: &Chart,
-    finder: &Finder,
-    (shown, bins): (&ShownRows, &Bins),
-    spans: &mut [Span],
+    projection: &ChartProjection,
+    (shown, bins): (&VisibleRowTest, &DistanceBins),
+    spans: &mut [ColumnSpan],
 ) {
     for (source, span) in sources.iter().zip(spans) {
         let distance = source.distance();
-        let margin_km = 2.0 * source.reach.max(LEAST_CELLS * chart.column_step as f32 * distance)
-            + bins.least_reach(distance)
-            + bins.blurred_km(distance);
-        if shown.may_hold(source.across, distance, margin_km) {
-            *span = Span::of(source, chart, finder);
+        let margin_km = 2.0 * source.reach.max(MIN_REACH_CELLS * chart.column_step as f32 * distance)
+            + bins.min_reach(distance)
+            + bins.smoothing_km(distance);
+        if shown.may_contain(source.across, distance, margin_km) {
+            *span = ColumnSpan::covering(source, chart, projection);
         }
     }
 }
 
-impl Span {
+impl ColumnSpan {
     #[inline(always)]
-    fn of(source: &Source, chart: &Chart, finder: &Finder) -> Self {
+    fn covering(source: &FieldLineSource, chart: &Chart, projection: &ChartProjection) -> Self {
         let step = chart.column_step as f32;
         let [x, y] = source.across;
         let distance = x.fma(x, y * y).sqrt();
-        let reach = source.reach.max(LEAST_CELLS * step * distance);
-        if source.power == [0.0; 3] || distance > FARTHEST_KM as f32 {
+        let reach = source.reach.max(MIN_REACH_CELLS * step * distance);
+        if source.power == [0.0; 3] || distance > MAX_DISTANCE_KM as f32 {
             return Self::default();
         }
         if reach * 1.001 >= distance {
-            // It lies about the observer's own field line and may show anywhere.
+            // It includes the observer's own field line and can be seen at any longitude.
             return Self { first: 0, count: chart.columns as i32 };
         }
-        let share = reach / distance;
-        let half = approximations::atan2(share, (1.0 - share * share).sqrt()) / step;
-        let column = finder.column(approximations::atan2(y, x));
+        let sine = reach / distance;
+        let half = approximations::atan2(sine, (1.0 - sine * sine).sqrt()) / step;
+        let column = projection.column(approximations::atan2(y, x));
         let (first, end) = ((column - half - 0.5).ceil(), (column + half - 0.5).floor() + 1.0);
         Self { first: first as i32, count: ((end - first) as i32).min(chart.columns as i32) }
     }
 }
 
-/// Calls `each` with every strip of so many columns that a span touches, and the columns there.
+/// Calls `each` with every strip that a span overlaps, and its columns there.
 #[inline]
-fn pieces(span: Span, chart: &Chart, width: usize, mut each: impl FnMut(usize, [u16; 2])) {
+fn for_each_strip(span: ColumnSpan, chart: &Chart, width: usize, mut each: impl FnMut(usize, [u16; 2])) {
     let columns = chart.columns as i32;
-    // A span that passes the seam of a whole chart shows on its other side too.
-    let turns = if chart.whole { &[0, columns, -columns][..] } else { &[0] };
+    // A span across the seam of a full-circle chart also appears on the other side.
+    let turns = if chart.wraps { &[0, columns, -columns][..] } else { &[0] };
     for turn in turns {
         let mut first = (span.first + turn).max(0) as usize;
         let end = (span.first + turn + span.count).clamp(0, columns) as usize;
@@ -355,52 +355,52 @@ fn pieces(span: Span, chart: &Chart, width: usize, mut each: impl FnMut(usize, [
     }
 }
 
-/// A source as the columns of a strip see it.
-pub(crate) struct Patch {
-    /// Share of it per km of width.
-    pub(crate) side: [f32; STRIP],
-    /// How far out it lies, km.
-    pub(super) along: [f32; STRIP],
+/// Kernel weights of a source in the columns of a strip.
+pub(crate) struct PatchWeights {
+    /// Weight per km of width.
+    pub(crate) column_weights: [f32; STRIP_COLUMNS],
+    /// Distance along the meridian, km.
+    pub(super) distances_km: [f32; STRIP_COLUMNS],
 }
 
-impl Patch {
+impl PatchWeights {
     #[inline(always)]
-    pub(crate) fn new(source: &Source, chart: &Chart, [cosines, sines]: &[[f32; STRIP]; 2]) -> Self {
+    pub(crate) fn new(source: &FieldLineSource, chart: &Chart, [cosines, sines]: &[[f32; STRIP_COLUMNS]; 2]) -> Self {
         let [x, y] = source.across;
-        let per_reach = 1.0 / source.reach.max(LEAST_CELLS * chart.column_step as f32 * source.distance());
-        let (mut side, mut along) = ([0.0; STRIP], [0.0; STRIP]);
-        for column in 0..STRIP {
-            let away = y.fma(cosines[column], -(x * sines[column])) * per_reach;
-            let shape = away.fma(-away, 1.0).max(0.0);
+        let per_reach = 1.0 / source.reach.max(MIN_REACH_CELLS * chart.column_step as f32 * source.distance());
+        let (mut side, mut along) = ([0.0; STRIP_COLUMNS], [0.0; STRIP_COLUMNS]);
+        for column in 0..STRIP_COLUMNS {
+            let offset = y.fma(cosines[column], -(x * sines[column])) * per_reach;
+            let shape = offset.fma(-offset, 1.0).max(0.0);
             side[column] = shape * shape * (NORM * per_reach);
             along[column] = x.fma(cosines[column], y * sines[column]);
         }
-        Self { side, along }
+        Self { column_weights: side, distances_km: along }
     }
 
-    /// The bins that it covers along the columns.
+    /// Bins within its support along each column.
     #[inline(always)]
-    fn bins(&self, source: &Source, bins: &Bins) -> BinSpans {
-        let (mut middles, mut reaches) = ([0.0; STRIP], [0.0; STRIP]);
-        for column in 0..STRIP {
-            let along = self.along[column];
-            middles[column] = bins.place(along);
-            let reach = source.reach / bins.width(along);
-            reaches[column] = if reach > LEAST_CELLS { reach } else { LEAST_CELLS };
+    fn bins(&self, source: &FieldLineSource, bins: &DistanceBins) -> PatchBins {
+        let (mut middles, mut reaches) = ([0.0; STRIP_COLUMNS], [0.0; STRIP_COLUMNS]);
+        for column in 0..STRIP_COLUMNS {
+            let along = self.distances_km[column];
+            middles[column] = bins.coordinate(along);
+            let reach = source.reach / bins.bin_width(along);
+            reaches[column] = if reach > MIN_REACH_CELLS { reach } else { MIN_REACH_CELLS };
         }
-        BinSpans { middles, reaches }
+        PatchBins { middles, reaches }
     }
 }
 
-/// Where along each column of a strip a patch lies, and how far it reaches, in bins.
-struct BinSpans {
-    middles: [f32; STRIP],
-    reaches: [f32; STRIP],
+/// Center and half-width of a patch along each column of a strip, in bins.
+struct PatchBins {
+    middles: [f32; STRIP_COLUMNS],
+    reaches: [f32; STRIP_COLUMNS],
 }
 
-impl BinSpans {
+impl PatchBins {
     #[inline(always)]
-    fn add<S: Simd>(&self, column: usize, weights: FourLanes<S>, bins: &Bins, sums: &mut StripSums) {
+    fn add<S: Simd>(&self, column: usize, weights: FourLanes<S>, bins: &DistanceBins, sums: &mut StripBins) {
         let (middle, reach) = (self.middles[column], self.reaches[column]);
         let first = (middle - reach - 0.5).ceil().max(0.0) as usize;
         let end = ((middle + reach - 0.5).floor() + 1.0).clamp(0.0, bins.count as f32) as usize;
@@ -411,11 +411,11 @@ impl BinSpans {
         let weights = weights * (NORM * per_reach);
         let filled = &mut sums.filled[column];
         *filled = [filled[0].min(first), filled[1].max(end)];
-        let mut away = (first as f32 + 0.5 - middle) * per_reach;
+        let mut offset = (first as f32 + 0.5 - middle) * per_reach;
         for bin in &mut sums.bins[column * bins.count..][first..end] {
-            let shape = away.fma(-away, 1.0);
+            let shape = offset.fma(-offset, 1.0);
             *bin = weights.broadcast(shape * shape).fma(weights, FourLanes::simd_from(weights.simd, *bin)).into();
-            away += per_reach;
+            offset += per_reach;
         }
     }
 }

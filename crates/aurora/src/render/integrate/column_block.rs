@@ -1,202 +1,205 @@
-//! Columns of the chart that one thread draws the falls of sources in.
+//! A block of chart columns in which one thread rasterizes the electron tracks of sources.
 //!
-//! They are worked on in a buffer that stays in the cache, and are then written to the picture at once.
+//! The buffer fits into the cache and is written to the picture once.
 
 use bansho_base::math::{self, MulAdd, approximations, simd::FourLanes};
 
-use super::columns::LightStrip;
+use super::columns::ColumnStrip;
 use crate::{
     render::{
-        bin::source_bins::{Entry, Footprint, Source},
+        bin::source_bins::{FieldLineSource, SourceBins, StripEntry},
         project::{
-            altitude_polynomial::{Descent, Descents, LineOfFall},
-            chart::{Chart, Finder, STRIP},
+            altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials},
+            chart::{Chart, ChartProjection, STRIP_COLUMNS},
             field_lines::FieldLines,
         },
     },
-    single_collisions::rasterize::{QUAD, Quad, Trace},
+    single_collisions::rasterize::{QUAD_ROWS, RowQuad, TrackRasterizer},
 };
 use fearless_simd::Simd;
 
-/// Columns that a thread draws at once: the more, the fewer sources are placed twice.
-pub(crate) const GROUP: usize = 4 * STRIP;
+/// Columns per block: the wider, the fewer sources are projected more than once.
+pub(crate) const BLOCK_COLUMNS: usize = 4 * STRIP_COLUMNS;
 
-/// Ranges of distance from one to twice as far, in each of which lines are seen alike but for a shift: a hundredth.
+/// Distance intervals per octave, in each of which field lines differ by a shift of their rows only, to within a
+/// hundredth.
 const RANGES_PER_OCTAVE: f32 = 70.0;
-/// Ranges from 1 km on, to beyond the horizon.
+/// Number of intervals, from 1 km to beyond the horizon.
 const RANGES: usize = 12 * 70;
 /// No column.
 const NONE: u32 = u32::MAX;
 
-/// How the lines of a column in a range of distance are seen, by the line in its middle.
+/// Projection of the field line at the center of a distance interval, for one column.
 #[derive(Clone, Copy)]
-pub(crate) struct CachedDescent {
+pub(crate) struct CachedProjection {
     column: u32,
     /// Distance of that line, km.
     pub(crate) distance: f32,
-    pub(crate) descent: Descent,
+    pub(crate) descent: RowPolynomials,
 }
 
-/// What a thread keeps from group to group.
-pub(crate) struct Group {
-    /// Fours of rows of one column after those of another, of which those from `lit` on are valid.
-    light: Vec<Quad>,
-    lit: [[usize; 2]; GROUP],
-    /// Fours of rows from column to column.
+/// Buffers that a thread reuses from block to block.
+pub(crate) struct ColumnBlock {
+    /// Groups of four rows, column by column; only those within `valid` are initialized.
+    light: Vec<RowQuad>,
+    valid: [[usize; 2]; BLOCK_COLUMNS],
+    /// Groups of four rows per column.
     stride: usize,
-    /// What shows, by the first column where it does.
-    entries: Vec<Entry>,
-    /// Cosines and sines of the columns' longitudes, and as many more.
-    units: [[f32; GROUP + STRIP]; 2],
-    meridians: [[f32; 3]; GROUP],
-    /// How lines were last seen in each range of distance, by an even and by an odd column.
-    seen: Vec<CachedDescent>,
+    /// Sources of the block, sorted by their first column.
+    entries: Vec<StripEntry>,
+    /// Cosines and sines of the columns' longitudes, padded by one strip.
+    units: [[f32; BLOCK_COLUMNS + STRIP_COLUMNS]; 2],
+    meridians: [[f32; 3]; BLOCK_COLUMNS],
+    /// Direct-mapped cache of projections by distance interval and column parity.
+    cache: Vec<CachedProjection>,
 }
 
-impl Group {
+impl ColumnBlock {
     pub(crate) fn new(chart: &Chart) -> Self {
-        // Odd, so that the same row of many columns does not fall to one place of the cache.
-        let stride = chart.rows.div_ceil(QUAD) | 1;
+        // Odd, to avoid cache-set aliasing between the same row of neighboring columns.
+        let stride = chart.rows.div_ceil(QUAD_ROWS) | 1;
         Self {
-            light: vec![Quad::DARK; stride * GROUP],
-            lit: [[usize::MAX, 0]; GROUP],
+            light: vec![RowQuad::DARK; stride * BLOCK_COLUMNS],
+            valid: [[usize::MAX, 0]; BLOCK_COLUMNS],
             stride,
             entries: Vec::new(),
-            units: [[0.0; GROUP + STRIP]; 2],
-            meridians: [[0.0; 3]; GROUP],
-            seen: (0..2 * RANGES).map(|slot| CachedDescent::none(slot / 2)).collect(),
+            units: [[0.0; BLOCK_COLUMNS + STRIP_COLUMNS]; 2],
+            meridians: [[0.0; 3]; BLOCK_COLUMNS],
+            cache: (0..2 * RANGES).map(|slot| CachedProjection::none(slot / 2)).collect(),
         }
     }
 
-    /// Begins with a group of the chart; gives what shows in it.
+    /// Starts a block of the chart and returns its sources.
     pub(crate) fn begin(
         &mut self,
-        number: usize,
+        index: usize,
         chart: &Chart,
-        footprint: &Footprint,
+        source_bins: &SourceBins,
         field: &FieldLines,
-    ) -> Vec<Entry> {
-        self.lit = [[usize::MAX, 0]; GROUP];
-        for seen in &mut self.seen {
-            seen.column = NONE;
+    ) -> Vec<StripEntry> {
+        self.valid = [[usize::MAX, 0]; BLOCK_COLUMNS];
+        for cached in &mut self.cache {
+            cached.column = NONE;
         }
-        for column in 0..GROUP {
-            let unit = chart.unit(number * GROUP + column);
-            self.meridians[column] = field.meridian(unit).single();
+        for column in 0..BLOCK_COLUMNS {
+            let unit = chart.longitude_cos_sin(index * BLOCK_COLUMNS + column);
+            self.meridians[column] = field.meridian(unit).coefficients_f32();
             for (values, value) in self.units.iter_mut().zip(unit) {
                 values[column] = value as f32;
             }
         }
-        self.sort(number, footprint);
+        self.sort(index, source_bins);
         std::mem::take(&mut self.entries)
     }
 
-    /// Sources that show first in one column one after the other: what is written stays in the nearest cache.
-    fn sort(&mut self, number: usize, footprint: &Footprint) {
-        let mut starts = [0; GROUP + 1];
-        for entry in footprint.entries(number).flatten() {
+    /// Counting sort by first column, for cache locality of the writes.
+    fn sort(&mut self, index: usize, source_bins: &SourceBins) {
+        let mut starts = [0; BLOCK_COLUMNS + 1];
+        for entry in source_bins.entries(index).flatten() {
             starts[entry.columns().start + 1] += 1;
         }
-        for column in 0..GROUP {
+        for column in 0..BLOCK_COLUMNS {
             starts[column + 1] += starts[column];
         }
         self.entries.clear();
-        self.entries.resize(starts[GROUP], Entry::default());
-        for entry in footprint.entries(number).flatten() {
+        self.entries.resize(starts[BLOCK_COLUMNS], StripEntry::default());
+        for entry in source_bins.entries(index).flatten() {
             let next = &mut starts[entry.columns().start];
             self.entries[*next] = *entry;
             *next += 1;
         }
     }
 
-    /// Takes the list of entries back to be used again.
-    pub(crate) fn end(&mut self, entries: Vec<Entry>) {
+    /// Returns the entry list for reuse.
+    pub(crate) fn recycle(&mut self, entries: Vec<StripEntry>) {
         self.entries = entries;
     }
 
     /// Cosines and sines from a column on.
     #[inline(always)]
-    pub(crate) fn units(&self, column: usize) -> [[f32; STRIP]; 2] {
-        let mut units = [[0.0; STRIP]; 2];
+    pub(crate) fn units(&self, column: usize) -> [[f32; STRIP_COLUMNS]; 2] {
+        let mut units = [[0.0; STRIP_COLUMNS]; 2];
         for (units, all) in units.iter_mut().zip(&self.units) {
-            units.copy_from_slice(&all[column..column + STRIP]);
+            units.copy_from_slice(&all[column..column + STRIP_COLUMNS]);
         }
         units
     }
 
-    /// The meridian of a column, and how far out on it a source lies, km.
+    /// The meridian of a column, and the source's distance along it, km.
     #[inline(always)]
-    pub(crate) fn seen_by(&self, column: usize, source: &Source) -> (&[f32; 3], f32) {
+    pub(crate) fn meridian_and_distance(&self, column: usize, source: &FieldLineSource) -> (&[f32; 3], f32) {
         let [x, y] = source.across;
         (&self.meridians[column], x.fma(self.units[0][column], y * self.units[1][column]))
     }
 
-    /// How a column sees lines about that distance, km.
+    /// The cached projection of field lines at about that distance in km, for a column.
     #[inline(always)]
-    pub(crate) fn descent<S: Simd>(
+    pub(crate) fn cached_projection<S: Simd>(
         &mut self,
         simd: S,
         column: usize,
         distance: f32,
-        (descents, finder): (&Descents, &Finder),
-    ) -> &CachedDescent {
+        (descents, projection): (&RowPolynomialBasis, &ChartProjection),
+    ) -> &CachedProjection {
         let range = ((approximations::log2(distance) * RANGES_PER_OCTAVE).max(0.0) as usize).min(RANGES - 1);
-        let seen = &mut self.seen[2 * range + column % 2];
-        if seen.column != column as u32 {
-            let line = LineOfFall::new(&self.meridians[column], seen.distance, finder);
-            (seen.column, seen.descent) = (column as u32, descents.along(simd, &line));
+        let cached = &mut self.cache[2 * range + column % 2];
+        if cached.column != column as u32 {
+            let line = ProjectedFieldLine::new(&self.meridians[column], cached.distance, projection);
+            (cached.column, cached.descent) = (column as u32, descents.fit(simd, &line));
         }
-        seen
+        cached
     }
 
-    /// Adds a fall with weights to a column.
+    /// Adds a rasterized track with weights to a column.
     #[inline(always)]
-    pub(crate) fn add<S: Simd>(&mut self, column: usize, trace: &Trace, weights: FourLanes<S>) {
-        let (Some(first), Some(last)) = (trace.quads().first(), trace.quads().last()) else { return };
+    pub(crate) fn add<S: Simd>(&mut self, column: usize, rasterizer: &TrackRasterizer, weights: FourLanes<S>) {
+        let (Some(first), Some(last)) = (rasterizer.active_quads().first(), rasterizer.active_quads().last()) else {
+            return;
+        };
         let light = &mut self.light[column * self.stride..][..self.stride];
-        light_up(light, &mut self.lit[column], [*first as usize, *last as usize + 1]);
-        trace.add_to(light, weights);
+        extend_valid_quads(light, &mut self.valid[column], [*first as usize, *last as usize + 1]);
+        rasterizer.add_to(light, weights);
     }
 
-    /// Writes everything to the picture.
-    pub(crate) fn write(&self, strip: LightStrip, rows: usize) {
-        let columns = strip.light.chunks_mut(rows).zip(strip.lit);
-        for ((own, lit), (light, rows_lit)) in self.light.chunks(self.stride).zip(&self.lit).zip(columns) {
-            let [first, end] = *lit;
+    /// Writes the block to the picture.
+    pub(crate) fn write(&self, strip: ColumnStrip, rows: usize) {
+        let columns = strip.light.chunks_mut(rows).zip(strip.valid_rows);
+        for ((own, valid), (light, rows_lit)) in self.light.chunks(self.stride).zip(&self.valid).zip(columns) {
+            let [first, end] = *valid;
             if first >= end {
                 continue;
             }
-            let last = rows.min(end * QUAD);
-            for (quad, light) in own[first..end].iter().zip(light[first * QUAD..last].chunks_mut(QUAD)) {
+            let last = rows.min(end * QUAD_ROWS);
+            for (quad, light) in own[first..end].iter().zip(light[first * QUAD_ROWS..last].chunks_mut(QUAD_ROWS)) {
                 let light = light.as_flattened_mut();
                 light.copy_from_slice(&quad.0[..light.len()]);
             }
-            *rows_lit = [(first * QUAD) as u32, last as u32];
+            *rows_lit = [(first * QUAD_ROWS) as u32, last as u32];
         }
     }
 }
 
-impl CachedDescent {
+impl CachedProjection {
     fn none(range: usize) -> Self {
         let distance = math::exp2((range as f64 + 0.5) / f64::from(RANGES_PER_OCTAVE)) as f32;
-        Self { column: NONE, distance, descent: Descent::default() }
+        Self { column: NONE, distance, descent: RowPolynomials::default() }
     }
 }
 
-/// Makes more of a column valid: what has been lit stays, what is new is dark.
+/// Extends the valid range of a column; new quads are cleared.
 #[inline(always)]
-fn light_up(light: &mut [Quad], lit: &mut [usize; 2], [start, end]: [usize; 2]) {
+fn extend_valid_quads(light: &mut [RowQuad], valid: &mut [usize; 2], [start, end]: [usize; 2]) {
     let end = end.min(light.len());
-    if lit[0] > lit[1] {
-        light[start..end].fill(Quad::DARK);
-        *lit = [start, end];
+    if valid[0] > valid[1] {
+        light[start..end].fill(RowQuad::DARK);
+        *valid = [start, end];
     }
-    if start < lit[0] {
-        light[start..lit[0]].fill(Quad::DARK);
-        lit[0] = start;
+    if start < valid[0] {
+        light[start..valid[0]].fill(RowQuad::DARK);
+        valid[0] = start;
     }
-    if end > lit[1] {
-        light[lit[1]..end].fill(Quad::DARK);
-        lit[1] = end;
+    if end > valid[1] {
+        light[valid[1]..end].fill(RowQuad::DARK);
+        valid[1] = end;
     }
 }

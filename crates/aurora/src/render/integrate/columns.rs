@@ -1,8 +1,8 @@
-//! The picture of an aurora on its chart: along every meridian, the light of all field lines that are seen there.
+//! Integration along lines of sight: for each meridian of the chart, the light of all field lines on it.
 //!
-//! On a line of sight at colatitude a, the field line at distance r from the observer's own is passed at the place r
-//! cot a along the field. So brightness is the integral over r of precipitation times the volume emission at the
-//! altitude of that place, over sin a.
+//! A line of sight at colatitude a passes the field line at distance r from the observer's own at the coordinate r cot
+//! a along the field. So the brightness is the integral over r of precipitation times volume emission at the altitude
+//! of that point, divided by sin a.
 
 use std::ops::Range;
 
@@ -14,13 +14,13 @@ use bansho_base::{
     },
 };
 
-use super::emission_profile::{BOTTOM_KM, Profile, Profiles, SPACINGS};
+use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS};
 use crate::{
     physics::emission::PerEmitter,
     render::{
-        bin::source_bins::{Bin, Bins, Footprint, StripSums},
+        bin::source_bins::{Bin, DistanceBins, SourceBins, StripBins},
         project::{
-            chart::{Chart, STRIP},
+            chart::{Chart, STRIP_COLUMNS},
             field_lines::{FieldLine, FieldLines, Meridian, altitude},
         },
     },
@@ -28,81 +28,87 @@ use crate::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Rows that are worked on at once.
+/// Rows per batch.
 const ROWS: usize = 16;
-/// Where light changes slowly upward, only every so many rows are worked on, and the others are straight between them.
+/// Where light varies slowly with altitude, it is computed every fourth row and interpolated linearly.
 const KNOT_ROWS: usize = 4;
-/// From this altitude on light does so where knots are no farther apart than a share of the way from there, km.
+/// It does so from this altitude on, where the knot spacing is at most this fraction of the distance from that
+/// altitude, km.
 const SLOW_KM: f32 = 110.0;
 const KNOTS_ABOVE: f32 = 0.1;
-/// Steps of altitude from bin to bin above which smoothed tables are taken, km: near the magnetic zenith a line of
-/// sight runs along the field.
+/// Altitude step between bins above which prefiltered tables are used, km: near the magnetic zenith a line of sight is
+/// nearly parallel to the field.
 const STEP_KM: f32 = 1.5;
 
-/// Spacing of such tables in steps: at least 1 / [`STEP_KM`]. Steps as long as the light is high need 2, or linear
-/// interpolation lets the bins' own pattern through; shorter ones need less, since the light itself is smooth, and keep
-/// its lower edge.
+/// Entry spacing of prefiltered tables relative to the step: at least 1 / [`STEP_KM`]. Steps as large as the emission
+/// layer need 2, else linear interpolation shows the pattern of the bins; smaller steps need less because the profile
+/// is smooth, and the lower border stays sharp.
 pub(crate) const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
-/// Steps above which tables are more than a step apart, km.
+/// Steps above which the entry spacing exceeds the step, km.
 const SMOOTH_KM: f32 = 12.0;
 
-/// Brightness by emitter in kR, column after column, without what the air takes away.
+/// Accumulation buffer: brightness by emitter in kR without extinction, column by column.
 #[derive(Clone)]
-pub(crate) struct Meridians {
+pub(crate) struct ColumnBuffer {
     pub(crate) chart: Chart,
     pub(crate) light: Vec<PerEmitter<f32>>,
-    /// First row of each column that may hold light, and the one after the last.
-    pub(crate) lit: Vec<[u32; 2]>,
+    /// First row of each column that may be non-zero, and one past the last.
+    pub(crate) valid_rows: Vec<[u32; 2]>,
 }
 
-/// What all columns share.
+/// Inputs that all columns share.
 struct ProfilePass<'a> {
     chart: &'a Chart,
     field: &'a FieldLines,
-    profiles: &'a Profiles,
-    bins: &'a Bins,
-    /// Distance and width of every bin, km.
+    profiles: &'a EmissionProfiles,
+    bins: &'a DistanceBins,
+    /// Center and width of every bin, km.
     distances: &'a [[f64; 2]],
-    /// By row and by knot, and [`ROWS`] more.
+    /// By row and by knot, padded by [`ROWS`].
     cotangents: &'a [f32],
     knots: &'a [f32],
     inverse_sines: &'a [f32],
 }
 
-impl Meridians {
-    /// Draws the footprint's sources.
-    pub(crate) fn new(chart: Chart, field: &FieldLines, profiles: &Profiles, footprint: &Footprint) -> Self {
+impl ColumnBuffer {
+    /// Integrates the binned sources.
+    pub(crate) fn new(chart: Chart, field: &FieldLines, profiles: &EmissionProfiles, source_bins: &SourceBins) -> Self {
         let level = Level::new();
         let [cotangents, inverse_sines] = chart.row_tables(ROWS * KNOT_ROWS);
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
-        let distances: Vec<_> = (0..footprint.bins().count).map(|bin| footprint.bins().distance(bin)).collect();
-        let mut picture = Self::dark(chart);
-        let (chart, strips) = picture.strips(STRIP);
+        let distances: Vec<_> = (0..source_bins.bins().count).map(|bin| source_bins.bins().distance(bin)).collect();
+        let mut picture = Self::zeros(chart);
+        let (chart, strips) = picture.strips(STRIP_COLUMNS);
         let pass = ProfilePass {
             chart,
             field,
             profiles,
-            bins: footprint.bins(),
+            bins: source_bins.bins(),
             distances: &distances,
             cotangents: &cotangents,
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        let spares = Spares::new(Workspace::default);
+        let spares = Spares::new(ProfileScratch::default);
         strips.with_max_len(1).for_each(|strip| {
-            spares.lend(|workspace| dispatch!(level, simd => pass.strip(simd, strip, footprint, workspace)));
+            spares
+                .lend(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
         });
         picture
     }
 
-    /// A picture without light.
-    pub(crate) fn dark(chart: Chart) -> Self {
-        Self { light: vec![[0.0; 4]; chart.columns * chart.rows], lit: vec![[u32::MAX, 0]; chart.columns], chart }
+    /// A buffer without light.
+    pub(crate) fn zeros(chart: Chart) -> Self {
+        Self {
+            light: vec![[0.0; 4]; chart.columns * chart.rows],
+            valid_rows: vec![[u32::MAX, 0]; chart.columns],
+            chart,
+        }
     }
 
-    /// Red light of all heights as that of its emitter.
-    pub(crate) fn add_up_heights(&mut self) {
-        for (column, [first, end]) in self.light.chunks_mut(self.chart.rows).zip(&self.lit) {
+    /// Sums the red light of all altitudes into the red emitter.
+    pub(crate) fn sum_red_altitudes(&mut self) {
+        for (column, [first, end]) in self.light.chunks_mut(self.chart.rows).zip(&self.valid_rows) {
             for light in &mut column[(*first).min(*end) as usize..*end as usize] {
                 let [low, middle, high, _] = *light;
                 *light = [0.0, low + middle + high, 0.0, 0.0];
@@ -110,127 +116,143 @@ impl Meridians {
         }
     }
 
-    /// Its strips of so many columns, each to be drawn by one thread.
-    pub(crate) fn strips(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = LightStrip<'_>>) {
+    /// Strips of columns, each for one thread.
+    pub(crate) fn strips(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = ColumnStrip<'_>>) {
         let light = self.light.par_chunks_mut(columns * self.chart.rows);
-        let strips = light.zip(self.lit.par_chunks_mut(columns)).enumerate();
-        (&self.chart, strips.map(|(number, (light, lit))| LightStrip { number, light, lit }))
+        let strips = light.zip(self.valid_rows.par_chunks_mut(columns)).enumerate();
+        (&self.chart, strips.map(|(number, (light, valid_rows))| ColumnStrip { number, light, valid_rows }))
     }
 
-    /// First row that may hold light in any of two columns, and the one after the last.
+    /// Union of the valid rows of two columns.
     #[inline(always)]
-    pub(crate) fn lit_either(&self, [left, right]: [usize; 2]) -> [u32; 2] {
-        let (left, right) = (self.lit[left], self.lit[right]);
+    pub(crate) fn valid_rows_of_either(&self, [left, right]: [usize; 2]) -> [u32; 2] {
+        let (left, right) = (self.valid_rows[left], self.valid_rows[right]);
         [left[0].min(right[0]), left[1].max(right[1])]
     }
 }
 
-/// Some columns of a picture beside each other.
-pub(crate) struct LightStrip<'a> {
+/// Adjacent columns of a buffer.
+pub(crate) struct ColumnStrip<'a> {
     pub(crate) number: usize,
     pub(crate) light: &'a mut [PerEmitter<f32>],
-    pub(crate) lit: &'a mut [[u32; 2]],
+    pub(crate) valid_rows: &'a mut [[u32; 2]],
 }
 
-impl LightStrip<'_> {
-    /// One of its columns, of which these rows are lit.
+impl ColumnStrip<'_> {
+    /// A column whose valid range includes these rows.
     ///
-    /// Rows that were not lit are written, though they are 0: memory that is new and first read is given to a thread twice, the
-    /// second time by stopping all others.
+    /// New rows are cleared explicitly although the allocation is zeroed: a first read maps the shared zero page and
+    /// the later write faults again with a TLB shootdown on all threads.
     #[inline(always)]
-    pub(super) fn light_up(&mut self, column: usize, rows: &Range<usize>, of: usize) -> &mut [PerEmitter<f32>] {
-        let [first, end] = self.lit[column].map(|row| row as usize);
+    pub(super) fn extend_valid_rows(
+        &mut self,
+        column: usize,
+        rows: &Range<usize>,
+        of: usize,
+    ) -> &mut [PerEmitter<f32>] {
+        let [first, end] = self.valid_rows[column].map(|row| row as usize);
         let light = &mut self.light[column * of..][..of];
         if first > end {
             light[rows.clone()].fill([0.0; 4]);
-            self.lit[column] = [rows.start as u32, rows.end as u32];
+            self.valid_rows[column] = [rows.start as u32, rows.end as u32];
             return light;
         }
         if rows.start < first {
             light[rows.start..first].fill([0.0; 4]);
-            self.lit[column][0] = rows.start as u32;
+            self.valid_rows[column][0] = rows.start as u32;
         }
         if rows.end > end {
             light[end..rows.end].fill([0.0; 4]);
-            self.lit[column][1] = rows.end as u32;
+            self.valid_rows[column][1] = rows.end as u32;
         }
         light
     }
 }
 
-/// `low` and `high` mixed, `part` of the way from the one to the other.
+/// Linear interpolation of all emitters.
 #[inline(always)]
-pub(crate) fn mixed<S: Simd>(simd: S, low: &PerEmitter<f32>, high: &PerEmitter<f32>, part: f32) -> FourLanes<S> {
+pub(crate) fn lerp_emitters<S: Simd>(
+    simd: S,
+    low: &PerEmitter<f32>,
+    high: &PerEmitter<f32>,
+    fraction: f32,
+) -> FourLanes<S> {
     let (low, high) = (FourLanes::simd_from(simd, *low), FourLanes::simd_from(simd, *high));
-    low.broadcast(part).fma(high - low, low)
+    low.broadcast(fraction).fma(high - low, low)
 }
 
-/// Light of one column that changes slowly upward: of every [`KNOT_ROWS`] rows, at the first of them and at the one
-/// after the last.
+/// Light that varies slowly with altitude: for each group of [`KNOT_ROWS`] rows the values at its first row and one
+/// past its last.
 #[derive(Default)]
-struct SlowLight {
+struct KnotBuffer {
     light: Vec<[PerEmitter<f32>; 2]>,
-    /// The first that may hold some, and the one after the last.
-    lit: [usize; 2],
+    /// First group that may be non-zero, and one past the last.
+    valid_rows: [usize; 2],
 }
 
-impl SlowLight {
-    /// Dark, for so many rows.
+impl KnotBuffer {
+    /// Clears the buffer for a number of rows.
     fn clear(&mut self, rows: usize) {
         self.light.clear();
         self.light.resize(rows.div_ceil(KNOT_ROWS), [[0.0; 4]; 2]);
-        self.lit = [usize::MAX, 0];
+        self.valid_rows = [usize::MAX, 0];
     }
 
-    /// Adds light at knots from number `first` on.
+    /// Adds light at knots from index `first` on.
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, first: usize, knots: &[PerEmitter<f32>]) {
-        self.lit = [self.lit[0].min(first), self.lit[1].max(first + knots.len() - 1)];
+        self.valid_rows = [self.valid_rows[0].min(first), self.valid_rows[1].max(first + knots.len() - 1)];
         for (own, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
             let own = own.as_flattened_mut();
             (HalfLanes::from_slice(simd, ends.as_flattened()) + HalfLanes::from_slice(simd, own)).store_slice(own);
         }
     }
 
-    /// Adds all of it to the rows of the column.
+    /// Interpolates it to the rows of the column.
     #[inline(always)]
     fn add_to<S: Simd>(&self, simd: S, light: &mut [PerEmitter<f32>]) {
-        for knot in self.lit[0]..self.lit[1] {
+        for knot in self.valid_rows[0]..self.valid_rows[1] {
             let [low, high] = &self.light[knot];
             let end = light.len().min((knot + 1) * KNOT_ROWS);
             for (row, light) in light[knot * KNOT_ROWS..end].iter_mut().enumerate() {
-                let between = mixed(simd, low, high, row as f32 * (1.0 / KNOT_ROWS as f32));
+                let between = lerp_emitters(simd, low, high, row as f32 * (1.0 / KNOT_ROWS as f32));
                 *light = (between + FourLanes::simd_from(simd, *light)).into();
             }
         }
     }
 }
 
-/// What a thread keeps from strip to strip.
+/// Buffers that a thread reuses from strip to strip.
 #[derive(Default)]
-struct Workspace {
-    sums: StripSums,
-    slow: SlowLight,
+struct ProfileScratch {
+    sums: StripBins,
+    slow: KnotBuffer,
 }
 
 impl ProfilePass<'_> {
     #[inline(always)]
-    fn strip<S: Simd>(&self, simd: S, mut strip: LightStrip, footprint: &Footprint, workspace: &mut Workspace) {
-        let Workspace { sums, slow } = workspace;
-        footprint.sum(simd, strip.number, self.chart, &self.chart.single_units(strip.number), sums);
-        for column in 0..STRIP {
-            let meridian = self.field.meridian(self.chart.unit(strip.number * STRIP + column));
+    fn integrate_strip<S: Simd>(
+        &self,
+        simd: S,
+        mut strip: ColumnStrip,
+        source_bins: &SourceBins,
+        workspace: &mut ProfileScratch,
+    ) {
+        let ProfileScratch { sums, slow } = workspace;
+        source_bins.accumulate(simd, strip.number, self.chart, &self.chart.strip_cos_sin(strip.number), sums);
+        for column in 0..STRIP_COLUMNS {
+            let meridian = self.field.meridian(self.chart.longitude_cos_sin(strip.number * STRIP_COLUMNS + column));
             let (first, bins) = sums.column(column, self.bins);
             slow.clear(self.chart.rows);
             for (number, bin) in bins.iter().enumerate() {
-                self.bin(simd, &meridian, (first + number, bin), (&mut strip, column), slow);
+                self.accumulate_bin(simd, &meridian, (first + number, bin), (&mut strip, column), slow);
             }
-            let [first, end] = strip.lit[column].map(|row| row as usize);
-            let lit = first.min(end)..end;
+            let [first, end] = strip.valid_rows[column].map(|row| row as usize);
+            let valid = first.min(end)..end;
             let light = &mut strip.light[column * self.chart.rows..][..self.chart.rows];
-            // The last knots may reach beyond the rows that are lit.
+            // The last knots may extend past the valid rows.
             slow.add_to(simd, &mut light[..end]);
-            for (light, inverse) in light[lit.clone()].iter_mut().zip(&self.inverse_sines[lit]) {
+            for (light, inverse) in light[valid.clone()].iter_mut().zip(&self.inverse_sines[valid]) {
                 for value in light {
                     *value *= inverse;
                 }
@@ -238,15 +260,15 @@ impl ProfilePass<'_> {
         }
     }
 
-    /// The light of one bin on its meridian.
+    /// Adds the light of one bin on its meridian.
     #[inline(always)]
-    fn bin<S: Simd>(
+    fn accumulate_bin<S: Simd>(
         &self,
         simd: S,
         meridian: &Meridian,
         (number, bin): (usize, &Bin),
-        (strip, column): (&mut LightStrip, usize),
-        slow: &mut SlowLight,
+        (strip, column): (&mut ColumnStrip, usize),
+        slow: &mut KnotBuffer,
     ) {
         let [green, red, prompt, by_node] = *bin;
         let all = green + red + prompt;
@@ -256,39 +278,39 @@ impl ProfilePass<'_> {
         let profile = self.profiles.at(by_node / all, red > 0.0);
         let [distance, width] = self.distances[number];
         let line = meridian.line(distance);
-        // Where tables are smoothed, light reaches rows of neighbouring bins.
-        let near = distance < self.bins.near_to;
-        let blurred = f64::from(self.bins.blurred_km(distance as f32));
-        let top = self.row(&line, distance, -blurred, profile.top_km);
-        let bottom = self.row(&line, distance, blurred, profile.bottom_km);
+        // Prefiltered tables spread light to the rows of neighboring bins.
+        let near = distance < self.bins.near_limit_km;
+        let blurred = f64::from(self.bins.smoothing_km(distance as f32));
+        let top = self.row_of_altitude(&line, distance, -blurred, profile.top_km);
+        let bottom = self.row_of_altitude(&line, distance, blurred, profile.bottom_km);
         let end = ((bottom.floor() + 1.0).max(0.0) as usize).min(self.chart.rows);
         let first = top.ceil().max(0.0) as usize;
         if first >= end {
             return;
         }
-        // The bin holds precipitation times its width already; what is left is per km of sight.
+        // The bin's power already includes its width; the rest is per km along the line of sight.
         let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let (distance, width) = (distance as f32, width as f32);
         let bin_rows = BinRows { line: &line, profile: &profile, distance, width, near, weights };
-        let light = strip.light_up(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
-        let rest = if near { first } else { self.slow_rows(&bin_rows, first..end, slow) };
-        self.rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
+        let light = strip.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
+        let rest = if near { first } else { self.add_knot_rows(&bin_rows, first..end, slow) };
+        self.add_dense_rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
         if near {
-            // Beyond the observer's own field line the sheet goes on: what smoothing spreads from there would be
-            // missed.
+            // The sheet continues beyond the observer's own field line; prefiltering spreads light from there too.
             let line = meridian.line(-f64::from(distance));
             let beyond = BinRows { line: &line, distance: -distance, ..bin_rows };
-            self.rows(&beyond, first, &mut light[first..end]);
+            self.add_dense_rows(&beyond, first, &mut light[first..end]);
         }
     }
 
-    /// Adds those of the rows in which light changes slowly, the upper ones; gives the first one that is left.
+    /// Adds the upper rows, in which light varies slowly; returns the first remaining row.
     #[inline(always)]
-    fn slow_rows<S: Simd>(&self, bin_rows: &BinRows<S>, rows: Range<usize>, slow: &mut SlowLight) -> usize {
+    fn add_knot_rows<S: Simd>(&self, bin_rows: &BinRows<S>, rows: Range<usize>, slow: &mut KnotBuffer) -> usize {
         let distance = bin_rows.distance;
-        // Altitude from knot to knot.
+        // Altitude difference between knots.
         let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32) * (SLOW_KM * SLOW_KM / distance + distance);
-        let end = self.row(bin_rows.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
+        let end =
+            self.row_of_altitude(bin_rows.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
         let end = (end.max(0.0) as usize).min(rows.end.next_multiple_of(KNOT_ROWS));
         let (mut knot, last) = (rows.start / KNOT_ROWS, end / KNOT_ROWS);
         if knot >= last {
@@ -305,20 +327,19 @@ impl ProfilePass<'_> {
         last * KNOT_ROWS
     }
 
-    /// The row in which a line of sight passes an altitude on the field line at a distance, moved down by what
-    /// smoothing over bins of distance spreads: where the line of sight sinks along the field, nearer bins are those
-    /// that show farther down.
+    /// The row in which a line of sight passes an altitude on the field line at a distance, extended by the prefilter's
+    /// spread: where the line of sight descends along the field, nearer bins appear farther down.
     #[inline(always)]
-    fn row(&self, line: &FieldLine, distance: f64, blurred: f64, altitude_km: f32) -> f32 {
-        let place = line.place(f64::from(altitude_km));
-        let distance = distance + if place < 0.0 { -blurred } else { blurred };
-        let colatitude = approximations::atan2(distance.max(0.0) as f32, place as f32);
-        self.chart.finder().row(colatitude) - 0.5
+    fn row_of_altitude(&self, line: &FieldLine, distance: f64, blurred: f64, altitude_km: f32) -> f32 {
+        let position = line.position_at_altitude(f64::from(altitude_km));
+        let distance = distance + if position < 0.0 { -blurred } else { blurred };
+        let colatitude = approximations::atan2(distance.max(0.0) as f32, position as f32);
+        self.chart.projection().row(colatitude) - 0.5
     }
 
     /// Adds the light of a bin to rows from `first` on.
     #[inline(always)]
-    fn rows<S: Simd>(&self, bin_rows: &BinRows<S>, first: usize, light: &mut [PerEmitter<f32>]) {
+    fn add_dense_rows<S: Simd>(&self, bin_rows: &BinRows<S>, first: usize, light: &mut [PerEmitter<f32>]) {
         let mut from = 0;
         while from < light.len() {
             let Some(cotangents) = self.cotangents[first + from..].first_chunk() else { return };
@@ -329,13 +350,13 @@ impl ProfilePass<'_> {
     }
 }
 
-/// Some rows of one bin.
+/// Inputs for the rows of one bin.
 struct BinRows<'a, S: Simd> {
     line: &'a FieldLine,
-    profile: &'a Profile<'a>,
+    profile: &'a EmissionProfile<'a>,
     distance: f32,
     width: f32,
-    /// Whether it is one of the near bins.
+    /// Whether it is a near bin.
     near: bool,
     weights: FourLanes<S>,
 }
@@ -343,30 +364,29 @@ struct BinRows<'a, S: Simd> {
 impl<S: Simd> BinRows<'_, S> {
     #[inline(always)]
     fn add(&self, cotangents: &[f32; ROWS], light: &mut [PerEmitter<f32>]) {
-        let [constant, linear] = self.line.square();
-        let mut heights = [0.0; ROWS];
+        let [constant, linear] = self.line.quadratic();
+        let mut altitudes = [0.0; ROWS];
         for i in 0..ROWS {
-            let place = self.distance * cotangents[i];
-            heights[i] = altitude(place.fma(place + linear, constant)) - BOTTOM_KM;
+            let position = self.distance * cotangents[i];
+            altitudes[i] = altitude(position.fma(position + linear, constant)) - BOTTOM_KM;
         }
-        // From bin to bin the altitude changes by this at the steepest of these rows; of far bins in proportion to
-        // itself, as light does.
+        // Altitude change from bin to bin in the steepest row; for far bins it is proportional to the bin width, as the
+        // profile is.
         if !self.near || self.width * cotangents[0].abs().max(cotangents[light.len() - 1].abs()) < STEP_KM {
-            self.add_rows(self.profile.table(0), &heights, light);
+            self.add_rows(self.profile.table(0), &altitudes, light);
             return;
         }
         let spacings = self.spacings(cotangents);
         for i in 0..light.len() {
-            let height = heights[i].fma(approximations::exp2(-spacings[i]), 1.0);
-            self.add_row(self.profile.table(spacings[i] as usize), height, &mut light[i]);
+            let altitude = altitudes[i].fma(approximations::exp2(-spacings[i]), 1.0);
+            self.add_row(self.profile.table(spacings[i] as usize), altitude, &mut light[i]);
         }
     }
 
-    /// The tables that rows take, as powers of two: their entries are farther apart where the altitude changes more
-    /// from bin to bin.
+    /// Mip level per row: coarser where the altitude changes more from bin to bin.
     #[inline(always)]
     fn spacings(&self, cotangents: &[f32; ROWS]) -> [f32; ROWS] {
-        const MOST: f32 = (SPACINGS - 1) as f32;
+        const MOST: f32 = (MIP_LEVELS - 1) as f32;
         let mut spacings = [0.0; ROWS];
         for i in 0..ROWS {
             let step = self.width * cotangents[i].abs();
@@ -376,21 +396,21 @@ impl<S: Simd> BinRows<'_, S> {
         spacings
     }
 
-    /// Adds the light at heights above the lowest level, km.
+    /// Adds the light at altitudes above the lowest level, km.
     #[inline(always)]
-    fn add_rows(&self, table: &[PerEmitter<f32>], heights: &[f32; ROWS], light: &mut [PerEmitter<f32>]) {
-        for (light, height) in light.iter_mut().zip(heights) {
-            self.add_row(table, height + 1.0, light);
+    fn add_rows(&self, table: &[PerEmitter<f32>], altitudes: &[f32; ROWS], light: &mut [PerEmitter<f32>]) {
+        for (light, altitude) in light.iter_mut().zip(altitudes) {
+            self.add_row(table, altitude + 1.0, light);
         }
     }
 
-    /// Adds the light at a height in entries of `table`, which is dark at both ends.
+    /// Adds the light at a fractional entry of `table`, whose ends are 0.
     #[inline(always)]
-    fn add_row(&self, table: &[PerEmitter<f32>], height: f32, light: &mut PerEmitter<f32>) {
-        let height = height.max(0.0).min((table.len() - 1) as f32);
-        let entry = (height as usize).min(table.len() - 2);
-        let part = height - entry as f32;
-        let value = mixed(self.weights.simd, &table[entry], &table[entry + 1], part);
+    fn add_row(&self, table: &[PerEmitter<f32>], altitude: f32, light: &mut PerEmitter<f32>) {
+        let altitude = altitude.max(0.0).min((table.len() - 1) as f32);
+        let entry = (altitude as usize).min(table.len() - 2);
+        let fraction = altitude - entry as f32;
+        let value = lerp_emitters(self.weights.simd, &table[entry], &table[entry + 1], fraction);
         *light = value.fma(self.weights, FourLanes::simd_from(value.simd, *light)).into();
     }
 }

@@ -1,4 +1,4 @@
-//! Light by altitude for every energy, as single precision tables that the drawing walks.
+//! Emission profiles by altitude for every energy, as prefiltered single-precision tables.
 
 use std::sync::OnceLock;
 
@@ -8,143 +8,145 @@ use crate::physics::{
     atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
     emission::{
         EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
-        red_line_levels::{RED_HEIGHTS, red_by_height},
+        red_line_altitudes::{RED_ALTITUDES, red_by_altitude},
     },
     precipitation::energy_grid::NODES,
 };
 
-/// Tables between two nodes of the grid of energies: the nearest is within 0.5 % of the energy, and the red column,
-/// which falls fastest, within 1 %.
-const FINENESS: usize = 8;
-/// Tables of one energy, each of them smoothed to and sampled at twice the spacing of the one before, from 1 km on.
-pub(super) const SPACINGS: usize = 12;
-/// Where the table of each spacing begins among those of one energy, and the end of all.
-const STARTS: [usize; SPACINGS + 1] = starts();
-/// A column is drawn from where this share of its light is left below up to where it is left above.
-const LEFT: f64 = 3e-4;
+/// Tables per node of the energy grid: the nearest is within 0.5 % of the energy, and the red column, which varies
+/// fastest, within 1 %.
+const TABLES_PER_NODE: usize = 8;
+/// Mip levels of a table: each is filtered and sampled at twice the spacing of the previous one, starting at 1 km.
+pub(super) const MIP_LEVELS: usize = 12;
+/// Start of each mip level among those of one energy, and the total.
+const STARTS: [usize; MIP_LEVELS + 1] = starts();
+/// Profiles are cut off where this fraction of the light is left above or below.
+const CUTOFF_FRACTION: f64 = 3e-4;
 
-/// Entries of the table of one spacing: one below the levels, and dark ones above them, so that smoothing loses
-/// nothing.
+/// Entries of a mip level: one below the levels and zeros above, so that filtering conserves light.
 const fn entries(spacing: usize) -> usize {
     ((LEVELS - 1) >> spacing) + 4
 }
 
-const fn starts() -> [usize; SPACINGS + 1] {
-    let (mut starts, mut spacing) = ([0; SPACINGS + 1], 0);
-    while spacing < SPACINGS {
+const fn starts() -> [usize; MIP_LEVELS + 1] {
+    let (mut starts, mut spacing) = ([0; MIP_LEVELS + 1], 0);
+    while spacing < MIP_LEVELS {
         starts[spacing + 1] = starts[spacing] + entries(spacing);
         spacing += 1;
     }
     starts
 }
 
-/// Light of precipitation by energy and altitude, in kR per km of sight and mW/m^2; tables are made when they are first
-/// asked for.
+/// Emission by energy and altitude, in kR per km along the line of sight and mW/m^2; tables are computed on first use.
 #[derive(Clone, Debug)]
-pub(crate) struct Profiles {
+pub(crate) struct EmissionProfiles {
     emission: Emission,
-    /// Whether it is red light alone, its heights in place of the emitters.
-    red_by_height: bool,
-    tables: Vec<OnceLock<Table>>,
+    /// Whether the components are red light by altitude instead of emitters.
+    red_by_altitude: bool,
+    tables: Vec<OnceLock<MipTables>>,
 }
 
-/// The tables of one energy, one after the other.
+/// Mip levels of one energy, concatenated.
 #[derive(Clone, Debug)]
-struct Table {
-    light: Vec<PerEmitter<f32>>,
-    /// Altitudes above which there is hardly any prompt, and any red light, km.
+struct MipTables {
+    values: Vec<PerEmitter<f32>>,
+    /// Cutoff altitudes at the top for prompt and for red light, km.
     tops_km: [f32; 2],
-    /// Altitude below which there is hardly any light, km.
+    /// Cutoff altitude at the bottom, km.
     bottom_km: f32,
 }
 
-/// Light by altitude of one energy.
+/// Emission by altitude of one energy.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Profile<'a> {
-    light: &'a [PerEmitter<f32>],
-    /// Altitudes between which nearly all light is, km.
+pub(super) struct EmissionProfile<'a> {
+    values: &'a [PerEmitter<f32>],
+    /// Cutoff altitudes, km.
     pub(super) bottom_km: f32,
     pub(super) top_km: f32,
 }
 
-impl Profiles {
+impl EmissionProfiles {
     /// The tables for a spectrum.
     pub(crate) fn new(emission: &Emission) -> Self {
-        let tables = vec![OnceLock::new(); (NODES - 1) * FINENESS + 1];
-        Self { emission: emission.clone(), red_by_height: false, tables }
+        let tables = vec![OnceLock::new(); (NODES - 1) * TABLES_PER_NODE + 1];
+        Self { emission: emission.clone(), red_by_altitude: false, tables }
     }
 
-    /// The tables of red light alone, its heights in place of the emitters.
-    pub(crate) fn of_red_by_height(emission: &Emission) -> Self {
-        Self { red_by_height: true, ..Self::new(emission) }
+    /// Tables of red light by altitude instead of emitters.
+    pub(crate) fn red_by_altitude(emission: &Emission) -> Self {
+        Self { red_by_altitude: true, ..Self::new(emission) }
     }
 
-    /// The light of an energy, given as its place among the nodes of the grid; `red` includes the red line's height.
+    /// The profile of an energy, given as fractional node index; `red` includes the red line's altitude range.
     #[inline(always)]
-    pub(super) fn at(&self, node: f32, red: bool) -> Profile<'_> {
+    pub(super) fn at(&self, node: f32, red: bool) -> EmissionProfile<'_> {
         let last = self.tables.len() - 1;
-        let fine = ((node * FINENESS as f32 + 0.5).max(0.0) as usize).min(last);
-        let Table { light, tops_km: [prompt_km, red_km], bottom_km } = self.table(fine);
-        Profile { light, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
+        let table_index = ((node * TABLES_PER_NODE as f32 + 0.5).max(0.0) as usize).min(last);
+        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.table(table_index);
+        EmissionProfile { values, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
     }
 
     #[inline(never)]
-    fn table(&self, fine: usize) -> &Table {
-        self.tables[fine].get_or_init(|| {
-            let profile = self.emission.profile(fine_energy_ev(fine));
-            if self.red_by_height { Table::of_heights(&red_by_height(&profile)) } else { Table::new(&profile) }
+    fn table(&self, table_index: usize) -> &MipTables {
+        self.tables[table_index].get_or_init(|| {
+            let profile = self.emission.profile(table_energy_ev(table_index));
+            if self.red_by_altitude {
+                MipTables::from_red_altitudes(&red_by_altitude(&profile))
+            } else {
+                MipTables::new(&profile)
+            }
         })
     }
 }
 
-impl Table {
+impl MipTables {
     /// From the volume emission at each level.
     fn new(profile: &[PerEmitter<f64>]) -> Self {
         Self {
-            light: smoothed(profile),
+            values: smoothed(profile),
             tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter.index())),
             bottom_km: bottom_km(profile, &EMITTERS.map(Emitter::index)),
         }
     }
 
-    /// From that of red light at each level, by its heights in place of the emitters.
-    fn of_heights(profile: &[PerEmitter<f64>]) -> Self {
-        let top_km = top_km(profile, RED_HEIGHTS - 1);
-        let heights: [usize; RED_HEIGHTS] = std::array::from_fn(|height| height);
-        Self { light: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
+    /// The same for red light by altitude.
+    fn from_red_altitudes(profile: &[PerEmitter<f64>]) -> Self {
+        let top_km = top_km(profile, RED_ALTITUDES - 1);
+        let heights: [usize; RED_ALTITUDES] = std::array::from_fn(|height| height);
+        Self { values: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
     }
 }
 
-/// The tables of all spacings one after the other, from the volume emission at each level.
+/// All mip levels, from the volume emission at each level.
 fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
-    let mut light = Vec::with_capacity(STARTS[SPACINGS]);
+    let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
     let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
-    for spacing in 0..SPACINGS {
+    for spacing in 0..MIP_LEVELS {
         let entry = |at: usize| table.get(at).copied().unwrap_or_default();
         light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
-        table = halved(&table);
+        table = downsampled(&table);
     }
     light
 }
 
-impl<'a> Profile<'a> {
-    /// The table smoothed over 2^`spacing` km. Entries lie so far apart, the second at 80 km; the last is dark.
+impl<'a> EmissionProfile<'a> {
+    /// The table filtered to 2^`spacing` km. The second entry is at 80 km, the last is 0.
     #[inline(always)]
     pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
-        &self.light[STARTS[spacing]..STARTS[spacing + 1]]
+        &self.values[STARTS[spacing]..STARTS[spacing + 1]]
     }
 }
 
-/// Energy of a table, eV.
-fn fine_energy_ev(fine: usize) -> f64 {
+/// Nominal energy of a table, eV.
+fn table_energy_ev(table_index: usize) -> f64 {
     use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
-    let share = fine as f64 / ((NODES - 1) * FINENESS) as f64;
-    LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, share)
+    let log_fraction = table_index as f64 / ((NODES - 1) * TABLES_PER_NODE) as f64;
+    LOWEST_EV * math::pow(HIGHEST_EV / LOWEST_EV, log_fraction)
 }
 
-/// Every other entry from the second on, and one before, smoothed so that none of the light is lost.
-fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+/// Downsamples by two with the filter 1/4, 1/2, 1/4, which conserves the sum.
+fn downsampled(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let entry = |at: Option<usize>| at.and_then(|at| table.get(at)).copied().unwrap_or_default();
     let smoothed = |number: usize| -> PerEmitter<f64> {
         let near = [2, 1, 0].map(|before| entry((2 * number).checked_sub(before)));
@@ -154,23 +156,25 @@ fn halved(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
 }
 
 fn top_km(profile: &[PerEmitter<f64>], emitter: usize) -> f32 {
-    let passed = passed((0..LEVELS).rev(), profile, emitter);
-    level_altitude_km(LEVELS - 1 - passed.min(LEVELS - 2)).min(HIGHEST_KM) as f32
+    let levels_within_cutoff = levels_within_cutoff((0..LEVELS).rev(), profile, emitter);
+    level_altitude_km(LEVELS - 1 - levels_within_cutoff.min(LEVELS - 2)).min(HIGHEST_KM) as f32
 }
 
 fn bottom_km(profile: &[PerEmitter<f64>], emitters: &[usize]) -> f32 {
-    let bottom = |emitter: &usize| level_altitude_km(passed(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32;
+    let bottom = |emitter: &usize| {
+        level_altitude_km(levels_within_cutoff(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32
+    };
     emitters.iter().map(bottom).fold(f32::INFINITY, f32::min)
 }
 
-/// How many of the levels, in that order, hold hardly any of the light together.
-fn passed(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
+/// Number of levels, in iteration order, within the cutoff fraction.
+fn levels_within_cutoff(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
     let light = |level: usize| profile[level][emitter];
     let whole: f64 = (0..LEVELS).map(light).sum();
     let mut sum = 0.0;
     let hardly_any = |level: &usize| {
         sum += light(*level);
-        sum < LEFT * whole
+        sum < CUTOFF_FRACTION * whole
     };
     levels.take_while(hardly_any).count()
 }
@@ -186,12 +190,12 @@ mod tests {
     #[test]
     fn every_table_of_an_energy_holds_the_same_column() {
         let table = table::Emission::new(atmosphere(), ARC);
-        let profiles = Profiles::new(&table);
+        let profiles = EmissionProfiles::new(&table);
         for node in [20.0, 48.0, 60.25] {
             let profile = profiles.at(node, true);
-            let energy = fine_energy_ev((node * FINENESS as f32) as usize);
+            let energy = table_energy_ev((node * TABLES_PER_NODE as f32) as usize);
             let expected = table.column(energy).kilorayleigh;
-            for spacing in 0..SPACINGS {
+            for spacing in 0..MIP_LEVELS {
                 let sum = profile.table(spacing).iter().fold([0.0; 4], |sum: [f64; 4], light| {
                     std::array::from_fn(|i| sum[i] + f64::from(light[i]) * f64::from(1 << spacing))
                 });
@@ -204,7 +208,7 @@ mod tests {
 
     #[test]
     fn hard_electrons_stop_lower() {
-        let profiles = Profiles::new(&table::Emission::new(atmosphere(), ARC));
+        let profiles = EmissionProfiles::new(&table::Emission::new(atmosphere(), ARC));
         assert!(profiles.at(64.0, false).top_km < profiles.at(32.0, false).top_km);
         assert!(profiles.at(48.0, true).top_km > 300.0);
     }

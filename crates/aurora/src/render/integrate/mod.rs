@@ -1,4 +1,4 @@
-//! Light along field lines, summed up into the columns of the chart.
+//! Integration of the emission along lines of sight into chart columns.
 
 pub(crate) mod column_block;
 pub(crate) mod columns;

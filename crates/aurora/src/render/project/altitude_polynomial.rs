@@ -1,4 +1,4 @@
-//! Where on the chart the altitudes of a field line are seen: of single points exactly, of many by polynomials.
+//! Projection of altitudes on a field line to chart rows: exact for single points, by Chebyshev interpolation for many.
 
 use std::f64::consts::PI;
 
@@ -7,210 +7,216 @@ use bansho_base::math::{
     simd::{HalfLanes, LANES, Lanes, Real},
 };
 
-use super::{chart::Finder, field_lines::EARTH_RADIUS_KM};
+use super::{chart::ChartProjection, field_lines::EARTH_RADIUS_KM};
 use crate::physics::atmosphere::{HIGHEST_KM, LOWEST_KM};
 use fearless_simd::{Simd, prelude::*};
 
-/// Altitudes at which a line is seen exactly, and terms of the polynomial through its rows.
+/// Chebyshev nodes at which a line is projected exactly, and terms of the row polynomial.
 const NODES: usize = 8;
-/// Terms of the polynomials through slopes and brightness, which are smoother.
+/// Terms of the polynomials of slope and brightness, which are smoother.
 const TERMS: usize = 5;
-/// Points of a level lie up to a kilometre from it.
+/// Collisions of a level lie up to a kilometer from it.
 const MARGIN_KM: f64 = 1.0;
-/// Polynomials are those of `1 / (altitude + PIVOT_KM)`, nearly in proportion to which rays are foreshortened.
+/// The polynomials are in `1 / (altitude + PIVOT_KM)`, which approximates the perspective foreshortening of rays.
 const PIVOT_KM: f64 = 100.0;
-/// That quantity at both ends, per km.
+/// Range of that quantity, per km.
 const ENDS: [f64; 2] = [1.0 / (HIGHEST_KM + MARGIN_KM + PIVOT_KM), 1.0 / (LOWEST_KM - MARGIN_KM + PIVOT_KM)];
 const MIDDLE: f64 = 0.5 * (ENDS[0] + ENDS[1]);
 const HALF: f64 = 0.5 * (ENDS[1] - ENDS[0]);
 
-/// A field line that electrons fall down, as it is seen.
-pub(crate) struct LineOfFall<'a> {
+/// A field line and its projection.
+pub(crate) struct ProjectedFieldLine<'a> {
     /// Distance from the observer's own field line, km.
     pub(super) distance: f32,
-    /// Of its meridian, [`Meridian::single`](super::field_lines::Meridian::single).
+    /// Coefficients of its meridian, [`Meridian::coefficients_f32`](super::field_lines::Meridian::coefficients_f32).
     meridian: &'a [f32; 3],
-    finder: &'a Finder,
+    projection: &'a ChartProjection,
 }
 
-impl<'a> LineOfFall<'a> {
+impl<'a> ProjectedFieldLine<'a> {
     #[inline(always)]
-    pub(crate) fn new(meridian: &'a [f32; 3], distance: f32, finder: &'a Finder) -> Self {
-        Self { distance, meridian, finder }
+    pub(crate) fn new(meridian: &'a [f32; 3], distance: f32, projection: &'a ChartProjection) -> Self {
+        Self { distance, meridian, projection }
     }
 
-    /// Rows of points at altitudes in km, so far from the line in km, and how bright they are seen.
+    /// Rows of points at altitudes and offsets from the line in km, and their brightness factors.
     #[inline(always)]
     pub(crate) fn points<S: Simd>(&self, altitudes_km: &[f32; LANES], offsets: Lanes<S>) -> [Lanes<S>; 2] {
         let mut distances: [f32; LANES] = offsets.into();
         for distance in &mut distances {
             *distance += self.distance;
         }
-        let ProjectedPoints { rows, lights, .. } = self.seen(altitudes_km, &distances);
-        [Lanes::from_slice(offsets.simd, &rows), Lanes::from_slice(offsets.simd, &lights)]
+        let ProjectedPoints { rows, brightness, .. } = self.project_points(altitudes_km, &distances);
+        [Lanes::from_slice(offsets.simd, &rows), Lanes::from_slice(offsets.simd, &brightness)]
     }
 
-    /// Points of the meridian at altitudes and distances, km. One step a loop: each of them becomes vector code.
+    /// Exact projection of points of the meridian at altitudes and distances, km. One operation per loop, so that each
+    /// is vectorized.
     #[inline(always)]
-    fn seen<const COUNT: usize>(&self, altitudes: &[f32; COUNT], distances: &[f32; COUNT]) -> ProjectedPoints<COUNT> {
+    fn project_points<const COUNT: usize>(
+        &self,
+        altitudes: &[f32; COUNT],
+        distances: &[f32; COUNT],
+    ) -> ProjectedPoints<COUNT> {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
-        let ([constant, outward, own], finder) = (*self.meridian, *self.finder);
-        let (mut per_upward, mut places, mut far_squared) = ([0.0; COUNT], [0.0; COUNT], [0.0; COUNT]);
+        let ([constant, outward, own], projection) = (*self.meridian, *self.projection);
+        let (mut per_upward, mut coordinates, mut far_squared) = ([0.0; COUNT], [0.0; COUNT], [0.0; COUNT]);
         for i in 0..COUNT {
             let (altitude, distance) = (altitudes[i], distances[i]);
             let squared = altitude.fma(DIAMETER + altitude, -distance.fma(2.0 * outward + distance, constant));
             let squared = own.fma(own, squared);
             let squared = if squared > 1.0 { squared } else { 1.0 };
             per_upward[i] = squared.simd_rsqrt();
-            places[i] = squared * per_upward[i] - own;
-            far_squared[i] = distance.fma(distance, places[i] * places[i]);
+            coordinates[i] = squared * per_upward[i] - own;
+            far_squared[i] = distance.fma(distance, coordinates[i] * coordinates[i]);
         }
-        let mut seen = ProjectedPoints { rows: [0.0; COUNT], slopes: [0.0; COUNT], lights: [0.0; COUNT] };
+        let mut projected = ProjectedPoints { rows: [0.0; COUNT], slopes: [0.0; COUNT], brightness: [0.0; COUNT] };
         for i in 0..COUNT {
-            seen.rows[i] = finder.row(approximations::atan2(distances[i], places[i])) - 0.5;
+            projected.rows[i] = projection.row(approximations::atan2(distances[i], coordinates[i])) - 0.5;
         }
         for i in 0..COUNT {
             let distance = distances[i];
             let far_squared = if far_squared[i] > 1e-12 { far_squared[i] } else { 1e-12 };
             let per_far = far_squared.simd_rsqrt();
-            let slope = distance.fma((outward + distance) * per_upward[i], places[i]) * (per_far * per_far);
-            seen.slopes[i] = finder.rows(slope);
-            // A source's power is that across the field; a collision stands for all of it, so the cosine to the vertical is
-            // taken out again.
+            let slope = distance.fma((outward + distance) * per_upward[i], coordinates[i]) * (per_far * per_far);
+            projected.slopes[i] = projection.rows(slope);
+            // A source's power is per area perpendicular to the field; a collision stands for all of it, so the cosine
+            // to the vertical cancels.
             let slant = (RADIUS + altitudes[i]) * per_upward[i] * per_far;
-            seen.lights[i] = if distance > 0.0 && far_squared > 1.0 { slant } else { 0.0 };
+            projected.brightness[i] = if distance > 0.0 && far_squared > 1.0 { slant } else { 0.0 };
         }
-        seen
+        projected
     }
 }
 
-/// How points are seen.
+/// Projected points.
 struct ProjectedPoints<const COUNT: usize> {
     rows: [f32; COUNT],
-    /// Rows for each km of distance.
+    /// Rows per km of distance.
     slopes: [f32; COUNT],
-    lights: [f32; COUNT],
+    brightness: [f32; COUNT],
 }
 
-/// Altitudes of [`Descents::place`]s, km.
+/// Altitudes of [`RowPolynomialBasis::altitude_coordinate`]s, km.
 #[inline(always)]
-pub(crate) fn altitudes_km(places: &[f32; LANES]) -> [f32; LANES] {
+pub(crate) fn altitudes_km(coordinates: &[f32; LANES]) -> [f32; LANES] {
     let mut altitudes = [0.0; LANES];
-    for (altitude, place) in altitudes.iter_mut().zip(places) {
-        *altitude = 1.0 / place.fma(HALF as f32, MIDDLE as f32) - PIVOT_KM as f32;
+    for (altitude, position) in altitudes.iter_mut().zip(coordinates) {
+        *altitude = 1.0 / position.fma(HALF as f32, MIDDLE as f32) - PIVOT_KM as f32;
     }
     altitudes
 }
 
-/// From nodes to polynomials.
+/// Matrices from values at the nodes to polynomial coefficients.
 #[derive(Clone, Debug)]
-pub(crate) struct Descents {
+pub(crate) struct RowPolynomialBasis {
     altitudes_km: [f32; NODES],
-    /// What the value at each node adds to each coefficient: of all terms, and of the first [`TERMS`].
-    whole: [[f32; NODES]; NODES],
+    /// Contribution of each node's value to each coefficient: for all terms, and for the first [`TERMS`].
+    full: [[f32; NODES]; NODES],
     short: [[f32; NODES]; NODES],
 }
 
-/// Rows, slopes and brightness by place among the altitudes.
+/// Polynomials of row, slope and brightness in the altitude coordinate.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Descent {
+pub(crate) struct RowPolynomials {
     rows: [f32; NODES],
     slopes: [f32; NODES],
-    lights: [f32; NODES],
-    /// Rows of the highest and the lowest node, and the steepest slope.
+    brightness: [f32; NODES],
+    /// Rows of the highest and the lowest node, and the maximum slope.
     ends: [f32; 2],
     steepest: f32,
 }
 
-impl Descents {
+impl RowPolynomialBasis {
     pub(crate) fn new() -> Self {
-        let altitude = |node: usize| (1.0 / HALF.mul_add(node_place(node), MIDDLE) - PIVOT_KM) as f32;
+        let altitude = |node: usize| (1.0 / HALF.mul_add(chebyshev_node(node), MIDDLE) - PIVOT_KM) as f32;
         Self {
             altitudes_km: std::array::from_fn(altitude),
-            whole: std::array::from_fn(|node| coefficients(node, NODES)),
+            full: std::array::from_fn(|node| coefficients(node, NODES)),
             short: std::array::from_fn(|node| coefficients(node, TERMS)),
         }
     }
 
-    /// Place of an altitude: 1 at the lowest, -1 at the highest.
-    pub(crate) fn place(altitude_km: f32) -> f32 {
+    /// Altitude coordinate: 1 at the lowest altitude, -1 at the highest.
+    pub(crate) fn altitude_coordinate(altitude_km: f32) -> f32 {
         ((1.0 / (f64::from(altitude_km) + PIVOT_KM) - MIDDLE) / HALF) as f32
     }
 
-    /// How the points of a line are seen.
+    /// Fits the polynomials of a line.
     #[inline(always)]
-    pub(crate) fn along<S: Simd>(&self, simd: S, line: &LineOfFall) -> Descent {
-        let ProjectedPoints { rows, slopes, lights } = line.seen(&self.altitudes_km, &[line.distance; NODES]);
+    pub(crate) fn fit<S: Simd>(&self, simd: S, line: &ProjectedFieldLine) -> RowPolynomials {
+        let ProjectedPoints { rows, slopes, brightness } =
+            line.project_points(&self.altitudes_km, &[line.distance; NODES]);
         let mut steepest = 0.0_f32;
         for slope in slopes {
             steepest = if slope.abs() > steepest { slope.abs() } else { steepest };
         }
-        Descent {
+        RowPolynomials {
             ends: [rows[NODES - 1], rows[0]],
             steepest,
-            rows: sum(simd, &self.whole, &rows),
+            rows: sum(simd, &self.full, &rows),
             slopes: sum(simd, &self.short, &slopes),
-            lights: sum(simd, &self.short, &lights),
+            brightness: sum(simd, &self.short, &brightness),
         }
     }
 }
 
-impl Descent {
-    /// Whether any of its points within `reach` km may lie on a chart of so many rows.
+impl RowPolynomials {
+    /// Conservative test whether points within `reach` km of the line can lie on a chart of `rows` rows.
     #[inline(always)]
-    pub(crate) fn shows(&self, reach: f32, rows: usize) -> bool {
-        // A row more for what lies beyond the outermost nodes.
+    pub(crate) fn may_be_visible(&self, reach: f32, rows: usize) -> bool {
+        // One row of margin beyond the outermost nodes.
         let beyond = self.steepest.fma(2.0 * reach, 0.1 * (self.ends[1] - self.ends[0]).abs() + 1.0);
         self.ends[1] + beyond > 0.0 && self.ends[0] - beyond < rows as f32
     }
 
-    /// Rows of points at places, so far from the line in km, and how bright they are seen.
+    /// Rows of points at altitude coordinates and offsets from the line in km, and their brightness factors.
     #[inline(always)]
-    pub(crate) fn points<S: Simd>(&self, places: Lanes<S>, offsets: Lanes<S>) -> [Lanes<S>; 2] {
-        let slopes = polynomial(places, &self.slopes[..TERMS]);
-        let rows = slopes.fma(offsets, polynomial(places, &self.rows));
-        [rows, polynomial(places, &self.lights[..TERMS])]
+    pub(crate) fn points<S: Simd>(&self, coordinates: Lanes<S>, offsets: Lanes<S>) -> [Lanes<S>; 2] {
+        let slopes = polynomial(coordinates, &self.slopes[..TERMS]);
+        let rows = slopes.fma(offsets, polynomial(coordinates, &self.rows));
+        [rows, polynomial(coordinates, &self.brightness[..TERMS])]
     }
 }
 
-/// Its value at `places`, coefficients from the constant on.
+/// Evaluates a polynomial at `coordinates`, coefficients from the constant term on (Horner).
 #[inline(always)]
-fn polynomial<S: Simd>(places: Lanes<S>, coefficients: &[f32]) -> Lanes<S> {
-    let Some((highest, others)) = coefficients.split_last() else { return places.broadcast(0.0) };
-    let mut value = places.broadcast(*highest);
+fn polynomial<S: Simd>(coordinates: Lanes<S>, coefficients: &[f32]) -> Lanes<S> {
+    let Some((highest, others)) = coefficients.split_last() else { return coordinates.broadcast(0.0) };
+    let mut value = coordinates.broadcast(*highest);
     for coefficient in others.iter().rev() {
-        value = value.fma(places, places.broadcast(*coefficient));
+        value = value.fma(coordinates, coordinates.broadcast(*coefficient));
     }
     value
 }
 
-/// The coefficients for values at the nodes.
+/// Coefficients from the values at the nodes.
 #[inline(always)]
-fn sum<S: Simd>(simd: S, shares: &[[f32; NODES]; NODES], values: &[f32; NODES]) -> [f32; NODES] {
+fn sum<S: Simd>(simd: S, basis: &[[f32; NODES]; NODES], values: &[f32; NODES]) -> [f32; NODES] {
     let mut sum = HalfLanes::splat(simd, 0.0);
     for node in 0..NODES {
-        sum = HalfLanes::splat(simd, values[node]).fma(HalfLanes::from_slice(simd, &shares[node]), sum);
+        sum = HalfLanes::splat(simd, values[node]).fma(HalfLanes::from_slice(simd, &basis[node]), sum);
     }
     sum.into()
 }
 
-/// Place of a node: Chebyshev's.
-fn node_place(node: usize) -> f64 {
+/// Chebyshev node.
+fn chebyshev_node(node: usize) -> f64 {
     math::cos(PI * (node as f64 + 0.5) / NODES as f64)
 }
 
-/// What a value of 1 at a node and 0 at all others adds to the coefficients of the first `terms` Chebyshev polynomials,
-/// in powers of the place.
+/// Contribution of a value of 1 at a node to the coefficients of the first `terms` Chebyshev polynomials, in powers of
+/// the coordinate.
 fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
     let mut powers = [0.0; NODES];
     let (mut last, mut polynomial) = ([0.0; NODES], [0.0; NODES]);
     polynomial[0] = 1.0;
     for term in 0..terms {
         let angle = PI * term as f64 * (node as f64 + 0.5) / NODES as f64;
-        let share = if term == 0 { 1.0 } else { 2.0 } / NODES as f64 * math::cos(angle);
+        let weight = if term == 0 { 1.0 } else { 2.0 } / NODES as f64 * math::cos(angle);
         for (power, coefficient) in powers.iter_mut().zip(&polynomial) {
-            *power += share * coefficient;
+            *power += weight * coefficient;
         }
         // T(n + 1) = 2 x T(n) - T(n - 1), and T(1) = x.
         let scale = if term == 0 { 1.0 } else { 2.0 };
@@ -232,29 +238,29 @@ mod tests {
     #[test]
     fn polynomials_place_points_where_they_are_seen() {
         // A row is 1.5 mrad high, a pixel of an ordinary picture.
-        let finder = Finder::of_rows(1.5e-3);
-        let descents = Descents::new();
+        let projection = ChartProjection::of_rows(1.5e-3);
+        let descents = RowPolynomialBasis::new();
         for dip_deg in [90.0, 77.0, 60.0] {
             let field = FieldLines::new(dip_deg, 0.0, DVec3::ZERO);
             for (longitude, distance) in [(0.3, 15.0), (1.6, 60.0), (-1.5, 150.0), (-1.6, 400.0), (-1.2, 900.0)] {
                 let (sin, cos) = math::sin_cos(longitude);
-                let meridian = field.meridian([cos, sin]).single();
-                let line = LineOfFall::new(&meridian, distance, &finder);
+                let meridian = field.meridian([cos, sin]).coefficients_f32();
+                let line = ProjectedFieldLine::new(&meridian, distance, &projection);
                 for first_km in [82.0, 130.0, 400.0] {
                     let altitudes_km: [f32; LANES] = std::array::from_fn(|i| first_km + 3.0 * i as f32);
                     let offset = |i: usize| distance * 0.01 * (i as f32 / 7.5 - 1.0);
                     let offsets: [f32; LANES] = std::array::from_fn(offset);
-                    let [[rows, lights], [exact_rows, exact_lights]] = dispatch!(Level::new(), simd => {
-                        let places = altitudes_km.map(Descents::place);
+                    let [[rows, brightness], [exact_rows, exact_lights]] = dispatch!(Level::new(), simd => {
+                        let coordinates = altitudes_km.map(RowPolynomialBasis::altitude_coordinate);
                         let offsets = Lanes::from_slice(simd, &offsets);
-                        let found = descents.along(simd, &line).points(Lanes::from_slice(simd, &places), offsets);
+                        let found = descents.fit(simd, &line).points(Lanes::from_slice(simd, &coordinates), offsets);
                         [found, line.points(&altitudes_km, offsets)].map(|pair| pair.map(<[f32; LANES]>::from))
                     });
                     for i in 0..LANES {
                         let what = || format!("dip {dip_deg}, {distance} km away, {} km high", altitudes_km[i]);
                         assert!((rows[i] - exact_rows[i]).abs() < 0.3, "{}: {} {}", what(), rows[i], exact_rows[i]);
                         // Brightness does not follow the offset.
-                        let ratio = lights[i] / exact_lights[i];
+                        let ratio = brightness[i] / exact_lights[i];
                         assert!((ratio - 1.0).abs() < 0.025, "{}: {ratio}", what());
                     }
                 }

@@ -1,5 +1,4 @@
-//! The chart that auroras are drawn on: the part of the sky that a picture shows, by longitude and colatitude about the
-//! magnetic zenith.
+//! The chart: the visible part of the sky in longitude and colatitude about the magnetic zenith.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -11,33 +10,33 @@ use bansho_base::{
 
 use super::field_lines::FieldLines;
 
-/// Columns of a strip, which one thread draws.
-pub(crate) const STRIP: usize = 16;
-/// Places along each side of the picture at which its directions are sampled.
-const SAMPLES: usize = 24;
-/// Most columns and rows.
-const MOST: f64 = 16_384.0;
-/// Most cells of a chart for each of the picture's pixels: more are seen only where a camera zooms or turns far while its shutter is open,
-/// which blurs them.
-const MOST_PER_PIXEL: f64 = 16.0;
-/// Lower than this below the horizon nothing is drawn: sine of the elevation.
-const LOWEST: f64 = -0.35;
+/// Columns per strip; one thread works on a strip.
+pub(crate) const STRIP_COLUMNS: usize = 16;
+/// Samples per side of the picture for the coverage.
+const SAMPLES_PER_SIDE: usize = 24;
+/// Maximum number of columns and of rows.
+const MAX_SIZE: f64 = 16_384.0;
+/// Maximum chart cells per pixel: more occur only where a camera zooms or pans far during the exposure, which blurs
+/// them.
+const MAX_CELLS_PER_PIXEL: f64 = 16.0;
+/// Minimum sine of the elevation that is drawn.
+const MIN_SINE_ELEVATION: f64 = -0.35;
 
-/// What a chart covers, radians.
+/// Angular range of a chart, radians.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coverage {
-    /// Longitude of the middle and how far it reaches to both sides; all around from pi on.
+    /// Center and half-width of the longitude range; full circle from pi on.
     longitude: [f64; 2],
     /// Least and greatest colatitude.
     colatitude: [f64; 2],
-    /// Angle of a pixel, or more where the chart would have far more cells than the picture has pixels.
+    /// Angle of a pixel, or more where the chart would have too many cells.
     pub(crate) pixel: f64,
 }
 
 /// A grid of directions; columns are meridians, rows parallels.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
-    /// Number of columns, a multiple of [`STRIP`].
+    /// Number of columns, a multiple of [`STRIP_COLUMNS`].
     pub(crate) columns: usize,
     /// Number of rows, at least 2.
     pub(crate) rows: usize,
@@ -47,28 +46,28 @@ pub(crate) struct Chart {
     pub(crate) row_step: f64,
     first_longitude: f64,
     first_colatitude: f64,
-    /// Whether it goes all around.
-    pub(crate) whole: bool,
+    /// Whether it spans the full circle of longitude.
+    pub(crate) wraps: bool,
 }
 
 impl Coverage {
-    /// What the whole picture shows while the shutter is open.
+    /// Range of the whole picture over the exposure.
     pub(crate) fn of_view(view: &View, field: &FieldLines) -> Self {
         let cameras = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(|t| view.camera_at(t));
         let directions: Vec<[f64; 3]> = cameras.iter().flat_map(|camera| directions(camera, field)).collect();
-        // The longitude of the middle of what is seen.
+        // Circular mean of the longitudes.
         let sum = directions.iter().fold([0.0; 2], |sum, [_, x, y]| [sum[0] + x, sum[1] + y]);
         let middle = math::atan2(sum[1], sum[0]);
         let (mut reach, mut least, mut greatest) = (0.0_f64, PI, 0.0_f64);
         for [along, x, y] in &directions {
             let colatitude = math::atan2(math::hypot(*x, *y), *along);
-            let turned = math::atan2(*y, *x) - middle;
-            reach = reach.max((turned - TAU * (turned / TAU).round()).abs());
+            let wrapped = math::atan2(*y, *x) - middle;
+            reach = reach.max((wrapped - TAU * (wrapped / TAU).round()).abs());
             (least, greatest) = (least.min(colatitude), greatest.max(colatitude));
         }
         let camera = &view.camera;
         let pixel = 1.0 / camera.focal_pixels;
-        let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES - 1) as f64 * pixel;
+        let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES_PER_SIDE - 1) as f64 * pixel;
         let around = least < margin || reach > 0.8 * PI;
         let sine = math::sin(least.min(FRAC_PI_2)).max(1e-3);
         let mut coverage = Self {
@@ -76,12 +75,12 @@ impl Coverage {
             colatitude: [if around { 0.0 } else { least - margin }.max(0.0), (greatest + margin).min(PI)],
             pixel,
         };
-        let most = MOST_PER_PIXEL * camera.size[0] * camera.size[1];
+        let most = MAX_CELLS_PER_PIXEL * camera.size[0] * camera.size[1];
         coverage.pixel = pixel.max(math::sqrt(coverage.area() / most));
         coverage
     }
 
-    /// Sine of the colatitude where meridians lie farthest apart.
+    /// Maximum sine of the colatitude.
     fn widest(&self) -> f64 {
         let [least, greatest] = self.colatitude;
         if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
@@ -90,39 +89,43 @@ impl Coverage {
         math::sin(least).max(math::sin(greatest)).max(1e-3)
     }
 
-    /// What a chart over it takes up, columns as wide everywhere as where they are widest, square radians.
+    /// Solid-angle bound, with columns as wide as the widest, square radians.
     fn area(&self) -> f64 {
         let [least, greatest] = self.colatitude;
         2.0 * self.longitude[1] * self.widest() * (greatest - least)
     }
 }
 
-/// Parts along and across the field of directions all over the picture, without those far below the horizon.
+/// Components along and across the field of sampled directions of the picture, without those far below the horizon.
 fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<Item = [f64; 3]> + 'a {
-    (0..SAMPLES * SAMPLES).filter_map(move |index| {
-        let share = |at: usize| at as f64 / (SAMPLES - 1) as f64;
-        let pixel = DVec2::new(share(index % SAMPLES) * camera.size[0], share(index / SAMPLES) * camera.size[1]);
+    (0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE).filter_map(move |index| {
+        let fraction = |at: usize| at as f64 / (SAMPLES_PER_SIDE - 1) as f64;
+        let pixel = DVec2::new(
+            fraction(index % SAMPLES_PER_SIDE) * camera.size[0],
+            fraction(index / SAMPLES_PER_SIDE) * camera.size[1],
+        );
         let direction = camera.direction(pixel)?.normalize();
-        (direction.y > LOWEST).then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
+        (direction.y > MIN_SINE_ELEVATION)
+            .then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
     })
 }
 
 impl Chart {
-    /// A chart over `coverage` whose cells are `column` by `row` radians where they are widest, or somewhat less.
+    /// A chart over `coverage` with cells of at most `column` by `row` radians where they are widest.
     pub(crate) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
         let ([least, greatest], widest) = (coverage.colatitude, coverage.widest());
         let [middle, reach] = coverage.longitude;
-        let whole = reach >= PI;
+        let wraps = reach >= PI;
         let range = 2.0 * reach;
-        let columns = (range * widest / column).min(MOST).ceil() as usize;
-        let columns = columns.max(1).next_multiple_of(STRIP);
-        let column_step = if whole { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
-        // On multiples of the step, so that a chart does not crawl over the sky as the camera turns.
-        let first_longitude = if whole { -PI } else { ((middle - reach) / column_step).floor() * column_step };
-        let row = row.max((greatest - least) / MOST);
+        let columns = (range * widest / column).min(MAX_SIZE).ceil() as usize;
+        let columns = columns.max(1).next_multiple_of(STRIP_COLUMNS);
+        let column_step = if wraps { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
+        // Aligned to multiples of the step, so that the chart does not crawl as the camera turns.
+        let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
+        let row = row.max((greatest - least) / MAX_SIZE);
         let first_row = (least / row).floor();
         let rows = ((greatest / row).ceil() - first_row).max(2.0) as usize;
-        Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, whole }
+        Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, wraps }
     }
 
     /// Longitude of the middle of a column.
@@ -136,23 +139,23 @@ impl Chart {
     }
 
     /// Cosine and sine of the longitude of a column.
-    pub(crate) fn unit(&self, column: usize) -> [f64; 2] {
+    pub(crate) fn longitude_cos_sin(&self, column: usize) -> [f64; 2] {
         let (sin, cos) = math::sin_cos(self.longitude(column));
         [cos, sin]
     }
 
     /// Cosines and sines of the longitudes of a strip's columns.
-    pub(crate) fn single_units(&self, strip: usize) -> [[f32; STRIP]; 2] {
-        let mut units = [[0.0; STRIP]; 2];
-        for column in 0..STRIP {
-            for (values, value) in units.iter_mut().zip(self.unit(strip * STRIP + column)) {
+    pub(crate) fn strip_cos_sin(&self, strip: usize) -> [[f32; STRIP_COLUMNS]; 2] {
+        let mut units = [[0.0; STRIP_COLUMNS]; 2];
+        for column in 0..STRIP_COLUMNS {
+            for (values, value) in units.iter_mut().zip(self.longitude_cos_sin(strip * STRIP_COLUMNS + column)) {
                 values[column] = value as f32;
             }
         }
         units
     }
 
-    /// Cotangent of the colatitude of every row and so many more, and inverse sine of that of every row.
+    /// Cotangents of the colatitude of every row and `more` rows beyond, and inverse sines of that of every row.
     pub(crate) fn row_tables(&self, more: usize) -> [Vec<f32>; 2] {
         let trigonometry = |row| math::sin_cos(self.colatitude(row));
         let cotangents = (0..self.rows + more).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
@@ -160,21 +163,21 @@ impl Chart {
         [cotangents.collect(), inverses.collect()]
     }
 
-    /// The column that stands for one less than a column beside the chart.
+    /// Wraps or clamps a column that is at most one column outside the chart.
     #[inline(always)]
-    pub(crate) fn held(&self, column: i32) -> usize {
+    pub(crate) fn wrap_column(&self, column: i32) -> usize {
         let columns = self.columns as i32;
-        let turned = match (self.whole, column < 0, column >= columns) {
+        let wrapped = match (self.wraps, column < 0, column >= columns) {
             (true, true, _) => column + columns,
             (true, _, true) => column - columns,
             _ => column,
         };
-        turned.clamp(0, columns - 1) as usize
+        wrapped.clamp(0, columns - 1) as usize
     }
 
-    /// How places on the chart are found.
-    pub(crate) fn finder(&self) -> Finder {
-        Finder {
+    /// The mapping from directions to cells.
+    pub(crate) fn projection(&self) -> ChartProjection {
+        ChartProjection {
             per_column: (1.0 / self.column_step) as f32,
             per_row: (1.0 / self.row_step) as f32,
             middle: (self.first_longitude + 0.5 * self.columns as f64 * self.column_step) as f32,
@@ -184,9 +187,9 @@ impl Chart {
     }
 }
 
-/// Places on a chart in cells: 0 is the chart's edge, 0.5 the middle of its first column or row.
+/// Maps directions to fractional cells: 0 is the chart's edge, 0.5 the center of the first column or row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Finder {
+pub(crate) struct ChartProjection {
     per_column: f32,
     per_row: f32,
     middle: f32,
@@ -194,8 +197,8 @@ pub(crate) struct Finder {
     first_row: f32,
 }
 
-impl Finder {
-    /// One for rows of so many radians from the magnetic zenith on.
+impl ChartProjection {
+    /// For rows of so many radians, starting at the magnetic zenith.
     #[cfg(test)]
     pub(super) fn of_rows(step: f32) -> Self {
         Self { per_column: 1.0 / step, per_row: 1.0 / step, middle: 0.0, half: 0.0, first_row: 0.0 }
@@ -204,9 +207,9 @@ impl Finder {
     /// The column of a longitude in radians, within half a turn of the chart's middle.
     #[inline(always)]
     pub(crate) fn column(&self, longitude: f32) -> f32 {
-        let turned = longitude - self.middle;
-        let turned = turned - (turned * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
-        turned.fma(self.per_column, self.half)
+        let wrapped = longitude - self.middle;
+        let wrapped = wrapped - (wrapped * (1.0 / std::f32::consts::TAU)).round_ties_even() * std::f32::consts::TAU;
+        wrapped.fma(self.per_column, self.half)
     }
 
     /// How many rows an angle in radians is.
@@ -252,8 +255,8 @@ mod tests {
         let [still, angle] = cells([50.0, 50.0]);
         assert!((1.0..4.0).contains(&still) && angle == 1.0, "{still} {angle}");
         let [zoomed, angle] = cells([170.0, 0.1]);
-        assert!(zoomed < 1.3 * MOST_PER_PIXEL && angle == 1.0, "{zoomed} {angle}");
+        assert!(zoomed < 1.3 * MAX_CELLS_PER_PIXEL && angle == 1.0, "{zoomed} {angle}");
         let [narrow, angle] = cells([0.2, 170.0]);
-        assert!(narrow < 1.3 * MOST_PER_PIXEL, "{narrow} {angle}");
+        assert!(narrow < 1.3 * MAX_CELLS_PER_PIXEL, "{narrow} {angle}");
     }
 }

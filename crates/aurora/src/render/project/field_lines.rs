@@ -1,24 +1,22 @@
-//! Field lines over a round Earth, as an observer sees them.
+//! Field lines over a spherical Earth, seen by an observer.
 //!
-//! Lines of a uniform field are parallel, so that from one place each is seen on a meridian of the sky about the
-//! magnetic zenith, the point to which all of them converge: its longitude never changes along the line. Everything
-//! here rests on that.
+//! The lines of a uniform field are parallel, so from one position each appears on a meridian of the sky about the
+//! magnetic zenith, their vanishing point: the longitude is constant along a line. The whole renderer relies on that.
 
 use bansho_base::math::{self, DVec2, DVec3, MulAdd, approximations};
 
 pub(crate) use bansho_base::world::sky::EARTH_RADIUS_KM;
 
-/// Altitude of the plane on which feet are drawn, km.
-pub(crate) const FOOT_KM: f64 = 100.0;
-/// Least dip that is drawn, degrees: nearer the magnetic equator there are no auroras, and field lines would not reach
-/// the ground.
-const LEAST_DIP_DEG: f64 = 30.0;
+pub(crate) use crate::shapes::FOOT_ALTITUDE_KM;
+/// Minimum dip angle, degrees: nearer the magnetic equator there are no auroras and field lines would not reach the
+/// ground.
+const MIN_DIP_DEG: f64 = 30.0;
 
 /// The magnetic field about an observer. Lengths are km; x east, y up, z south from the point on the ground below the
-/// drawn square's middle.
+/// center of the drawn square.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FieldLines {
-    /// The observer, from the Earth's middle.
+    /// The observer, relative to the Earth's center.
     observer: DVec3,
     /// Unit vector along the field, away from the ground.
     pub(crate) along: DVec3,
@@ -26,58 +24,57 @@ pub(crate) struct FieldLines {
     pub(crate) across: [DVec3; 2],
 }
 
-/// Where a field line passes the foot's plane.
+/// Intersection of a field line with the drawn plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Foot {
-    /// The line's place in the plane across the field through the observer, km.
+pub(crate) struct FootPoint {
+    /// Position in the plane perpendicular to the field through the observer, km.
     pub(crate) across: [f32; 2],
     /// Cosine of the angle between the field and the vertical there.
-    pub(crate) upright: f32,
+    pub(crate) vertical_cosine: f32,
 }
 
 impl FieldLines {
-    /// The field of that dip and declination for an observer at a place in m.
-    pub(crate) fn new(dip_deg: f64, declination_deg: f64, place: DVec3) -> Self {
-        let dip = dip_deg.abs().max(LEAST_DIP_DEG).to_radians();
+    /// The field of that dip and declination for an observer at a position in m.
+    pub(crate) fn new(dip_deg: f64, declination_deg: f64, position: DVec3) -> Self {
+        let dip = dip_deg.abs().max(MIN_DIP_DEG).to_radians();
         let (sin, cos) = math::sin_cos(dip);
         let (east, north) = math::sin_cos(declination_deg.to_radians());
-        // Lines lean away from the nearer pole: to the south in the north.
+        // Field lines incline away from the nearer pole: to the south in the northern hemisphere.
         let lean = if dip_deg < 0.0 { cos } else { -cos };
         let along = DVec3::new(lean * east, sin, -lean * north);
         let first = (DVec3::X - along * along.x).normalize();
-        let observer = place * 1e-3 + DVec3::Y * EARTH_RADIUS_KM;
+        let observer = position * 1e-3 + DVec3::Y * EARTH_RADIUS_KM;
         Self { observer, along, across: [first, along.cross(first)] }
     }
 
-    /// The field line whose foot is at a place of the drawn plane, km east and south: that far from the middle along
-    /// the shell at 100 km.
+    /// The field line through a position of the drawn plane, km east and south, measured along the shell at 100 km.
     #[inline(always)]
-    pub(crate) fn foot(&self, east: f32, south: f32) -> Foot {
-        const SHELL: f32 = (EARTH_RADIUS_KM + FOOT_KM) as f32;
-        const TURNS: f32 = (1.0 / (std::f64::consts::TAU * (EARTH_RADIUS_KM + FOOT_KM))) as f32;
+    pub(crate) fn foot_point(&self, east: f32, south: f32) -> FootPoint {
+        const SHELL: f32 = (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM) as f32;
+        const TURNS: f32 = (1.0 / (std::f64::consts::TAU * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM))) as f32;
         let distance = east.fma(east, south * south).sqrt();
         let turns = distance * TURNS;
         let (sin, cos) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
-        let share = if distance > 0.0 { sin / distance } else { 0.0 };
-        let up = [east * share, cos, south * share];
+        let scale = if distance > 0.0 { sin / distance } else { 0.0 };
+        let up = [east * scale, cos, south * scale];
         let observer = self.observer.as_vec3().to_array();
-        let mut place = [0.0; 3];
+        let mut position = [0.0; 3];
         for axis in 0..3 {
-            place[axis] = up[axis].fma(SHELL, -observer[axis]);
+            position[axis] = up[axis].fma(SHELL, -observer[axis]);
         }
-        let [along, first, second] = self.single();
-        Foot { across: [dot(first, place), dot(second, place)], upright: dot(along, up).max(0.05) }
+        let [along, first, second] = self.axes_f32();
+        FootPoint { across: [dot(first, position), dot(second, position)], vertical_cosine: dot(along, up).max(0.05) }
     }
 
-    /// The place of the drawn plane, km east and south, that is seen in a direction; none where it is not seen.
-    pub(crate) fn drawn(&self, direction: DVec3) -> Option<DVec2> {
-        const SHELL: f64 = EARTH_RADIUS_KM + FOOT_KM;
+    /// The position of the drawn plane, km east and south, that is seen in a direction, if any.
+    pub(crate) fn foot_position(&self, direction: DVec3) -> Option<DVec2> {
+        const SHELL: f64 = EARTH_RADIUS_KM + FOOT_ALTITUDE_KM;
         let direction = direction.normalize();
         let nearest = -self.observer.dot(direction);
         let squared = nearest * nearest + SHELL * SHELL - self.observer.length_squared();
-        let place = self.observer + direction * (nearest + math::sqrt(squared.max(0.0)));
-        let level = DVec2::new(place.x, place.z);
-        let distance = SHELL * math::atan2(level.length(), place.y);
+        let position = self.observer + direction * (nearest + math::sqrt(squared.max(0.0)));
+        let level = DVec2::new(position.x, position.z);
+        let distance = SHELL * math::atan2(level.length(), position.y);
         (squared >= 0.0).then(|| level.normalize_or_zero() * distance)
     }
 
@@ -93,13 +90,13 @@ impl FieldLines {
 
     /// The axes along the field and across it in single precision.
     #[inline(always)]
-    pub(crate) fn single(&self) -> [[f32; 3]; 3] {
+    pub(crate) fn axes_f32(&self) -> [[f32; 3]; 3] {
         let [first, second] = self.across;
         [self.along.as_vec3().to_array(), first.as_vec3().to_array(), second.as_vec3().to_array()]
     }
 
-    /// Cosine of the colatitude, and the two parts across the field, of a direction.
-    pub(crate) fn turned(&self, direction: DVec3) -> [f64; 3] {
+    /// Cosine of the colatitude, and the two components across the field, of a direction.
+    pub(crate) fn field_frame_components(&self, direction: DVec3) -> [f64; 3] {
         [direction.dot(self.along), direction.dot(self.across[0]), direction.dot(self.across[1])]
     }
 
@@ -117,10 +114,10 @@ pub(crate) struct Meridian {
     along: f64,
 }
 
-/// A field line of a meridian. Places on it are counted in km along the field from the plane through the observer.
+/// A field line of a meridian. Coordinates on it are km along the field from the plane through the observer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FieldLine {
-    /// Square of the distance from the Earth's middle at place 0, less that of the ground.
+    /// Squared distance from the Earth's center at coordinate 0, minus the squared Earth radius.
     excess: f64,
     along: f64,
 }
@@ -131,24 +128,24 @@ impl Meridian {
         FieldLine { excess: self.squared + distance * (2.0 * self.outward + distance), along: self.along }
     }
 
-    /// In single precision: square of the observer's distance from the Earth's middle less that of the ground, and the
-    /// parts of that distance outward and along the field.
+    /// In single precision: squared distance of the observer from the Earth's center minus the squared Earth radius,
+    /// and its components outward and along the field.
     #[inline(always)]
-    pub(crate) fn single(&self) -> [f32; 3] {
+    pub(crate) fn coefficients_f32(&self) -> [f32; 3] {
         [self.squared, self.outward, self.along].map(|value| value as f32)
     }
 }
 
 impl FieldLine {
-    /// Place of the line where it is so high; where it comes nearest if it is never so low.
-    pub(crate) fn place(&self, altitude_km: f64) -> f64 {
+    /// Coordinate at an altitude; the point of closest approach if the line does not reach it.
+    pub(crate) fn position_at_altitude(&self, altitude_km: f64) -> f64 {
         let squared = altitude_km * (2.0 * EARTH_RADIUS_KM + altitude_km);
         math::sqrt((self.along * self.along - self.excess + squared).max(0.0)) - self.along
     }
 
-    /// The coefficients of the square of the distance from the Earth's middle less that of the ground, `(c0 + s (c1 +
+    /// Coefficients of the squared distance from the Earth's center minus the squared Earth radius, `(c0 + s (c1 +
     /// s))`.
-    pub(crate) fn square(&self) -> [f32; 2] {
+    pub(crate) fn quadratic(&self) -> [f32; 2] {
         [self.excess as f32, (2.0 * self.along) as f32]
     }
 }
@@ -159,7 +156,7 @@ pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0].fma(b[0], a[1].fma(b[1], a[2] * b[2]))
 }
 
-/// Altitude from what [`FieldLine::square`] comes to, km; written so that little is lost to rounding.
+/// Altitude from the value of [`FieldLine::quadratic`], km; arranged to avoid cancellation.
 #[inline(always)]
 pub(crate) fn altitude(squared: f32) -> f32 {
     const RADIUS: f32 = EARTH_RADIUS_KM as f32;
@@ -188,21 +185,21 @@ mod tests {
     fn a_foot_lies_on_its_line_at_100_km() {
         let field = FieldLines::new(77.0, 5.0, DVec3::new(20.0, 1.7, -300.0));
         for [east, south] in [[0.0, 0.0], [120.0, -80.0], [-600.0, 900.0]] {
-            let foot = field.foot(east, south);
+            let foot = field.foot_point(east, south);
             let [x, y] = foot.across.map(f64::from);
             let distance = math::hypot(x, y);
             let line = field.meridian([x / distance, y / distance]).line(distance);
-            let place = line.place(100.0);
-            // The same place, by the sphere.
+            let position = line.position_at_altitude(100.0);
+            // The same position, by the sphere.
             let radius = EARTH_RADIUS_KM + 100.0;
             let far = math::hypot(f64::from(east), f64::from(south)).max(1e-9);
             let (sin, cos) = math::sin_cos(far / radius);
             let up = DVec3::new(f64::from(east) / far * sin, cos, f64::from(south) / far * sin);
-            let from_lines = field.observer + field.across[0] * x + field.across[1] * y + field.along * place;
+            let from_lines = field.observer + field.across[0] * x + field.across[1] * y + field.along * position;
             assert!((up * radius - from_lines).length() < 0.02, "{east} {south}");
-            assert!((f64::from(foot.upright) - up.dot(field.along)).abs() < 1e-6);
-            let [constant, linear] = line.square();
-            let found = altitude((place as f32).fma(place as f32 + linear, constant));
+            assert!((f64::from(foot.vertical_cosine) - up.dot(field.along)).abs() < 1e-6);
+            let [constant, linear] = line.quadratic();
+            let found = altitude((position as f32).fma(position as f32 + linear, constant));
             assert!((found - 100.0).abs() < 0.01, "{found}");
         }
     }
@@ -210,25 +207,25 @@ mod tests {
     #[test]
     fn a_drawn_place_is_seen_where_it_is() {
         let field = FieldLines::new(77.0, 5.0, DVec3::new(20e3, 1.7, -300e3));
-        let radius = EARTH_RADIUS_KM + FOOT_KM;
-        for place in [DVec2::ZERO, DVec2::new(120.0, -80.0), DVec2::new(-300.0, -700.0)] {
-            let (sin, cos) = math::sin_cos(place.length() / radius);
-            let level = place.normalize_or_zero() * sin;
+        let radius = EARTH_RADIUS_KM + FOOT_ALTITUDE_KM;
+        for position in [DVec2::ZERO, DVec2::new(120.0, -80.0), DVec2::new(-300.0, -700.0)] {
+            let (sin, cos) = math::sin_cos(position.length() / radius);
+            let level = position.normalize_or_zero() * sin;
             let direction = DVec3::new(level.x, cos, level.y) * radius - field.observer;
-            assert!((field.drawn(direction).unwrap() - place).length() < 1e-6);
+            assert!((field.foot_position(direction).unwrap() - position).length() < 1e-6);
         }
         // From above the shell and looking away.
-        assert_eq!(FieldLines::new(77.0, 0.0, DVec3::Y * 2e5).drawn(DVec3::X), None);
+        assert_eq!(FieldLines::new(77.0, 0.0, DVec3::Y * 2e5).foot_position(DVec3::X), None);
     }
 
     #[test]
     fn a_field_line_keeps_its_longitude() {
         let field = FieldLines::new(77.0, 0.0, DVec3::ZERO);
-        let foot = field.foot(80.0, -150.0).across.map(f64::from);
+        let foot = field.foot_point(80.0, -150.0).across.map(f64::from);
         let longitude = math::atan2(foot[1], foot[0]);
-        for place in [90.0, 150.0, 400.0] {
-            let seen = field.across[0] * foot[0] + field.across[1] * foot[1] + field.along * place;
-            let [_, x, y] = field.turned(seen.normalize());
+        for position in [90.0, 150.0, 400.0] {
+            let seen = field.across[0] * foot[0] + field.across[1] * foot[1] + field.along * position;
+            let [_, x, y] = field.field_frame_components(seen.normalize());
             assert!((math::atan2(y, x) - longitude).abs() < 1e-9);
         }
     }

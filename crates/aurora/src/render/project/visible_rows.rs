@@ -1,4 +1,4 @@
-//! Whether light about a field line can show between the first and the last row of a chart.
+//! Culling: whether light about a field line can be visible within the rows of a chart.
 
 use std::f64::consts::PI;
 
@@ -10,13 +10,13 @@ use super::{
 };
 use crate::physics::atmosphere::{HIGHEST_KM, LOWEST_KM};
 
-/// Rows beside the chart that count as shown.
+/// Margin in rows.
 const MARGIN_ROWS: f64 = 2.0;
 
-/// The rows of a chart, for field lines anywhere.
-pub(crate) struct ShownRows {
-    /// Square of the observer's distance from the Earth's middle less that of the ground, and the parts of that distance along
-    /// and across the field, km.
+/// Visible rows of a chart, tested against field lines.
+pub(crate) struct VisibleRowTest {
+    /// Squared distance of the observer from the Earth's center minus the squared Earth radius, and its components
+    /// along and across the field, km.
     squared: f32,
     along: f32,
     across: [f32; 2],
@@ -27,11 +27,11 @@ pub(crate) struct ShownRows {
     last: [f32; 2],
 }
 
-impl ShownRows {
+impl VisibleRowTest {
     pub(crate) fn new(chart: &Chart, field: &FieldLines) -> Self {
-        // The same for every longitude but for the part outward.
+        // Only the outward component depends on the longitude.
         let [[squared, first, along], [_, second, _]] =
-            [[1.0, 0.0], [0.0, 1.0]].map(|unit| field.meridian(unit).single());
+            [[1.0, 0.0], [0.0, 1.0]].map(|unit| field.meridian(unit).coefficients_f32());
         let unit = |row: f64| {
             let (sine, cosine) = math::sin_cos((chart.colatitude(0) + row * chart.row_step).clamp(0.0, PI));
             [sine as f32, cosine as f32]
@@ -46,16 +46,17 @@ impl ShownRows {
         }
     }
 
-    /// Whether light within `margin_km` of a field line, across the field, may show: the line's place across the field and its distance
-    /// from the observer's own, km.
+    /// Conservative test for light within `margin_km` of a field line, given by its position across the field and its
+    /// distance from the observer's own, km.
     #[inline(always)]
-    pub(crate) fn may_hold(&self, [x, y]: [f32; 2], distance: f32, margin_km: f32) -> bool {
+    pub(crate) fn may_contain(&self, [x, y]: [f32; 2], distance: f32, margin_km: f32) -> bool {
         let outward = x.fma(self.across[0], y * self.across[1]);
         let excess = distance.fma(distance, 2.0_f32.fma(outward, self.squared));
         let change = margin_km * 2.0_f32.fma(distance + self.lean, margin_km);
-        let highest = self.place(HIGHEST_KM as f32, excess - change);
-        let lowest = self.place(LOWEST_KM as f32, excess + change);
-        // The sine of how much farther down than the first row its lowest light beside the margin's outer edge lies; and so on.
+        let highest = self.position_at_altitude(HIGHEST_KM as f32, excess - change);
+        let lowest = self.position_at_altitude(LOWEST_KM as f32, excess + change);
+        // Sine of the angle by which its lowest light at the margin's outer edge is below the first row; likewise for
+        // the last row.
         let [sine, cosine] = self.first;
         let above = (distance + margin_km).fma(cosine, -lowest * sine) < 0.0;
         let [sine, cosine] = self.last;
@@ -63,10 +64,11 @@ impl ShownRows {
         !above && !below
     }
 
-    /// Place along a field line of that altitude, as [`FieldLine::place`](super::field_lines::FieldLine::place), by the square of the distance
-    /// from the Earth's middle at place 0 less that of the ground.
+    /// Coordinate along a field line at an altitude, as
+    /// [`FieldLine::position_at_altitude`](super::field_lines::FieldLine::position_at_altitude), from the squared
+    /// distance at coordinate 0 minus the squared Earth radius.
     #[inline(always)]
-    fn place(&self, altitude_km: f32, excess: f32) -> f32 {
+    fn position_at_altitude(&self, altitude_km: f32, excess: f32) -> f32 {
         const DIAMETER: f32 = 2.0 * EARTH_RADIUS_KM as f32;
         let squared = self.along.fma(self.along, altitude_km.fma(DIAMETER + altitude_km, -excess));
         (if squared > 0.0 { squared } else { 0.0 }).sqrt() - self.along
@@ -84,12 +86,12 @@ mod tests {
     use super::*;
     use crate::render::project::chart::Coverage;
 
-    /// Whether the line at a place is seen between the first and the last row, by its altitudes one after the other.
+    /// Whether the line at a position is seen between the first and the last row, by its altitudes one after the other.
     fn is_seen(chart: &Chart, field: &FieldLines, [x, y]: [f32; 2]) -> bool {
         let distance = math::hypot(f64::from(x), f64::from(y));
         let line = field.meridian([f64::from(x) / distance, f64::from(y) / distance]).line(distance);
         let rows = (0..=720).map(|step| {
-            let colatitude = math::atan2(distance, line.place(80.0 + f64::from(step)));
+            let colatitude = math::atan2(distance, line.position_at_altitude(80.0 + f64::from(step)));
             (colatitude - chart.colatitude(0)) / chart.row_step
         });
         rows.into_iter().any(|row| row > -0.5 && row < chart.rows as f64 - 0.5)
@@ -103,13 +105,14 @@ mod tests {
             let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [128, 72], 0);
             let coverage = Coverage::of_view(&view, &field);
             let chart = Chart::new(&coverage, coverage.pixel, coverage.pixel);
-            let shown = ShownRows::new(&chart, &field);
+            let shown = VisibleRowTest::new(&chart, &field);
             let (mut seen, mut kept, mut all) = (0, 0, 0);
             for east in -40..=40 {
                 for south in -40..=40 {
                     let across = [12.0 * east as f32 + 1.0, 12.0 * south as f32 + 1.0];
                     let distance = math::hypot(f64::from(across[0]), f64::from(across[1])) as f32;
-                    let (is_seen, is_kept) = (is_seen(&chart, &field, across), shown.may_hold(across, distance, 3.0));
+                    let (is_seen, is_kept) =
+                        (is_seen(&chart, &field, across), shown.may_contain(across, distance, 3.0));
                     assert!(is_kept || !is_seen, "dip {dip_deg}: {across:?}");
                     (seen, kept, all) = (seen + usize::from(is_seen), kept + usize::from(is_kept), all + 1);
                 }

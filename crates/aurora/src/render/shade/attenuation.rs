@@ -1,4 +1,4 @@
-//! From kilorayleighs to the colour that reaches the observer through the air.
+//! From kilorayleighs to color, with the extinction of the lower atmosphere.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,65 +9,65 @@ use bansho_base::math::{
 
 use crate::{
     physics::emission::{EMITTERS, Emitter, LINES, PerEmitter},
-    render::extinction::Extinction,
+    physics::extinction::Extinction,
 };
 use fearless_simd::{Simd, prelude::*};
 
-/// Steps from the horizon to the zenith, even in the root of the sine of the elevation: the air changes fast near the
-/// horizon.
+/// Steps from the horizon to the zenith, uniform in the square root of the sine of the elevation: extinction varies
+/// rapidly near the horizon.
 const STEPS: usize = 1024;
-/// Where the visible light of the first positive bands has its middle, nm.
+/// Effective wavelength of the visible first positive bands, nm.
 const BANDS_NM: f64 = 655.0;
 
 /// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
 #[derive(Clone, Debug)]
-pub(crate) struct Shading {
-    /// Red, green, blue, and whether its brightness counts.
-    colours: Vec<PerEmitter<[f32; 4]>>,
+pub(crate) struct EmitterColors {
+    /// Red, green, blue, and 1 for emitters whose brightness counts.
+    colors: Vec<PerEmitter<[f32; 4]>>,
 }
 
-impl Shading {
-    /// Through this air.
+impl EmitterColors {
+    /// Precomputes the table for an extinction.
     pub(crate) fn new(air: &Extinction) -> Self {
-        let colours = (0..=STEPS).map(|step| {
+        let colors = (0..=STEPS).map(|step| {
             let root = step as f64 / STEPS as f64;
             let elevation = math::asin(root * root).min(FRAC_PI_2);
             EMITTERS.map(|emitter| {
-                let [red, green, blue] = seen(emitter, air, elevation).map(|value| value as f32);
+                let [red, green, blue] = attenuated_color(emitter, air, elevation).map(|value| value as f32);
                 [red, green, blue, if emitter == Emitter::Nitrogen { 0.0 } else { 1.0 }]
             })
         });
-        Self { colours: colours.collect() }
+        Self { colors: colors.collect() }
     }
 
-    /// Where the elevation of that sine stands in the table; as the horizon below it.
+    /// Table coordinate of a sine of elevation, clamped at the horizon.
     #[inline(always)]
-    pub(crate) fn place(sine: f32) -> f32 {
+    pub(crate) fn table_coordinate(sine: f32) -> f32 {
         let held = if sine > 0.0 { sine } else { 0.0 };
         held.sqrt().fma(STEPS as f32, 0.5)
     }
 
-    /// The colour in which light by emitter, in kR, arrives from a [`place`](Self::place), and after it its brightness in kR, but for that of
-    /// the dim first positive bands.
+    /// Color of light by emitter in kR at a [`table_coordinate`](Self::table_coordinate); the fourth component is its
+    /// brightness in kR without the dim first positive bands.
     #[inline(always)]
-    pub(crate) fn arriving<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, place: f32) -> FourLanes<S> {
+    pub(crate) fn attenuated<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, coordinate: f32) -> FourLanes<S> {
         let mut sum = FourLanes::splat(simd, 0.0);
-        for (light, colour) in light.iter().zip(&self.colours[(place as usize).min(STEPS)]) {
-            sum = sum.broadcast(*light).fma(FourLanes::simd_from(simd, *colour), sum);
+        for (light, color) in light.iter().zip(&self.colors[(coordinate as usize).min(STEPS)]) {
+            sum = sum.broadcast(*light).fma(FourLanes::simd_from(simd, *color), sum);
         }
         sum
     }
 }
 
-/// A kilorayleigh of an emitter, all its lines together, as it arrives.
-fn seen(emitter: Emitter, air: &Extinction, elevation: f64) -> [f64; 3] {
+/// Attenuated color of a kilorayleigh of an emitter, all lines included.
+fn attenuated_color(emitter: Emitter, air: &Extinction, elevation: f64) -> [f64; 3] {
     if emitter == Emitter::Nitrogen {
-        let share = air.transmittance(BANDS_NM, elevation);
-        return emitter.colour_per_kilorayleigh().map(|value| value * share);
+        let transmittance = air.transmittance(BANDS_NM, elevation);
+        return emitter.color_per_kilorayleigh().map(|value| value * transmittance);
     }
     let lines = LINES.iter().filter(|line| line.emitter == emitter);
     let sum = lines.fold(DVec3::ZERO, |sum, line| {
-        sum + DVec3::from(line.colour_per_kilorayleigh())
+        sum + DVec3::from(line.color_per_kilorayleigh())
             * (line.photons * air.transmittance(line.wavelength_nm, elevation))
     });
     sum.to_array()
@@ -80,31 +80,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_air_every_emitter_has_its_own_colour() {
+    fn without_air_every_emitter_has_its_own_color() {
         let none = Extinction { rayleigh: 0.0, aerosol: 0.0, ozone: 0.0, ..Extinction::default() };
-        let shading = Shading::new(&none);
+        let emitter_colors = EmitterColors::new(&none);
         for emitter in EMITTERS {
             let mut light = [0.0; 4];
             light[emitter.index()] = 2.0;
-            let colour: [f32; 4] =
-                dispatch!(Level::new(), simd => shading.arriving(simd, &light, Shading::place(0.3)).into());
-            let expected = emitter.colour_per_kilorayleigh();
+            let color: [f32; 4] = dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(0.3)).into());
+            let expected = emitter.color_per_kilorayleigh();
             assert!(
-                (0..3).all(|c| (f64::from(colour[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
+                (0..3).all(|c| (f64::from(color[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
             );
         }
     }
 
     #[test]
     fn blue_fades_before_red_toward_the_horizon() {
-        let shading = Shading::new(&Extinction::default());
-        let share = |emitter: Emitter| {
+        let emitter_colors = EmitterColors::new(&Extinction::default());
+        let transmittance = |emitter: Emitter| {
             let mut light = [0.0; 4];
             light[emitter.index()] = 1.0;
-            let blue =
-                |sine: f32| dispatch!(Level::new(), simd => shading.arriving(simd, &light, Shading::place(sine))[2]);
+            let blue = |sine: f32| dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(sine))[2]);
             blue(0.02) / blue(1.0)
         };
-        assert!(share(Emitter::NitrogenIon) < 0.5 * share(Emitter::OxygenGreen).abs());
+        assert!(transmittance(Emitter::NitrogenIon) < 0.5 * transmittance(Emitter::OxygenGreen).abs());
     }
 }

@@ -1,4 +1,4 @@
-//! Light looked up on a chart: between its columns and rows.
+//! Bilinear sampling of a chart.
 
 #[cfg(test)]
 use fearless_simd::{Level, dispatch};
@@ -8,24 +8,24 @@ use bansho_base::math::simd::{FourLanes, HalfLanes, Real};
 
 use crate::{
     physics::emission::PerEmitter,
-    render::{integrate::columns::Meridians, project::chart::Finder},
+    render::{integrate::columns::ColumnBuffer, project::chart::ChartProjection},
 };
 
-impl Meridians {
-    /// The picture with how to find places on it.
-    pub(crate) fn sampler(&self) -> Sampler<'_> {
-        Sampler { meridians: self, finder: self.chart.finder() }
+impl ColumnBuffer {
+    /// A sampler of this buffer.
+    pub(crate) fn sampler(&self) -> ChartSampler<'_> {
+        ChartSampler { meridians: self, projection: self.chart.projection() }
     }
 }
 
-/// A chart with how to find places on it.
-pub(crate) struct Sampler<'a> {
-    meridians: &'a Meridians,
-    finder: Finder,
+/// A chart and its mapping from directions to cells.
+pub(crate) struct ChartSampler<'a> {
+    meridians: &'a ColumnBuffer,
+    projection: ChartProjection,
 }
 
-impl Sampler<'_> {
-    /// Adds the light at directions, linear between the cells of the chart.
+impl ChartSampler<'_> {
+    /// Adds the light at directions, bilinear between cells.
     #[inline(always)]
     pub(crate) fn add<S: Simd, const COUNT: usize>(
         &self,
@@ -37,11 +37,11 @@ impl Sampler<'_> {
         let last = (self.meridians.chart.rows - 1) as f32;
         let (mut columns, mut rows) = ([0.0; COUNT], [0.0; COUNT]);
         for i in 0..COUNT {
-            columns[i] = self.finder.column(longitude[i]) - 0.5;
-            rows[i] = (self.finder.row(colatitude[i]) - 0.5).clamp(0.0, last);
+            columns[i] = self.projection.column(longitude[i]) - 0.5;
+            rows[i] = (self.projection.row(colatitude[i]) - 0.5).clamp(0.0, last);
         }
         for i in 0..COUNT {
-            self.add_place(simd, columns[i], rows[i], &mut light[i]);
+            self.add_bilinear(simd, columns[i], rows[i], &mut light[i]);
         }
     }
 
@@ -54,36 +54,36 @@ impl Sampler<'_> {
     }
 
     #[inline(always)]
-    fn add_place<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
-        let Meridians { chart, light: all, .. } = self.meridians;
+    fn add_bilinear<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
+        let ColumnBuffer { chart, light: all, .. } = self.meridians;
         let left = column.floor();
         let across = column - left;
         let upper = (row as usize).min(chart.rows - 2);
-        let part = row - upper as f32;
-        let (left, right) = (chart.held(left as i32), chart.held(left as i32 + 1));
-        let [first, end] = self.meridians.lit_either([left, right]);
+        let fraction = row - upper as f32;
+        let (left, right) = (chart.wrap_column(left as i32), chart.wrap_column(left as i32 + 1));
+        let [first, end] = self.meridians.valid_rows_of_either([left, right]);
         if upper as u32 + 1 < first || upper as u32 >= end {
             return;
         }
-        // The row and the one below lie side by side.
+        // A row and the next one are adjacent in memory.
         let (left, right) = (left * chart.rows + upper, right * chart.rows + upper);
         let left = HalfLanes::from_slice(simd, all[left..left + 2].as_flattened());
         let right = HalfLanes::from_slice(simd, all[right..right + 2].as_flattened());
         let (above, below) = (left.broadcast(across)).fma(right - left, left).split();
-        *light = above.broadcast(part).fma(below - above, above + FourLanes::simd_from(simd, *light)).into();
+        *light = above.broadcast(fraction).fma(below - above, above + FourLanes::simd_from(simd, *light)).into();
     }
 
-    /// Whether all of a part of the sky is dark: between two longitudes, in radians, and two colatitudes.
+    /// Conservative test whether a region between two longitudes, in radians, and two colatitudes is dark.
     pub(crate) fn is_dark(&self, longitudes: [f32; 2], colatitudes: [f32; 2]) -> bool {
-        let Meridians { chart, lit, .. } = self.meridians;
-        let [left, right] = longitudes.map(|longitude| self.finder.column(longitude) as i32);
-        // Where a part reaches over the seam of a whole chart nothing is said.
+        let ColumnBuffer { chart, valid_rows, .. } = self.meridians;
+        let [left, right] = longitudes.map(|longitude| self.projection.column(longitude) as i32);
+        // Regions across the seam of a full-circle chart are not tested.
         if right < left || (right - left) as usize > chart.columns / 2 {
             return false;
         }
-        let [top, bottom] = colatitudes.map(|colatitude| (self.finder.row(colatitude).max(0.0)) as u32);
+        let [top, bottom] = colatitudes.map(|colatitude| (self.projection.row(colatitude).max(0.0)) as u32);
         let dark = |column: i32| {
-            let [first, end] = lit[chart.held(column)];
+            let [first, end] = valid_rows[chart.wrap_column(column)];
             bottom + 2 < first || top >= end + 2
         };
         (left - 2..=right + 2).all(dark)

@@ -1,4 +1,5 @@
-//! The charts as they are seen: sharp and soft light together, dimmed and coloured by the air below, so that a pixel looks up one colour.
+//! Composites the sharp and the soft chart, applies extinction and converts to color, so that a pixel samples one
+//! chart.
 
 use bansho_base::{
     host::scratch_pool::Spares,
@@ -6,13 +7,13 @@ use bansho_base::{
     math::simd::{FourLanes, HalfLanes, Real},
 };
 
-use super::attenuation::Shading;
+use super::attenuation::EmitterColors;
 use crate::{
     physics::emission::PerEmitter,
     render::{
-        integrate::columns::{LightStrip, Meridians, mixed},
+        integrate::columns::{ColumnBuffer, ColumnStrip, lerp_emitters},
         project::{
-            chart::{Chart, Finder, STRIP},
+            chart::{Chart, ChartProjection, STRIP_COLUMNS},
             field_lines::FieldLines,
         },
     },
@@ -20,56 +21,56 @@ use crate::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-/// Rows whose elevations are found at once.
+/// Rows per batch.
 const ROWS: usize = 16;
 
-/// What all columns share.
-struct Colouring<'a> {
+/// Inputs that all columns share.
+struct ColorPass<'a> {
     chart: &'a Chart,
-    soft: &'a Meridians,
-    soft_finder: Finder,
-    shading: &'a Shading,
+    soft: &'a ColumnBuffer,
+    soft_projection: ChartProjection,
+    emitter_colors: &'a EmitterColors,
     field: &'a FieldLines,
-    /// By row, and [`ROWS`] more: cosine and sine of the colatitude, and the row of the soft chart.
+    /// By row, padded by [`ROWS`]: cosine and sine of the colatitude, and the row of the soft chart.
     cosines: Vec<f32>,
     sines: Vec<f32>,
     soft_rows: Vec<f32>,
 }
 
-impl Meridians {
-    /// In place of light by emitter the colour in which the light of this chart and of the soft one arrives, ACEScg in cd/m^2, and after it the
-    /// brightness in kR of what is bright enough to be seen as an aurora.
-    pub(crate) fn seen(mut self, soft: &Self, field: &FieldLines, shading: &Shading) -> Self {
+impl ColumnBuffer {
+    /// Replaces brightness by emitter with the attenuated color of this and the soft chart, ACEScg in cd/m^2; the
+    /// fourth component is the brightness in kR.
+    pub(crate) fn composite(mut self, soft: &Self, field: &FieldLines, emitter_colors: &EmitterColors) -> Self {
         let level = Level::new();
-        let (chart, strips) = self.strips(STRIP);
-        let soft_finder = soft.chart.finder();
+        let (chart, strips) = self.strips(STRIP_COLUMNS);
+        let soft_projection = soft.chart.projection();
         let (mut cosines, mut sines, mut soft_rows) = (Vec::new(), Vec::new(), Vec::new());
         for row in 0..chart.rows + ROWS {
             let colatitude = chart.colatitude(row);
             let (sine, cosine) = math::sin_cos(colatitude);
             cosines.push(cosine as f32);
             sines.push(sine as f32);
-            soft_rows.push(soft_finder.row(colatitude as f32) - 0.5);
+            soft_rows.push(soft_projection.row(colatitude as f32) - 0.5);
         }
-        let colouring = Colouring { chart, soft, soft_finder, shading, field, cosines, sines, soft_rows };
+        let coloring = ColorPass { chart, soft, soft_projection, emitter_colors, field, cosines, sines, soft_rows };
         let spares = Spares::new(Vec::new);
         strips.with_max_len(1).for_each(|strip| {
-            spares.lend(|column| dispatch!(level, simd => colouring.strip(simd, strip, column)));
+            spares.lend(|column| dispatch!(level, simd => coloring.color_strip(simd, strip, column)));
         });
         self
     }
 }
 
-impl Colouring<'_> {
+impl ColorPass<'_> {
     #[inline(always)]
-    fn strip<S: Simd>(&self, simd: S, strip: LightStrip, soft: &mut Vec<PerEmitter<f32>>) {
-        for column in 0..STRIP {
-            let number = strip.number * STRIP + column;
+    fn color_strip<S: Simd>(&self, simd: S, strip: ColumnStrip, soft: &mut Vec<PerEmitter<f32>>) {
+        for column in 0..STRIP_COLUMNS {
+            let number = strip.number * STRIP_COLUMNS + column;
             let [soft_first, soft_end] = self.soft_column(simd, self.chart.longitude(number) as f32, soft);
-            let own = strip.lit[column];
+            let own = strip.valid_rows[column];
             let [mut first, mut end] = own.map(|row| row as usize);
             if soft_first < soft_end {
-                let row = |soft_row: usize| self.row_of(soft_row);
+                let row = |soft_row: usize| self.row_of_soft(soft_row);
                 first = first.min(row(soft_first.saturating_sub(1)));
                 end = end.max((row(soft_end) + 1).min(self.chart.rows));
             }
@@ -77,25 +78,25 @@ impl Colouring<'_> {
                 continue;
             }
             let light = &mut strip.light[column * self.chart.rows..][first..end];
-            self.colour(simd, number, first, light, soft);
-            strip.lit[column] = [first as u32, end as u32];
+            self.color(simd, number, first, light, soft);
+            strip.valid_rows[column] = [first as u32, end as u32];
         }
     }
 
-    /// The row of the chart that holds a row of the soft one.
-    fn row_of(&self, soft_row: usize) -> usize {
+    /// The row of the chart at a row of the soft one.
+    fn row_of_soft(&self, soft_row: usize) -> usize {
         self.soft_rows[..self.chart.rows].partition_point(|row| *row < soft_row as f32)
     }
 
-    /// The soft light along a longitude, row by row, and where it is lit.
+    /// The soft light along a longitude, by row, and its valid rows.
     #[inline(always)]
     fn soft_column<S: Simd>(&self, simd: S, longitude: f32, column: &mut Vec<PerEmitter<f32>>) -> [usize; 2] {
         let rows = self.soft.chart.rows;
-        let place = self.soft_finder.column(longitude) - 0.5;
-        let left = place.floor();
-        let across = place - left;
-        let pair = [left as i32, left as i32 + 1].map(|column| self.soft.chart.held(column));
-        let [first, end] = self.soft.lit_either(pair).map(|row| (row as usize).min(rows));
+        let column_position = self.soft_projection.column(longitude) - 0.5;
+        let left = column_position.floor();
+        let across = column_position - left;
+        let pair = [left as i32, left as i32 + 1].map(|column| self.soft.chart.wrap_column(column));
+        let [first, end] = self.soft.valid_rows_of_either(pair).map(|row| (row as usize).min(rows));
         column.clear();
         column.resize(rows, [0.0; 4]);
         if first >= end {
@@ -103,14 +104,14 @@ impl Colouring<'_> {
         }
         let [left, right] = pair.map(|column| &self.soft.light[column * rows..][first..end]);
         for ((light, left), right) in column[first..end].iter_mut().zip(left).zip(right) {
-            *light = mixed(simd, left, right, across).into();
+            *light = lerp_emitters(simd, left, right, across).into();
         }
         [first, end]
     }
 
-    /// Colours the rows of a column from `first` on.
+    /// Converts the rows of a column from `first` on to color.
     #[inline(always)]
-    fn colour<S: Simd>(
+    fn color<S: Simd>(
         &self,
         simd: S,
         number: usize,
@@ -119,7 +120,7 @@ impl Colouring<'_> {
         soft: &[PerEmitter<f32>],
     ) {
         let last = (soft.len() - 1) as f32;
-        let [cosine, sine] = self.chart.unit(number);
+        let [cosine, sine] = self.chart.longitude_cos_sin(number);
         let [one, other] = self.field.across;
         let along = self.field.along.y as f32;
         let outward = (one.y * cosine + other.y * sine) as f32;
@@ -128,7 +129,7 @@ impl Colouring<'_> {
             let (cosines, sines) = (&self.cosines[from..][..ROWS], &self.sines[from..][..ROWS]);
             let mut steps = [0.0; ROWS];
             for i in 0..ROWS {
-                steps[i] = Shading::place(along.fma(cosines[i], outward * sines[i]));
+                steps[i] = EmitterColors::table_coordinate(along.fma(cosines[i], outward * sines[i]));
             }
             for (i, light) in light.iter_mut().enumerate() {
                 let row = self.soft_rows[from + i].max(0.0).min(last);
@@ -137,7 +138,7 @@ impl Colouring<'_> {
                 let (above, below) = both.split();
                 let soft = above.broadcast(row - upper as f32).fma(below - above, above);
                 let all = soft + FourLanes::simd_from(simd, *light);
-                *light = self.shading.arriving(simd, &all.into(), steps[i]).into();
+                *light = self.emitter_colors.attenuated(simd, &all.into(), steps[i]).into();
             }
         }
     }
@@ -152,11 +153,14 @@ mod tests {
     };
 
     use super::*;
-    use crate::render::{extinction::Extinction, prepared::Batch, project::chart::Coverage};
+    use crate::{
+        physics::extinction::Extinction,
+        render::{prepared::PixelBatch, project::chart::Coverage},
+    };
 
     /// Light that changes slowly over the sky, on a chart.
-    fn painted(chart: Chart, scale: f32) -> Meridians {
-        let mut picture = Meridians::dark(chart);
+    fn painted(chart: Chart, scale: f32) -> ColumnBuffer {
+        let mut picture = ColumnBuffer::zeros(chart);
         let rows = picture.chart.rows;
         for (index, light) in picture.light.iter_mut().enumerate() {
             let (longitude, colatitude) =
@@ -164,7 +168,7 @@ mod tests {
             let value = scale * (2.0 + math::sin(5.0 * longitude) * math::cos(4.0 * colatitude)) as f32;
             *light = [value, 0.5 * value, 0.3, 0.2 * value];
         }
-        picture.lit.fill([0, rows as u32]);
+        picture.valid_rows.fill([0, rows as u32]);
         picture
     }
 
@@ -177,7 +181,7 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [320, 240], 0);
         let field = FieldLines::new(77.0, 3.0, DVec3::ZERO);
-        let shading = Shading::new(&Extinction::default());
+        let emitter_colors = EmitterColors::new(&Extinction::default());
         let coverage = Coverage::of_view(&view, &field);
         let pixel = coverage.pixel;
         let [sharp, soft] = [(1.0, 2.0, 9.0), (8.0, 2.0, 4.0)]
@@ -185,18 +189,18 @@ mod tests {
         let expected = |longitude: f32, colatitude: f32, sine: f32| -> PerEmitter<f32> {
             let [a, b] = [&sharp, &soft].map(|picture| picture.sampler().light(longitude, colatitude));
             let both = std::array::from_fn(|i| a[i] + b[i]);
-            dispatch!(Level::new(), simd => shading.arriving(simd, &both, Shading::place(sine)).into())
+            dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &both, EmitterColors::table_coordinate(sine)).into())
         };
-        let places: Vec<_> = [[20, 10], [160, 100], [300, 60], [90, 180]]
+        let samples: Vec<_> = [[20, 10], [160, 100], [300, 60], [90, 180]]
             .map(|[x, y]| {
-                let Batch { longitude, colatitude, .. } = Batch::new(&view.camera, &field, x, y);
+                let PixelBatch { longitude, colatitude, .. } = PixelBatch::new(&view.camera, &field, x, y);
                 let direction = view.camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
                 let sine = direction.normalize().y as f32;
                 (longitude[0], colatitude[0], expected(longitude[0], colatitude[0], sine))
             })
             .into();
-        let seen = sharp.seen(&soft, &field, &shading);
-        for (longitude, colatitude, expected) in places {
+        let seen = sharp.composite(&soft, &field, &emitter_colors);
+        for (longitude, colatitude, expected) in samples {
             let found = seen.sampler().light(longitude, colatitude);
             for i in 0..4 {
                 assert!((found[i] / expected[i] - 1.0).abs() < 0.005, "{found:?} {expected:?}");

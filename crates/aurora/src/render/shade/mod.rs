@@ -1,4 +1,4 @@
-//! From the chart to pixels: attenuation by the air below, and sampling through any lens.
+//! From charts to pixels: extinction, color and sampling.
 
 pub(crate) mod attenuation;
 pub(crate) mod chart_sampler;

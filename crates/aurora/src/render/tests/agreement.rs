@@ -1,7 +1,7 @@
-//! Pictures of collisions have the picture of the mean fall for their mean, each emitter by itself.
+//! Pictures of collisions have the picture of the mean track for their mean, each emitter by itself.
 
 use super::*;
-use crate::{drawing_parameters::MOST_WOBBLE, physics::precipitation::lateral_spread::wander_km};
+use crate::{parameters::MAX_WOBBLE, physics::precipitation::lateral_spread::lateral_spread_km};
 
 /// Sum of absolute differences over the sum, for each emitter but the red line, which is not drawn by collisions.
 fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
@@ -15,24 +15,24 @@ fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
 /// Standard deviation of sources but for the wandering of their collisions, km.
 const OWN_SPREAD_KM: f64 = 1.5;
 
-/// How far the mean of 64 pictures of collisions is from the picture of the mean fall, and that one.
+/// How far the mean of 64 pictures of collisions is from the picture of the mean track, and that one.
 fn beside_profile(
     emission: &Emission,
-    collisions: &Collisions,
-    cells: &[GlowCell<1>],
+    collisions: &CollisionRenderer,
+    cells: &[AfterglowCell<1>],
     spread_km: f64,
-) -> ([f64; 3], Meridians) {
+) -> ([f64; 3], ColumnBuffer) {
     let (profiles, view, field) =
-        (Profiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
+        (EmissionProfiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
     let sources = sources(cells, PROMPT_AND_GREEN, spread_km, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
-    let sorted = |strip| Footprint::new(&sources, (&chart(), strip), &field, spread_of(&sources));
-    let expected = Meridians::new(chart(), &field, &profiles, &sorted(STRIP));
-    let footprint = sorted(GROUP);
+    let sorted = |strip| SourceBins::new(&sources, (&chart(), strip), &field, spread_of(&sources));
+    let expected = ColumnBuffer::new(chart(), &field, &profiles, &sorted(STRIP_COLUMNS));
+    let source_bins = sorted(BLOCK_COLUMNS);
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
-        let picture = collisions.draw(chart(), &field, &footprint, step);
+        let picture = collisions.draw(chart(), &field, &source_bins, step);
         for (sum, light) in mean.iter_mut().zip(&picture.light) {
             *sum = std::array::from_fn(|i| light[i].mul_add(1.0 / 64.0, sum[i]));
         }
@@ -40,11 +40,12 @@ fn beside_profile(
     (differences(&mean, &expected.light), expected)
 }
 
-/// The same for an arc of so many particles with falls of a seed.
-fn arc_beside_profile(fall: FallModel, wobble: f64, seed: u64, particles: usize) -> ([f64; 3], Meridians) {
+/// The same for an arc of so many particles with tracks of a seed.
+fn arc_beside_profile(fall: TrackModel, wobble: f64, seed: u64, particles: usize) -> ([f64; 3], ColumnBuffer) {
     let (emission, drawing) = (fall.emission(ARC), DrawingParameters { fall, wobble, ..DrawingParameters::default() });
-    let collisions = Collisions::new(&emission, &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(seed, "aurora"));
-    let spread_km = math::hypot(OWN_SPREAD_KM, wander_km(fall, wobble, ENERGY_EV));
+    let collisions =
+        CollisionRenderer::new(&emission, &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(seed, "aurora"));
+    let spread_km = math::hypot(OWN_SPREAD_KM, lateral_spread_km(fall, wobble, ENERGY_EV));
     beside_profile(&emission, &collisions, &arc(particles), spread_km)
 }
 
@@ -54,22 +55,22 @@ fn usual_wobble() -> f64 {
 
 #[test]
 fn the_mean_of_many_collision_pictures_is_the_profile() {
-    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, 0.02), (5, MOST_WOBBLE), (77, MOST_WOBBLE)] {
-        let (apart, _) = arc_beside_profile(FallModel::Fang, wobble, seed, 8000);
+    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, 0.02), (5, MAX_WOBBLE), (77, MAX_WOBBLE)] {
+        let (apart, _) = arc_beside_profile(TrackModel::Fang, wobble, seed, 8000);
         assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
     }
 }
 
 #[test]
 fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
-    // A fall has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
-    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, MOST_WOBBLE)] {
-        let (apart, _) = arc_beside_profile(FallModel::HardSphere, wobble, seed, 40_000);
+    // A track has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
+    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, MAX_WOBBLE)] {
+        let (apart, _) = arc_beside_profile(TrackModel::HardSphereAtmosphere, wobble, seed, 40_000);
         assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
     }
 }
 
-/// A sheet with the greatest energy factor that a scene may give, and the falls that its aurora has for it.
+/// A sheet with the greatest energy factor that a scene may give, and the tracks that its aurora has for it.
 #[test]
 fn collisions_lose_no_light_on_hard_sheets() {
     const FACTOR: f64 = 20.0;
@@ -81,7 +82,7 @@ fn collisions_lose_no_light_on_hard_sheets() {
         energy_ev: Animated::from(0.2 * ENERGY_EV),
         particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
         shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
-        drawing: DrawingParameters { sampling: Sampling::Collisions, ..DrawingParameters::default() },
+        drawing: DrawingParameters { sampling: Sampling::CollisionRenderer, ..DrawingParameters::default() },
         ..AuroraParameters::default()
     };
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
@@ -93,7 +94,7 @@ fn collisions_lose_no_light_on_hard_sheets() {
 }
 
 /// The row of a picture above which half of an emitter's light is, from the magnetic zenith on.
-fn middle_row(picture: &Meridians, emitter: Emitter) -> usize {
+fn middle_row(picture: &ColumnBuffer, emitter: Emitter) -> usize {
     let mut rows = vec![0.0; picture.chart.rows];
     for (at, light) in picture.light.iter().enumerate() {
         rows[at % picture.chart.rows] += f64::from(light[emitter.index()]);
@@ -111,7 +112,7 @@ fn middle_row(picture: &Meridians, emitter: Emitter) -> usize {
 #[test]
 fn the_fall_of_the_thesis_lies_elsewhere() {
     let [measured, thesis] =
-        [FallModel::Fang, FallModel::HardSphere].map(|fall| arc_beside_profile(fall, 0.0, 5, 1000).1);
+        [TrackModel::Fang, TrackModel::HardSphereAtmosphere].map(|fall| arc_beside_profile(fall, 0.0, 5, 1000).1);
     // Rows of 5 mrad: green light only above 190 km, the rest hardly elsewhere at this energy.
     let [green, violet] = [Emitter::OxygenGreen, Emitter::NitrogenIon]
         .map(|emitter| [&measured, &thesis].map(|picture| middle_row(picture, emitter)));

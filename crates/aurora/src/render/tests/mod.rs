@@ -1,4 +1,4 @@
-//! What the drawing must get right: brightness, place, and the same for every way of drawing.
+//! What the drawing must get right: brightness, position, and the same for every way of drawing.
 
 mod agreement;
 mod threads;
@@ -20,8 +20,8 @@ use bansho_base::{
 };
 
 use super::{
-    Aurora, BlurParameters, DrawingParameters, FallModel, Sampling,
-    prepared::{Batch, Charts},
+    Aurora, BlurParameters, DrawingParameters, Sampling, TrackModel,
+    prepared::{ChartBuilder, PixelBatch},
 };
 use crate::{
     AuroraParameters, ParticleParameters, SpectrumShape,
@@ -33,28 +33,28 @@ use crate::{
     },
     render::{
         bin::{
-            source_bins::{Footprint, REACH, Source},
-            sources::{Maker, Shares, Sources, nearest_node},
+            source_bins::{FieldLineSource, REACH, SourceBins},
+            sources::{EmitterWeights, SourceBuilder, Sources, nearest_node},
         },
-        integrate::{column_block::GROUP, columns::Meridians, emission_profile::Profiles},
+        integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer, emission_profile::EmissionProfiles},
         project::{
-            chart::{Chart, Coverage, STRIP},
+            chart::{Chart, Coverage, STRIP_COLUMNS},
             field_lines::{EARTH_RADIUS_KM, FieldLines},
         },
     },
     shapes::{ShapeParameters, SheetParameters},
-    simulate::afterglow::GlowCell,
-    single_collisions::{blur::Blurred, collision_pass::Collisions},
+    simulate::afterglow::AfterglowCell,
+    single_collisions::{blur::BlurredImage, collision_pass::CollisionRenderer},
 };
 
 const ENERGY_EV: f64 = 5000.0;
 const STEP: f64 = 0.01;
-const GREEN: Shares = [1.0, 0.0, 0.0];
-const RED: Shares = [0.0, 1.0, 0.0];
-/// All heights of red light on the soft chart.
-const SOFT: Shares = [1.0; 3];
-const PROMPT: Shares = [0.0, 0.0, 1.0];
-const PROMPT_AND_GREEN: Shares = [1.0, 0.0, 1.0];
+const GREEN: EmitterWeights = [1.0, 0.0, 0.0];
+const RED: EmitterWeights = [0.0, 1.0, 0.0];
+/// All altitudes of red light on the soft chart.
+const SOFT: EmitterWeights = [1.0; 3];
+const PROMPT: EmitterWeights = [0.0, 0.0, 1.0];
+const PROMPT_AND_GREEN: EmitterWeights = [1.0, 0.0, 1.0];
 
 fn emission() -> Emission {
     Emission::new(atmosphere(), ARC)
@@ -75,28 +75,39 @@ fn field(dip_deg: f64) -> FieldLines {
     FieldLines::new(dip_deg, 0.0, DVec3::ZERO)
 }
 
-fn sources(cells: &[GlowCell<1>], shares: Shares, spread_km: f64, field: &FieldLines) -> Vec<Source> {
-    Maker { field, reach: spread_km as f32 * REACH, share: 1.0, instant: 0 }.cells(cells, [shares])
+fn sources(
+    cells: &[AfterglowCell<1>],
+    shares: EmitterWeights,
+    spread_km: f64,
+    field: &FieldLines,
+) -> Vec<FieldLineSource> {
+    SourceBuilder { field, reach: spread_km as f32 * REACH, weight: 1.0, instant: 0 }.cells(cells, [shares])
 }
 
 /// Least standard deviation of sources, km.
-fn spread_of(sources: &[Source]) -> f64 {
+fn spread_of(sources: &[FieldLineSource]) -> f64 {
     f64::from(sources.iter().fold(f32::INFINITY, |least, source| least.min(source.reach)) / REACH)
 }
 
-fn draw(sources: &[Source], view: &View, field: &FieldLines, profiles: &Profiles, step: f64) -> Meridians {
+fn draw(
+    sources: &[FieldLineSource],
+    view: &View,
+    field: &FieldLines,
+    profiles: &EmissionProfiles,
+    step: f64,
+) -> ColumnBuffer {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
-    let footprint = Footprint::new(sources, (&chart, STRIP), field, spread_of(sources));
-    Meridians::new(chart, field, profiles, &footprint)
+    let source_bins = SourceBins::new(sources, (&chart, STRIP_COLUMNS), field, spread_of(sources));
+    ColumnBuffer::new(chart, field, profiles, &source_bins)
 }
 
 /// Cells of one mW/m^2 over a wide square.
-fn slab() -> Vec<GlowCell<1>> {
+fn slab() -> Vec<AfterglowCell<1>> {
     const SIDE: i32 = 200;
     const KM: f32 = 5.0;
     let place = |index: i32| (index as f32 - 0.5 * SIDE as f32) * KM;
-    let cell = |index: i32| GlowCell {
-        number: index as u32,
+    let cell = |index: i32| AfterglowCell {
+        cell_index: index as u32,
         position_km: [place(index % SIDE), place(index / SIDE)],
         powers_w: [1e3 * KM * KM],
         energy_ev: ENERGY_EV as f32,
@@ -105,26 +116,26 @@ fn slab() -> Vec<GlowCell<1>> {
 }
 
 /// A waving arc to the north.
-fn arc(count: usize) -> Vec<GlowCell<1>> {
+fn arc(count: usize) -> Vec<AfterglowCell<1>> {
     let cell = |index: usize| {
         let share = index as f64 / count as f64;
         let south = -150.0 + 25.0 * math::sin(9.0 * share) + 3.0 * math::sin(index as f64 * 1.7);
         let energy_ev = (ENERGY_EV * (1.0 + 0.2 * math::sin(30.0 * share))) as f32;
         let position_km = [(share * 300.0 - 150.0) as f32, south as f32];
-        GlowCell { number: index as u32, position_km, powers_w: [1e5], energy_ev }
+        AfterglowCell { cell_index: index as u32, position_km, powers_w: [1e5], energy_ev }
     };
     (0..count).map(cell).collect()
 }
 
 fn colatitude_and_longitude(field: &FieldLines, direction: DVec3) -> [f32; 2] {
-    let [along, x, y] = field.turned(direction);
+    let [along, x, y] = field.field_frame_components(direction);
     [math::atan2(math::hypot(x, y), along) as f32, math::atan2(y, x) as f32]
 }
 
 #[test]
 fn an_even_sheet_overhead_shows_its_column() {
     let (emission, view) = (emission(), view(Lens::Fisheye, [0.0, 1.0, 0.0], [64, 64]));
-    let profiles = Profiles::new(&emission);
+    let profiles = EmissionProfiles::new(&emission);
     for (shares, emitters) in [(GREEN, 0..1), (RED, 1..2), (PROMPT, 2..4)] {
         for dip_deg in [90.0, 77.0, -60.0] {
             let field = field(dip_deg);
@@ -149,9 +160,10 @@ fn an_even_sheet_overhead_shows_its_column() {
 
 #[test]
 fn a_ray_is_seen_where_every_lens_puts_it() {
-    let profiles = Profiles::new(&emission());
+    let profiles = EmissionProfiles::new(&emission());
     let field = field(77.0);
-    let cell = GlowCell { number: 0, position_km: [40.0, -90.0], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
+    let cell =
+        AfterglowCell { cell_index: 0, position_km: [40.0, -90.0], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
     let sources = sources(&[cell], PROMPT, 0.4, &field);
     let [x, y] = sources[0].across.map(f64::from);
     let line = field.meridian([x, y].map(|value| value / math::hypot(x, y))).line(math::hypot(x, y));
@@ -167,13 +179,13 @@ fn a_ray_is_seen_where_every_lens_puts_it() {
         for view in views {
             let picture = draw(&sources, &view, &field, &profiles, 1.0 / view.camera.focal_pixels);
             for altitude_km in [108.0, 120.0, 150.0] {
-                let along = field.along * line.place(altitude_km);
+                let along = field.along * line.position_at_altitude(altitude_km);
                 let point = field.across[0] * x + field.across[1] * y + along;
                 let Some(seen) = view.camera.project(point * 1e3) else { continue };
                 shown += 1;
                 let light = |offset: DVec2| {
                     let pixel = seen.pixel + offset;
-                    let batch = Batch::new(&view.camera, &field, pixel.x as usize, pixel.y as usize);
+                    let batch = PixelBatch::new(&view.camera, &field, pixel.x as usize, pixel.y as usize);
                     picture.sampler().light(batch.longitude[0], batch.colatitude[0])[2]
                 };
                 // Across the ray on the picture.
@@ -187,7 +199,7 @@ fn a_ray_is_seen_where_every_lens_puts_it() {
                 );
             }
         }
-        // Three heights; the mirror image of all but the panorama looks down.
+        // Three altitudes; the mirror image of all but the panorama looks down.
         assert_eq!(shown, if lens == Lens::Panorama { 6 } else { 3 }, "{lens:?}");
     }
 }
@@ -232,7 +244,7 @@ fn auto_exposure_knows_the_flux_and_energy_of_sheets() {
     let plain = luminance(1.0, 1.0);
     assert!((luminance(8.0, 1.0) / plain - 8.0).abs() < 1e-9);
     let emission = emission();
-    let column = |energy_ev| f64::from(color::luminance(emission.column_colour(energy_ev).map(|value| value as f32)));
+    let column = |energy_ev| f64::from(color::luminance(emission.column_color(energy_ev).map(|value| value as f32)));
     assert!((luminance(1.0, 0.2) / plain / (column(1000.0) / column(5000.0)) - 1.0).abs() < 1e-6);
 }
 
@@ -240,13 +252,14 @@ fn auto_exposure_knows_the_flux_and_energy_of_sheets() {
 /// 110 km high, blurred in the picture.
 fn blurred_width(north_km: f32, radii: &BlurParameters) -> f64 {
     let (profiles, view, field) =
-        (Profiles::new(&emission()), view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]), field(77.0));
-    let cell = GlowCell { number: 0, position_km: [0.0, -north_km], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
+        (EmissionProfiles::new(&emission()), view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]), field(77.0));
+    let cell =
+        AfterglowCell { cell_index: 0, position_km: [0.0, -north_km], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
     let sources = sources(&[cell], PROMPT, 0.01, &field);
     let pixel = 1.0 / view.camera.focal_pixels;
     let picture = draw(&sources, &view, &field, &profiles, pixel);
-    let dark = Meridians::dark(Chart::new(&Coverage::of_view(&view, &field), 16.0 * pixel, 4.0 * pixel));
-    let blurred = Blurred::new(&view, &field, &[picture.sampler(), dark.sampler()], radii);
+    let dark = ColumnBuffer::zeros(Chart::new(&Coverage::of_view(&view, &field), 16.0 * pixel, 4.0 * pixel));
+    let blurred = BlurredImage::new(&view, &field, &[picture.sampler(), dark.sampler()], radii);
     let row: Vec<f64> = (0..240)
         .map(|y| (0..320).step_by(16).flat_map(|x| blurred.batch(x, y)).map(|light| f64::from(light[2])).collect())
         .max_by(|a: &Vec<f64>, b: &Vec<f64>| a.iter().sum::<f64>().total_cmp(&b.iter().sum()))
@@ -267,10 +280,14 @@ fn the_blur_of_the_thesis_is_as_wide_near_and_far() {
 }
 
 /// A straight, even arc from west to east, so far to the north.
-fn even_arc(north_km: f64, energy_ev: f32) -> Vec<GlowCell<1>> {
+fn even_arc(north_km: f64, energy_ev: f32) -> Vec<AfterglowCell<1>> {
     let place = |index: i32| [(4.0 * f64::from(index)) as f32, -north_km as f32];
-    let cell =
-        |index: i32| GlowCell { number: (index + 100) as u32, position_km: place(index), powers_w: [1e6], energy_ev };
+    let cell = |index: i32| AfterglowCell {
+        cell_index: (index + 100) as u32,
+        position_km: place(index),
+        powers_w: [1e6],
+        energy_ev,
+    };
     (-100..=100).map(cell).collect()
 }
 
@@ -293,11 +310,11 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
             let of = |shares, spread_km| sources(&cells, shares, spread_km, &field);
             let sharp = [of(GREEN, 6.0), of(PROMPT, 6.0)].concat();
             let sources = Sources { sharp, soft: of(SOFT, 15.0), spread_km };
-            let charts = Charts { aurora: &aurora, field: &field, coverage: Coverage::of_view(&view, &field) };
+            let charts = ChartBuilder { aurora: &aurora, field: &field, coverage: Coverage::of_view(&view, &field) };
             let charts = [charts.sharp(&sources), charts.soft(&sources)];
             let column: Vec<PerEmitter<f32>> = (0..600)
                 .map(|row| {
-                    let Batch { longitude, colatitude, .. } = Batch::new(&view.camera, &field, 640, row);
+                    let PixelBatch { longitude, colatitude, .. } = PixelBatch::new(&view.camera, &field, 640, row);
                     let [sharp, soft] =
                         [0, 1].map(|chart: usize| charts[chart].sampler().light(longitude[0], colatitude[0]));
                     std::array::from_fn(|i| sharp[i] + soft[i])
@@ -323,7 +340,7 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
 #[test]
 fn few_particles_are_as_smooth_and_as_bright_as_many() {
     let (profiles, view, field) =
-        (Profiles::new(&emission()), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
+        (EmissionProfiles::new(&emission()), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
     let picture = |count: usize| {
         let mut cells = arc(count);
         cells.iter_mut().for_each(|cell| cell.powers_w[0] *= 16_000.0 / count as f32);
@@ -339,17 +356,17 @@ const THIN_SPREAD_KM: f64 = 0.35;
 /// Distance of its sources, km.
 const THIN_CELL_KM: f64 = 0.15;
 
-/// Places across a thin sheet at which its sources lie, km.
+/// Positions across a thin sheet at which its sources lie, km.
 fn across_thin() -> impl Iterator<Item = f64> {
     let count = (THIN_KM / THIN_CELL_KM) as i32;
     (-count..=count).map(|index| THIN_CELL_KM * f64::from(index))
 }
 
 /// An even, thin sheet of 1 mW/m^2 from west to east through the magnetic zenith, straight up.
-fn thin_sheet() -> Vec<GlowCell<1>> {
+fn thin_sheet() -> Vec<AfterglowCell<1>> {
     let power_w = (1e3 * THIN_CELL_KM * THIN_CELL_KM) as f32;
-    let cell = |east: f64, south: f64| GlowCell {
-        number: (east as f32).to_bits().rotate_left(16) ^ (south as f32).to_bits(),
+    let cell = |east: f64, south: f64| AfterglowCell {
+        cell_index: (east as f32).to_bits().rotate_left(16) ^ (south as f32).to_bits(),
         position_km: [east as f32, south as f32],
         powers_w: [power_w],
         energy_ev: ENERGY_EV as f32,
@@ -384,7 +401,7 @@ fn thin_light(emission: &Emission, emitter: usize, [colatitude, longitude]: [f64
 #[test]
 fn a_thin_sheet_is_as_bright_about_the_magnetic_zenith_as_its_light_comes_to() {
     let (emission, field, view) = (emission(), field(90.0), view(Lens::Perspective, [0.0, 1.0, 1e-3], [320, 320]));
-    let profiles = Profiles::new(&emission);
+    let profiles = EmissionProfiles::new(&emission);
     for (shares, emitter) in [(GREEN, 0), (PROMPT, 2)] {
         let sources = sources(&thin_sheet(), shares, THIN_SPREAD_KM, &field);
         // Rows of a pixel of an ordinary picture.

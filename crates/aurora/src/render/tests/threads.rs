@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
     let (profiles, view, field) =
-        (Profiles::new(&emission()), view(Lens::Fisheye, [0.0, 1.0, 0.0], [200, 200]), field(77.0));
+        (EmissionProfiles::new(&emission()), view(Lens::Fisheye, [0.0, 1.0, 0.0], [200, 200]), field(77.0));
     let sources = sources(&arc(3000), GREEN, 0.5, &field);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -19,14 +19,15 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
 fn single_collisions_do_not_depend_on_the_number_of_threads() {
     let (view, field) = (view(Lens::Perspective, [0.0, 60.0, -110.0], [320, 180]), field(77.0));
     let drawing = DrawingParameters::default();
-    let collisions = Collisions::new(&emission(), &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
+    let collisions =
+        CollisionRenderer::new(&emission(), &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
     let sources = sources(&arc(3000), PROMPT_AND_GREEN, 0.5, &field);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let chart = Chart::new(&Coverage::of_view(&view, &field), 0.25 * STEP, 0.25 * STEP);
-            let footprint = Footprint::new(&sources, (&chart, GROUP), &field, spread_of(&sources));
-            collisions.draw(chart, &field, &footprint, 3).light
+            let source_bins = SourceBins::new(&sources, (&chart, BLOCK_COLUMNS), &field, spread_of(&sources));
+            collisions.draw(chart, &field, &source_bins, 3).light
         })
     };
     let one = with(1);

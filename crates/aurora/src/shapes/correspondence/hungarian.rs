@@ -1,11 +1,11 @@
-//! Which of n things goes with which of n others, so that all together cost least.
+//! The assignment problem (Hungarian algorithm).
 
-/// The optimal assignment by shortest augmenting paths, O(n^3) (Kuhn 1955; Jonker & Volgenant 1987). `cost(row, column)` must be
-/// finite. Gives the column of each row.
+/// Minimum-cost assignment by shortest augmenting paths, O(n^3) (Kuhn 1955; Jonker & Volgenant 1987). `cost(row,
+/// column)` must be finite. Returns the column of each row.
 pub(super) fn assign(count: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<usize> {
     const FREE: usize = usize::MAX;
     let mut row_price = vec![0.0; count];
-    // One column more than there are: it holds the row that is being placed.
+    // An extra column holds the row that is being inserted.
     let mut column_price = vec![0.0; count + 1];
     let mut row_of = vec![FREE; count + 1];
     for row in 0..count {
@@ -58,9 +58,9 @@ mod tests {
             return vec![Vec::new()];
         }
         let insert = |shorter: Vec<usize>| {
-            (0..count).map(move |place| {
+            (0..count).map(move |slot| {
                 let mut longer = shorter.clone();
-                longer.insert(place, count - 1);
+                longer.insert(slot, count - 1);
                 longer
             })
         };

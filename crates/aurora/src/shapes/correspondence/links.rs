@@ -1,112 +1,123 @@
-//! Sheets and points that go where a person says, rather than where it is near.
+//! User-specified links between sheets and points of successive shapes, which override the automatic matching.
 
 use super::{
-    sheet_matching::WantedMatch,
-    split_merge::{Change, sheet_index},
+    sheet_matching::MatchConstraint,
+    split_merge::{Transition, sheet_index},
 };
 use crate::shapes::{
-    LinkParameters, ShapeFault, ShapeFaultKind, geometry::polyline::shares, interpolation::spline_track::Track,
+    LinkParameters, ShapeError, ShapeErrorKind, geometry::polyline::length_fractions,
+    interpolation::spline_track::ControlPointTrack,
 };
 
-/// Nearest that a linked point comes to an end of its sheet, as a share of the length: ends go to ends.
-const END: f64 = 1e-3;
+/// Minimum distance of a linked point from the ends of its sheet, as a fraction of the length: ends are matched to
+/// ends.
+const END_MARGIN: f64 = 1e-3;
 
-/// What the links to a shape ask for.
+/// Constraints from the links to a shape.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Anchors {
-    /// What each chain of strands must become.
-    pub(crate) wanted: Vec<WantedMatch>,
-    /// Tracks, and the share of their new sheet's length at which they must arrive.
+pub(crate) struct LinkConstraints {
+    /// Required match of each chain of strands.
+    pub(crate) chain_constraints: Vec<MatchConstraint>,
+    /// Control-point tracks and the fraction of the new sheet's length at which they must arrive.
     points: Vec<(usize, f64)>,
 }
 
-impl Anchors {
-    /// What `links` to shape `index` ask for, which has `count` sheets and comes of `sheets` by `change`.
+impl LinkConstraints {
+    /// Constraints from `links` to shape `index`, which follows `sheets` by the transition `change`.
     ///
     /// # Errors
-    /// A sheet that is not there, a sheet that is linked to two, points that would pass each other or arrive nowhere.
+    ///
+    /// A link to a missing sheet, two links of one sheet, linked points that change their order, or a point without an
+    /// arrival.
     pub(crate) fn new(
         links: &[LinkParameters],
         index: usize,
         sheets: &[Vec<usize>],
-        change: &Change,
-        tracks: &[Track],
-    ) -> Result<Self, ShapeFault> {
-        let mut anchors = Self { wanted: vec![WantedMatch::default(); change.chains.len()], points: Vec::new() };
+        change: &Transition,
+        tracks: &[ControlPointTrack],
+    ) -> Result<Self, ShapeError> {
+        let mut constraints =
+            Self { chain_constraints: vec![MatchConstraint::default(); change.chains.len()], points: Vec::new() };
         for (number, link) in links.iter().enumerate() {
-            let fault = |kind| ShapeFault { key: format!("shapes.{index}.link.{number}"), kind };
-            let from = sheet_index(link.from, sheets.len()).map_err(fault)?;
+            let error = |kind| ShapeError { key: format!("shapes.{index}.link.{number}"), kind };
+            let from = sheet_index(link.from, sheets.len()).map_err(error)?;
             let count = change.chains.len();
-            let no_target = |_| fault(ShapeFaultKind::NoSuchTarget { sheet: link.to, count });
+            let no_target = |_| error(ShapeErrorKind::NoSuchTarget { sheet: link.to, count });
             let to = sheet_index(link.to, count).map_err(no_target)?;
             let track = nearest(&sheets[from], link.at.unwrap_or(0.5), tracks, index - 1);
-            anchors.send(change, track, to).map_err(fault)?;
+            constraints.constrain_chain(change, track, to).map_err(error)?;
             match (link.at, link.arrives) {
-                (Some(_), Some(share)) => anchors.points.push((track, share.clamp(END, 1.0 - END))),
+                (Some(_), Some(fraction)) => {
+                    constraints.points.push((track, fraction.clamp(END_MARGIN, 1.0 - END_MARGIN)))
+                }
                 (Some(_), None) if !splits(&sheets[from], change) => {
-                    return Err(fault(ShapeFaultKind::NowhereToArrive));
+                    return Err(error(ShapeErrorKind::PointWithoutArrival));
                 }
                 (_, None) => {}
-                (None, Some(_)) => return Err(fault(ShapeFaultKind::HalfALink)),
+                (None, Some(_)) => return Err(error(ShapeErrorKind::ArrivalWithoutPoint)),
             }
-            anchors.put_in_order(change).map_err(fault)?;
+            constraints.check_order(change).map_err(error)?;
         }
-        Ok(anchors)
+        Ok(constraints)
     }
 
-    /// The chain that holds `track` becomes sheet `to`, and no other does.
-    fn send(&mut self, change: &Change, track: usize, to: usize) -> Result<(), ShapeFaultKind> {
+    /// Requires that the chain that contains `track` becomes sheet `to`.
+    fn constrain_chain(&mut self, change: &Transition, track: usize, to: usize) -> Result<(), ShapeErrorKind> {
         let holds = |chain: &usize| change.tracks_of(*chain).contains(&track);
-        // Every track of a sheet lies in one of its strands.
+        // Every track of a sheet is in one of its strands.
         let own = (0..change.chains.len()).find(holds).unwrap_or_default();
-        let other = self.wanted.iter().position(|wanted| wanted.target == Some(to));
-        if self.wanted[own].target.is_some_and(|target| target != to) || other.is_some_and(|other| other != own) {
-            return Err(ShapeFaultKind::LinkedTwice { sheet: to + 1 });
+        let other = self.chain_constraints.iter().position(|chain_constraint| chain_constraint.target == Some(to));
+        if self.chain_constraints[own].target.is_some_and(|target| target != to)
+            || other.is_some_and(|other| other != own)
+        {
+            return Err(ShapeErrorKind::LinkedTwice { sheet: to + 1 });
         }
-        self.wanted[own].target = Some(to);
+        self.chain_constraints[own].target = Some(to);
         Ok(())
     }
 
-    /// Points arrive in the order in which they lie, one way round or the other, which tells how the sheet is turned.
-    fn put_in_order(&mut self, change: &Change) -> Result<(), ShapeFaultKind> {
-        for (chain, wanted) in self.wanted.iter_mut().enumerate() {
+    /// Linked points must arrive in ascending or descending order, which determines the sheet's direction.
+    fn check_order(&mut self, change: &Transition) -> Result<(), ShapeErrorKind> {
+        for (chain, chain_constraint) in self.chain_constraints.iter_mut().enumerate() {
             let tracks = change.tracks_of(chain);
-            let arrives = |track: &usize| self.points.iter().find(|(own, _)| own == track).map(|(_, share)| *share);
+            let arrives =
+                |track: &usize| self.points.iter().find(|(own, _)| own == track).map(|(_, fraction)| *fraction);
             let arrivals: Vec<f64> = tracks.iter().filter_map(arrives).collect();
             let linked = self.points.iter().filter(|(own, _)| tracks.contains(own)).count();
             let [rising, falling] =
                 [1.0, -1.0].map(|sign| arrivals.windows(2).all(|pair| sign * (pair[1] - pair[0]) > 0.0));
             if linked > arrivals.len() || !(rising || falling) {
-                return Err(ShapeFaultKind::LinksCross);
+                return Err(ShapeErrorKind::LinksCross);
             }
-            wanted.reversed = (arrivals.len() > 1).then_some(falling);
+            chain_constraint.reversed = (arrivals.len() > 1).then_some(falling);
         }
         Ok(())
     }
 
-    /// The linked points of `strand`: their places in it and where they arrive, within the part `range` of the sheet.
-    pub(crate) fn along(&self, strand: &[usize], range: [f64; 2]) -> Vec<(usize, f64)> {
+    /// Linked points of `strand` as index and arrival, within `range` of the sheet.
+    pub(crate) fn linked_points(&self, strand: &[usize], range: [f64; 2]) -> Vec<(usize, f64)> {
         let [low, high] = if range[0] <= range[1] { range } else { [range[1], range[0]] };
-        let arrives = |(place, track): (usize, &usize)| {
-            let (_, share) = self.points.iter().find(|(own, _)| own == track)?;
-            Some((place, *share)).filter(|_| *share > low && *share < high && place > 0 && place + 1 < strand.len())
+        let arrives = |(index, track): (usize, &usize)| {
+            let (_, fraction) = self.points.iter().find(|(own, _)| own == track)?;
+            Some((index, *fraction))
+                .filter(|_| *fraction > low && *fraction < high && index > 0 && index + 1 < strand.len())
         };
         strand.iter().enumerate().filter_map(arrives).collect()
     }
 }
 
-/// Whether a sheet parts on the way.
-fn splits(sheet: &[usize], change: &Change) -> bool {
+/// Whether a sheet splits in the transition.
+fn splits(sheet: &[usize], change: &Transition) -> bool {
     let whole =
         |strand: &Vec<usize>| [sheet.first(), sheet.last()].into_iter().flatten().all(|end| strand.contains(end));
     !change.strands.iter().any(whole)
 }
 
-/// The control point within `sheet` that is nearest to the share `at` of its length.
-fn nearest(sheet: &[usize], at: f64, tracks: &[Track], knot: usize) -> usize {
+/// The control point within `sheet` that is nearest to the fraction `at` of its length.
+fn nearest(sheet: &[usize], at: f64, tracks: &[ControlPointTrack], knot: usize) -> usize {
     let positions: Vec<_> = sheet.iter().map(|&track| tracks[track].knot(knot).position).collect();
-    let shares = shares(&positions);
+    let fractions = length_fractions(&positions);
     let inner = 1..(sheet.len() - 1).max(2);
-    let nearest = inner.min_by(|&a, &b| (shares[a] - at).abs().total_cmp(&(shares[b] - at).abs()));
+    let nearest = inner.min_by(|&a, &b| (fractions[a] - at).abs().total_cmp(&(fractions[b] - at).abs()));
     sheet[nearest.unwrap_or_default()]
 }

@@ -1,4 +1,4 @@
-//! Which sheet and which point of a shape becomes which of the next.
+//! Correspondence of sheets and control points between successive shapes.
 
 pub(crate) mod hungarian;
 pub(crate) mod links;

@@ -1,4 +1,4 @@
-//! Which sheet becomes which, found from where they lie (thesis, chapter 4, asks for it).
+//! Automatic matching of sheets between shapes (requested in chapter 4 of the thesis).
 
 use std::collections::BTreeSet;
 
@@ -10,122 +10,132 @@ use crate::shapes::{
     strokes::intersection::{count_crossings, crossing_sheets},
 };
 
-/// Points by which sheets are compared.
+/// Samples per sheet.
 const SAMPLES: usize = 32;
 
-/// Moments of the way at which sheets should not cross.
-const MOMENTS: [f64; 3] = [0.25, 0.5, 0.75];
+/// Fractions of the transition at which crossings are counted.
+const CHECKED_FRACTIONS: [f64; 3] = [0.25, 0.5, 0.75];
 
-/// Sheets that are looked at for crossings in all tries of turns and exchanges together, for about a second. Of few sheets all are tried.
-const MOST_LOOKS: usize = 60_000;
-/// Share of the tries in which one change is looked for.
-const PER_CHANGE: usize = 8;
+/// Maximum number of sheet crossing tests in the local search, about a second. With few sheets the search is
+/// exhaustive.
+const MAX_CROSSING_TESTS: usize = 60_000;
+/// Candidate changes per iteration are the remaining tests divided by this.
+const CANDIDATES_DIVISOR: usize = 8;
 
-/// The target of a sheet, and whether it was drawn the other way round.
+/// The target of a sheet, and whether its direction is reversed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Match {
+pub(crate) struct SheetMatch {
     pub(crate) target: usize,
     pub(crate) reversed: bool,
 }
 
-/// What a person asks of a sheet.
+/// A constraint from links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct WantedMatch {
+pub(crate) struct MatchConstraint {
     pub(super) target: Option<usize>,
     pub(super) reversed: Option<bool>,
 }
 
-impl WantedMatch {
-    fn allows(&self, of: Match) -> bool {
+impl MatchConstraint {
+    fn allows(&self, of: SheetMatch) -> bool {
         self.target.is_none_or(|target| target == of.target) && self.reversed.is_none_or(|turned| turned == of.reversed)
     }
 }
 
-/// Sheets and targets as evenly spaced points, as many of one as of the other.
+/// Resampled sheets and targets, equal in number.
 struct Comparison<'a> {
-    wanted: &'a [WantedMatch],
+    constraints: &'a [MatchConstraint],
     sources: Vec<Vec<DVec2>>,
     targets: Vec<Vec<DVec2>>,
-    /// Mean length of a sheet and its target weighs their motion.
+    /// Lengths of sheets and targets; their mean weights the motion.
     lengths: [Vec<f64>; 2],
 }
 
-/// The target of each source such that all together move least, and no two cross on the way where that can be had by
-/// exchanging two targets or turning one round. What is `wanted` of a source comes first.
-pub(crate) fn match_sheets(sources: &[Polyline], targets: &[&Polyline], wanted: &[WantedMatch]) -> Vec<Match> {
+/// Matches sources to targets with the minimum total motion, then removes crossings by swapping two targets or
+/// reversing one sheet where possible. `constraints` take precedence.
+pub(crate) fn match_sheets(
+    sources: &[Polyline],
+    targets: &[&Polyline],
+    constraints: &[MatchConstraint],
+) -> Vec<SheetMatch> {
     let comparison = Comparison {
-        wanted,
-        sources: sources.iter().map(|line| line.evenly(SAMPLES)).collect(),
-        targets: targets.iter().map(|line| line.evenly(SAMPLES)).collect(),
+        constraints,
+        sources: sources.iter().map(|line| line.resample(SAMPLES)).collect(),
+        targets: targets.iter().map(|line| line.resample(SAMPLES)).collect(),
         lengths: [sources.iter().map(Polyline::length).collect(), targets.iter().map(|line| line.length()).collect()],
     };
     let count = sources.len();
-    let best: Vec<(f64, bool)> = (0..count * count).map(|pair| comparison.best(pair / count, pair % count)).collect();
-    // More than all sheets could move together.
+    let best: Vec<(f64, bool)> =
+        (0..count * count).map(|pair| comparison.best_direction(pair / count, pair % count)).collect();
+    // Larger than any possible total motion.
     let forbidden = 1.0 + best.iter().map(|(motion, _)| motion).sum::<f64>();
     let columns = assign(count, |source, target| {
-        let elsewhere = wanted[source].target.is_some_and(|own| own != target);
+        let elsewhere = constraints[source].target.is_some_and(|own| own != target);
         best[source * count + target].0 + if elsewhere { forbidden } else { 0.0 }
     });
-    let matched = |(source, target): (usize, usize)| Match { target, reversed: best[source * count + target].1 };
+    let matched = |(source, target): (usize, usize)| SheetMatch { target, reversed: best[source * count + target].1 };
     let found = columns.into_iter().enumerate().map(matched).collect();
-    comparison.untangled(found).0
+    comparison.reduce_crossings(found).0
 }
 
 impl Comparison<'_> {
-    fn target(&self, of: Match) -> impl Iterator<Item = DVec2> {
+    fn target(&self, of: SheetMatch) -> impl Iterator<Item = DVec2> {
         let points = &self.targets[of.target];
         (0..SAMPLES).map(move |index| points[if of.reversed { SAMPLES - 1 - index } else { index }])
     }
 
-    /// Mean square of the way of each point, times the length of the sheet.
-    fn motion(&self, source: usize, of: Match) -> f64 {
+    /// Mean squared displacement times the length of the sheet.
+    fn motion(&self, source: usize, of: SheetMatch) -> f64 {
         let squares = self.sources[source].iter().zip(self.target(of)).map(|(from, to)| from.distance_squared(to));
         let length = (self.lengths[0][source] + self.lengths[1][of.target]) / 2.0;
         squares.sum::<f64>() / SAMPLES as f64 * length
     }
 
-    /// The lesser motion of the two ways round, and whether it is the reverse one.
-    fn best(&self, source: usize, target: usize) -> (f64, bool) {
-        let [straight, turned] = [false, true].map(|reversed| self.motion(source, Match { target, reversed }));
-        if let Some(reversed) = self.wanted[source].reversed {
+    /// The smaller motion of the two directions, and whether it is the reversed one.
+    fn best_direction(&self, source: usize, target: usize) -> (f64, bool) {
+        let [straight, turned] = [false, true].map(|reversed| self.motion(source, SheetMatch { target, reversed }));
+        if let Some(reversed) = self.constraints[source].reversed {
             return (if reversed { turned } else { straight }, reversed);
         }
         if turned < straight { (turned, true) } else { (straight, false) }
     }
 
-    /// The sheets at a share of the way.
-    fn on_the_way(&self, matches: &[Match], share: f64) -> Vec<Vec<DVec2>> {
-        let sheet = |(source, of): (&Vec<DVec2>, &Match)| -> Vec<DVec2> {
-            source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, share)).collect()
+    /// Sheets interpolated at a fraction of the transition.
+    fn interpolated(&self, matches: &[SheetMatch], fraction: f64) -> Vec<Vec<DVec2>> {
+        let sheet = |(source, of): (&Vec<DVec2>, &SheetMatch)| -> Vec<DVec2> {
+            source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, fraction)).collect()
         };
         self.sources.iter().zip(matches).map(sheet).collect()
     }
 
-    fn crossings(&self, matches: &[Match]) -> usize {
-        MOMENTS.into_iter().map(|share| count_crossings(&self.on_the_way(matches, share))).sum()
+    fn crossings(&self, matches: &[SheetMatch]) -> usize {
+        CHECKED_FRACTIONS.into_iter().map(|fraction| count_crossings(&self.interpolated(matches, fraction))).sum()
     }
 
     /// The sheets that cross others or themselves.
-    fn crossed(&self, matches: &[Match]) -> BTreeSet<usize> {
-        MOMENTS.into_iter().flat_map(|share| crossing_sheets(&self.on_the_way(matches, share))).collect()
+    fn crossed(&self, matches: &[SheetMatch]) -> BTreeSet<usize> {
+        CHECKED_FRACTIONS
+            .into_iter()
+            .flat_map(|fraction| crossing_sheets(&self.interpolated(matches, fraction)))
+            .collect()
     }
 
-    fn cost(&self, matches: &[Match]) -> (usize, f64) {
+    fn cost(&self, matches: &[SheetMatch]) -> (usize, f64) {
         (self.crossings(matches), self.all_motion(matches))
     }
 
-    fn all_motion(&self, matches: &[Match]) -> f64 {
+    fn all_motion(&self, matches: &[SheetMatch]) -> f64 {
         matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum()
     }
 
-    /// Turns one or exchanges two as long as fewer cross, or as many with less motion; and how many such changes were tried.
-    fn untangled(&self, mut matches: Vec<Match>) -> (Vec<Match>, usize) {
+    /// Local search: reverses one or swaps two as long as the number of crossings, or at equal number the motion,
+    /// decreases. Also returns the number of changes tried.
+    fn reduce_crossings(&self, mut matches: Vec<SheetMatch>) -> (Vec<SheetMatch>, usize) {
         let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
-        let most = MOST_LOOKS / matches.len().max(1);
+        let most = MAX_CROSSING_TESTS / matches.len().max(1);
         let (mut cost, mut tries) = (self.cost(&matches), 0);
         while cost.0 > 0 && tries < most {
-            let candidates = self.nearest_neighbours(&matches, (most / PER_CHANGE).min(most - tries));
+            let candidates = self.candidate_changes(&matches, (most / CANDIDATES_DIVISOR).min(most - tries));
             tries += candidates.len();
             let candidates = candidates.into_iter().map(|other| (self.cost(&other), other));
             let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
@@ -137,20 +147,20 @@ impl Comparison<'_> {
         (matches, tries)
     }
 
-    /// Up to `most` matches with a sheet that crosses turned, or exchanged with another, that are allowed: those that move least.
-    /// Two that cross nothing take no crossing away.
-    fn nearest_neighbours(&self, matches: &[Match], most: usize) -> Vec<Vec<Match>> {
+    /// Up to `most` allowed changes that involve a crossing sheet, those with the least motion first. Changes of two
+    /// sheets without crossings cannot remove one.
+    fn candidate_changes(&self, matches: &[SheetMatch], most: usize) -> Vec<Vec<SheetMatch>> {
         let crossed = self.crossed(matches);
         let mut changes = Vec::new();
         for one in 0..matches.len() {
             let pairs = (0..=one).filter(|other| crossed.contains(&one) || crossed.contains(other));
             let allowed = pairs
                 .map(|other| self.change(matches, [one, other]))
-                .filter(|change| change.iter().all(|(source, of)| self.wanted[*source].allows(*of)));
+                .filter(|change| change.iter().all(|(source, of)| self.constraints[*source].allows(*of)));
             changes.extend(allowed);
         }
-        let more = |change: &[(usize, Match); 2]| -> f64 {
-            // A sheet that turns stands here twice.
+        let more = |change: &[(usize, SheetMatch); 2]| -> f64 {
+            // A reversal is listed twice.
             let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
             changed.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
         };
@@ -158,7 +168,7 @@ impl Comparison<'_> {
             changes.sort_by(|a, b| more(a).total_cmp(&more(b)));
             changes.truncate(most);
         }
-        let changed = |change: [(usize, Match); 2]| {
+        let changed = |change: [(usize, SheetMatch); 2]| {
             let mut all = matches.to_vec();
             change.into_iter().for_each(|(source, of)| all[source] = of);
             all
@@ -166,14 +176,14 @@ impl Comparison<'_> {
         changes.into_iter().map(changed).collect()
     }
 
-    /// What two sheets become where they exchange their targets, or a sheet where it is turned.
-    fn change(&self, matches: &[Match], [one, other]: [usize; 2]) -> [(usize, Match); 2] {
+    /// The new matches of two sheets that swap their targets, or of a sheet that is reversed.
+    fn change(&self, matches: &[SheetMatch], [one, other]: [usize; 2]) -> [(usize, SheetMatch); 2] {
         if one == other {
             let of = matches[one];
-            return [(one, Match { reversed: !of.reversed, ..of }); 2];
+            return [(one, SheetMatch { reversed: !of.reversed, ..of }); 2];
         }
         [(one, matches[other].target), (other, matches[one].target)]
-            .map(|(source, target)| (source, Match { target, reversed: self.best(source, target).1 }))
+            .map(|(source, target)| (source, SheetMatch { target, reversed: self.best_direction(source, target).1 }))
     }
 }
 
@@ -186,11 +196,15 @@ mod tests {
     }
 
     fn matches(sources: &[Polyline], targets: &[Polyline]) -> Vec<(usize, bool)> {
-        wanted_matches(sources, targets, &vec![WantedMatch::default(); sources.len()])
+        constrained_matches(sources, targets, &vec![MatchConstraint::default(); sources.len()])
     }
 
-    fn wanted_matches(sources: &[Polyline], targets: &[Polyline], wanted: &[WantedMatch]) -> Vec<(usize, bool)> {
-        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), wanted);
+    fn constrained_matches(
+        sources: &[Polyline],
+        targets: &[Polyline],
+        constraints: &[MatchConstraint],
+    ) -> Vec<(usize, bool)> {
+        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), constraints);
         found.into_iter().map(|of| (of.target, of.reversed)).collect()
     }
 
@@ -205,10 +219,10 @@ mod tests {
     fn what_a_person_wants_comes_before_what_is_near() {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([0.0, 5.0], [10.0, 5.0])];
         let targets = [line([10.0, 6.0], [0.0, 6.0]), line([0.0, 1.0], [10.0, 1.0])];
-        let mut wanted = [WantedMatch::default(), WantedMatch { target: Some(1), reversed: None }];
-        assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, false)]);
-        wanted[1].reversed = Some(true);
-        assert_eq!(wanted_matches(&sources, &targets, &wanted), [(0, true), (1, true)]);
+        let mut constraints = [MatchConstraint::default(), MatchConstraint { target: Some(1), reversed: None }];
+        assert_eq!(constrained_matches(&sources, &targets, &constraints), [(0, true), (1, false)]);
+        constraints[1].reversed = Some(true);
+        assert_eq!(constrained_matches(&sources, &targets, &constraints), [(0, true), (1, true)]);
     }
 
     #[test]
@@ -224,18 +238,22 @@ mod tests {
     fn sheets_that_would_cross_midway_are_turned() {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
         let targets = [line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
-        let wanted = [WantedMatch::default(); 2];
-        let found = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &wanted);
-        let comparison = comparison(&sources, &targets, &wanted);
-        let through = [Match { target: 0, reversed: true }, Match { target: 1, reversed: false }];
-        assert!(comparison.best(0, 0).1 && comparison.crossings(&through) > 0);
+        let constraints = [MatchConstraint::default(); 2];
+        let found = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &constraints);
+        let comparison = comparison(&sources, &targets, &constraints);
+        let through = [SheetMatch { target: 0, reversed: true }, SheetMatch { target: 1, reversed: false }];
+        assert!(comparison.best_direction(0, 0).1 && comparison.crossings(&through) > 0);
         assert_eq!(comparison.crossings(&found), 0);
     }
 
-    fn comparison<'a>(sources: &[Polyline], targets: &[Polyline], wanted: &'a [WantedMatch]) -> Comparison<'a> {
-        let sampled = |line: &Polyline| line.evenly(SAMPLES);
+    fn comparison<'a>(
+        sources: &[Polyline],
+        targets: &[Polyline],
+        constraints: &'a [MatchConstraint],
+    ) -> Comparison<'a> {
+        let sampled = |line: &Polyline| line.resample(SAMPLES);
         Comparison {
-            wanted,
+            constraints,
             sources: sources.iter().map(sampled).collect(),
             targets: targets.iter().map(sampled).collect(),
             lengths: [vec![1.0; sources.len()], vec![1.0; targets.len()]],
@@ -250,12 +268,13 @@ mod tests {
         let with_rows = |two: [Polyline; 2]| two.into_iter().chain(rows()).collect::<Vec<_>>();
         let sources = with_rows([line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
         let targets = with_rows([line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])]);
-        let wanted = vec![WantedMatch::default(); MANY + 2];
-        let comparison = comparison(&sources, &targets, &wanted);
-        let through: Vec<Match> = (0..MANY + 2).map(|target| Match { target, reversed: target == 0 }).collect();
+        let constraints = vec![MatchConstraint::default(); MANY + 2];
+        let comparison = comparison(&sources, &targets, &constraints);
+        let through: Vec<SheetMatch> =
+            (0..MANY + 2).map(|target| SheetMatch { target, reversed: target == 0 }).collect();
         assert!(comparison.crossings(&through) > 0);
-        let (found, tries) = comparison.untangled(through);
+        let (found, tries) = comparison.reduce_crossings(through);
         assert_eq!(comparison.crossings(&found), 0);
-        assert!(tries > 0 && tries <= MOST_LOOKS / (MANY + 2) / PER_CHANGE, "{tries} tries");
+        assert!(tries > 0 && tries <= MAX_CROSSING_TESTS / (MANY + 2) / CANDIDATES_DIVISOR, "{tries} tries");
     }
 }

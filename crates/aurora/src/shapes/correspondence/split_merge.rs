@@ -1,57 +1,60 @@
-//! What splits and merges on the way from one shape to the next (thesis, figs. 2.4 and 2.5).
+//! Splits and merges in the transition between two shapes (thesis, figs. 2.4 and 2.5).
 
 use bansho_base::{math::DVec2, parameters::Auto};
 
 use crate::shapes::{
-    MergeParameters, ShapeFault, ShapeFaultKind, ShapeParameters, SplitParameters,
-    geometry::polyline::shares,
+    MergeParameters, ShapeError, ShapeErrorKind, ShapeParameters, SplitParameters,
+    geometry::polyline::length_fractions,
     interpolation::{
         gap::Gap,
-        spline_track::{Parents, Track},
+        spline_track::{ControlPointTrack, Parents},
     },
 };
 
-/// A strand in a chain of strands that grow together, first to last.
+/// A strand within a chain of strands that merge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Link {
+pub(crate) struct ChainLink {
     pub(super) strand: usize,
-    /// Whether it runs against the chain.
+    /// Whether it is traversed backward.
     pub(super) reversed: bool,
 }
 
-/// Two new control points, coincident at first (split) or at last (merge), and the old ones that they were added to.
+/// Two new control points, coincident at the start (split) or the end (merge) of the transition, and the old points
+/// next to them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pair {
+pub(crate) struct CoincidentPoints {
     pub(crate) new: [usize; 2],
     pub(crate) old: [usize; 2],
 }
 
-/// The strands that move from a shape to the next: the sheets, cut where they split. A strand is a list of tracks.
+/// A transition to the next shape: strands are the sheets, cut where they split. A strand is a list of control-point
+/// tracks.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Change {
+pub(crate) struct Transition {
     pub(crate) strands: Vec<Vec<usize>>,
-    /// What each sheet of the next shape is made of.
-    pub(crate) chains: Vec<Vec<Link>>,
-    pub(crate) splits: Vec<Pair>,
-    pub(crate) merges: Vec<Pair>,
+    /// The strands that form each sheet of the next shape.
+    pub(crate) chains: Vec<Vec<ChainLink>>,
+    pub(crate) splits: Vec<CoincidentPoints>,
+    pub(crate) merges: Vec<CoincidentPoints>,
 }
 
-/// A cut of a sheet: after which control point, and at which share of the segment.
+/// A cut of a sheet: the control point before it, and the fraction of the segment.
 type Cut = (usize, f64);
 
-impl Change {
-    /// The change that leads to shape `index` from the one before, whose sheets are `sheets`.
+impl Transition {
+    /// The transition to shape `index` from the previous shape, whose sheets are `sheets`.
     ///
     /// # Errors
-    /// A sheet or segment that is not there, a point that is no end, two changes of one place, a ring.
+    ///
+    /// A missing sheet or segment, a merge point that is not an end, two changes at one position, or a closed ring.
     pub(crate) fn new(
         parameters: &ShapeParameters,
         index: usize,
         sheets: &[Vec<usize>],
-        tracks: &mut Vec<Track>,
-    ) -> Result<Self, ShapeFault> {
+        tracks: &mut Vec<ControlPointTrack>,
+    ) -> Result<Self, ShapeError> {
         let mut change = Self::default();
-        // The strands of each sheet, in order.
+        // First and last strand of each sheet.
         let mut parts = Vec::new();
         let cuts = cuts(parameters, index, sheets, tracks)?;
         for (sheet, cuts) in sheets.iter().zip(cuts) {
@@ -61,81 +64,87 @@ impl Change {
         }
         let mut chains = Chains::new(change.strands.len());
         for (number, merge) in parameters.merge.iter().enumerate() {
-            let fault = |kind| ShapeFault { key: format!("shapes.{index}.merge.{number}"), kind };
-            let ends = merged_ends(merge, sheets, tracks, index - 1).map_err(fault)?;
-            let places = ends.map(|(sheet, end)| (parts[sheet][end], end));
-            for (place, (sheet, end)) in places.iter().zip(ends) {
-                if chains.links[place.0][place.1].is_some() {
-                    return Err(fault(ShapeFaultKind::MergedTwice { sheet: sheet + 1, is_end: end == 1 }));
+            let error = |kind| ShapeError { key: format!("shapes.{index}.merge.{number}"), kind };
+            let ends = merged_ends(merge, sheets, tracks, index - 1).map_err(error)?;
+            let ends_of_strands = ends.map(|(sheet, end)| (parts[sheet][end], end));
+            for (index, (sheet, end)) in ends_of_strands.iter().zip(ends) {
+                if chains.links[index.0][index.1].is_some() {
+                    return Err(error(ShapeErrorKind::MergedTwice { sheet: sheet + 1, is_end: end == 1 }));
                 }
             }
-            if !chains.join(places) {
-                return Err(fault(ShapeFaultKind::Ring { sheet: ends[0].0 + 1 }));
+            if !chains.join(ends_of_strands) {
+                return Err(error(ShapeErrorKind::Ring { sheet: ends[0].0 + 1 }));
             }
-            change.extend(places, index - 1, tracks);
+            change.add_merge_points(ends_of_strands, index - 1, tracks);
         }
         change.chains = chains.collect();
         Ok(change)
     }
 
-    /// Adds the strands of a sheet: at each cut both sides let go and take a new point there.
-    fn cut(&mut self, sheet: &[usize], cuts: &[Cut], knot: usize, tracks: &mut Vec<Track>) {
+    /// Cuts a sheet into strands, with two new coincident points at each cut.
+    fn cut(&mut self, sheet: &[usize], cuts: &[Cut], knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         let mut strand = Vec::new();
         let mut start = 0;
-        for &(segment, share) in cuts {
+        for &(segment, fraction) in cuts {
             let old = [sheet[segment], sheet[segment + 1]];
-            let new = [0, 1].map(|_| born(Parents { tracks: old, share }, knot, tracks));
+            let new = [0, 1].map(|_| add_track(Parents { tracks: old, fraction }, knot, tracks));
             strand.extend_from_slice(&sheet[start..=segment]);
             strand.push(new[0]);
             self.strands.push(std::mem::replace(&mut strand, vec![new[1]]));
-            self.splits.push(Pair { new, old });
+            self.splits.push(CoincidentPoints { new, old });
             start = segment + 1;
         }
         strand.extend_from_slice(&sheet[start..]);
         self.strands.push(strand);
     }
 
-    /// Adds a new point at each of two ends that grow together.
-    fn extend(&mut self, places: [(usize, usize); 2], knot: usize, tracks: &mut Vec<Track>) {
-        let mut pair = Pair { new: [0; 2], old: [0; 2] };
-        for (side, (strand, end)) in places.into_iter().enumerate() {
+    /// Adds a new point at each of two merging ends.
+    fn add_merge_points(
+        &mut self,
+        ends_of_strands: [(usize, usize); 2],
+        knot: usize,
+        tracks: &mut Vec<ControlPointTrack>,
+    ) {
+        let mut pair = CoincidentPoints { new: [0; 2], old: [0; 2] };
+        for (side, (strand, end)) in ends_of_strands.into_iter().enumerate() {
             let strand = &mut self.strands[strand];
-            let place = if end == 0 { 0 } else { strand.len() };
-            let old = strand[place.saturating_sub(end)];
-            let new = born(Parents { tracks: [old; 2], share: 0.0 }, knot, tracks);
-            strand.insert(place, new);
+            let index = if end == 0 { 0 } else { strand.len() };
+            let old = strand[index.saturating_sub(end)];
+            let new = add_track(Parents { tracks: [old; 2], fraction: 0.0 }, knot, tracks);
+            strand.insert(index, new);
             (pair.new[side], pair.old[side]) = (new, old);
         }
         self.merges.push(pair);
     }
 
-    /// Gives every strand at least `count` control points by halving its longest segments, which changes no line.
-    pub(crate) fn refine(&mut self, count: usize, knot: usize, tracks: &mut Vec<Track>) {
+    /// Subdivides the longest segments of each strand until it has at least `count` control points; the curve does not
+    /// change.
+    pub(crate) fn refine(&mut self, count: usize, knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         for strand in &mut self.strands {
             while strand.len() < count {
                 let at = |track: usize| tracks[track].knot(knot).position;
-                let length = |place: usize| at(strand[place]).distance_squared(at(strand[place + 1]));
+                let length = |index: usize| at(strand[index]).distance_squared(at(strand[index + 1]));
                 let longest = (0..strand.len() - 1).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
-                let parents = Parents { tracks: [strand[longest], strand[longest + 1]], share: 0.5 };
-                strand.insert(longest + 1, born(parents, knot, tracks));
+                let parents = Parents { tracks: [strand[longest], strand[longest + 1]], fraction: 0.5 };
+                strand.insert(longest + 1, add_track(parents, knot, tracks));
             }
         }
     }
 
     /// The gaps that open and close.
     pub(crate) fn gaps(&self) -> Vec<Gap> {
-        let gap = |pair: &Pair, opens: bool| Gap { ends: pair.new, opens };
+        let gap = |pair: &CoincidentPoints, opens: bool| Gap { ends: pair.new, opens };
         let opening = self.splits.iter().map(|pair| gap(pair, true));
         opening.chain(self.merges.iter().map(|pair| gap(pair, false))).collect()
     }
 
     /// The tracks of chain `chain`, along it.
     pub(super) fn tracks_of(&self, chain: usize) -> Vec<usize> {
-        self.chains[chain].iter().flat_map(|&link| self.along(link)).collect()
+        self.chains[chain].iter().flat_map(|&link| self.tracks_along(link)).collect()
     }
 
     /// The tracks of a strand in the direction of its chain.
-    pub(crate) fn along(&self, link: Link) -> Vec<usize> {
+    pub(crate) fn tracks_along(&self, link: ChainLink) -> Vec<usize> {
         let mut tracks = self.strands[link.strand].clone();
         if link.reversed {
             tracks.reverse();
@@ -144,34 +153,34 @@ impl Change {
     }
 }
 
-/// A new control point between two others.
-fn born(parents: Parents, knot: usize, tracks: &mut Vec<Track>) -> usize {
+/// Adds a control point between two others.
+fn add_track(parents: Parents, knot: usize, tracks: &mut Vec<ControlPointTrack>) -> usize {
     let [first, second] = parents.tracks.map(|parent| tracks[parent].knot(knot));
-    tracks.push(Track::new(knot, Some(parents), first.lerp(second, parents.share)));
+    tracks.push(ControlPointTrack::new(knot, Some(parents), first.lerp(second, parents.fraction)));
     tracks.len() - 1
 }
 
-/// The index of the sheet that a person calls `number`.
-pub(super) fn sheet_index(number: i64, count: usize) -> Result<usize, ShapeFaultKind> {
+/// Index of a sheet from its one-based number.
+pub(super) fn sheet_index(number: i64, count: usize) -> Result<usize, ShapeErrorKind> {
     let index = usize::try_from(number - 1).ok().filter(|&index| index < count);
-    index.ok_or(ShapeFaultKind::NoSuchSheet { sheet: number, count })
+    index.ok_or(ShapeErrorKind::NoSuchSheet { sheet: number, count })
 }
 
-/// Where each sheet is cut, in order along it.
+/// Cuts of each sheet, sorted.
 fn cuts(
     parameters: &ShapeParameters,
     index: usize,
     sheets: &[Vec<usize>],
-    tracks: &[Track],
-) -> Result<Vec<Vec<Cut>>, ShapeFault> {
+    tracks: &[ControlPointTrack],
+) -> Result<Vec<Vec<Cut>>, ShapeError> {
     let mut cuts: Vec<Vec<Cut>> = vec![Vec::new(); sheets.len()];
     for (number, split) in parameters.split.iter().enumerate() {
-        let fault = |kind| ShapeFault { key: format!("shapes.{index}.split.{number}"), kind };
-        let sheet = sheet_index(split.sheet, sheets.len()).map_err(fault)?;
+        let error = |kind| ShapeError { key: format!("shapes.{index}.split.{number}"), kind };
+        let sheet = sheet_index(split.sheet, sheets.len()).map_err(error)?;
         let positions: Vec<DVec2> = sheets[sheet].iter().map(|&track| tracks[track].knot(index - 1).position).collect();
-        let cut = cut_of(split, sheet, &positions).map_err(fault)?;
+        let cut = cut_of(split, sheet, &positions).map_err(error)?;
         if cuts[sheet].iter().any(|other| other.0 == cut.0) {
-            return Err(fault(ShapeFaultKind::SplitTwice { sheet: sheet + 1, segment: cut.0 + 1 }));
+            return Err(error(ShapeErrorKind::SplitTwice { sheet: sheet + 1, segment: cut.0 + 1 }));
         }
         cuts[sheet].push(cut);
     }
@@ -179,47 +188,52 @@ fn cuts(
     Ok(cuts)
 }
 
-fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<Cut, ShapeFaultKind> {
+fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<Cut, ShapeErrorKind> {
     let segments = positions.len() - 1;
     match (split.segment, split.at) {
-        (Some(_), Some(_)) => Err(ShapeFaultKind::SegmentAndShare),
+        (Some(_), Some(_)) => Err(ShapeErrorKind::SegmentAndPosition),
         (Some(segment), None) => {
             let index = usize::try_from(segment - 1).ok().filter(|&index| index < segments);
-            let missing = ShapeFaultKind::NoSuchSegment { sheet: sheet + 1, segment, count: segments };
+            let missing = ShapeErrorKind::NoSuchSegment { sheet: sheet + 1, segment, count: segments };
             index.map(|index| (index, 0.5)).ok_or(missing)
         }
         (None, at) => {
-            let (at, shares) = (at.unwrap_or(0.5), shares(positions));
-            let segment = shares.partition_point(|&share| share <= at).clamp(1, segments) - 1;
-            let length = shares[segment + 1] - shares[segment];
-            let share = if length > 0.0 { (at - shares[segment]) / length } else { 0.5 };
-            Ok((segment, share.clamp(0.0, 1.0)))
+            let (at, fractions) = (at.unwrap_or(0.5), length_fractions(positions));
+            let segment = fractions.partition_point(|&fraction| fraction <= at).clamp(1, segments) - 1;
+            let length = fractions[segment + 1] - fractions[segment];
+            let fraction = if length > 0.0 { (at - fractions[segment]) / length } else { 0.5 };
+            Ok((segment, fraction.clamp(0.0, 1.0)))
         }
     }
 }
 
-/// The two ends that a merge names: sheet, and 0 for its start or 1 for its end.
+/// The two ends named by a merge: sheet, and 0 for its start or 1 for its end.
 fn merged_ends(
     merge: &MergeParameters,
     sheets: &[Vec<usize>],
-    tracks: &[Track],
+    tracks: &[ControlPointTrack],
     knot: usize,
-) -> Result<[(usize, usize); 2], ShapeFaultKind> {
+) -> Result<[(usize, usize); 2], ShapeErrorKind> {
     let [first, second] = merge.sheets;
     let pair = [sheet_index(first, sheets.len())?, sheet_index(second, sheets.len())?];
     if pair[0] == pair[1] {
-        return Err(ShapeFaultKind::Ring { sheet: pair[0] + 1 });
+        return Err(ShapeErrorKind::Ring { sheet: pair[0] + 1 });
     }
     let Auto::Set(at) = merge.at else { return Ok(nearest_ends(pair, sheets, tracks, knot)) };
     let end = |side: usize| match at[side] {
         0.0 => Ok((pair[side], 0)),
         1.0 => Ok((pair[side], 1)),
-        at => Err(ShapeFaultKind::NotAnEnd { sheet: pair[side] + 1, at }),
+        at => Err(ShapeErrorKind::NotAnEnd { sheet: pair[side] + 1, at }),
     };
     Ok([end(0)?, end(1)?])
 }
 
-fn nearest_ends(pair: [usize; 2], sheets: &[Vec<usize>], tracks: &[Track], knot: usize) -> [(usize, usize); 2] {
+fn nearest_ends(
+    pair: [usize; 2],
+    sheets: &[Vec<usize>],
+    tracks: &[ControlPointTrack],
+    knot: usize,
+) -> [(usize, usize); 2] {
     let at = |side: usize, end: usize| {
         let sheet = &sheets[pair[side]];
         tracks[sheet[end * (sheet.len() - 1)]].knot(knot).position
@@ -230,11 +244,11 @@ fn nearest_ends(pair: [usize; 2], sheets: &[Vec<usize>], tracks: &[Track], knot:
     [(pair[0], ends[0]), (pair[1], ends[1])]
 }
 
-/// Strands joined end to end.
+/// Strands joined at their ends.
 struct Chains {
-    /// What each end of each strand is joined to: strand and end.
+    /// The strand and end that each end of each strand is joined to.
     links: Vec<[Option<(usize, usize)>; 2]>,
-    /// A number that all strands of a chain have.
+    /// Chain id of each strand (union by relabeling).
     chain: Vec<usize>,
 }
 
@@ -255,20 +269,20 @@ impl Chains {
         true
     }
 
-    /// The chains, by the first strand of each, which none runs against.
-    fn collect(&self) -> Vec<Vec<Link>> {
+    /// The chains, each starting with its lowest-numbered strand in forward direction.
+    fn collect(&self) -> Vec<Vec<ChainLink>> {
         let mut seen = vec![false; self.links.len()];
         let mut chains = Vec::new();
         for strand in 0..self.links.len() {
             if seen[strand] {
                 continue;
             }
-            let mut chain = vec![Link { strand, reversed: false }];
+            let mut chain = vec![ChainLink { strand, reversed: false }];
             for end in [0, 1] {
                 let mut at = self.links[strand][end];
                 while let Some((next, entered)) = at {
                     // Walking toward the start, a strand entered at its end runs with the chain.
-                    let link = Link { strand: next, reversed: entered == end };
+                    let link = ChainLink { strand: next, reversed: entered == end };
                     if end == 0 {
                         chain.insert(0, link)
                     } else {
@@ -290,16 +304,17 @@ mod tests {
     use crate::shapes::interpolation::spline_track::Knot;
 
     /// Sheets of 4 points along x, 1 km apart, at z = 0, 10, ...
-    fn setting(count: usize) -> (Vec<Vec<usize>>, Vec<Track>) {
+    fn setting(count: usize) -> (Vec<Vec<usize>>, Vec<ControlPointTrack>) {
         let position = |index: usize| DVec2::new((index % 4) as f64, 10.0 * (index / 4) as f64);
-        let track = |index: usize| Track::new(0, None, Knot { position: position(index), values: [1.0; 2] });
+        let track =
+            |index: usize| ControlPointTrack::new(0, None, Knot { position: position(index), factors: [1.0; 2] });
         let sheets = (0..count).map(|sheet| (4 * sheet..4 * sheet + 4).collect()).collect();
         (sheets, (0..4 * count).map(track).collect())
     }
 
-    fn change(parameters: &ShapeParameters, sheets: usize) -> Result<(Change, Vec<Track>), ShapeFault> {
+    fn change(parameters: &ShapeParameters, sheets: usize) -> Result<(Transition, Vec<ControlPointTrack>), ShapeError> {
         let (sheets, mut tracks) = setting(sheets);
-        Change::new(parameters, 1, &sheets, &mut tracks).map(|change| (change, tracks))
+        Transition::new(parameters, 1, &sheets, &mut tracks).map(|change| (change, tracks))
     }
 
     fn split(sheet: i64, segment: Option<i64>, at: Option<f64>) -> ShapeParameters {
@@ -337,9 +352,9 @@ mod tests {
     fn merged_ends_take_a_point_each() {
         let (change, tracks) = change(&merge(&[([1, 2], Auto::Set([1.0, 1.0]))]), 2).unwrap();
         assert_eq!(change.strands, [vec![0, 1, 2, 3, 8], vec![4, 5, 6, 7, 9]]);
-        let links = [Link { strand: 0, reversed: false }, Link { strand: 1, reversed: true }];
+        let links = [ChainLink { strand: 0, reversed: false }, ChainLink { strand: 1, reversed: true }];
         assert_eq!(change.chains, [links]);
-        assert_eq!(change.along(links[1]), [9, 7, 6, 5, 4]);
+        assert_eq!(change.tracks_along(links[1]), [9, 7, 6, 5, 4]);
         assert_eq!(tracks[9].knot(0).position, DVec2::new(3.0, 10.0));
     }
 

@@ -1,10 +1,10 @@
-//! Square cells over a part of the plane, and which of them a segment passes.
+//! A uniform grid of square cells, and traversal of the cells along a segment.
 
 use std::ops::Range;
 
 use bansho_base::math::DVec2;
 
-/// Cells in rows, from north-west.
+/// Cells in row-major order from the north-west.
 #[derive(Clone, Debug)]
 pub(crate) struct CellGrid {
     low: DVec2,
@@ -25,14 +25,14 @@ impl CellGrid {
         self.size[0] * self.size[1]
     }
 
-    /// The cell of `point`; of one outside, the nearest column and row.
+    /// The cell of `point`, clamped to the grid.
     pub(super) fn cell_of(&self, point: DVec2) -> usize {
         self.line(1, point.y) * self.size[0] + self.line(0, point.x)
     }
 
-    /// The middle of a cell.
-    pub(super) fn middle(&self, cell: usize) -> DVec2 {
-        let [column, row] = [cell % self.size[0], cell / self.size[0]].map(|place| place as f64 + 0.5);
+    /// Center of a cell.
+    pub(super) fn center(&self, cell: usize) -> DVec2 {
+        let [column, row] = [cell % self.size[0], cell / self.size[0]].map(|index| index as f64 + 0.5);
         self.low + DVec2::new(column, row) * self.cell
     }
 
@@ -48,27 +48,28 @@ impl CellGrid {
 
     /// Column (`axis` 0) or row (1) of a coordinate.
     fn line(&self, axis: usize, coordinate: f64) -> usize {
-        // Casts saturate, so what lies outside or is no number ends in a border cell.
+        // Casts saturate, so points outside and NaN map to a border cell.
         (((coordinate - self.low[axis]) / self.cell) as usize).min(self.size[axis] - 1)
     }
 
-    /// Visits every cell that the segment from `a` to `b` passes, and few others. Both ends must lie within the cells.
-    pub(crate) fn for_each_passed(&self, a: DVec2, b: DVec2, mut visit: impl FnMut(usize)) {
+    /// Visits every cell that the segment from `a` to `b` intersects, and few others. Both ends must be inside the
+    /// grid.
+    pub(crate) fn for_each_traversed(&self, a: DVec2, b: DVec2, mut visit: impl FnMut(usize)) {
         self.for_each_run(a, b, 0.0, |run| run.for_each(&mut visit));
     }
 
-    /// Visits the runs of cells, row by row, that the segment from `a` to `b` passes within `margin`, and few others. Both ends must lie within
-    /// the cells.
+    /// Visits, row by row, the runs of cells within `margin` of the segment from `a` to `b`, and few others. Both ends
+    /// must be inside the grid.
     pub(super) fn for_each_run(&self, a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut(Range<usize>)) {
         let (top, bottom) = if a.y <= b.y { (a, b) } else { (b, a) };
-        let place_at = |height: f64| {
-            let share = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
-            top.x + (bottom.x - top.x) * share
+        let x_at = |height: f64| {
+            let fraction = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
+            top.x + (bottom.x - top.x) * fraction
         };
         for row in self.line(1, top.y - margin)..=self.line(1, bottom.y + margin) {
             let slab = self.low.y + row as f64 * self.cell;
             let ends = if bottom.y > top.y {
-                [place_at(slab - margin), place_at(slab + self.cell + margin)]
+                [x_at(slab - margin), x_at(slab + self.cell + margin)]
             } else {
                 [top.x, bottom.x]
             };

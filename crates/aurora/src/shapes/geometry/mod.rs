@@ -1,4 +1,4 @@
-//! Polylines, their segments, and finding what is near.
+//! Polylines, sampling by arc length, and nearest-segment queries.
 
 pub(crate) mod cell_grid;
 pub(crate) mod nearest_segment;

@@ -1,66 +1,66 @@
-//! How far a point is from the shape, answered near the shape only: the test with L_thr (thesis, 2.2.3).
+//! Nearest-segment queries within a maximum distance: the test against L_thr (thesis, 2.2.3).
 
 use bansho_base::math::DVec2;
 
 use super::cell_grid::CellGrid;
 use crate::shapes::Shape;
 
-/// Cells along the reach: the finer they are, the fewer segments can be nearest to a place in one.
+/// Cells per query radius: smaller cells have fewer candidate segments.
 const CELLS_PER_REACH: f64 = 4.0;
-/// Most cells along a side.
-const MOST_CELLS: usize = 512;
-/// About as many cells as lie within the reach at most, so that long shapes cost no more than their segments do.
-const MOST_WITHIN: f64 = 40_000.0;
+/// Maximum number of cells along a side.
+const MAX_CELLS_PER_SIDE: usize = 512;
+/// Approximate maximum number of cells within the radius, which bounds the cost for long shapes.
+const MAX_CELLS_WITHIN_REACH: f64 = 40_000.0;
 
-/// Segments of a shape by the cells to whose places they can be nearest.
+/// A uniform grid with the candidate segments of each cell.
 #[derive(Clone, Debug)]
-pub struct Neighbourhood {
+pub struct NearestSegmentGrid {
     reach: f64,
     grid: CellGrid,
-    /// Where the list of each cell begins in `lists`, and where the last one ends.
+    /// Start of each cell's list in `lists`, and the total.
     starts: Vec<u32>,
-    lists: Vec<ListedSegment>,
+    lists: Vec<SegmentGeometry>,
 }
 
-/// The place of a shape that is nearest to a point.
+/// The point of a shape that is nearest to a query point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Nearest {
-    /// Its segment, counted over all sheets in turn.
+pub(crate) struct NearestPoint {
+    /// Its segment index, counted over all sheets.
     pub(crate) segment: usize,
-    /// Share of the segment before it.
-    pub(crate) share: f64,
+    /// Fraction along the segment.
+    pub(crate) fraction: f64,
     /// Square of the distance, km^2.
-    pub(crate) square: f64,
-    /// Signed distance from the line through the segment, negative on the left of the way along it, times the segment's length, km^2.
-    pub(crate) side: f64,
+    pub(crate) distance_squared: f64,
+    /// Signed distance from the line through the segment, negative to the left, times the segment's length, km^2.
+    pub(crate) cross: f64,
 }
 
-/// A segment: its number, its start, the way to its end, and one over the square of its length (0 where it has none).
+/// Index, start and direction of a segment, and one over its squared length (0 for a degenerate one).
 #[derive(Clone, Copy, Debug)]
-struct ListedSegment {
+struct SegmentGeometry {
     number: u32,
     start: DVec2,
-    way: DVec2,
+    direction: DVec2,
     inverse_square: f64,
 }
 
-impl Neighbourhood {
-    /// What lies within `reach` km of `shape`.
+impl NearestSegmentGrid {
+    /// A grid for queries within `reach` km of `shape`.
     pub fn new(shape: &Shape, reach: f64) -> Self {
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
-        let segments: Vec<ListedSegment> =
-            pairs.zip(0..).map(|(pair, number)| ListedSegment::new(number, pair[0], pair[1])).collect();
-        let ends = || segments.iter().flat_map(|segment| [segment.start, segment.start + segment.way]);
+        let segments: Vec<SegmentGeometry> =
+            pairs.zip(0..).map(|(pair, number)| SegmentGeometry::new(number, pair[0], pair[1])).collect();
+        let ends = || segments.iter().flat_map(|segment| [segment.start, segment.start + segment.direction]);
         let low = ends().fold(DVec2::INFINITY, DVec2::min);
         let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
         let grid = if segments.is_empty() {
             CellGrid::new(DVec2::ZERO, DVec2::ZERO, 1.0, 1)
         } else {
             let area = 2.0 * reach * (shape.length() + reach);
-            let cell = (reach / CELLS_PER_REACH).max((area / MOST_WITHIN).sqrt());
-            CellGrid::new(low - reach, high + reach, cell, MOST_CELLS)
+            let cell = (reach / CELLS_PER_REACH).max((area / MAX_CELLS_WITHIN_REACH).sqrt());
+            CellGrid::new(low - reach, high + reach, cell, MAX_CELLS_PER_SIDE)
         };
-        let (starts, lists) = nearest_ones(&grid, &segments, reach);
+        let (starts, lists) = nearest_candidates(&grid, &segments, reach);
         Self { reach, grid, starts, lists }
     }
 
@@ -69,58 +69,60 @@ impl Neighbourhood {
         self.nearest(point).map(|(_, distance)| distance)
     }
 
-    /// The segment nearest to `point`, counted over all sheets in turn, and the distance to it, km; the first of several that
-    /// are as near. `None` beyond the reach.
+    /// Index of the segment nearest to `point`, counted over all sheets, and its distance, km; the first one at equal
+    /// distance. `None` beyond the reach.
     #[inline]
     pub fn nearest(&self, point: DVec2) -> Option<(usize, f64)> {
-        let nearest = self.nearest_place(point)?;
-        Some((nearest.segment, nearest.square.sqrt()))
+        let nearest = self.nearest_point(point)?;
+        Some((nearest.segment, nearest.distance_squared.sqrt()))
     }
 
-    /// The place of the shape that is nearest to `point`; that on the first of several segments that are as near. `None` beyond the reach.
+    /// The point of the shape that is nearest to `point`, on the first segment at equal distance. `None` beyond the
+    /// reach.
     #[inline]
-    pub(crate) fn nearest_place(&self, point: DVec2) -> Option<Nearest> {
+    pub(crate) fn nearest_point(&self, point: DVec2) -> Option<NearestPoint> {
         let cell = self.grid.cell_of(point);
-        let mut nearest = Nearest { segment: 0, share: 0.0, square: f64::INFINITY, side: 0.0 };
+        let mut nearest = NearestPoint { segment: 0, fraction: 0.0, distance_squared: f64::INFINITY, cross: 0.0 };
         for segment in &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
             let from_start = point - segment.start;
-            let share = (from_start.dot(segment.way) * segment.inverse_square).clamp(0.0, 1.0);
-            let square = from_start.distance_squared(segment.way * share);
-            if square < nearest.square {
-                // Times the length, the distance from the line through the segment.
-                let side = from_start.perp_dot(segment.way);
-                nearest = Nearest { segment: segment.number as usize, share, square, side };
+            let fraction = (from_start.dot(segment.direction) * segment.inverse_square).clamp(0.0, 1.0);
+            let square = from_start.distance_squared(segment.direction * fraction);
+            if square < nearest.distance_squared {
+                // Cross product: distance from the line times the length.
+                let side = from_start.perp_dot(segment.direction);
+                nearest =
+                    NearestPoint { segment: segment.number as usize, fraction, distance_squared: square, cross: side };
             }
         }
-        (nearest.square <= self.reach * self.reach).then_some(nearest)
+        (nearest.distance_squared <= self.reach * self.reach).then_some(nearest)
     }
 }
 
-/// A run of cells that a segment passes near by.
-struct Run {
+/// A run of cells within reach of a segment.
+struct CellRun {
     segment: u32,
-    /// Its first cell, and the place of its distance in the list of all.
+    /// First cell, and the index of its distance in the common list.
     cell: u32,
     first: u32,
 }
 
-/// The segments that can be nearest to a place within `reach` in each cell, one cell's after those of another, and where each cell's begin:
-/// those no farther from its middle than the nearest one by more than twice the way from there to its corners.
-fn nearest_ones(grid: &CellGrid, segments: &[ListedSegment], reach: f64) -> (Vec<u32>, Vec<ListedSegment>) {
+/// Candidate lists of all cells: a segment is kept if its distance from the cell's center exceeds that of the nearest
+/// segment by at most the cell's diagonal. Distances are computed per run of cells.
+fn nearest_candidates(grid: &CellGrid, segments: &[SegmentGeometry], reach: f64) -> (Vec<u32>, Vec<SegmentGeometry>) {
     let (mut runs, mut squares) = (Vec::new(), Vec::new());
     let mut least = vec![f32::INFINITY; grid.count()];
     for (number, segment) in segments.iter().enumerate() {
-        grid.for_each_run(segment.start, segment.start + segment.way, reach, |cells| {
+        grid.for_each_run(segment.start, segment.start + segment.direction, reach, |cells| {
             let (cell, first) = (cells.start, squares.len());
-            runs.push(Run { segment: number as u32, cell: cell as u32, first: first as u32 });
+            runs.push(CellRun { segment: number as u32, cell: cell as u32, first: first as u32 });
             squares.resize(first + cells.len(), 0.0);
-            segment.fill_squares(grid.middle(cell), grid.side(), &mut squares[first..]);
+            segment.fill_squares(grid.center(cell), grid.side(), &mut squares[first..]);
             for (least, square) in least[cells].iter_mut().zip(&squares[first..]) {
                 *least = if *square < *least { *square } else { *least };
             }
         });
     }
-    // A little more, so that rounding loses nothing.
+    // Margin for rounding.
     let slack = (2.0 * 1.001 * grid.half_diagonal()) as f32;
     let most: Vec<f32> = least.iter().map(|least| (least.sqrt() + slack) * (least.sqrt() + slack)).collect();
     let ends = runs.iter().skip(1).map(|run| run.first as usize).chain([squares.len()]);
@@ -140,7 +142,7 @@ fn nearest_ones(grid: &CellGrid, segments: &[ListedSegment], reach: f64) -> (Vec
         starts[cell + 1] += starts[cell];
     }
     let mut next = starts.clone();
-    let mut lists = vec![ListedSegment::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
+    let mut lists = vec![SegmentGeometry::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
     for_each_kept(&mut |cell, segment| {
         lists[next[cell] as usize] = segments[segment as usize];
         next[cell] += 1;
@@ -148,22 +150,23 @@ fn nearest_ones(grid: &CellGrid, segments: &[ListedSegment], reach: f64) -> (Vec
     (starts, lists)
 }
 
-impl ListedSegment {
+impl SegmentGeometry {
     fn new(number: u32, start: DVec2, end: DVec2) -> Self {
         let square = start.distance_squared(end);
         let inverse_square = if square > 0.0 { 1.0 / square } else { 0.0 };
-        Self { number, start, way: end - start, inverse_square }
+        Self { number, start, direction: end - start, inverse_square }
     }
 
-    /// Squares of the distances from places in a row, so far from each other, of which the first is given.
+    /// Squared distances of `squares.len()` points in a row, `apart` from each other, starting at `first`.
     fn fill_squares(&self, first: DVec2, apart: f64, squares: &mut [f32]) {
         let from_start = first - self.start;
-        let ([x, y], [u, v]) = ([from_start.x as f32, from_start.y as f32], [self.way.x as f32, self.way.y as f32]);
+        let ([x, y], [u, v]) =
+            ([from_start.x as f32, from_start.y as f32], [self.direction.x as f32, self.direction.y as f32]);
         let (apart, per_square) = (apart as f32, self.inverse_square.min(f64::from(f32::MAX)) as f32);
-        for (place, square) in squares.iter_mut().enumerate() {
-            let x = x + apart * place as f32;
-            let share = ((x * u + y * v) * per_square).clamp(0.0, 1.0);
-            let (beside, below) = (x - share * u, y - share * v);
+        for (index, square) in squares.iter_mut().enumerate() {
+            let x = x + apart * index as f32;
+            let fraction = ((x * u + y * v) * per_square).clamp(0.0, 1.0);
+            let (beside, below) = (x - fraction * u, y - fraction * v);
             *square = beside * beside + below * below;
         }
     }
@@ -172,8 +175,8 @@ impl ListedSegment {
     #[cfg(test)]
     fn distance_squared(&self, point: DVec2) -> f64 {
         let from_start = point - self.start;
-        let share = (from_start.dot(self.way) * self.inverse_square).clamp(0.0, 1.0);
-        from_start.distance_squared(self.way * share)
+        let fraction = (from_start.dot(self.direction) * self.inverse_square).clamp(0.0, 1.0);
+        from_start.distance_squared(self.direction * fraction)
     }
 }
 
@@ -191,12 +194,12 @@ mod tests {
     #[test]
     fn distances_to_a_segment_and_beyond_its_ends() {
         let shape = Shape { sheets: vec![sheet(vec![DVec2::ZERO, DVec2::new(10.0, 0.0)])] };
-        let near = Neighbourhood::new(&shape, 5.0);
+        let near = NearestSegmentGrid::new(&shape, 5.0);
         assert_eq!(near.distance(DVec2::new(4.0, -3.0)), Some(3.0));
         assert_eq!(near.distance(DVec2::new(13.0, 4.0)), Some(5.0));
         assert_eq!(near.distance(DVec2::new(13.1, 4.0)), None);
         assert_eq!(near.distance(DVec2::new(1e9, f64::NAN)), None);
-        assert_eq!(Neighbourhood::new(&Shape::default(), 5.0).distance(DVec2::ZERO), None);
+        assert_eq!(NearestSegmentGrid::new(&Shape::default(), 5.0).distance(DVec2::ZERO), None);
     }
 
     #[test]
@@ -208,10 +211,10 @@ mod tests {
         };
         let sheets = (0..4).map(|index| sheet((0..30).map(|point| random(100 * index + point)).collect())).collect();
         let shape = Shape { sheets };
-        let near = Neighbourhood::new(&shape, 7.0);
+        let near = NearestSegmentGrid::new(&shape, 7.0);
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
-        let segments: Vec<ListedSegment> =
-            pairs.zip(0..).map(|(pair, number)| ListedSegment::new(number, pair[0], pair[1])).collect();
+        let segments: Vec<SegmentGeometry> =
+            pairs.zip(0..).map(|(pair, number)| SegmentGeometry::new(number, pair[0], pair[1])).collect();
         let mut within = 0;
         for probe in 0..5_000 {
             let point = random(1000 + probe) * 1.2;

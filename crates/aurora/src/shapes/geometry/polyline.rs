@@ -1,11 +1,11 @@
-//! Polylines: length along them, points at shares of it, and how strokes become control points.
+//! Polylines: arc length, resampling, and control points from strokes.
 
 use bansho_base::math::{DVec2, lerp};
 
-/// Strokes with fewer points than this are taken for sketches and smoothed.
-const SKETCH: usize = 256;
+/// Strokes with fewer points are treated as sketches and smoothed.
+const SKETCH_POINTS: usize = 256;
 
-/// Points with the length along them; at least one point.
+/// Points with cumulative arc length; at least one point.
 #[derive(Clone, Debug)]
 pub(crate) struct Polyline {
     points: Vec<DVec2>,
@@ -31,28 +31,28 @@ impl Polyline {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// The point at the share `share` of the length, 0 at the start to 1 at the end.
-    pub(crate) fn at(&self, share: f64) -> DVec2 {
-        let way = share * self.length();
+    /// The point at a fraction of the length, 0 at the start to 1 at the end.
+    pub(crate) fn at(&self, fraction: f64) -> DVec2 {
+        let distance = fraction * self.length();
         let last = self.points.len() - 1;
-        let next = self.lengths.partition_point(|&length| length <= way).clamp(1, last.max(1)).min(last);
+        let next = self.lengths.partition_point(|&length| length <= distance).clamp(1, last.max(1)).min(last);
         let before = next.saturating_sub(1);
         let step = self.lengths[next] - self.lengths[before];
         if step > 0.0 {
-            self.points[before].lerp(self.points[next], ((way - self.lengths[before]) / step).clamp(0.0, 1.0))
+            self.points[before].lerp(self.points[next], ((distance - self.lengths[before]) / step).clamp(0.0, 1.0))
         } else {
             self.points[before]
         }
     }
 
-    /// `count` points at equal distances along it, both ends included.
-    pub(crate) fn evenly(&self, count: usize) -> Vec<DVec2> {
+    /// Resamples to `count` points at equal arc length, both ends included.
+    pub(crate) fn resample(&self, count: usize) -> Vec<DVec2> {
         (0..count).map(|index| self.at(index as f64 / (count - 1).max(1) as f64)).collect()
     }
 }
 
 /// Length of a line up to each of its points.
-pub(crate) fn lengths(points: &[DVec2]) -> Vec<f64> {
+pub(crate) fn cumulative_lengths(points: &[DVec2]) -> Vec<f64> {
     let mut lengths = Vec::with_capacity(points.len());
     let mut sum = 0.0;
     for (index, point) in points.iter().enumerate() {
@@ -62,36 +62,37 @@ pub(crate) fn lengths(points: &[DVec2]) -> Vec<f64> {
     lengths
 }
 
-/// Share of the length at each point; evenly from 0 to 1 where the line has no length.
-pub(crate) fn shares(points: &[DVec2]) -> Vec<f64> {
-    let mut shares = lengths(points);
-    let sum = shares.last().copied().unwrap_or(0.0);
+/// Fraction of the length at each point; uniform where the length is 0.
+pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
+    let mut fractions = cumulative_lengths(points);
+    let sum = fractions.last().copied().unwrap_or(0.0);
     let last = points.len().saturating_sub(1).max(1) as f64;
-    for (index, share) in shares.iter_mut().enumerate() {
-        *share = if sum > 0.0 { *share / sum } else { index as f64 / last };
+    for (index, fraction) in fractions.iter_mut().enumerate() {
+        *fraction = if sum > 0.0 { *fraction / sum } else { index as f64 / last };
     }
-    shares
+    fractions
 }
 
-/// Eq. (2.1): `count` control points P_i by linear interpolation over the recorded positions M_j. The printed place i m/n
-/// leaves out the end of the stroke; i (m - 1)/(n - 1) reaches it.
-pub(crate) fn by_recorded_points(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
+/// Eq. (2.1): `count` control points P_i by linear interpolation over the recorded positions M_j. The printed index i
+/// m/n cuts off the end of the stroke; i (m - 1)/(n - 1) reaches it.
+pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
     let last = recorded.len().saturating_sub(1);
     let point = |i: usize| {
-        let place = (i * last) as f64 / (count - 1).max(1) as f64;
-        let q = place as usize;
-        let p = place - q as f64;
+        let index = (i * last) as f64 / (count - 1).max(1) as f64;
+        let q = index as usize;
+        let p = index - q as f64;
         recorded[q.min(last)].lerp(recorded[(q + 1).min(last)], p)
     };
     (0..count).map(point).collect()
 }
 
-/// A smooth line through the points of a sketch: Catmull-Rom segments, whose centripetal knots make neither loops nor cusps
-/// between two points (Yuksel, Schaefer & Keyser 2011), and how many pieces lie between them. Strokes of many points stay as they are.
-pub(crate) fn smoothed(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
+/// A centripetal Catmull-Rom spline through the points of a sketch, without cusps or self-intersections within a
+/// segment (Yuksel, Schaefer & Keyser 2011), and its number of segments per point. Longer strokes are returned
+/// unchanged.
+pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     const PIECES: usize = 8;
     let count = points.len();
-    if !(3..SKETCH).contains(&count) {
+    if !(3..SKETCH_POINTS).contains(&count) {
         return (points, 1);
     }
     let mirrored = |end: DVec2, inner: DVec2| end + (end - inner);
@@ -108,13 +109,13 @@ pub(crate) fn smoothed(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     (line, PIECES)
 }
 
-/// The curve between the two inner points, by the pyramid of Barry & Goldman (1988).
-fn centripetal([a, b, c, d]: [DVec2; 4], share: f64) -> DVec2 {
+/// The segment between the two inner points (Barry & Goldman 1988).
+fn centripetal([a, b, c, d]: [DVec2; 4], fraction: f64) -> DVec2 {
     let step = |from: DVec2, to: DVec2| from.distance(to).sqrt().max(1e-9);
     let [ta, tb] = [0.0, step(a, b)];
     let tc = tb + step(b, c);
     let td = tc + step(c, d);
-    let t = lerp(tb, tc, share);
+    let t = lerp(tb, tc, fraction);
     let between = |p: DVec2, q: DVec2, low: f64, high: f64| p.lerp(q, (t - low) / (high - low));
     let [ab, bc, cd] = [between(a, b, ta, tb), between(b, c, tb, tc), between(c, d, tc, td)];
     between(between(ab, bc, ta, tc), between(bc, cd, tb, td), tb, tc)
@@ -133,35 +134,35 @@ mod tests {
         let line = Polyline::new(corner()).unwrap();
         assert_eq!(line.length(), 4.0);
         assert_eq!(
-            line.evenly(5).iter().map(|p| p.to_array()).collect::<Vec<_>>(),
+            line.resample(5).iter().map(|p| p.to_array()).collect::<Vec<_>>(),
             [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [3.0, 1.0]]
         );
-        assert_eq!(shares(&corner()), [0.0, 0.75, 1.0]);
+        assert_eq!(length_fractions(&corner()), [0.0, 0.75, 1.0]);
         assert_eq!(line.at(-1.0), DVec2::ZERO);
         assert_eq!(line.at(7.0), DVec2::new(3.0, 1.0));
         let spot = Polyline::new(vec![DVec2::ONE]).unwrap();
         assert_eq!((spot.at(0.3), spot.length()), (DVec2::ONE, 0.0));
-        assert_eq!(shares(&[DVec2::ONE; 3]), [0.0, 0.5, 1.0]);
+        assert_eq!(length_fractions(&[DVec2::ONE; 3]), [0.0, 0.5, 1.0]);
         assert!(Polyline::new(Vec::new()).is_none());
     }
 
-    /// m = 3 recorded points, n = 5 control points: places 0, 1/2, 1, 3/2, 2.
+    /// m = 3 recorded points, n = 5 control points: positions 0, 1/2, 1, 3/2, 2.
     #[test]
     fn control_points_reach_the_end_of_the_stroke() {
-        let points = by_recorded_points(&corner(), 5);
+        let points = resample_by_index(&corner(), 5);
         let expected = [[0.0, 0.0], [1.5, 0.0], [3.0, 0.0], [3.0, 0.5], [3.0, 1.0]];
         assert_eq!(points.iter().map(|p| p.to_array()).collect::<Vec<_>>(), expected);
     }
 
     #[test]
     fn a_smoothed_sketch_passes_its_points_and_stays_straight_where_they_are() {
-        let (line, pieces) = smoothed(corner());
+        let (line, pieces) = smooth_sketch(corner());
         assert_eq!((line.len(), pieces), (17, 8));
         assert!(corner().iter().all(|point| line.contains(point)));
         let straight: Vec<DVec2> = (0..4).map(|i| DVec2::new(f64::from(i), 0.0)).collect();
-        let (line, _) = smoothed(straight);
+        let (line, _) = smooth_sketch(straight);
         assert!(line.iter().all(|point| point.y.abs() < 1e-12));
         assert!(line.windows(2).all(|pair| pair[0].x < pair[1].x));
-        assert_eq!(smoothed(corner()[..2].to_vec()), (corner()[..2].to_vec(), 1));
+        assert_eq!(smooth_sketch(corner()[..2].to_vec()), (corner()[..2].to_vec(), 1));
     }
 }

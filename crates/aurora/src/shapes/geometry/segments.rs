@@ -1,38 +1,38 @@
-//! Sampling along the sheets: cost grows with what is sampled, not with the area that the shape takes.
+//! Uniform sampling of sheets by arc length: the cost depends on the number of samples, not on the covered area.
 
 use bansho_base::math::{DVec2, lerp};
 
 use crate::shapes::{SegmentId, Shape};
 
-/// A place on a sheet.
+/// A sampled position on a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    /// Where it is, km.
+pub struct SheetSample {
+    /// Position, km.
     pub point: DVec2,
     /// Unit vector along the sheet.
     pub tangent: DVec2,
-    /// Where it is on the sheet.
+    /// The segment.
     pub segment: SegmentId,
-    /// Share of the sheet's length before it.
-    pub share: f64,
+    /// Fraction of the sheet's length.
+    pub fraction: f64,
     /// Factor of the aurora's flux there.
     pub flux: f64,
     /// Factor of the aurora's energy there.
     pub energy: f64,
 }
 
-/// The segments of a shape that have a length, with the length up to each.
+/// Segments with non-zero length and their cumulative length.
 #[derive(Clone, Debug)]
-pub struct Segments<'a> {
+pub struct SheetSampler<'a> {
     shape: &'a Shape,
     ids: Vec<SegmentId>,
     /// Length of all sheets up to the end of each segment, km.
     ends: Vec<f64>,
-    /// Where each sheet begins and ends in that length, km.
+    /// Range of each sheet in the cumulative length, km.
     sheets: Vec<[f64; 2]>,
 }
 
-impl<'a> Segments<'a> {
+impl<'a> SheetSampler<'a> {
     /// The segments of `shape`.
     pub fn new(shape: &'a Shape) -> Self {
         let (mut ids, mut ends, mut sheets) = (Vec::new(), Vec::new(), Vec::new());
@@ -54,23 +54,23 @@ impl<'a> Segments<'a> {
         self.ends.last().copied().unwrap_or(0.0)
     }
 
-    /// The place at the share `u` of the length of all sheets, 0 to 1: even `u` lie evenly along the sheets. O(log n) for n
+    /// The position at the fraction `u` of the length of all sheets; uniform `u` give uniform density. O(log n) for n
     /// segments. `None` for a shape without length.
-    pub fn sample(&self, u: f64) -> Option<Sample> {
-        let way = u.clamp(0.0, 1.0) * self.length();
-        let index = self.ends.partition_point(|&end| end <= way).min(self.ends.len().checked_sub(1)?);
+    pub fn sample(&self, u: f64) -> Option<SheetSample> {
+        let distance = u.clamp(0.0, 1.0) * self.length();
+        let index = self.ends.partition_point(|&end| end <= distance).min(self.ends.len().checked_sub(1)?);
         let id = self.ids[index];
         let start = if index > 0 { self.ends[index - 1] } else { 0.0 };
-        let along = ((way - start) / (self.ends[index] - start)).clamp(0.0, 1.0);
+        let along = ((distance - start) / (self.ends[index] - start)).clamp(0.0, 1.0);
         let sheet = &self.shape.sheets[id.sheet];
         let [from, to] = [sheet.points[id.segment], sheet.points[id.segment + 1]];
         let between = |values: &[f64]| lerp(values[id.segment], values[id.segment + 1], along);
         let [first, last] = self.sheets[id.sheet];
-        Some(Sample {
+        Some(SheetSample {
             point: from.lerp(to, along),
             tangent: (to - from).normalize_or(DVec2::X),
             segment: id,
-            share: (way - first) / (last - first),
+            fraction: (distance - first) / (last - first),
             flux: between(&sheet.flux),
             energy: between(&sheet.energy),
         })
@@ -100,15 +100,15 @@ mod tests {
     #[test]
     fn samples_lie_evenly_along_all_sheets() {
         let shape = shape();
-        let segments = Segments::new(&shape);
+        let segments = SheetSampler::new(&shape);
         assert_eq!((segments.length(), shape.length()), (8.0, 8.0));
         let sample = segments.sample(0.4375).unwrap();
         assert_eq!((sample.point, sample.tangent), (DVec2::new(3.0, 0.5), DVec2::Y));
-        assert_eq!((sample.segment, sample.share), (SegmentId { sheet: 0, segment: 1 }, 0.875));
+        assert_eq!((sample.segment, sample.fraction), (SegmentId { sheet: 0, segment: 1 }, 0.875));
         assert_eq!((sample.flux, sample.energy), (1.5, 2.0));
         let beyond_the_double_point = segments.sample(0.875).unwrap();
         assert_eq!(beyond_the_double_point.segment, SegmentId { sheet: 1, segment: 2 });
-        assert_eq!((beyond_the_double_point.share, beyond_the_double_point.flux), (0.75, 2.5));
+        assert_eq!((beyond_the_double_point.fraction, beyond_the_double_point.flux), (0.75, 2.5));
         assert_eq!(segments.sample(0.0).unwrap().point, DVec2::ZERO);
         assert_eq!(segments.sample(1.0).unwrap().point, DVec2::new(4.0, 9.0));
     }
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn each_sheet_gets_its_share() {
         let shape = shape();
-        let segments = Segments::new(&shape);
+        let segments = SheetSampler::new(&shape);
         let first =
             (0..1000).filter(|i| segments.sample((*i as f64 + 0.5) / 1000.0).unwrap().segment.sheet == 0).count();
         assert_eq!(first, 500);
@@ -124,8 +124,8 @@ mod tests {
 
     #[test]
     fn a_shape_without_length_has_no_samples() {
-        assert_eq!(Segments::new(&Shape::default()).sample(0.5), None);
+        assert_eq!(SheetSampler::new(&Shape::default()).sample(0.5), None);
         let spot = Sheet { points: vec![DVec2::ONE; 2], flux: vec![1.0; 2], energy: vec![1.0; 2] };
-        assert_eq!(Segments::new(&Shape { sheets: vec![spot] }).sample(0.5), None);
+        assert_eq!(SheetSampler::new(&Shape { sheets: vec![spot] }).sample(0.5), None);
     }
 }

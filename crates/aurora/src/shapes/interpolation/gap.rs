@@ -1,21 +1,21 @@
-//! Gaps that open where a sheet splits and close where two merge: how light fades toward them and passes over them.
+//! Gaps where a sheet splits or two sheets merge: how flux fades toward them and bridges them.
 //!
-//! A sheet does not break like a rod. Where it splits, precipitation first weakens over some way to both sides, then the two ends draw apart
-//! in the dark; where ends merge they stay faint until they are near, and brighten together.
+//! Before a gap opens, the flux decreases over some distance on both sides; the ends then separate while dark. Merging
+//! ends stay dim until they are close, then brighten together.
 
 use bansho_base::math::smoothstep;
 
-use crate::shapes::{Sheet, geometry::polyline::lengths};
+use crate::shapes::{Sheet, geometry::polyline::cumulative_lengths};
 
-/// Light passes over gaps narrower than this, km, and narrower than half of what they are when they are widest.
+/// Gaps narrower than this, km, and than half of their maximum width, are bridged by light.
 const BRIDGED_KM: f64 = 40.0;
-/// Over this way along a sheet its light fades toward a gap, km, and over no more than this share of the sheet.
+/// Length over which the flux fades toward a gap, km, and its maximum as a fraction of the sheet.
 const FADE_KM: f64 = 60.0;
-const FADE_SHARE: f64 = 0.35;
-/// Share of the transition, at the side where the gap is widest, in which ends change between what is drawn and dark.
+const MAX_FADE_FRACTION: f64 = 0.35;
+/// Fraction of the transition, on the side of the maximum width, over which ends change between drawn and dark.
 const DARKENING: f64 = 0.15;
 
-/// Two control points that are one where the gap is closed.
+/// Two control points that coincide where the gap is closed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gap {
     pub(crate) ends: [usize; 2],
@@ -23,7 +23,7 @@ pub(crate) struct Gap {
     pub(crate) opens: bool,
 }
 
-/// A gap at a moment.
+/// State of a gap at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GapFlux {
     /// Factor of the flux at both ends.
@@ -32,10 +32,10 @@ pub(crate) struct GapFlux {
     pub(crate) across: f64,
 }
 
-/// A stretch of light over a narrow gap between two ends of sheets.
+/// Light across a narrow gap between two ends of sheets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bridge {
-    /// The two sheets, as the shape lists them, and whether it is the end of each (or its start).
+    /// Index of the two sheets, and whether it is the end of each (or its start).
     pub ends: [(usize, bool); 2],
     /// Factors of the aurora's flux and energy there.
     pub flux: f64,
@@ -44,25 +44,25 @@ pub struct Bridge {
 }
 
 impl GapFlux {
-    /// A gap of `width` km that is `widest` km when it is widest, at a share of the time from where it is closed to there.
-    pub(crate) fn new(width: f64, widest: f64, share: f64) -> Self {
+    /// A gap of `width` km with the maximum `widest`, at a fraction of the time from closed to widest.
+    pub(crate) fn new(width: f64, widest: f64, fraction: f64) -> Self {
         let limit = BRIDGED_KM.min(0.5 * widest);
         let closed = if limit > 0.0 { 1.0 - smoothstep(0.0, limit, width) } else { 1.0 };
-        // At the wide side sheets are as they are drawn.
-        let free = 1.0 - smoothstep(1.0 - DARKENING, 1.0, share);
+        // At maximum width the sheets are as drawn.
+        let free = 1.0 - smoothstep(1.0 - DARKENING, 1.0, fraction);
         Self { ends: 1.0 - (1.0 - closed) * free, across: closed * free }
     }
 }
 
-/// Lets the flux of a sheet fade toward its start, or its end, down to that share there.
-pub(crate) fn fade(sheet: &mut Sheet, at_end: bool, share: f64) {
-    let lengths = lengths(&sheet.points);
+/// Fades the flux of a sheet toward its start or end, down to that fraction.
+pub(crate) fn fade_toward_gap(sheet: &mut Sheet, at_end: bool, fraction: f64) {
+    let lengths = cumulative_lengths(&sheet.points);
     let whole = lengths.last().copied().unwrap_or(0.0);
-    let way = FADE_KM.min(FADE_SHARE * whole);
+    let fade_km = FADE_KM.min(MAX_FADE_FRACTION * whole);
     for (flux, length) in sheet.flux.iter_mut().zip(&lengths) {
         let from_end = if at_end { whole - length } else { *length };
-        let risen = if way > 0.0 { smoothstep(0.0, way, from_end) } else { 1.0 };
-        *flux *= 1.0 - (1.0 - share) * (1.0 - risen);
+        let risen = if fade_km > 0.0 { smoothstep(0.0, fade_km, from_end) } else { 1.0 };
+        *flux *= 1.0 - (1.0 - fraction) * (1.0 - risen);
     }
 }
 
@@ -88,7 +88,7 @@ mod tests {
     fn flux_fades_toward_the_gap_alone() {
         let points: Vec<DVec2> = (0..41).map(|index| DVec2::new(10.0 * f64::from(index), 0.0)).collect();
         let mut sheet = Sheet { flux: vec![2.0; points.len()], energy: vec![1.0; points.len()], points };
-        fade(&mut sheet, true, 0.25);
+        fade_toward_gap(&mut sheet, true, 0.25);
         assert_eq!((sheet.flux[40], sheet.flux[0], sheet.flux[34]), (0.5, 2.0, 2.0));
         assert!(sheet.flux.windows(2).all(|pair| pair[1] <= pair[0]));
         // Half of the way up between.

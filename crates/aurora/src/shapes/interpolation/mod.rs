@@ -1,4 +1,4 @@
-//! Shapes between shapes: splines through the key shapes.
+//! In-between shapes: splines in time through the key shapes.
 
 pub(crate) mod control_points;
 pub(crate) mod gap;

@@ -1,15 +1,15 @@
-//! A control point on its way through the shapes: a cubic spline in time (thesis, 2.2.2).
+//! The path of a control point through the shapes: a cubic spline in time (thesis, 2.2.2).
 
 use bansho_base::math::{DVec2, lerp, smoothstep};
 
-/// When each shape is reached and left, s.
+/// Arrival and departure times of each shape, s.
 #[derive(Clone, Debug)]
-pub(crate) struct Timing {
+pub(crate) struct ShapeTiming {
     pub(crate) arrivals: Vec<f64>,
     pub(crate) departures: Vec<f64>,
 }
 
-impl Timing {
+impl ShapeTiming {
     /// Time from leaving shape `index` to reaching the next, s.
     fn span(&self, index: usize) -> f64 {
         self.arrivals[index + 1] - self.departures[index]
@@ -20,112 +20,121 @@ impl Timing {
     }
 }
 
-/// Where a control point is at one shape.
+/// State of a control point at one shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knot {
     pub(crate) position: DVec2,
     /// Factors of flux and energy there.
-    pub(crate) values: [f64; 2],
+    pub(crate) factors: [f64; 2],
 }
 
 impl Knot {
-    pub(crate) fn lerp(self, other: Self, share: f64) -> Self {
-        let values = [0, 1].map(|index| lerp(self.values[index], other.values[index], share));
-        Self { position: self.position.lerp(other.position, share), values }
+    pub(crate) fn lerp(self, other: Self, fraction: f64) -> Self {
+        let factors = [0, 1].map(|index| lerp(self.factors[index], other.factors[index], fraction));
+        Self { position: self.position.lerp(other.position, fraction), factors }
     }
 }
 
-/// The two control points between which one is born, and the share of the way from the first to the second.
+/// The two control points between which a point is inserted, and the fraction from the first to the second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parents {
     pub(crate) tracks: [usize; 2],
-    pub(crate) share: f64,
+    pub(crate) fraction: f64,
 }
 
-/// A control point from the shape at which it is born to the last one that has it.
+/// A control point from the shape where it is inserted to the last one that has it.
 #[derive(Clone, Debug)]
-pub(crate) struct Track {
-    /// The shape at which it is born.
-    pub(super) first: usize,
+pub(crate) struct ControlPointTrack {
+    /// Index of its first shape.
+    pub(super) first_shape: usize,
     pub(super) parents: Option<Parents>,
     pub(crate) knots: Vec<Knot>,
     /// Velocity at each knot, km/s.
     velocities: Vec<DVec2>,
 }
 
-/// What is known of the velocity at an end of a spline.
+/// Boundary condition of a spline.
 #[derive(Clone, Copy)]
-enum End {
-    /// No curvature there.
+enum SplineEnd {
+    /// Zero curvature.
     Natural,
     Velocity(DVec2),
 }
 
-impl Track {
-    pub(crate) fn new(first: usize, parents: Option<Parents>, knot: Knot) -> Self {
-        Self { first, parents, knots: vec![knot], velocities: Vec::new() }
+impl ControlPointTrack {
+    pub(crate) fn new(first_shape: usize, parents: Option<Parents>, knot: Knot) -> Self {
+        Self { first_shape, parents, knots: vec![knot], velocities: Vec::new() }
     }
 
-    /// The knot at shape `index`, which it must pass.
+    /// The knot at shape `index`, which must be one of its shapes.
     pub(crate) fn knot(&self, index: usize) -> Knot {
-        self.knots[index - self.first]
+        self.knots[index - self.first_shape]
     }
 
-    /// Where it is between the shapes `index` and the next, at the share `share` of the time between them.
-    pub(crate) fn between(&self, index: usize, share: f64, timing: &Timing) -> Knot {
-        let place = index - self.first;
-        let [from, to] = [self.knots[place], self.knots[place + 1]];
+    /// Interpolates between shape `index` and the next, at a fraction of the time between them.
+    pub(crate) fn between(&self, index: usize, fraction: f64, timing: &ShapeTiming) -> Knot {
+        let knot_index = index - self.first_shape;
+        let [from, to] = [self.knots[knot_index], self.knots[knot_index + 1]];
         let span = timing.span(index);
-        let [out, into] = [self.velocities[place] * span, self.velocities[place + 1] * span];
-        let way = to.position - from.position;
-        let position =
-            from.position + share * (out + share * (3.0 * way - 2.0 * out - into + share * (out + into - 2.0 * way)));
-        Knot { position, ..from.lerp(to, smoothstep(0.0, 1.0, share)) }
+        let [out, into] = [self.velocities[knot_index] * span, self.velocities[knot_index + 1] * span];
+        let displacement = to.position - from.position;
+        let position = from.position
+            + fraction
+                * (out
+                    + fraction
+                        * (3.0 * displacement - 2.0 * out - into + fraction * (out + into - 2.0 * displacement)));
+        Knot { position, ..from.lerp(to, smoothstep(0.0, 1.0, fraction)) }
     }
 }
 
-/// Finds the velocities of all tracks. A held shape stands still; one that nothing fixes begins and ends without curvature,
-/// but eases in and out where there are only two shapes; what is born between two points begins as they move on, and also ends so
-/// if it lives to the next shape only. With `closed`, points that end where they began pass that place with one velocity.
-pub(crate) fn find_velocities(tracks: &mut [Track], timing: &Timing, closed: bool) {
+/// Computes the velocities of all tracks. Velocities are 0 at held shapes. Free ends have zero curvature; with only two
+/// shapes the motion eases in and out. An inserted point starts with its parents' velocity, and also ends with it if it
+/// exists for one transition only. With `closed`, points that return to their start have one velocity there.
+pub(crate) fn find_velocities(tracks: &mut [ControlPointTrack], timing: &ShapeTiming, closed: bool) {
     for index in 0..tracks.len() {
         let (known, rest) = tracks.split_at_mut(index);
         let Some(track) = rest.first_mut() else { return };
-        let born = track.parents.map(|parents| [0, 1].map(|later| parents.velocity(track.first + later, known)));
-        track.velocities = velocities(track, timing, born, closed);
+        let parent_velocities =
+            track.parents.map(|parents| [0, 1].map(|later| parents.velocity(track.first_shape + later, known)));
+        track.velocities = velocities(track, timing, parent_velocities, closed);
     }
 }
 
 impl Parents {
-    /// How they move at shape `index`.
-    fn velocity(&self, index: usize, tracks: &[Track]) -> DVec2 {
+    /// Interpolated velocity of the parents at shape `index`.
+    fn velocity(&self, index: usize, tracks: &[ControlPointTrack]) -> DVec2 {
         let [first, second] = self.tracks.map(|parent| {
             let parent = &tracks[parent];
-            parent.velocities.get(index - parent.first).copied().unwrap_or_default()
+            parent.velocities.get(index - parent.first_shape).copied().unwrap_or_default()
         });
-        first.lerp(second, self.share)
+        first.lerp(second, self.fraction)
     }
 }
 
-fn velocities(track: &Track, timing: &Timing, born: Option<[DVec2; 2]>, closed: bool) -> Vec<DVec2> {
+fn velocities(
+    track: &ControlPointTrack,
+    timing: &ShapeTiming,
+    parent_velocities: Option<[DVec2; 2]>,
+    closed: bool,
+) -> Vec<DVec2> {
     let count = track.knots.len();
     let round = closed.then(|| closing_velocity(track, timing)).flatten();
-    let end = |place: usize| {
-        if timing.is_held(track.first + place) {
-            return End::Velocity(DVec2::ZERO);
+    let end = |knot_index: usize| {
+        if timing.is_held(track.first_shape + knot_index) {
+            return SplineEnd::Velocity(DVec2::ZERO);
         }
-        match (place, born) {
-            (0, Some([velocity, _])) => End::Velocity(velocity),
-            (1, Some([_, velocity])) if count == 2 => End::Velocity(velocity),
-            _ => round.map_or(End::Natural, End::Velocity),
+        match (knot_index, parent_velocities) {
+            (0, Some([velocity, _])) => SplineEnd::Velocity(velocity),
+            (1, Some([_, velocity])) if count == 2 => SplineEnd::Velocity(velocity),
+            _ => round.map_or(SplineEnd::Natural, SplineEnd::Velocity),
         }
     };
     let mut velocities = vec![DVec2::ZERO; count];
     let mut from = 0;
     while from + 1 < count {
-        let held = (from + 1..count - 1).find(|&place| timing.is_held(track.first + place));
+        let held = (from + 1..count - 1).find(|&knot_index| timing.is_held(track.first_shape + knot_index));
         let to = held.unwrap_or(count - 1);
-        let spans: Vec<f64> = (from..to).map(|place| timing.span(track.first + place)).collect();
+        let spans: Vec<f64> = (from..to).map(|knot_index| timing.span(track.first_shape + knot_index)).collect();
         let positions: Vec<DVec2> = track.knots[from..=to].iter().map(|knot| knot.position).collect();
         velocities[from..=to].copy_from_slice(&spline(&positions, &spans, [end(from), end(to)]));
         from = to;
@@ -133,24 +142,24 @@ fn velocities(track: &Track, timing: &Timing, born: Option<[DVec2; 2]>, closed: 
     velocities
 }
 
-/// The velocity with which a point passes the place where it begins and ends; none for one that does not return.
-fn closing_velocity(track: &Track, timing: &Timing) -> Option<DVec2> {
+/// Velocity at the common start and end position of a closed track, if it returns.
+fn closing_velocity(track: &ControlPointTrack, timing: &ShapeTiming) -> Option<DVec2> {
     let count = track.knots.len();
     let [first, last] = [track.knots[0], track.knots[count - 1]].map(|knot| knot.position);
-    let returns = track.first == 0 && count == timing.arrivals.len() && first.distance(last) < 1e-3;
+    let returns = track.first_shape == 0 && count == timing.arrivals.len() && first.distance(last) < 1e-3;
     (returns && count > 2).then(|| {
-        let way = track.knots[1].position - track.knots[count - 2].position;
-        way / (timing.span(0) + timing.span(count - 2))
+        let displacement = track.knots[1].position - track.knots[count - 2].position;
+        displacement / (timing.span(0) + timing.span(count - 2))
     })
 }
 
-/// Velocities of the cubic spline through `positions`: continuous in its second derivative.
-fn spline(positions: &[DVec2], spans: &[f64], mut ends: [End; 2]) -> Vec<DVec2> {
+/// Velocities of the C2 cubic spline through `positions` (tridiagonal system, Thomas algorithm).
+fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<DVec2> {
     let last = spans.len();
-    if last == 1 && matches!(ends, [End::Natural, End::Natural]) {
-        ends = [End::Velocity(DVec2::ZERO); 2];
+    if last == 1 && matches!(ends, [SplineEnd::Natural, SplineEnd::Natural]) {
+        ends = [SplineEnd::Velocity(DVec2::ZERO); 2];
     }
-    let slope = |place: usize| (positions[place + 1] - positions[place]) / spans[place];
+    let slope = |knot_index: usize| (positions[knot_index + 1] - positions[knot_index]) / spans[knot_index];
     // Row i: low v(i-1) + middle v(i) + high v(i+1) = right.
     let row = |i: usize| match i {
         0 => end_row(ends[0], slope(0)),
@@ -178,11 +187,11 @@ fn spline(positions: &[DVec2], spans: &[f64], mut ends: [End; 2]) -> Vec<DVec2> 
     values
 }
 
-/// The first row of the system: nothing before, the point, the one after, right side.
-fn end_row(end: End, slope: DVec2) -> (f64, f64, f64, DVec2) {
+/// Boundary row of the system: lower, diagonal and upper coefficient, right-hand side.
+fn end_row(end: SplineEnd, slope: DVec2) -> (f64, f64, f64, DVec2) {
     match end {
-        End::Natural => (0.0, 2.0, 1.0, 3.0 * slope),
-        End::Velocity(velocity) => (0.0, 1.0, 0.0, velocity),
+        SplineEnd::Natural => (0.0, 2.0, 1.0, 3.0 * slope),
+        SplineEnd::Velocity(velocity) => (0.0, 1.0, 0.0, velocity),
     }
 }
 
@@ -190,18 +199,18 @@ fn end_row(end: End, slope: DVec2) -> (f64, f64, f64, DVec2) {
 mod tests {
     use super::*;
 
-    fn timing(arrivals: &[f64], departures: &[f64]) -> Timing {
-        Timing { arrivals: arrivals.to_vec(), departures: departures.to_vec() }
+    fn timing(arrivals: &[f64], departures: &[f64]) -> ShapeTiming {
+        ShapeTiming { arrivals: arrivals.to_vec(), departures: departures.to_vec() }
     }
 
-    fn track(xs: &[f64]) -> Track {
-        let knot = |x: f64| Knot { position: DVec2::new(x, 0.0), values: [1.0, 1.0] };
-        let mut track = Track::new(0, None, knot(xs[0]));
+    fn track(xs: &[f64]) -> ControlPointTrack {
+        let knot = |x: f64| Knot { position: DVec2::new(x, 0.0), factors: [1.0, 1.0] };
+        let mut track = ControlPointTrack::new(0, None, knot(xs[0]));
         track.knots.extend(xs[1..].iter().map(|&x| knot(x)));
         track
     }
 
-    fn solved(xs: &[f64], timing: &Timing, closed: bool) -> Track {
+    fn solved(xs: &[f64], timing: &ShapeTiming, closed: bool) -> ControlPointTrack {
         let mut tracks = [track(xs)];
         find_velocities(&mut tracks, timing, closed);
         let [track] = tracks;
@@ -221,7 +230,7 @@ mod tests {
     fn two_shapes_ease_in_and_out() {
         let timing = timing(&[0.0, 4.0], &[0.0, 4.0]);
         let track = solved(&[0.0, 8.0], &timing, false);
-        let at = |share: f64| track.between(0, share, &timing).position.x;
+        let at = |fraction: f64| track.between(0, fraction, &timing).position.x;
         assert_eq!([at(0.0), at(0.25), at(0.5), at(1.0)], [0.0, 1.25, 4.0, 8.0]);
     }
 
@@ -238,11 +247,11 @@ mod tests {
     fn the_second_derivative_is_continuous() {
         let timing = timing(&[0.0, 0.7, 3.0, 3.4, 9.0], &[0.0, 0.7, 3.0, 3.4, 9.0]);
         let track = solved(&[0.0, 5.0, -2.0, 1.0, 7.0], &timing, false);
-        let bend = |index: usize, share: f64| {
+        let bend = |index: usize, fraction: f64| {
             let h = 1e-4;
-            let at = |share: f64| track.between(index, share, &timing).position.x;
+            let at = |fraction: f64| track.between(index, fraction, &timing).position.x;
             let span = timing.span(index);
-            (at(share - h) - 2.0 * at(share) + at(share + h)) / (h * span * h * span)
+            (at(fraction - h) - 2.0 * at(fraction) + at(fraction + h)) / (h * span * h * span)
         };
         for knot in 1..4 {
             // A cubic's second derivative is linear, so that its values beyond the piece are exact too.
@@ -263,12 +272,13 @@ mod tests {
     fn what_is_born_moves_on_as_its_parents() {
         let timing = timing(&[0.0, 1.0, 2.0], &[0.0, 1.0, 2.0]);
         let mut tracks = vec![track(&[0.0, 1.0, 0.0]), track(&[0.0, 3.0, 8.0])];
-        let parents = Parents { tracks: [0, 1], share: 0.5 };
-        let mut child = Track::new(1, Some(parents), Knot { position: DVec2::new(2.0, 0.0), values: [1.0; 2] });
-        child.knots.push(Knot { position: DVec2::new(9.0, 0.0), values: [3.0; 2] });
+        let parents = Parents { tracks: [0, 1], fraction: 0.5 };
+        let mut child =
+            ControlPointTrack::new(1, Some(parents), Knot { position: DVec2::new(2.0, 0.0), factors: [1.0; 2] });
+        child.knots.push(Knot { position: DVec2::new(9.0, 0.0), factors: [3.0; 2] });
         tracks.push(child);
         find_velocities(&mut tracks, &timing, false);
         assert_eq!(tracks[2].velocities[0], tracks[0].velocities[1].midpoint(tracks[1].velocities[1]));
-        assert_eq!(tracks[2].between(1, 0.5, &timing).values, [2.0; 2]);
+        assert_eq!(tracks[2].between(1, 0.5, &timing).factors, [2.0; 2]);
     }
 }

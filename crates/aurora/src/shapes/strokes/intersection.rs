@@ -1,12 +1,12 @@
-//! Where sheets cross: themselves or one another. Sheets of an aurora never do (thesis, 2.2.1).
-
-use std::collections::BTreeSet;
-
-use bansho_base::math::DVec2;
+//! Crossings of sheets with themselves or one another, which are not allowed (thesis, 2.2.1), and sheets that pass
+//! through each other over time.
 
 use crate::shapes::geometry::cell_grid::CellGrid;
+use crate::shapes::{Shape, Sheet};
+use bansho_base::math::DVec2;
+use std::collections::BTreeSet;
 
-/// A segment of one of several sheets; both count from 0.
+/// A segment of a sheet, indices from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SegmentId {
     /// The sheet.
@@ -19,22 +19,23 @@ pub struct SegmentId {
 struct SheetSegment {
     id: SegmentId,
     ends: [DVec2; 2],
-    /// Whether it goes on from the one before it in the list.
+    /// Whether it continues the previous segment in the list.
     continues: bool,
 }
 
-/// Which meetings of segments count.
+/// Which intersections count.
 #[derive(Clone, Copy, PartialEq)]
 enum Meeting {
-    /// Also those that only touch.
+    /// Touching segments included.
     Touching,
-    /// Those where each passes from one side of the other to its other side.
+    /// Proper crossings only.
     Proper,
 }
 
-/// The first crossing along the sheets, touching included: of all segments that meet an earlier one the first, and the earliest that it meets.
+/// The first crossing along the sheets, touching included: the first segment that meets an earlier one, and the
+/// earliest of these.
 ///
-/// A cell list makes it linear for strokes as hands draw them; it ends at the first crossing.
+/// A cell list makes the cost linear for typical strokes; the search ends at the first crossing.
 pub fn first_crossing<S: AsRef<[DVec2]>>(sheets: &[S]) -> Option<[SegmentId; 2]> {
     let mut found = None;
     for_each_meeting(sheets, Meeting::Touching, |pair| {
@@ -44,7 +45,7 @@ pub fn first_crossing<S: AsRef<[DVec2]>>(sheets: &[S]) -> Option<[SegmentId; 2]>
     found
 }
 
-/// How many pairs of segments pass through each other. In-between shapes may; it is a figure to show, not a fault.
+/// Number of properly crossing pairs of segments. In-between shapes may have some; this is not an error.
 pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
     let mut count = 0;
     for_each_meeting(sheets, Meeting::Proper, |_| {
@@ -54,7 +55,7 @@ pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
     count
 }
 
-/// The sheets of which a segment passes through one of another or of its own.
+/// Indices of sheets with proper crossings.
 pub(crate) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     for_each_meeting(sheets, Meeting::Proper, |pair| {
@@ -64,7 +65,7 @@ pub(crate) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize
     found
 }
 
-/// All segments that have a length, in order.
+/// All segments with non-zero length, in order.
 fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
     let mut list = Vec::new();
     for (sheet, points) in sheets.iter().enumerate() {
@@ -77,7 +78,7 @@ fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
     list
 }
 
-/// Cells about as long as a segment, and not many more than there are segments, since all of them are cleared.
+/// Cells about as long as a segment, and not many more cells than segments, since all are cleared.
 fn grid(segments: &[SheetSegment]) -> CellGrid {
     let ends = || segments.iter().flat_map(|segment| segment.ends);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);
@@ -88,20 +89,20 @@ fn grid(segments: &[SheetSegment]) -> CellGrid {
 
 const NONE: u32 = u32::MAX;
 
-/// Calls `visit` with each pair that meets, the later segment last, until it says `false`.
+/// Calls `visit` with each intersecting pair, the later segment last, until it returns `false`.
 fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit: impl FnMut([SegmentId; 2]) -> bool) {
     let segments = segments(sheets);
     if segments.len() < 2 {
         return;
     }
     let grid = grid(&segments);
-    // Each cell's list of segments, linked from the latest to the earliest.
+    // Linked list of segments per cell, latest first.
     let mut heads = vec![NONE; grid.count()];
     let mut links: Vec<(u32, u32)> = Vec::with_capacity(4 * segments.len());
     let mut compared_with = vec![NONE; segments.len()];
     let mut met: Vec<u32> = Vec::new();
     for (index, segment) in segments.iter().enumerate() {
-        grid.for_each_passed(segment.ends[0], segment.ends[1], |cell| {
+        grid.for_each_traversed(segment.ends[0], segment.ends[1], |cell| {
             let mut link = heads[cell];
             while link != NONE {
                 let (other, next) = links[link as usize];
@@ -124,18 +125,18 @@ fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit
     }
 }
 
-/// Twice the area of the triangle, positive on one side of the line from `a` to `b`.
-fn side(a: DVec2, b: DVec2, point: DVec2) -> f64 {
+/// Orientation predicate: twice the signed area of the triangle.
+fn orient2d(a: DVec2, b: DVec2, point: DVec2) -> f64 {
     (b - a).perp_dot(point - a)
 }
 
 fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Meeting) -> bool {
     let [[a, b], [c, d]] = [first.ends, second.ends];
     if follows {
-        // They share a point; they meet elsewhere only if the second runs back over the first.
-        return meeting == Meeting::Touching && side(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
+        // Consecutive segments share a point; they overlap only if the second runs backward.
+        return meeting == Meeting::Touching && orient2d(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
     }
-    let [c_side, d_side, a_side, b_side] = [side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)];
+    let [c_side, d_side, a_side, b_side] = [orient2d(a, b, c), orient2d(a, b, d), orient2d(c, d, a), orient2d(c, d, b)];
     let apart = |x: f64, y: f64| (x < 0.0 && y > 0.0) || (x > 0.0 && y < 0.0);
     if apart(c_side, d_side) && apart(a_side, b_side) {
         return true;
@@ -144,6 +145,52 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
         && [(c_side, a, b, c), (d_side, a, b, d), (a_side, c, d, a), (b_side, c, d, b)]
             .into_iter()
             .any(|(side, from, to, point)| side == 0.0 && (point - from).dot(point - to) <= 0.0)
+}
+
+/// The test is skipped with more sheets.
+const MAX_SHEETS: usize = 40;
+/// Tested points of a sheet, in quarters of its points.
+const TESTED_QUARTERS: [usize; 3] = [1, 2, 3];
+/// Maximum distance relative to the motion.
+const MAX_RELATIVE_DISTANCE: f64 = 1.5;
+
+/// Whether a sheet of `before` is on the other side of another sheet in `after`; both shapes have the same control
+/// points.
+pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
+    let count = before.sheets.len();
+    let alike = |(a, b): (&Sheet, &Sheet)| a.points.len() == b.points.len();
+    if count > MAX_SHEETS || count != after.sheets.len() || !before.sheets.iter().zip(&after.sheets).all(alike) {
+        return false;
+    }
+    let pairs =
+        || (0..count).flat_map(|own| (0..count).filter(move |other| *other != own).map(move |other| (own, other)));
+    pairs().any(|(own, other)| {
+        let [own, other] = [own, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
+        let moved = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        TESTED_QUARTERS.iter().any(|quarters| {
+            let point = own.map(|points| points[quarters * (points.len() - 1) / 4]);
+            let sides = [0, 1].map(|moment| signed_distance(point[moment], other[moment]));
+            let [Some(was), Some(is)] = sides else { return false };
+            was * is < 0.0 && was.abs() + is.abs() < MAX_RELATIVE_DISTANCE * (moved + point[0].distance(point[1]))
+        })
+    })
+}
+
+/// Signed distance of a point from a polyline; `None` beyond its ends.
+fn signed_distance(point: DVec2, line: &[DVec2]) -> Option<f64> {
+    let (mut least, mut nearest) = (f64::INFINITY, None);
+    let last = line.len().saturating_sub(2);
+    for (index, pair) in line.windows(2).enumerate() {
+        let direction = pair[1] - pair[0];
+        let unclamped = (point - pair[0]).dot(direction) / direction.length_squared().max(f64::MIN_POSITIVE);
+        let clamped = unclamped.clamp(0.0, 1.0);
+        let distance = point.distance(pair[0] + direction * clamped);
+        if distance < least {
+            let beyond = (index == 0 && unclamped < 0.0) || (index == last && unclamped > 1.0);
+            (least, nearest) = (distance, (!beyond).then(|| distance.copysign(direction.perp_dot(point - pair[0]))));
+        }
+    }
+    nearest
 }
 
 #[cfg(test)]
@@ -214,5 +261,29 @@ mod tests {
             assert_eq!(first_crossing(&[&walk]), every.first().copied(), "stroke {stroke}");
             assert_eq!(count_crossings(&[&walk]), every.len());
         }
+    }
+}
+
+#[cfg(test)]
+mod passing_tests {
+    use super::*;
+
+    fn row(y: f64, from: f64) -> Sheet {
+        Sheet {
+            points: (0..9).map(|index| DVec2::new(from + 10.0 * f64::from(index), y)).collect(),
+            ..Sheet::default()
+        }
+    }
+
+    #[test]
+    fn a_sheet_that_is_beyond_another_has_passed_it() {
+        let shape = |a: Sheet, b: Sheet| Shape { sheets: vec![a, b] };
+        let before = shape(row(0.0, 0.0), row(2.0, 0.0));
+        assert!(passes(&before, &shape(row(3.0, 0.0), row(1.0, 0.0))));
+        assert!(!passes(&before, &shape(row(1.0, 0.0), row(3.0, 0.0))), "it comes nearer");
+        // Beside its end there is nothing to pass through.
+        let beside = shape(row(0.0, 0.0), row(2.0, 100.0));
+        assert!(!passes(&beside, &shape(row(3.0, 0.0), row(1.0, 100.0))));
+        assert!(!passes(&before, &Shape { sheets: vec![row(0.0, 0.0)] }));
     }
 }

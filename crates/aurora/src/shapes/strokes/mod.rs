@@ -1,6 +1,4 @@
-//! Strokes as they are drawn, and the faults that they may have.
+//! Drawn strokes and their validation.
 
-pub(crate) mod factors;
 pub(crate) mod intersection;
-pub(crate) mod passing;
 pub(crate) mod validate;

@@ -1,39 +1,36 @@
-//! From parameters to drawn sheets, checked one by one and against each other.
+//! Converts parameters to drawn sheets and validates them.
 
-use bansho_base::{
-    geometry::strokes::Drawing,
-    host::assets::{AssetError, AssetProblem, Assets},
-    math::{self, DVec2},
-    parameters::Auto,
-};
+use super::intersection::first_crossing;
+use crate::shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch};
+use crate::shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing};
+use bansho_base::geometry::strokes::Drawing;
+use bansho_base::host::assets::{AssetError, AssetProblem, Assets};
+use bansho_base::math::curve::Curve;
+use bansho_base::math::{self, DVec2, smoothstep};
+use bansho_base::parameters::Auto;
+use std::sync::Arc;
 
-use super::{factors::Factors, intersection::first_crossing};
-use crate::shapes::{
-    SegmentId, ShapeFault, ShapeFaultKind, ShapeParameters, SheetParameters, Spacing,
-    geometry::polyline::{Polyline, by_recorded_points, smoothed},
-};
-
-/// Points closer than this are one, km.
+/// Points closer than this are merged, km.
 const SAME_KM: f64 = 1e-6;
 
-/// Length of a form as a share of the drawn square.
-const USUAL_LENGTH: f64 = 0.6;
+/// Default length of a form as a fraction of the drawn square.
+const DEFAULT_FORM_LENGTH: f64 = 0.6;
 
-/// Most sheets of a shape.
-const MOST_SHEETS: usize = 256;
+/// Maximum number of sheets of a shape.
+const MAX_SHEETS: usize = 256;
 
-/// A sheet as it was drawn, in its drawn direction.
+/// A sheet in its drawn direction.
 #[derive(Clone, Debug)]
 pub(crate) struct DrawnSheet {
     pub(crate) line: Polyline,
-    /// The points that were given, without repetitions.
+    /// The given points without repetitions.
     recorded: Vec<DVec2>,
-    /// Which point of the parameters each recorded one is.
+    /// Parameter index of each recorded point.
     origins: Vec<usize>,
-    /// Pieces of the line between two recorded points.
+    /// Segments of the line per recorded point.
     pieces: usize,
-    pub(crate) factors: Factors,
-    /// The parameter that it comes from, below `sheets`, and whether that lists points.
+    pub(crate) factors: FluxEnergyFactors,
+    /// Its index below `sheets` in the parameters, and whether that entry lists points.
     entry: usize,
     lists_points: bool,
 }
@@ -42,18 +39,18 @@ impl DrawnSheet {
     /// `count` control points P_i.
     pub(crate) fn control_points(&self, count: usize, spacing: Spacing) -> Vec<DVec2> {
         match spacing {
-            Spacing::ArcLength => self.line.evenly(count),
-            Spacing::Recorded => by_recorded_points(&self.recorded, count),
+            Spacing::ArcLength => self.line.resample(count),
+            Spacing::Recorded => resample_by_index(&self.recorded, count),
         }
     }
 
-    /// The parameter's point at or before a point of the line.
+    /// Parameter index of the point at or before a point of the line.
     fn origin(&self, point: usize) -> usize {
         self.origins[(point / self.pieces).min(self.origins.len() - 1)]
     }
 }
 
-/// Where a shape stands in the parameters, and the square that it must lie in.
+/// Key prefix of a shape and its bounds.
 #[derive(Clone, Copy)]
 pub(crate) struct ShapeContext {
     pub(crate) shape: usize,
@@ -61,34 +58,35 @@ pub(crate) struct ShapeContext {
 }
 
 impl ShapeContext {
-    fn fault(self, key: &str, kind: ShapeFaultKind) -> ShapeFault {
-        ShapeFault { key: format!("shapes.{}{key}", self.shape), kind }
+    fn error(self, key: &str, kind: ShapeErrorKind) -> ShapeError {
+        ShapeError { key: format!("shapes.{}{key}", self.shape), kind }
     }
 
-    /// A fault at a point of a sheet.
-    fn fault_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeFaultKind) -> ShapeFault {
+    /// An error at a point of a sheet.
+    fn error_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeErrorKind) -> ShapeError {
         let point = if sheet.lists_points { format!(".points.{}", sheet.origin(point)) } else { String::new() };
-        self.fault(&format!(".sheets.{}{point}", sheet.entry), kind)
+        self.error(&format!(".sheets.{}{point}", sheet.entry), kind)
     }
 }
 
 /// All sheets of a shape, in order.
 ///
 /// # Errors
-/// The first sheet that is no line, leaves the square, or meets itself or another.
+///
+/// The first sheet that has fewer than two points, leaves the square, or crosses itself or another.
 pub(crate) fn drawn_sheets(
     parameters: &ShapeParameters,
     context: ShapeContext,
     assets: &dyn Assets,
-) -> Result<Vec<DrawnSheet>, ShapeFault> {
+) -> Result<Vec<DrawnSheet>, ShapeError> {
     let arc = [SheetParameters::default()];
     let entries = if parameters.sheets.is_empty() { &arc[..] } else { &parameters.sheets[..] };
     let mut sheets = Vec::new();
     for (entry, parameters) in entries.iter().enumerate() {
         draw_entry(parameters, entry, context, assets, &mut sheets)?;
-        if sheets.len() > MOST_SHEETS {
-            let kind = ShapeFaultKind::TooManySheets { found: sheets.len(), most: MOST_SHEETS };
-            return Err(context.fault(".sheets", kind));
+        if sheets.len() > MAX_SHEETS {
+            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), most: MAX_SHEETS };
+            return Err(context.error(".sheets", kind));
         }
     }
     check_extent(&sheets, context)?;
@@ -96,40 +94,40 @@ pub(crate) fn drawn_sheets(
     Ok(sheets)
 }
 
-/// Adds the sheets of one entry: one a stroke and copy.
+/// Adds the sheets of one entry: one per stroke and copy.
 fn draw_entry(
     parameters: &SheetParameters,
     entry: usize,
     context: ShapeContext,
     assets: &dyn Assets,
     sheets: &mut Vec<DrawnSheet>,
-) -> Result<(), ShapeFault> {
-    let fault = |key: &str, kind| context.fault(&format!(".sheets.{entry}{key}"), kind);
+) -> Result<(), ShapeError> {
+    let error_for = |key: &str, kind| context.error(&format!(".sheets.{entry}{key}"), kind);
     if parameters.stroke.is_some() && parameters.path.is_none() {
-        return Err(fault(".stroke", ShapeFaultKind::StrokeOfNoFile));
+        return Err(error_for(".stroke", ShapeErrorKind::StrokeWithoutFile));
     }
     let strokes = match (&parameters.points, &parameters.path, parameters.form) {
         (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
         (None, Some(path), None) => {
             let id = parameters.stroke.as_deref();
             strokes(&path.0, id, context.extent_km, assets).map_err(|error| {
-                fault(
+                error_for(
                     if matches!(error.problem, AssetProblem::NoStroke(_)) { ".stroke" } else { ".path" },
                     error.into(),
                 )
             })?
         }
         (None, None, _) => vec![form_line(parameters, context.extent_km)],
-        _ => return Err(fault("", ShapeFaultKind::SeveralSources { sheet: sheets.len() + 1 })),
+        _ => return Err(error_for("", ShapeErrorKind::SeveralSources { sheet: sheets.len() + 1 })),
     };
-    let factors = Factors::new(parameters);
+    let factors = FluxEnergyFactors::new(parameters);
     for copy in 0..parameters.copies {
         let offset = (copy as f64 - (parameters.copies - 1) as f64 / 2.0) * parameters.spacing_km;
         for stroke in &strokes {
             let placed = stroke.iter().map(|&point| placed(point, offset, parameters)).collect();
             let sheet = sheet(placed, parameters, entry, factors.clone()).map_err(|found| {
                 let key = if parameters.points.is_some() { ".points" } else { "" };
-                fault(key, ShapeFaultKind::TooFewPoints { sheet: sheets.len() + 1, found })
+                error_for(key, ShapeErrorKind::TooFewPoints { sheet: sheets.len() + 1, found })
             })?;
             sheets.push(sheet);
         }
@@ -137,15 +135,16 @@ fn draw_entry(
     Ok(())
 }
 
-/// A sheet through different points.
+/// A sheet through distinct points.
 ///
 /// # Errors
-/// The number of different points, where it is below two.
+///
+/// The number of distinct points if it is below two.
 fn sheet(
     points: Vec<DVec2>,
     parameters: &SheetParameters,
     entry: usize,
-    factors: Factors,
+    factors: FluxEnergyFactors,
 ) -> Result<DrawnSheet, usize> {
     let mut recorded: Vec<DVec2> = Vec::with_capacity(points.len());
     let mut origins = Vec::with_capacity(points.len());
@@ -155,7 +154,7 @@ fn sheet(
             origins.push(origin);
         }
     }
-    let (line, pieces) = if parameters.smooth { smoothed(recorded.clone()) } else { (recorded.clone(), 1) };
+    let (line, pieces) = if parameters.smooth { smooth_sketch(recorded.clone()) } else { (recorded.clone(), 1) };
     let line = Polyline::new(line).filter(|_| recorded.len() > 1).ok_or(recorded.len())?;
     Ok(DrawnSheet { line, recorded, origins, pieces, factors, entry, lists_points: parameters.points.is_some() })
 }
@@ -163,12 +162,12 @@ fn sheet(
 fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
     let set = |auto: Auto<f64>| if let Auto::Set(value) = auto { Some(value) } else { None };
     let count = if let Auto::Set(count) = parameters.count { Some(count) } else { None };
-    let length = set(parameters.length_km).unwrap_or(USUAL_LENGTH * extent_km);
+    let length = set(parameters.length_km).unwrap_or(DEFAULT_FORM_LENGTH * extent_km);
     let line = parameters.form.unwrap_or_default().line(set(parameters.bend_deg), count);
     line.into_iter().map(|point| point * length).collect()
 }
 
-/// Size, mirror, turn and shift, in this order; a copy lies `offset` km to the south before it is turned.
+/// Applies scale, mirror, rotation and translation, in this order; a copy is offset to the south before the rotation.
 fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
     let mut point = point * parameters.scale;
     if parameters.mirror {
@@ -178,7 +177,7 @@ fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
     DVec2::new(cos, sin).rotate(point + DVec2::new(0.0, offset)) + DVec2::from(parameters.position_km)
 }
 
-/// The strokes of a drawing whose sheet is fitted to the drawn square.
+/// The strokes of a drawing, scaled to the drawn square.
 fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) -> Result<Vec<Vec<DVec2>>, AssetError> {
     let drawing = assets.drawing(file)?;
     let wanted = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
@@ -197,8 +196,8 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
     points.iter().map(|&point| (point - middle) * scale).collect()
 }
 
-/// The points that were given come first, so that a fault names one of them; then the smooth line between them.
-fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+/// Given points are checked first, so that the error names one of them; then the smoothed line.
+fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let half = context.extent_km / 2.0;
     let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
@@ -208,28 +207,77 @@ fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), Shap
         let number = sheet.origin(at) + 1;
         let (x, z, sheet_number) = (point.x, point.y, index + 1);
         let kind = if given.is_some() {
-            ShapeFaultKind::Outside { sheet: sheet_number, point: number, x, z, half }
+            ShapeErrorKind::Outside { sheet: sheet_number, point: number, x, z, half }
         } else {
-            ShapeFaultKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
+            ShapeErrorKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }
         };
-        return Err(context.fault_at(sheet, at, kind));
+        return Err(context.error_at(sheet, at, kind));
     }
     Ok(())
 }
 
-fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeFault> {
+fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let lines: Vec<&[DVec2]> = sheets.iter().map(|sheet| sheet.line.points()).collect();
     let Some([earlier, later]) = first_crossing(&lines) else { return Ok(()) };
     let point = |at: SegmentId| sheets[at.sheet].origin(at.segment) + 1;
     let kind = if earlier.sheet == later.sheet {
-        ShapeFaultKind::CrossesItself { sheet: later.sheet + 1, point: point(later), earlier: point(earlier) }
+        ShapeErrorKind::CrossesItself { sheet: later.sheet + 1, point: point(later), earlier: point(earlier) }
     } else {
-        ShapeFaultKind::CrossesSheet {
+        ShapeErrorKind::CrossesSheet {
             sheet: later.sheet + 1,
             point: point(later),
             other: earlier.sheet + 1,
             other_point: point(earlier),
         }
     };
-    Err(context.fault_at(&sheets[later.sheet], later.segment, kind))
+    Err(context.error_at(&sheets[later.sheet], later.segment, kind))
+}
+
+/// Flux and energy factors along a sheet, for all sheets of one entry.
+#[derive(Clone, Debug)]
+pub(crate) struct FluxEnergyFactors {
+    curves: Arc<[Curve; 2]>,
+    /// Fraction of the length over which the flux rises from 0 at both ends.
+    fade: f64,
+}
+
+impl FluxEnergyFactors {
+    pub(super) fn new(parameters: &SheetParameters) -> Self {
+        Self { curves: Arc::new([parameters.flux.clone(), parameters.energy.clone()]), fade: parameters.fade }
+    }
+
+    /// Flux and energy at that fraction of the length.
+    pub(crate) fn at(&self, fraction: f64) -> [f64; 2] {
+        let [flux, energy] = [0, 1].map(|index| self.curves[index].eval(fraction));
+        let from_end = fraction.min(1.0 - fraction).max(0.0);
+        [flux * smoothstep(0.0, self.fade, from_end), energy]
+    }
+
+    /// Whether both are equal at sampled positions.
+    pub(crate) fn approximately_equals(&self, other: &Self) -> bool {
+        const SAMPLES: usize = 512;
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+        let same_at = |fraction: f64| {
+            let [a, b] = [self.at(fraction), other.at(fraction)];
+            near(a[0], b[0]) && near(a[1], b[1])
+        };
+        (self.curves == other.curves && self.fade == other.fade)
+            || (0..=SAMPLES).all(|sample| same_at(sample as f64 / SAMPLES as f64))
+    }
+}
+
+#[cfg(test)]
+mod factors_tests {
+    use super::*;
+
+    #[test]
+    fn flux_rises_from_nothing_at_both_ends_and_energy_stays() {
+        let factors = |fade: f64| FluxEnergyFactors::new(&SheetParameters { fade, ..SheetParameters::default() });
+        let soft = factors(0.2);
+        assert_eq!([0.0, 1.0].map(|fraction| soft.at(fraction)), [[0.0, 1.0]; 2]);
+        assert_eq!([0.1, 0.9].map(|fraction| (soft.at(fraction)[0] - 0.5).abs() < 1e-12), [true; 2]);
+        assert_eq!([0.2, 0.5, 0.8].map(|fraction| soft.at(fraction)), [[1.0; 2]; 3]);
+        assert_eq!([0.0, 0.5, 1.0].map(|fraction| factors(0.0).at(fraction)), [[1.0; 2]; 3]);
+        assert!(soft.approximately_equals(&factors(0.2)) && !soft.approximately_equals(&factors(0.1)));
+    }
 }

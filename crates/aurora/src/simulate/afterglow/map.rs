@@ -1,108 +1,108 @@
-//! A sparse map of power in the plane that follows what feeds it with a delay.
+//! A sparse map of power that relaxes toward the power of the particles.
 
 use bansho_base::math;
 
 use crate::{
-    physics::precipitation::energy_grid::{NODES, node_energy_ev, node_of},
+    physics::precipitation::energy_grid::{NODES, node_coordinate, node_energy_ev},
     simulate::AuroraParticles,
 };
 use rayon::prelude::*;
 
-/// Cells along a tile.
-const SIDE: usize = 8;
-const CELLS: usize = SIDE * SIDE;
-/// A tile is dark where no cell has as much as this flux, mW/m^2, would bring it in a step: a tenth of a rayleigh.
+/// Cells per tile side.
+const TILE_SIDE: usize = 8;
+const TILE_CELLS: usize = TILE_SIDE * TILE_SIDE;
+/// A tile is freed if no cell has as much power as this flux, mW/m^2, would add in a step: a tenth of a rayleigh.
 const DARK_MW_PER_M2: f64 = 2e-4;
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 const NO_TILE: u32 = u32::MAX;
-/// Blocks of cells are so wide at most beside the spread of their light.
+/// Maximum width of merged blocks relative to the spread of their light.
 const BLOCK_PER_SPREAD: f64 = 1.1;
-/// Particles that a task of the thread pool finds the cells of, at least.
+/// Minimum number of particles per task.
 const TASK: usize = 4096;
-/// Tiles that a task goes through, at least.
-const TILES: usize = 256;
+/// Tiles per task.
+const TILES_PER_TASK: usize = 256;
 
-/// A lit cell of a map, or a block of some.
+/// A non-zero cell, or a block of merged cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GlowCell<const HEIGHTS: usize> {
-    /// Number of its place on the map, row by row, for a block that of its first cell.
-    pub number: u32,
-    /// Its middle, for a block that of its light, km: x east, z south.
+pub struct AfterglowCell<const ALTITUDES: usize> {
+    /// Row-major index of the cell, for a block of its first cell.
+    pub cell_index: u32,
+    /// Its center, for a block the centroid of its light, km: x east, z south.
     pub position_km: [f32; 2],
-    /// Power that electrons would have to bring now for the light that it gives at each height, W: a steady aurora's own.
-    pub powers_w: [f32; HEIGHTS],
-    /// Central energy of those electrons, eV.
+    /// Power per altitude, W: that of steady precipitation with the same light.
+    pub powers_w: [f32; ALTITUDES],
+    /// Power-weighted mean electron energy, eV.
     pub energy_ev: f32,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Tile<const HEIGHTS: usize> {
-    place: u32,
-    powers: [[f32; HEIGHTS]; CELLS],
+struct Tile<const ALTITUDES: usize> {
+    tile_position: u32,
+    powers: [[f32; ALTITUDES]; TILE_CELLS],
     /// Power times energy, W eV.
-    weighted: [[f32; HEIGHTS]; CELLS],
+    weighted: [[f32; ALTITUDES]; TILE_CELLS],
 }
 
-/// What of a cell's power is kept in a step, by the energy of the electrons that brought it.
+/// Decay factor of a cell's power per step, by electron energy.
 #[derive(Clone, Debug)]
-pub(super) struct Keeping<const HEIGHTS: usize> {
-    /// By node of the grid of energies.
-    nodes: Vec<[f32; HEIGHTS]>,
+pub(super) struct DecayFactors<const ALTITUDES: usize> {
+    /// By node of the energy grid.
+    nodes: Vec<[f32; ALTITUDES]>,
 }
 
-impl<const HEIGHTS: usize> Keeping<HEIGHTS> {
-    /// In steps of so many seconds, of light that lives `lifetimes(energy_ev)` seconds at each height.
-    pub(super) fn new(seconds: f64, lifetimes: impl Fn(f64) -> [f64; HEIGHTS]) -> Self {
+impl<const ALTITUDES: usize> DecayFactors<ALTITUDES> {
+    /// For a step in s and lifetimes in s by energy and altitude.
+    pub(super) fn new(seconds: f64, lifetimes: impl Fn(f64) -> [f64; ALTITUDES]) -> Self {
         let kept = |lifetime: f64| if lifetime > 0.0 { math::exp(-seconds / lifetime) as f32 } else { 0.0 };
         Self { nodes: (0..NODES).map(|node| lifetimes(node_energy_ev(node)).map(kept)).collect() }
     }
 
-    /// Nothing of what was before: light that follows power at once.
-    pub(super) fn at_once() -> Self {
-        Self { nodes: vec![[0.0; HEIGHTS]; NODES] }
+    /// Decay to 0 in one step: the light follows the power at once.
+    pub(super) fn instantaneous() -> Self {
+        Self { nodes: vec![[0.0; ALTITUDES]; NODES] }
     }
 
-    fn of(&self, energy_ev: f32) -> [f32; HEIGHTS] {
-        self.nodes[((node_of(energy_ev) + 0.5) as usize).min(NODES - 1)]
+    fn of(&self, energy_ev: f32) -> [f32; ALTITUDES] {
+        self.nodes[((node_coordinate(energy_ev) + 0.5) as usize).min(NODES - 1)]
     }
 }
 
-impl<const HEIGHTS: usize> Tile<HEIGHTS> {
-    const CELL: [f32; HEIGHTS] = [0.0; HEIGHTS];
+impl<const ALTITUDES: usize> Tile<ALTITUDES> {
+    const CELL: [f32; ALTITUDES] = [0.0; ALTITUDES];
 
-    fn new(place: u32) -> Self {
-        Self { place, powers: [Self::CELL; CELLS], weighted: [Self::CELL; CELLS] }
+    fn new(position: u32) -> Self {
+        Self { tile_position: position, powers: [Self::CELL; TILE_CELLS], weighted: [Self::CELL; TILE_CELLS] }
     }
 
-    /// Mean energy of the electrons that brought its power, eV.
+    /// Power-weighted mean electron energy, eV.
     fn energy_ev(&self) -> f32 {
-        let sum = |values: &[[f32; HEIGHTS]; CELLS]| values.as_flattened().iter().sum::<f32>();
+        let sum = |values: &[[f32; ALTITUDES]; TILE_CELLS]| values.as_flattened().iter().sum::<f32>();
         sum(&self.weighted) / sum(&self.powers).max(f32::MIN_POSITIVE)
     }
 }
 
-/// Power on square cells of which only lit ones are stored, once for each of some heights whose light lives differently long.
+/// Power on square cells, stored in sparse tiles, once per altitude of the red line with its own lifetime.
 ///
-/// The power of a cell follows that of the particles in it, `dP/dt = (P_particles - P) / lifetime`: so a steady sheet shows its own
-/// power, and one that is gone fades. Excited atoms do not move here: how far they diffuse is a blur of the light
-/// ([`Column::spread_km`](crate::physics::emission::table::Column)). The lifetime is that of the column of the energy at
-/// each place, by tiles of eight by eight cells: soft electrons shine high up, where it is long.
+/// Each cell relaxes toward the power of the particles in it, `dP/dt = (P_particles - P) / lifetime`: a steady sheet
+/// shows its own power, and one that has gone fades. Diffusion of the excited atoms is applied later as a blur
+/// ([`ColumnEmission::spread_km`](crate::physics::emission::table::ColumnEmission)). The lifetime is that of the local
+/// mean energy, per tile of eight by eight cells: soft electrons emit at high altitudes, where it is long.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GlowMap<const HEIGHTS: usize> {
+pub struct AfterglowMap<const ALTITUDES: usize> {
     cell_km: f64,
     half_km: f64,
-    /// Tiles along each side.
+    /// Tiles per side.
     side: usize,
-    /// For each place of a tile its number, or [`NO_TILE`].
+    /// Tile number by tile position, or [`NO_TILE`].
     numbers: Vec<u32>,
-    tiles: Vec<Tile<HEIGHTS>>,
+    tiles: Vec<Tile<ALTITUDES>>,
 }
 
-impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
-    /// A dark map.
+impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
+    /// An empty map.
     pub(super) fn new(extent_km: f64, cell_km: f64) -> Self {
-        let side = (extent_km / (cell_km * SIDE as f64)).ceil().max(1.0) as usize;
+        let side = (extent_km / (cell_km * TILE_SIDE as f64)).ceil().max(1.0) as usize;
         Self { cell_km, half_km: extent_km / 2.0, side, numbers: vec![NO_TILE; side * side], tiles: Vec::new() }
     }
 
@@ -112,214 +112,214 @@ impl<const HEIGHTS: usize> GlowMap<HEIGHTS> {
         self.cell_km
     }
 
-    /// All cells that are lit, in an order that does not depend on threads.
-    pub fn cells(&self) -> impl Iterator<Item = GlowCell<HEIGHTS>> + '_ {
-        self.tiles.iter().flat_map(|tile| (0..CELLS).filter_map(|cell| self.cell(tile, cell)))
+    /// All non-zero cells, in an order that does not depend on the number of threads.
+    pub fn cells(&self) -> impl Iterator<Item = AfterglowCell<ALTITUDES>> + '_ {
+        self.tiles.iter().flat_map(|tile| (0..TILE_CELLS).filter_map(|cell| self.cell(tile, cell)))
     }
 
-    /// All cells that are not fainter than `faintest` of a typical one, as blocks of `block` by `block`.
-    pub(crate) fn bright_blocks(&self, faintest: f32, block: usize) -> Vec<GlowCell<HEIGHTS>> {
+    /// All cells brighter than `faintest` times a typical cell, merged into blocks of `block` by `block`.
+    pub(crate) fn bright_blocks(&self, faintest: f32, block: usize) -> Vec<AfterglowCell<ALTITUDES>> {
         let faintest = faintest * self.typical_w();
         self.blocks(block, |tile, cell| self.tiles[tile].powers[cell].iter().any(|power| *power > faintest))
     }
 
-    /// Side of the widest blocks, in cells, whose light a spread (standard deviation, km) makes even.
+    /// Block side in cells that is still smooth after a blur with this standard deviation, km.
     pub(crate) fn block(&self, spread_km: f64) -> usize {
         [8, 4, 2].into_iter().find(|block| *block as f64 * self.cell_km <= BLOCK_PER_SPREAD * spread_km).unwrap_or(1)
     }
 
-    /// Blocks of `block` by `block` cells, a divisor of [`SIDE`], with the light of those of their cells, by tile and cell, that `wanted` lets
-    /// through.
-    fn blocks(&self, block: usize, wanted: impl Fn(usize, usize) -> bool + Sync) -> Vec<GlowCell<HEIGHTS>> {
-        let of_tiles = |(task, tiles): (usize, &[Tile<HEIGHTS>])| {
+    /// Merges the `wanted` cells (tile, cell) into blocks of `block` by `block`, a divisor of [`TILE_SIDE`].
+    fn blocks(&self, block: usize, wanted: impl Fn(usize, usize) -> bool + Sync) -> Vec<AfterglowCell<ALTITUDES>> {
+        let of_tiles = |(task, tiles): (usize, &[Tile<ALTITUDES>])| {
             let mut blocks = Vec::new();
-            for (tile, number) in tiles.iter().zip(task * TILES..) {
-                // The number that each block has got.
-                let mut numbers = [usize::MAX; CELLS];
-                for cell in (0..CELLS).filter(|cell| wanted(number, *cell)) {
+            for (tile, number) in tiles.iter().zip(task * TILES_PER_TASK..) {
+                // Output index of each block.
+                let mut numbers = [usize::MAX; TILE_CELLS];
+                for cell in (0..TILE_CELLS).filter(|cell| wanted(number, *cell)) {
                     let Some(mut lit) = self.cell(tile, cell) else { continue };
-                    let [column, row] = self.column_and_row(tile, cell).map(|place| place / block * block);
-                    lit.number = self.number_of([column, row]);
-                    let block_number = &mut numbers[cell / SIDE / block * SIDE + cell % SIDE / block];
+                    let [column, row] = self.column_and_row(tile, cell).map(|position| position / block * block);
+                    lit.cell_index = self.number_of([column, row]);
+                    let block_number = &mut numbers[cell / TILE_SIDE / block * TILE_SIDE + cell % TILE_SIDE / block];
                     if *block_number == usize::MAX {
                         *block_number = blocks.len();
                         blocks.push(lit);
                     } else {
-                        blocks[*block_number] = GlowCell::and(blocks[*block_number], lit);
+                        blocks[*block_number] = AfterglowCell::merged_with(blocks[*block_number], lit);
                     }
                 }
             }
             blocks
         };
-        let parts: Vec<Vec<GlowCell<HEIGHTS>>> = self.tiles.par_chunks(TILES).enumerate().map(of_tiles).collect();
-        parts.concat()
+        let partial_sums: Vec<Vec<AfterglowCell<ALTITUDES>>> =
+            self.tiles.par_chunks(TILES_PER_TASK).enumerate().map(of_tiles).collect();
+        partial_sums.concat()
     }
 
-    /// Number of the cell that each particle is in, tile after tile; one that does not exist where the map is dark.
+    /// Storage index of each particle's cell; out of range where there is no tile.
     fn cells_of(&self, particles: &AuroraParticles) -> Vec<u32> {
         let [xs, zs] = &particles.positions;
         let cell = |(x, z): (&f32, &f32)| {
-            let (place, cell) = self.locate([*x, *z]);
-            self.numbers[place].saturating_mul(CELLS as u32).saturating_add(cell as u32)
+            let (position, cell) = self.locate([*x, *z]);
+            self.numbers[position].saturating_mul(TILE_CELLS as u32).saturating_add(cell as u32)
         };
         xs.par_iter().zip(zs).map(cell).collect()
     }
 
-    /// Power of a cell, weighted by power, W: faint cells, however many, do not count.
+    /// Power-weighted mean power of a cell, W, which is insensitive to many faint cells.
     fn typical_w(&self) -> f32 {
-        let of_tiles = |tiles: &[Tile<HEIGHTS>]| {
+        let of_tiles = |tiles: &[Tile<ALTITUDES>]| {
             let powers = tiles.iter().flat_map(|tile| tile.powers.as_flattened()).map(|power| f64::from(*power));
             powers.fold([0.0; 2], |[sum, squares], power| [sum + power, squares + power * power])
         };
-        // Tasks of the same tiles, whatever the threads.
-        let parts: Vec<[f64; 2]> = self.tiles.par_chunks(TILES).map(of_tiles).collect();
-        let [sum, squares] = parts.iter().fold([0.0; 2], |sums, part| [sums[0] + part[0], sums[1] + part[1]]);
+        // Fixed chunks, so that the sum does not depend on the number of threads.
+        let partial_sums: Vec<[f64; 2]> = self.tiles.par_chunks(TILES_PER_TASK).map(of_tiles).collect();
+        let [sum, squares] = partial_sums.iter().fold([0.0; 2], |sums, part| [sums[0] + part[0], sums[1] + part[1]]);
         (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
     }
 
-    /// Power of the whole map at each height, W.
+    /// Total power per altitude, W.
     #[must_use]
-    pub fn powers_w(&self) -> [f64; HEIGHTS] {
-        self.cells().fold([0.0; HEIGHTS], |sum, cell| {
+    pub fn powers_w(&self) -> [f64; ALTITUDES] {
+        self.cells().fold([0.0; ALTITUDES], |sum, cell| {
             std::array::from_fn(|height| sum[height] + f64::from(cell.powers_w[height]))
         })
     }
 
-    /// Its lit tiles: the place of each, and the powers and then the powers times energy of its cells.
-    pub(crate) fn to_lists(&self) -> (Vec<u32>, Vec<f32>) {
-        let places = self.tiles.iter().map(|tile| tile.place).collect();
-        let values = |tile: &Tile<HEIGHTS>| tile.powers.into_iter().chain(tile.weighted).flatten();
-        (places, self.tiles.iter().flat_map(values).collect())
+    /// Tile positions, and per tile the powers and the powers times energy of its cells.
+    pub(crate) fn to_arrays(&self) -> (Vec<u32>, Vec<f32>) {
+        let positions = self.tiles.iter().map(|tile| tile.tile_position).collect();
+        let values = |tile: &Tile<ALTITUDES>| tile.powers.into_iter().chain(tile.weighted).flatten();
+        (positions, self.tiles.iter().flat_map(values).collect())
     }
 
-    /// A map laid out as this one that holds what [`Self::to_lists`] gave; none if the lists are no such map.
-    pub(crate) fn with_lists(&self, places: &[u32], values: &[f32]) -> Option<Self> {
-        let cells = values.as_chunks::<HEIGHTS>().0;
-        let (tiles, rest) = cells.as_chunks::<{ 2 * CELLS }>();
-        if tiles.len() != places.len() || !rest.is_empty() || cells.len() * HEIGHTS != values.len() {
+    /// Inverse of [`Self::to_arrays`] for a map of this layout; `None` for inconsistent arrays.
+    pub(crate) fn with_arrays(&self, positions: &[u32], values: &[f32]) -> Option<Self> {
+        let cells = values.as_chunks::<ALTITUDES>().0;
+        let (tiles, rest) = cells.as_chunks::<{ 2 * TILE_CELLS }>();
+        if tiles.len() != positions.len() || !rest.is_empty() || cells.len() * ALTITUDES != values.len() {
             return None;
         }
         let mut map = Self { numbers: vec![NO_TILE; self.numbers.len()], tiles: Vec::new(), ..*self };
-        for (place, values) in places.iter().zip(tiles) {
-            let number = map.numbers.get_mut(*place as usize).filter(|number| **number == NO_TILE)?;
+        for (position, values) in positions.iter().zip(tiles) {
+            let number = map.numbers.get_mut(*position as usize).filter(|number| **number == NO_TILE)?;
             *number = map.tiles.len() as u32;
             let half = |start: usize| std::array::from_fn(|cell| values[start + cell]);
-            map.tiles.push(Tile { place: *place, powers: half(0), weighted: half(CELLS) });
+            map.tiles.push(Tile { tile_position: *position, powers: half(0), weighted: half(TILE_CELLS) });
         }
         Some(map)
     }
 
-    /// Column and row of a cell on the map.
-    fn column_and_row(&self, tile: &Tile<HEIGHTS>, cell: usize) -> [usize; 2] {
-        let place = tile.place as usize;
-        [place % self.side * SIDE + cell % SIDE, place / self.side * SIDE + cell / SIDE]
+    /// Column and row of a cell in the map.
+    fn column_and_row(&self, tile: &Tile<ALTITUDES>, cell: usize) -> [usize; 2] {
+        let position = tile.tile_position as usize;
+        [position % self.side * TILE_SIDE + cell % TILE_SIDE, position / self.side * TILE_SIDE + cell / TILE_SIDE]
     }
 
     fn number_of(&self, [column, row]: [usize; 2]) -> u32 {
-        (row * self.side * SIDE + column) as u32
+        (row * self.side * TILE_SIDE + column) as u32
     }
 
-    fn cell(&self, tile: &Tile<HEIGHTS>, cell: usize) -> Option<GlowCell<HEIGHTS>> {
+    fn cell(&self, tile: &Tile<ALTITUDES>, cell: usize) -> Option<AfterglowCell<ALTITUDES>> {
         let powers_w = tile.powers[cell];
         let whole: f32 = powers_w.iter().sum();
         let [column, row] = self.column_and_row(tile, cell);
         let middle = |cells: usize| ((cells as f64 + 0.5) * self.cell_km - self.half_km) as f32;
-        (whole > 0.0).then(|| GlowCell {
-            number: self.number_of([column, row]),
+        (whole > 0.0).then(|| AfterglowCell {
+            cell_index: self.number_of([column, row]),
             position_km: [middle(column), middle(row)],
             powers_w,
             energy_ev: tile.weighted[cell].iter().sum::<f32>() / whole,
         })
     }
 
-    /// Lets a step pass.
-    pub(super) fn step(&mut self, particles: &AuroraParticles, keeping: &Keeping<HEIGHTS>) {
+    /// Advances by one step.
+    pub(super) fn step(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>) {
         let dark_w = (DARK_MW_PER_M2 * W_PER_KM2 * self.cell_km * self.cell_km) as f32;
-        let mut fed = self.fade(keeping, dark_w);
-        self.feed(particles, keeping, &mut fed);
+        let mut gain = self.fade(decay, dark_w);
+        self.feed(particles, decay, &mut gain);
     }
 
-    /// Fades all cells and lets go of tiles that a flux which brings `dark_w` to a cell would not have lit in a step; what shall be fed of
-    /// the particles' power to each tile that is left.
-    fn fade(&mut self, keeping: &Keeping<HEIGHTS>, dark_w: f32) -> Vec<[f32; HEIGHTS]> {
-        let fade = |tile: &mut Tile<HEIGHTS>| {
-            let kept = keeping.of(tile.energy_ev());
+    /// Applies the decay and frees dark tiles; returns the gain of the particles' power for each remaining tile.
+    fn fade(&mut self, decay: &DecayFactors<ALTITUDES>, dark_w: f32) -> Vec<[f32; ALTITUDES]> {
+        let fade = |tile: &mut Tile<ALTITUDES>| {
+            let kept = decay.of(tile.energy_ev());
             for values in tile.powers.iter_mut().chain(&mut tile.weighted) {
                 values.iter_mut().zip(kept).for_each(|(value, kept)| *value *= kept);
             }
-            let fed = kept.map(|kept| 1.0 - kept);
-            let is_dark = |powers: &[f32; HEIGHTS]| (0..HEIGHTS).all(|i| powers[i] < dark_w * fed[i]);
-            (fed, tile.powers.iter().all(is_dark))
+            let gain = kept.map(|kept| 1.0 - kept);
+            let is_dark = |powers: &[f32; ALTITUDES]| (0..ALTITUDES).all(|i| powers[i] < dark_w * gain[i]);
+            (gain, tile.powers.iter().all(is_dark))
         };
-        let (mut fed, mut dark): (Vec<_>, Vec<_>) = self.tiles.par_iter_mut().with_min_len(TILES).map(fade).unzip();
+        let (mut gain, mut dark): (Vec<_>, Vec<_>) =
+            self.tiles.par_iter_mut().with_min_len(TILES_PER_TASK).map(fade).unzip();
         let mut number = 0;
         while number < self.tiles.len() {
             if dark[number] {
-                fed.swap_remove(number);
+                gain.swap_remove(number);
                 dark.swap_remove(number);
-                self.numbers[self.tiles[number].place as usize] = NO_TILE;
+                self.numbers[self.tiles[number].tile_position as usize] = NO_TILE;
                 self.tiles.swap_remove(number);
                 if let Some(moved) = self.tiles.get(number) {
-                    self.numbers[moved.place as usize] = number as u32;
+                    self.numbers[moved.tile_position as usize] = number as u32;
                 }
             } else {
                 number += 1;
             }
         }
-        fed
+        gain
     }
 
-    /// Adds to each tile its share of the particles' power, one after the other, so that sums do not depend on threads. A new tile's is
-    /// that of the first particle in it.
-    fn feed(&mut self, particles: &AuroraParticles, keeping: &Keeping<HEIGHTS>, fed: &mut Vec<[f32; HEIGHTS]>) {
+    /// Adds the particles' power times the gain of their tile, sequentially, so that sums do not depend on threads. A
+    /// new tile takes the gain of its first particle.
+    fn feed(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>, gain: &mut Vec<[f32; ALTITUDES]>) {
         let [xs, zs] = &particles.positions;
-        let places = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
-        let places: Vec<(u32, u32)> = places.map(|(place, cell)| (place as u32, cell as u32)).collect();
+        let positions = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
+        let positions: Vec<(u32, u32)> = positions.map(|(position, cell)| (position as u32, cell as u32)).collect();
         let values = particles.powers_w.iter().zip(&particles.energies_ev);
-        for ((place, cell), (power, energy)) in places.into_iter().zip(values) {
-            let (number, cell) = (self.number(place as usize), cell as usize);
-            if number == fed.len() {
-                fed.push(keeping.of(*energy).map(|kept| 1.0 - kept));
+        for ((position, cell), (power, energy)) in positions.into_iter().zip(values) {
+            let (number, cell) = (self.number(position as usize), cell as usize);
+            if number == gain.len() {
+                gain.push(decay.of(*energy).map(|kept| 1.0 - kept));
             }
-            let (tile, shares) = (&mut self.tiles[number], fed[number]);
+            let (tile, fractions) = (&mut self.tiles[number], gain[number]);
             let (powers, weighted) = (&mut tile.powers[cell], &mut tile.weighted[cell]);
-            // No `mul_add`: outside a vector loop that is a call where the machine is not known to have it.
-            for i in 0..HEIGHTS {
-                powers[i] += power * shares[i];
-                weighted[i] += power * energy * shares[i];
+            // No `mul_add`: outside of vectorized loops it is a library call on targets without FMA.
+            for i in 0..ALTITUDES {
+                powers[i] += power * fractions[i];
+                weighted[i] += power * energy * fractions[i];
             }
         }
     }
 
-    /// The place of the tile that a place in km lies in, and the cell of the tile.
+    /// Tile position and cell within the tile, for a position in km.
     #[inline(always)]
     fn locate(&self, place_km: [f32; 2]) -> (usize, usize) {
-        let last = (self.side * SIDE) as f64 - 1.0;
+        let last = (self.side * TILE_SIDE) as f64 - 1.0;
         let per_km = 1.0 / self.cell_km;
         let [x, z] = place_km;
         let column = ((f64::from(x) + self.half_km) * per_km).clamp(0.0, last) as usize;
         let row = ((f64::from(z) + self.half_km) * per_km).clamp(0.0, last) as usize;
-        (row / SIDE * self.side + column / SIDE, row % SIDE * SIDE + column % SIDE)
+        (row / TILE_SIDE * self.side + column / TILE_SIDE, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
     }
 
-    /// Number of the tile at a place, which may be a new one.
-    fn number(&mut self, place: usize) -> usize {
-        if self.numbers[place] == NO_TILE {
-            self.numbers[place] = self.tiles.len() as u32;
-            self.tiles.push(Tile::new(place as u32));
+    /// Tile number at a tile position; allocates the tile if necessary.
+    fn number(&mut self, position: usize) -> usize {
+        if self.numbers[position] == NO_TILE {
+            self.numbers[position] = self.tiles.len() as u32;
+            self.tiles.push(Tile::new(position as u32));
         }
-        self.numbers[place] as usize
+        self.numbers[position] as usize
     }
 }
 
-impl<const HEIGHTS: usize> GlowCell<HEIGHTS> {
-    /// The light of both, where its middle is, under the number of the first.
-    fn and(self, other: Self) -> Self {
+impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
+    /// Sum of both at their centroid, with the index of the first.
+    fn merged_with(self, other: Self) -> Self {
         let whole = [self, other].map(|cell| cell.powers_w.iter().sum::<f32>());
-        let share = whole[1] / (whole[0] + whole[1]);
-        let mean = |own: f32, other: f32| own + share * (other - own);
+        let fraction = whole[1] / (whole[0] + whole[1]);
+        let mean = |own: f32, other: f32| own + fraction * (other - own);
         Self {
-            number: self.number,
+            cell_index: self.cell_index,
             position_km: [0, 1].map(|axis| mean(self.position_km[axis], other.position_km[axis])),
             powers_w: std::array::from_fn(|height| self.powers_w[height] + other.powers_w[height]),
             energy_ev: mean(self.energy_ev, other.energy_ev),
@@ -327,18 +327,18 @@ impl<const HEIGHTS: usize> GlowCell<HEIGHTS> {
     }
 }
 
-impl GlowMap<1> {
-    /// The map's light as that of particles: each cell's power is shared out among those in it as they bring power. Gives the share of each
-    /// particle, W, and the lit cells that hold none, as blocks of `block` by `block`; cells fainter than `faintest` of a typical one are left
-    /// out.
-    pub(crate) fn shared_out(
+impl AfterglowMap<1> {
+    /// Distributes each cell's power to the particles in it in proportion to their power. Returns the power per
+    /// particle, W, and the cells without particles, merged into blocks of `block` by `block`; cells below `faintest`
+    /// times a typical cell are skipped.
+    pub(crate) fn distribute_to_particles(
         &self,
         particles: &AuroraParticles,
         faintest: f32,
         block: usize,
-    ) -> (Vec<f32>, Vec<GlowCell<1>>) {
+    ) -> (Vec<f32>, Vec<AfterglowCell<1>>) {
         let cells = self.cells_of(particles);
-        let mut sums = vec![0.0_f32; self.tiles.len() * CELLS];
+        let mut sums = vec![0.0_f32; self.tiles.len() * TILE_CELLS];
         for (cell, power) in cells.iter().zip(&particles.powers_w) {
             if let Some(sum) = sums.get_mut(*cell as usize) {
                 *sum += power;
@@ -347,13 +347,13 @@ impl GlowMap<1> {
         let own = |(cell, power): (&u32, &f32)| {
             let cell = *cell as usize;
             let sum = sums.get(cell).copied().unwrap_or_default();
-            if sum > 0.0 { self.tiles[cell / CELLS].powers[cell % CELLS][0] * (power / sum) } else { 0.0 }
+            if sum > 0.0 { self.tiles[cell / TILE_CELLS].powers[cell % TILE_CELLS][0] * (power / sum) } else { 0.0 }
         };
-        let shares = cells.par_iter().zip(&particles.powers_w).map(own).collect();
+        let fractions = cells.par_iter().zip(&particles.powers_w).map(own).collect();
         let faintest = faintest * self.typical_w();
-        let left = |tile: usize, cell: usize| sums[tile * CELLS + cell] <= 0.0;
+        let left = |tile: usize, cell: usize| sums[tile * TILE_CELLS + cell] <= 0.0;
         let lit = |tile: usize, cell: usize| left(tile, cell) && self.tiles[tile].powers[cell][0] > faintest;
-        (shares, self.blocks(block, lit))
+        (fractions, self.blocks(block, lit))
     }
 }
 
@@ -361,14 +361,14 @@ impl GlowMap<1> {
 mod tests {
     use super::*;
 
-    fn even(seconds: f64, lifetime: f64) -> Keeping<1> {
-        Keeping::new(seconds, |_| [lifetime])
+    fn even(seconds: f64, lifetime: f64) -> DecayFactors<1> {
+        DecayFactors::new(seconds, |_| [lifetime])
     }
 
-    /// Particles of 3 W and 1 W at those places, of 1 and 5 keV.
-    fn particles(places: [[f32; 2]; 2]) -> AuroraParticles {
+    /// Particles of 3 W and 1 W at those positions, of 1 and 5 keV.
+    fn particles(positions: [[f32; 2]; 2]) -> AuroraParticles {
         AuroraParticles {
-            positions: [0, 1].map(|axis| places.iter().map(|place| place[axis]).collect()),
+            positions: [0, 1].map(|axis| positions.iter().map(|position| position[axis]).collect()),
             powers_w: vec![3.0, 1.0],
             energies_ev: vec![1000.0, 5000.0],
             ..AuroraParticles::default()
@@ -377,13 +377,13 @@ mod tests {
 
     #[test]
     fn a_cell_follows_what_feeds_it_and_fades_by_e_in_a_lifetime() {
-        let mut map = GlowMap::new(100.0, 0.5);
-        let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
+        let mut map = AfterglowMap::new(100.0, 0.5);
+        let gain = particles([[10.1, -20.1], [10.2, -20.2]]);
         // Half a lifetime: 1 - exp(-1/2) of 4 W.
-        map.step(&fed, &even(0.4, 0.8));
+        map.step(&gain, &even(0.4, 0.8));
         assert!((map.powers_w()[0] - 4.0 * 0.393_469).abs() < 1e-5);
-        (0..40).for_each(|_| map.step(&fed, &even(0.4, 0.8)));
-        let cells: Vec<GlowCell<1>> = map.cells().collect();
+        (0..40).for_each(|_| map.step(&gain, &even(0.4, 0.8)));
+        let cells: Vec<AfterglowCell<1>> = map.cells().collect();
         assert_eq!(cells.len(), 1);
         assert_eq!(cells[0].position_km, [10.25, -20.25]);
         assert!((cells[0].powers_w[0] - 4.0).abs() < 1e-4 && (cells[0].energy_ev - 2000.0).abs() < 0.1);
@@ -396,17 +396,17 @@ mod tests {
 
     #[test]
     fn light_of_soft_electrons_lives_as_long_as_theirs() {
-        // Two places far apart, of 1 and 5 keV, of which one has light that lives ten times as long.
-        let fed = particles([[10.1, -20.1], [-30.2, 30.2]]);
+        // Two positions far apart, of 1 and 5 keV, of which one has light that lives ten times as long.
+        let gain = particles([[10.1, -20.1], [-30.2, 30.2]]);
         let lifetime = |energy_ev: f64| if energy_ev < 2000.0 { 8.0 } else { 0.8 };
-        let mut map = GlowMap::new(100.0, 0.5);
-        map.step(&fed, &even(1.0, 0.0));
-        map.step(&AuroraParticles::default(), &Keeping::new(0.8, |energy_ev| [lifetime(energy_ev)]));
+        let mut map = AfterglowMap::new(100.0, 0.5);
+        map.step(&gain, &even(1.0, 0.0));
+        map.step(&AuroraParticles::default(), &DecayFactors::new(0.8, |energy_ev| [lifetime(energy_ev)]));
         let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.powers_w[0])).collect();
         assert!((powers[0] - 3.0 * math::exp(-0.1)).abs() < 1e-5 && (powers[1] - math::exp(-1.0)).abs() < 1e-6);
         // And fills up as slowly.
-        let mut map = GlowMap::new(100.0, 0.5);
-        map.step(&fed, &Keeping::new(0.8, |energy_ev| [lifetime(energy_ev)]));
+        let mut map = AfterglowMap::new(100.0, 0.5);
+        map.step(&gain, &DecayFactors::new(0.8, |energy_ev| [lifetime(energy_ev)]));
         let powers: Vec<f64> = map.cells().map(|cell| f64::from(cell.powers_w[0])).collect();
         assert!(
             (powers[0] - 3.0 * (1.0 - math::exp(-0.1))).abs() < 1e-5
@@ -416,16 +416,16 @@ mod tests {
 
     #[test]
     fn every_height_fades_by_its_own_lifetime() {
-        let keeping = Keeping::new(1.0, |_| [0.5, 10.0, 100.0]);
-        let mut map = GlowMap::<3>::new(100.0, 0.5);
-        map.step(&particles([[10.1, -20.1], [10.2, -20.2]]), &Keeping::at_once());
-        (0..20).for_each(|_| map.step(&AuroraParticles::default(), &keeping));
+        let decay = DecayFactors::new(1.0, |_| [0.5, 10.0, 100.0]);
+        let mut map = AfterglowMap::<3>::new(100.0, 0.5);
+        map.step(&particles([[10.1, -20.1], [10.2, -20.2]]), &DecayFactors::instantaneous());
+        (0..20).for_each(|_| map.step(&AuroraParticles::default(), &decay));
         for (power, lifetime) in map.powers_w().into_iter().zip([0.5, 10.0, 100.0]) {
             assert!((power - 4.0 * math::exp(-20.0 / lifetime)).abs() < 1e-5, "{lifetime} s: {power}");
         }
-        let (places, values) = map.to_lists();
-        assert_eq!(map.with_lists(&places, &values), Some(map.clone()));
-        assert_eq!(map.with_lists(&places, &values[1..]), None);
+        let (positions, values) = map.to_arrays();
+        assert_eq!(map.with_arrays(&positions, &values), Some(map.clone()));
+        assert_eq!(map.with_arrays(&positions, &values[1..]), None);
     }
 
     #[test]
@@ -433,7 +433,7 @@ mod tests {
         // Cells of 25 m2 on which 0.01 mW/m^2 fall: 2.5e-4 W each.
         let faint = AuroraParticles { powers_w: vec![2e-4, 0.5e-4], ..particles([[1.001, 1.001], [1.002, 1.002]]) };
         for lifetime in [0.8, 110.0] {
-            let mut map = GlowMap::new(10.0, 0.005);
+            let mut map = AfterglowMap::new(10.0, 0.005);
             (0..(8.0 * lifetime * 30.0) as usize).for_each(|_| map.step(&faint, &even(1.0 / 30.0, lifetime)));
             assert!((map.powers_w()[0] / 2.5e-4 - 1.0).abs() < 0.01, "{lifetime} s: {} W", map.powers_w()[0]);
         }
@@ -441,37 +441,37 @@ mod tests {
 
     #[test]
     fn a_map_is_shared_out_among_the_particles_in_its_cells() {
-        let mut map = GlowMap::new(100.0, 0.5);
-        let fed = particles([[10.1, -20.1], [10.2, -20.2]]);
-        map.step(&fed, &even(1.0, 0.0));
-        assert_eq!(map.shared_out(&fed, 0.01, 1), (vec![3.0, 1.0], vec![]));
+        let mut map = AfterglowMap::new(100.0, 0.5);
+        let gain = particles([[10.1, -20.1], [10.2, -20.2]]);
+        map.step(&gain, &even(1.0, 0.0));
+        assert_eq!(map.distribute_to_particles(&gain, 0.01, 1), (vec![3.0, 1.0], vec![]));
         // One has left its cell for a dark one, the other is still where all of the light is.
         let moved = particles([[-40.0, 40.0], [10.2, -20.2]]);
-        assert_eq!(map.shared_out(&moved, 0.01, 1), (vec![0.0, 4.0], vec![]));
+        assert_eq!(map.distribute_to_particles(&moved, 0.01, 1), (vec![0.0, 4.0], vec![]));
         // Both have left: the cell itself shines, unless that is too faint.
         let gone = particles([[-40.0, 40.0], [-40.0, 40.0]]);
-        let (shares, cells) = map.shared_out(&gone, 0.01, 1);
-        assert_eq!((shares, cells.len(), cells[0].powers_w[0]), (vec![0.0; 2], 1, 4.0));
-        assert_eq!(map.shared_out(&gone, 1.5, 1).1, []);
+        let (fractions, cells) = map.distribute_to_particles(&gone, 0.01, 1);
+        assert_eq!((fractions, cells.len(), cells[0].powers_w[0]), (vec![0.0; 2], 1, 4.0));
+        assert_eq!(map.distribute_to_particles(&gone, 1.5, 1).1, []);
         assert_eq!((map.bright_blocks(0.01, 1).len(), map.bright_blocks(1.5, 1)), (1, vec![]));
     }
 
     #[test]
     fn a_block_has_the_light_of_its_cells_where_its_middle_is() {
-        let mut map = GlowMap::new(100.0, 0.5);
+        let mut map = AfterglowMap::new(100.0, 0.5);
         // Two cells apart from west to east, the wanted one of 3 W and another of 1 W.
-        let fed = particles([[10.1, -20.1], [11.1, -20.1]]);
-        map.step(&fed, &even(1.0, 0.0));
+        let gain = particles([[10.1, -20.1], [11.1, -20.1]]);
+        map.step(&gain, &even(1.0, 0.0));
         let [apart, together] = [2, 4].map(|block| map.bright_blocks(0.01, block));
         assert_eq!(apart.iter().map(|cell| cell.powers_w[0]).collect::<Vec<_>>(), [3.0, 1.0]);
         assert_eq!(together.len(), 1);
-        let GlowCell { number, position_km, powers_w, energy_ev } = together[0];
+        let AfterglowCell { cell_index: number, position_km, powers_w, energy_ev } = together[0];
         assert_eq!((position_km, powers_w, energy_ev), ([10.5, -20.25], [4.0], 2000.0));
         // Row 56, column 120 of 200, whichever of its cells are lit.
         assert_eq!(number, 56 * 200 + 120);
         map.step(&particles([[10.6, -20.1], [11.1, -20.1]]), &even(1.0, 0.0));
-        assert_eq!(map.bright_blocks(0.01, 4)[0].number, number);
-        map.step(&fed, &even(1.0, 0.0));
+        assert_eq!(map.bright_blocks(0.01, 4)[0].cell_index, number);
+        map.step(&gain, &even(1.0, 0.0));
         let cells: f32 = map.cells().map(|cell| cell.powers_w[0]).sum();
         assert_eq!(cells, 4.0);
         // Blocks are wide where the light is spread far.
@@ -480,17 +480,17 @@ mod tests {
 
     #[test]
     fn tiles_come_and_go_without_losing_their_place() {
-        let mut map = GlowMap::new(100.0, 0.5);
+        let mut map = AfterglowMap::new(100.0, 0.5);
         map.step(&particles([[-49.9, -49.9], [49.9, 49.9]]), &even(1.0, 0.0));
         // The first tile goes, the second takes its number, a third comes.
         map.step(&particles([[49.9, 49.9], [0.1, 0.1]]), &even(1.0, 0.0));
         let mut cells: Vec<_> = map.cells().map(|cell| (cell.position_km[0], cell.powers_w[0])).collect();
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(cells, [(0.25, 1.0), (49.75, 3.0)]);
-        let (places, values) = map.to_lists();
-        assert_eq!(map.with_lists(&places, &values), Some(map.clone()));
-        assert_eq!(map.with_lists(&places[..1], &values), None);
-        assert_eq!(map.with_lists(&[places[0], places[0]], &values), None);
-        assert_eq!(map.with_lists(&[u32::MAX, places[1]], &values), None);
+        let (positions, values) = map.to_arrays();
+        assert_eq!(map.with_arrays(&positions, &values), Some(map.clone()));
+        assert_eq!(map.with_arrays(&positions[..1], &values), None);
+        assert_eq!(map.with_arrays(&[positions[0], positions[0]], &values), None);
+        assert_eq!(map.with_arrays(&[u32::MAX, positions[1]], &values), None);
     }
 }

@@ -1,32 +1,31 @@
-//! Light that lingers where electrons have been: the green and the red line, on maps of the plane at 100 km altitude.
+//! Afterglow of the green and the red line, on maps of the plane at 100 km altitude.
 //!
-//! Blue and purple light leaves at once, where the electrons are. Oxygen keeps its green for 0.8 s and its red for up to two
-//! minutes, less where the air quenches it, so that red light fades by height. So the green
-//! follows a moving sheet softly and the red stays behind.
+//! Blue and violet light is prompt. O(1S) has a lifetime of 0.8 s and O(1D) of up to two minutes, shorter at low
+//! altitudes because of quenching. So green light slightly lags behind a moving sheet and red light stays behind.
 
 mod map;
 
 use super::AuroraParticles;
-use crate::physics::emission::{Emission, Emitter, red_line_levels::RED_HEIGHTS};
-use map::Keeping;
-pub use map::{GlowCell, GlowMap};
+use crate::physics::emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES};
+use map::DecayFactors;
+pub use map::{AfterglowCell, AfterglowMap};
 
-/// Cells of the green map along a cell of the field; the green is sharp.
+/// Green cells per cell of the field.
 const GREEN_FINENESS: f64 = 8.0;
 
-/// What the maps of both slow emitters keep in a step.
+/// Decay factors of both maps.
 #[derive(Clone, Debug)]
-pub(crate) struct Fading {
-    green: Keeping<1>,
-    red: Keeping<RED_HEIGHTS>,
+pub(crate) struct AfterglowDecay {
+    green: DecayFactors<1>,
+    red: DecayFactors<RED_ALTITUDES>,
 }
 
-impl Fading {
-    /// In steps of so many seconds of the aurora. `emission` says how long light of electrons of an energy lives.
+impl AfterglowDecay {
+    /// For a step in s of the aurora's time; lifetimes are from `emission`.
     pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
         let green = |energy_ev| [emission.column(energy_ev).lifetime[Emitter::OxygenGreen.index()]];
         let red = |energy_ev| emission.red_lifetimes(energy_ev);
-        Self { green: Keeping::new(seconds, green), red: Keeping::new(seconds, red) }
+        Self { green: DecayFactors::new(seconds, green), red: DecayFactors::new(seconds, red) }
     }
 }
 
@@ -34,26 +33,29 @@ impl Fading {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Afterglow {
     /// O(1S), 557.7 nm: cells an eighth as wide as the field's.
-    pub green: GlowMap<1>,
-    /// O(1D), 630.0 and 636.4 nm, by its heights: cells as wide as the field's.
-    pub red: GlowMap<RED_HEIGHTS>,
+    pub green: AfterglowMap<1>,
+    /// O(1D), 630.0 and 636.4 nm, by altitude: cells as wide as the field's.
+    pub red: AfterglowMap<RED_ALTITUDES>,
 }
 
 impl Afterglow {
-    /// Dark maps of a square of side `extent_km` whose field has cells of `cell_km`.
+    /// Empty maps of a square of side `extent_km` whose field has cells of `cell_km`.
     #[must_use]
     pub fn new(extent_km: f64, cell_km: f64) -> Self {
-        Self { green: GlowMap::new(extent_km, cell_km / GREEN_FINENESS), red: GlowMap::new(extent_km, cell_km) }
+        Self {
+            green: AfterglowMap::new(extent_km, cell_km / GREEN_FINENESS),
+            red: AfterglowMap::new(extent_km, cell_km),
+        }
     }
 
-    /// Lets a step pass while `particles` feed both maps.
-    pub(crate) fn step(&mut self, particles: &AuroraParticles, fading: &Fading) {
-        rayon::join(|| self.green.step(particles, &fading.green), || self.red.step(particles, &fading.red));
+    /// Advances both maps by one step.
+    pub(crate) fn step(&mut self, particles: &AuroraParticles, decay: &AfterglowDecay) {
+        rayon::join(|| self.green.step(particles, &decay.green), || self.red.step(particles, &decay.red));
     }
 
-    /// Fills the maps as if `particles` had been as they are for long.
-    pub(crate) fn settle(&mut self, particles: &AuroraParticles) {
-        self.green.step(particles, &Keeping::at_once());
-        self.red.step(particles, &Keeping::at_once());
+    /// Sets the maps to the steady state of `particles`.
+    pub(crate) fn fill_steady_state(&mut self, particles: &AuroraParticles) {
+        self.green.step(particles, &DecayFactors::instantaneous());
+        self.red.step(particles, &DecayFactors::instantaneous());
     }
 }

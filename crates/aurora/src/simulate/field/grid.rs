@@ -1,27 +1,27 @@
-//! Values on a rectangle of square cells.
+//! A two-dimensional grid of square cells.
 
-/// A rectangle of square cells with one value at the middle of each; outside it everything is 0.
+/// Cell-centered values; 0 outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid2 {
-    layout: Layout,
+    layout: GridLayout,
     values: Vec<f64>,
 }
 
-/// Where the cells of a grid lie.
+/// Geometry of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Layout {
+struct GridLayout {
     size: [usize; 2],
     spacing: f64,
     origin: [f64; 2],
 }
 
-impl Layout {
-    /// For a place: the cell whose middle is next below it on each axis, and how far it is on the way to the one above (0 to 1).
+impl GridLayout {
+    /// Cell below a position on each axis, by cell centers, and the interpolation fractions toward the next.
     ///
-    /// Middles are numbered from 0; places are held to one cell around the grid.
-    fn split(&self, place: [f64; 2]) -> ([isize; 2], [f64; 2]) {
+    /// Positions are clamped to one ghost cell around the grid.
+    fn split(&self, position: [f64; 2]) -> ([isize; 2], [f64; 2]) {
         let at: [f64; 2] = std::array::from_fn(|c| {
-            let cells = (place[c] - self.origin[c]) / self.spacing - 0.5;
+            let cells = (position[c] - self.origin[c]) / self.spacing - 0.5;
             cells.max(-1.0).min(self.size[c] as f64)
         });
         let whole = at.map(f64::floor);
@@ -30,10 +30,11 @@ impl Layout {
 }
 
 impl Grid2 {
-    /// A grid of zeros, `size` columns and rows, its lower corner at `origin`; `spacing` is the width of a cell, above 0.
+    /// A grid of zeros with `size` columns and rows and its lower corner at `origin`; `spacing` is the cell width,
+    /// above 0.
     #[must_use]
     pub fn new(size: [usize; 2], spacing: f64, origin: [f64; 2]) -> Self {
-        Self { layout: Layout { size, spacing, origin }, values: vec![0.0; size[0] * size[1]] }
+        Self { layout: GridLayout { size, spacing, origin }, values: vec![0.0; size[0] * size[1]] }
     }
 
     /// Columns and rows.
@@ -65,7 +66,7 @@ impl Grid2 {
         &mut self.values
     }
 
-    /// Value at the middle of a cell; 0 outside, as in the ghost cells around.
+    /// Value of a cell; 0 in the ghost cells outside.
     #[must_use]
     pub fn at(&self, column: isize, row: isize) -> f64 {
         let [columns, rows] = self.layout.size;
@@ -73,31 +74,31 @@ impl Grid2 {
         if inside { self.values[row as usize * columns + column as usize] } else { 0.0 }
     }
 
-    /// The cell that holds a place (column, row); none outside.
+    /// Column and row of the cell at a position, if inside.
     #[must_use]
-    pub fn cell(&self, place: [f64; 2]) -> Option<[usize; 2]> {
-        let Layout { size, spacing, origin } = self.layout;
-        let cell: [f64; 2] = std::array::from_fn(|c| ((place[c] - origin[c]) / spacing).floor());
+    pub fn cell(&self, position: [f64; 2]) -> Option<[usize; 2]> {
+        let GridLayout { size, spacing, origin } = self.layout;
+        let cell: [f64; 2] = std::array::from_fn(|c| ((position[c] - origin[c]) / spacing).floor());
         let inside = (0..2).all(|c| (0.0..size[c] as f64).contains(&cell[c]));
         inside.then(|| cell.map(|cell| cell as usize))
     }
 
-    /// Number among the [`values`](Self::values) of the cell that holds a place; none outside.
+    /// Index into [`values`](Self::values) of the cell at a position, if inside.
     #[must_use]
-    pub fn index(&self, place: [f64; 2]) -> Option<usize> {
-        self.cell(place).map(|[column, row]| row * self.layout.size[0] + column)
+    pub fn index(&self, position: [f64; 2]) -> Option<usize> {
+        self.cell(position).map(|[column, row]| row * self.layout.size[0] + column)
     }
 
-    /// Value at a place, bilinear between middles.
+    /// Bilinear interpolation between cell centers.
     #[must_use]
-    pub fn sample(&self, place: [f64; 2]) -> f64 {
-        let ([i, j], [s, t]) = self.layout.split(place);
+    pub fn sample(&self, position: [f64; 2]) -> f64 {
+        let ([i, j], [s, t]) = self.layout.split(position);
         let lower = s.mul_add(self.at(i + 1, j) - self.at(i, j), self.at(i, j));
         let upper = s.mul_add(self.at(i + 1, j + 1) - self.at(i, j + 1), self.at(i, j + 1));
         t.mul_add(upper - lower, lower)
     }
 
-    /// Gradient at the middles by central differences, the aurora thesis (2.8) and (2.9) without their sign.
+    /// Gradient at cell centers by central differences: (2.8) and (2.9) of the thesis without their sign.
     #[must_use]
     pub fn gradient(&self) -> Gradient2 {
         let [columns, rows] = self.layout.size;
@@ -110,30 +111,30 @@ impl Grid2 {
     }
 }
 
-/// Gradient of a [`Grid2`] at the middles of its cells.
+/// Cell-centered gradient of a [`Grid2`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gradient2 {
-    layout: Layout,
+    layout: GridLayout,
     values: Vec<[f64; 2]>,
 }
 
 impl Gradient2 {
-    /// Gradient at the middles, row by row.
+    /// Gradients, row by row.
     #[must_use]
     pub fn values(&self) -> &[[f64; 2]] {
         &self.values
     }
 
-    /// Gradient at a place, bilinear between middles; beyond the outermost middles as at the nearest.
+    /// Bilinear interpolation between cell centers, clamped to the outermost.
     #[must_use]
-    pub fn sample(&self, place: [f64; 2]) -> [f64; 2] {
+    pub fn sample(&self, position: [f64; 2]) -> [f64; 2] {
         let [columns, rows] = self.layout.size;
         if self.values.is_empty() {
             return [0.0; 2];
         }
-        let ([i, j], [s, t]) = self.layout.split(place);
-        let held = |cell: isize, count: usize| cell.clamp(0, count as isize - 1) as usize;
-        let at = |i: isize, j: isize| self.values[held(j, rows) * columns + held(i, columns)];
+        let ([i, j], [s, t]) = self.layout.split(position);
+        let clamped = |cell: isize, count: usize| cell.clamp(0, count as isize - 1) as usize;
+        let at = |i: isize, j: isize| self.values[clamped(j, rows) * columns + clamped(i, columns)];
         let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
         std::array::from_fn(|k| {
             let (lower, upper) = (s.mul_add(b[k] - a[k], a[k]), s.mul_add(d[k] - c[k], c[k]));

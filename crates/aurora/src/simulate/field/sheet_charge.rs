@@ -1,59 +1,62 @@
-//! Charge that lies on the sheets as on conductors.
+//! Charge on the sheets: scattered particles (thesis, 2.2.3) and their charge as on conductors.
 
+use super::Grid2;
+use crate::simulate::sheets::nodes::split;
+use crate::simulate::sheets::refined_shape::RefinedShape;
+use bansho_base::math::DVec2;
+use bansho_base::math::random::{Key, Purpose, uniform};
 use rayon::prelude::*;
 
-use super::{Grid2, scatter::Scattered};
-use crate::simulate::sheets::{nodes::split, refined_shape::Course};
-
-/// How much a node changes at a time, and how little and how much charge it has at most beside one of a long, straight, lone sheet.
+/// Limits of the change per iteration, and of the charge relative to a long, straight, isolated sheet.
 const CHANGE: [f64; 2] = [0.5, 2.0];
 const CHARGE: [f64; 2] = [0.1, 4.0];
 
-/// Most nodes of all sheets together for each particle.
+/// Maximum nodes of all sheets per particle.
 const NODES_PER_PARTICLE: f64 = 0.05;
-/// Nodes that a task of the thread pool changes, at least.
+/// Minimum nodes per task.
 const TASK: usize = 256;
-/// Most that charge is denser at one side of a sheet than in its middle, as a share of that.
-const MOST_TILT: f64 = 0.9;
+/// Maximum relative difference of the charge between a sheet's edge and its middle.
+const MAX_TILT: f64 = 0.9;
 
-/// Charge of a scattered particle by its place along the sheets, linear between nodes, 1 on a long, straight, lone sheet.
+/// Charge per scattered particle as a function of the position along the sheets, linear between nodes; 1 on a long,
+/// straight, isolated sheet.
 ///
-/// With the same charge everywhere the potential would rise by half toward the ends of sheets, and fall where they wind up or lie close
-/// together: all particles would gather there. Here it is the same along all sheets. And a sheet that bends, or has another on one side of it,
-/// pulls toward that side, so that particles would come to rest beside the drawn line: charge gathers on the other side until both are at one
-/// potential.
+/// With uniform charge the potential would be half as deep at the ends of sheets and deeper where they wind up or lie
+/// close together, and particles would collect there. Here the potential is constant along all sheets, as on
+/// conductors. Next to a bend or another sheet the charge is also tilted across the sheet until both edges have the
+/// same potential; otherwise particles would rest beside the drawn line.
 #[derive(Clone, Debug)]
-pub(crate) struct LineCharge {
-    /// One sheet's after those of another; evenly spaced over its length, one at each end.
+pub(crate) struct SheetCharge {
+    /// Uniformly spaced nodes with one at each end, sheet by sheet.
     nodes: Vec<f64>,
-    /// How much denser it is at the one side (left of the way along) than in the middle, as a share of that, at the same places.
+    /// Relative increase of the charge at the left edge over the middle, at the same nodes.
     tilts: Vec<f64>,
-    /// Where each sheet's begin, and the end of all.
+    /// Start of each sheet's nodes, and the total.
     starts: Vec<usize>,
 }
 
-/// Where a particle is among the nodes: the one before it, and the part of the way to the next.
+/// Position of a particle among the nodes: the node before, the interpolation fraction, and the side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SheetCoordinate {
     node: u32,
-    part: f32,
+    fraction: f32,
     side: f32,
 }
 
-/// What charge shall come to.
+/// Target of the iteration.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct WantedCharge {
-    /// Potential along the sheets, negative, km^2/s^2.
+pub(super) struct ChargeTarget {
+    /// Potential on the sheets, negative, km^2/s^2.
     pub(super) potential: f64,
-    /// Charge density over eps of a lone sheet, 1/s^2, and half its thickness, km.
+    /// Charge density over eps of an isolated sheet, 1/s^2, and half its thickness, km.
     pub(super) density: f64,
     pub(super) half_thickness: f64,
 }
 
-impl LineCharge {
-    /// The same charge everywhere, at nodes about `spacing` km apart, or more where so many particles do not show as much.
-    pub(crate) fn even(course: &Course, spacing: f64, particles: f64) -> Self {
-        let lengths = course.sheet_lengths();
+impl SheetCharge {
+    /// Uniform charge, with nodes about `spacing` km apart, or more where there are few particles.
+    pub(crate) fn even(refined: &RefinedShape, spacing: f64, particles: f64) -> Self {
+        let lengths = refined.sheet_lengths();
         let spacing = spacing.max(lengths.iter().sum::<f64>() / (NODES_PER_PARTICLE * particles));
         let mut starts = vec![0];
         for length in lengths {
@@ -70,43 +73,88 @@ impl LineCharge {
         self.nodes.len()
     }
 
-    /// Where a particle is.
-    pub(super) fn place(&self, particle: &Scattered) -> SheetCoordinate {
+    /// Coordinate of a particle.
+    pub(super) fn coordinate(&self, particle: &ScatteredParticle) -> SheetCoordinate {
         let sheet = particle.sheet as usize;
         let (first, end) = (self.starts[sheet], self.starts[sheet + 1]);
-        let (node, part) = split(f64::from(particle.share), end - first);
-        SheetCoordinate { node: (first + node) as u32, part: part as f32, side: particle.side }
+        let (node, fraction) = split(f64::from(particle.arc_fraction), end - first);
+        SheetCoordinate { node: (first + node) as u32, fraction: fraction as f32, side: particle.side }
     }
 
-    /// Charge of a particle that is there.
+    /// Charge of a particle at a coordinate.
     #[inline]
-    pub(super) fn at(&self, place: SheetCoordinate) -> f64 {
-        let node = place.node as usize;
+    pub(super) fn charge(&self, position: SheetCoordinate) -> f64 {
+        let node = position.node as usize;
         let (before, after) = (self.nodes[node], self.nodes[node + 1]);
         let (tilt, next) = (self.tilts[node], self.tilts[node + 1]);
-        let (part, side) = (f64::from(place.part), f64::from(place.side));
-        (before + part * (after - before)) * (1.0 + (tilt + part * (next - tilt)) * side)
+        let (fraction, side) = (f64::from(position.fraction), f64::from(position.side));
+        (before + fraction * (after - before)) * (1.0 + (tilt + fraction * (next - tilt)) * side)
     }
 
-    /// Changes it where the potential that it makes is not the one that is wanted, or not the same on both sides.
-    pub(super) fn adjust(&mut self, course: &Course, potential: &Grid2, wanted: WantedCharge) {
-        let WantedCharge { density, half_thickness, .. } = wanted;
+    /// Adjusts charge and tilt toward the target potential and equal potentials at both edges.
+    pub(super) fn adjust_toward(&mut self, refined: &RefinedShape, potential: &Grid2, wanted: ChargeTarget) {
+        let ChargeTarget { density, half_thickness, .. } = wanted;
         let starts = &self.starts;
         let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
             let sheet = starts.partition_point(|start| *start <= index) - 1;
             let last = (starts[sheet + 1] - starts[sheet] - 1) as f64;
-            let share = (index - starts[sheet]) as f64 / last;
-            let place = course.place(sheet, share);
-            let found = potential.sample(place.to_array());
+            let fraction = (index - starts[sheet]) as f64 / last;
+            let position = refined.position(sheet, fraction);
+            let found = potential.sample(position.to_array());
             let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
             *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
-            let way = course.place(sheet, share + 0.5 / last) - course.place(sheet, share - 0.5 / last);
-            let across = way.perp().normalize_or_zero() * half_thickness;
-            let rise = potential.sample((place + across).to_array()) - potential.sample((place - across).to_array());
-            // Charge tilted by a makes the one edge lower than the other by 2/3 a density L^2.
+            let chord = refined.position(sheet, fraction + 0.5 / last) - refined.position(sheet, fraction - 0.5 / last);
+            let across = chord.perp().normalize_or_zero() * half_thickness;
+            let rise =
+                potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
+            // A tilt a of the charge lowers one edge relative to the other by 2/3 a density L^2.
             let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
-            *tilt = (*tilt + change).clamp(-MOST_TILT, MOST_TILT);
+            *tilt = (*tilt + change).clamp(-MAX_TILT, MAX_TILT);
         };
         self.nodes.par_iter_mut().zip(&mut self.tilts).with_min_len(TASK).enumerate().for_each(adjust);
     }
+}
+
+const SCATTER: Purpose = Purpose::named("aurora scatter");
+
+/// A particle that carries charge of a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ScatteredParticle {
+    /// Position, km.
+    pub(crate) position: DVec2,
+    /// Index of the nearest sheet.
+    pub(crate) sheet: u32,
+    /// Fraction of that sheet's length before it.
+    pub(crate) arc_fraction: f32,
+    /// Lateral position, -1 to 1 within L_thr.
+    pub(super) side: f32,
+}
+
+/// Scatters particles uniformly within `half_thickness` km of the shape; set number `renewal` of `count` trials.
+///
+/// Sampled along the segments, so the cost depends on the number of particles only. A position counts for its nearest
+/// segment, so overlaps are not counted twice.
+pub(crate) fn scatter(
+    refined: &RefinedShape,
+    half_thickness: f64,
+    count: usize,
+    key: Key,
+    renewal: u32,
+) -> Vec<ScatteredParticle> {
+    let segments = refined.segments();
+    let particle = |index: usize| {
+        let [u, v, ..] = key.words(index as u64, renewal, SCATTER).map(|word| f64::from(uniform(word)));
+        let sample = segments.sample((index as f64 + u) / count as f64)?;
+        let side = 2.0 * v - 1.0;
+        let position = sample.point + sample.tangent.perp() * (half_thickness * side);
+        let own = [sample.segment.sheet, sample.segment.segment];
+        let scattered = ScatteredParticle {
+            position,
+            sheet: own[0] as u32,
+            arc_fraction: sample.fraction as f32,
+            side: side as f32,
+        };
+        (refined.nearest_segment(position) == Some(own)).then_some(scattered)
+    };
+    (0..count).into_par_iter().with_min_len(1024).filter_map(particle).collect()
 }

@@ -1,7 +1,7 @@
-//! The field that pulls particles to the in-between shape (thesis, 2.2.3).
+//! The electric field that attracts particles to the in-between shape (thesis, 2.2.3).
 //!
-//! Units: km and s, the particle's charge and mass are 1, so the field is an acceleration in km/s^2 and the potential is in km^2/s^2. What
-//! is natural here is the cell and the frame, as the constants say.
+//! Units: km and s, particle charge and mass 1; the field is an acceleration in km/s^2 and the potential is in
+//! km^2/s^2. Constants are given in cells and frames.
 
 use bansho_base::{
     math::{
@@ -13,26 +13,28 @@ use bansho_base::{
 };
 
 use super::{
-    Grid2, PoissonSolver, relax,
-    scatter::Scattered,
-    sheet_charge::{LineCharge, SheetCoordinate, WantedCharge},
+    Grid2, PoissonSolver, gauss_seidel_sweep,
+    sheet_charge::ScatteredParticle,
+    sheet_charge::{ChargeTarget, SheetCharge, SheetCoordinate},
 };
-use crate::{AuroraParameters, FieldCharge, FieldSolver, shapes::FRAME_S, simulate::sheets::refined_shape::Course};
+use crate::{
+    AuroraParameters, FieldCharge, FieldSolver, shapes::FRAME_S, simulate::sheets::refined_shape::RefinedShape,
+};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-/// Screening length l unless a scene says otherwise, cells: particles are drawn in from a few cells, strays beyond can die.
+/// Default screening length l, cells: particles are attracted from a few cells, those farther away can be removed.
 const REACH_CELLS: f64 = 3.0;
-/// How often the charge along the sheets is made better.
+/// Iterations of the conductor charge.
 const ADJUSTMENTS: usize = 4;
-/// Scattered particles that a task of the thread pool finds the places of, at least.
+/// Minimum particles per task.
 const TASK: usize = 4096;
 /// Field at the edge of a sheet at a pull of 1, cells per frame^2.
 const EDGE_FIELD: f64 = 0.25;
 
-/// Everything about fields that does not change from shape to shape.
+/// Everything that does not depend on the shape.
 #[derive(Clone, Debug)]
-pub(crate) struct FieldMaker {
+pub(crate) struct FieldBuilder {
     parameters: AuroraParameters,
     solver: PoissonSolver,
     /// 1 / l^2, 1/km^2.
@@ -42,20 +44,21 @@ pub(crate) struct FieldMaker {
 
 /// The field of one in-between shape.
 #[derive(Clone, Debug)]
-pub(crate) struct Field {
-    /// N(i, j): how many particles were scattered into each cell.
+pub(crate) struct ElectricField {
+    /// N(i, j): number of scattered particles per cell.
     pub(crate) counts: Grid2,
-    /// phi(i, j) without noise, which relocation looks at.
+    /// phi(i, j) without noise, as used by relocation.
     pub(crate) potential: Grid2,
-    /// Potential with noise, and the field from it by (2.7) to (2.9) and nothing, one a cell and one row and column of ghosts around.
+    /// Potential with noise and field (2.7) to (2.9), padded to four components, with one ghost row and column on each
+    /// side.
     table: Vec<[f32; 4]>,
-    /// Columns and rows, the lower corner in cells, and cells a km.
+    /// Columns and rows, the lower corner in cells, and cells per km.
     size: [f32; 2],
     corner: [f32; 2],
     per_km: f32,
 }
 
-/// Potential and field where a particle is.
+/// Potential and field at a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FieldSample {
     /// km^2/s^2.
@@ -64,7 +67,7 @@ pub(crate) struct FieldSample {
     pub(crate) field: [f32; 2],
 }
 
-impl FieldMaker {
+impl FieldBuilder {
     pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
         let cells = parameters.field.cells as usize;
         let reach = match parameters.field.reach_km {
@@ -93,17 +96,17 @@ impl FieldMaker {
         1.0 / self.screening.sqrt()
     }
 
-    /// The field of particles scattered about a shape, with the noise of a time.
-    pub(crate) fn make(&self, course: &Course, scattered: &[Scattered], time: f64) -> Field {
-        let counts = self.sum(scattered.iter().map(|particle| (particle.place, 1.0)));
-        let source = self.source(course, scattered, &counts);
+    /// The field of scattered particles, with the noise at a time.
+    pub(crate) fn build(&self, refined: &RefinedShape, scattered: &[ScatteredParticle], time: f64) -> ElectricField {
+        let counts = self.sum_by_cell(scattered.iter().map(|particle| (particle.position, 1.0)));
+        let source = self.charge_density(refined, scattered, &counts);
         let potential = match self.parameters.field.solver {
-            FieldSolver::SineTransform => self.solved(source),
-            FieldSolver::GaussSeidel => self.relaxed(&source),
+            FieldSolver::SineTransform => self.solve_directly(source),
+            FieldSolver::GaussSeidel => self.solve_by_relaxation(&source),
         };
-        let table = self.table(&potential, time);
+        let table = self.sample_table(&potential, time);
         let per_km = 1.0 / counts.spacing();
-        Field {
+        ElectricField {
             size: counts.size().map(|cells| cells as f32),
             corner: counts.origin().map(|corner| (corner * per_km) as f32),
             per_km: per_km as f32,
@@ -113,46 +116,51 @@ impl FieldMaker {
         }
     }
 
-    /// Sum of values at places over those in each cell.
-    pub(crate) fn sum(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
+    /// Sums values by cell.
+    pub(crate) fn sum_by_cell(&self, values: impl Iterator<Item = (DVec2, f64)>) -> Grid2 {
         let mut sums = self.grid();
-        for (place, value) in values {
-            if let Some(cell) = sums.index(place.to_array()) {
+        for (position, value) in values {
+            if let Some(cell) = sums.index(position.to_array()) {
                 sums.values_mut()[cell] += value;
             }
         }
         sums
     }
 
-    /// Charge density over eps, eq. (2.2): such that all sheets pull alike, however many particles stand for them, and unless it shall be
-    /// even are at one potential all along.
-    pub(crate) fn source(&self, course: &Course, scattered: &[Scattered], counts: &Grid2) -> Grid2 {
+    /// Charge density over eps, eq. (2.2), normalized so that all sheets attract equally whatever the number of
+    /// particles; by default with constant potential along the sheets.
+    pub(crate) fn charge_density(
+        &self,
+        refined: &RefinedShape,
+        scattered: &[ScatteredParticle],
+        counts: &Grid2,
+    ) -> Grid2 {
         let half_thickness = self.parameters.half_thickness_km();
         let density = self.edge_field() / half_thickness;
-        let unit = density / full_count(counts).max(1.0);
-        // In the middle of a long, straight, lone sheet.
+        let unit = density / full_cell_count(counts).max(1.0);
+        // In the middle of a long, straight, isolated sheet.
         let reach = self.reach_km();
         let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
-        let wanted = WantedCharge { potential, density, half_thickness };
-        let mut charge = LineCharge::even(course, self.parameters.cell_km(), self.parameters.particles.count as f64);
-        let places: Vec<(usize, SheetCoordinate)> = scattered
+        let wanted = ChargeTarget { potential, density, half_thickness };
+        let mut charge = SheetCharge::even(refined, self.parameters.cell_km(), self.parameters.particles.count as f64);
+        let coordinates: Vec<(usize, SheetCoordinate)> = scattered
             .par_iter()
             .with_min_len(TASK)
-            .filter_map(|particle| Some((counts.index(particle.place.to_array())?, charge.place(particle))))
+            .filter_map(|particle| Some((counts.index(particle.position.to_array())?, charge.coordinate(particle))))
             .collect();
-        let source = |charge: &LineCharge| {
+        let source = |charge: &SheetCharge| {
             let mut source = self.grid();
             let cells = source.values_mut();
-            for (cell, place) in &places {
-                cells[*cell] += unit * charge.at(*place);
+            for (cell, position) in &coordinates {
+                cells[*cell] += unit * charge.charge(*position);
             }
             source
         };
-        // Sheets that do not pull have no potential to be at.
+        // Sheets without attraction have no target potential.
         let is_conductor = self.parameters.field.charge == FieldCharge::Conductor;
         let adjustments = if density > 0.0 && is_conductor { ADJUSTMENTS } else { 0 };
         for _ in 0..adjustments {
-            charge.adjust(course, &self.solved(source(&charge)), wanted);
+            charge.adjust_toward(refined, &self.solve_directly(source(&charge)), wanted);
         }
         source(&charge)
     }
@@ -162,31 +170,31 @@ impl FieldMaker {
         self.parameters.field.pull * EDGE_FIELD * self.parameters.cell_km() / (FRAME_S * FRAME_S)
     }
 
-    /// `laplacian(phi) - phi / l^2 = rho`, phi = 0 around the grid; negative, lowest on the shape.
-    fn solved(&self, mut source: Grid2) -> Grid2 {
+    /// Solves `laplacian(phi) - phi / l^2 = rho` directly; phi is negative, lowest on the shape.
+    fn solve_directly(&self, mut source: Grid2) -> Grid2 {
         self.solver.solve(&mut source);
         source
     }
 
-    /// Eq. (2.6), stopped after so many sweeps or where no cell changes by more than the tolerance.
-    fn relaxed(&self, source: &Grid2) -> Grid2 {
+    /// Eq. (2.6), until the maximum number of sweeps or the tolerance.
+    fn solve_by_relaxation(&self, source: &Grid2) -> Grid2 {
         let mut potential = self.grid();
         let least = self.parameters.field.tolerance * self.edge_field() * self.reach_km();
         let sweeps = self.parameters.field.sweeps;
-        (0..sweeps).take_while(|_| relax(&mut potential, source, self.screening) > least).count();
+        (0..sweeps).take_while(|_| gauss_seidel_sweep(&mut potential, source, self.screening) > least).count();
         potential
     }
 
     /// Adds the noise of (x, z, t) and takes the gradient.
-    fn table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 4]> {
+    fn sample_table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 4]> {
         let mut noisy = potential.clone();
         self.add_noise(&mut noisy, time);
         let gradient = noisy.gradient();
         let [columns, rows] = noisy.size();
         let value = |index: usize| {
-            let held = |place: usize, count: usize| place.clamp(1, count) - 1;
+            let clamped = |position: usize, count: usize| position.clamp(1, count) - 1;
             let (column, row) = (index % (columns + 2), index / (columns + 2));
-            let inner = held(row, rows) * columns + held(column, columns);
+            let inner = clamped(row, rows) * columns + clamped(column, columns);
             let [x, z] = gradient.values()[inner];
             [noisy.values()[inner] as f32, -x as f32, -z as f32, 0.0]
         };
@@ -212,35 +220,35 @@ impl FieldMaker {
     }
 }
 
-/// How many a cell holds that lies all within a sheet: the mean over particles of the count where they are.
-pub(crate) fn full_count(counts: &Grid2) -> f64 {
+/// Typical count of a cell that lies entirely within a sheet: the mean over particles of their cell's count.
+pub(crate) fn full_cell_count(counts: &Grid2) -> f64 {
     let sum: f64 = counts.values().iter().sum();
     let squares: f64 = counts.values().iter().map(|count| count * count).sum();
     if sum > 0.0 { squares / sum } else { 0.0 }
 }
 
-impl Field {
-    /// Bilinear between the middles of cells; as at the nearest middle beyond the outermost.
+impl ElectricField {
+    /// Bilinear interpolation between cell centers, clamped to the outermost.
     #[inline(always)]
     pub(crate) fn sample(&self, x: f32, z: f32) -> FieldSample {
-        let places = [x, z];
-        let (mut cells, mut parts) = ([0; 2], [0.0; 2]);
+        let coordinates = [x, z];
+        let (mut cells, mut fractions) = ([0; 2], [0.0; 2]);
         for axis in 0..2 {
-            let place = places[axis].fma(self.per_km, 0.5 - self.corner[axis]);
-            let held = if place > 0.0 { place } else { 0.0 };
+            let position = coordinates[axis].fma(self.per_km, 0.5 - self.corner[axis]);
+            let clamped = if position > 0.0 { position } else { 0.0 };
             let most = self.size[axis] + 0.999;
-            let held = if held < most { held } else { most };
-            cells[axis] = held as usize;
-            parts[axis] = held - cells[axis] as f32;
+            let clamped = if clamped < most { clamped } else { most };
+            cells[axis] = clamped as usize;
+            fractions[axis] = clamped - cells[axis] as f32;
         }
         let columns = self.size[0] as usize + 2;
         let first = cells[1] * columns + cells[0];
         let (lower, upper) = (&self.table[first..first + 2], &self.table[first + columns..first + columns + 2]);
         let mut sample = [0.0; 4];
         for k in 0..4 {
-            let lower = parts[0].fma(lower[1][k] - lower[0][k], lower[0][k]);
-            let upper = parts[0].fma(upper[1][k] - upper[0][k], upper[0][k]);
-            sample[k] = parts[1].fma(upper - lower, lower);
+            let lower = fractions[0].fma(lower[1][k] - lower[0][k], lower[0][k]);
+            let upper = fractions[0].fma(upper[1][k] - upper[0][k], upper[0][k]);
+            sample[k] = fractions[1].fma(upper - lower, lower);
         }
         let [potential, east, south, _] = sample;
         FieldSample { potential, field: [east, south] }

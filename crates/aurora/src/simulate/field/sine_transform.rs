@@ -1,4 +1,4 @@
-//! Discrete sine transform of the first kind, two rows at a time.
+//! Discrete sine transform of type I (DST-I), two rows at a time.
 
 use std::{f64::consts::PI, sync::Arc};
 
@@ -18,7 +18,7 @@ pub(super) struct SineTransform {
     level: Level,
 }
 
-/// Working memory of a thread.
+/// Scratch buffers of a thread.
 pub(super) struct Scratch {
     spectrum: Vec<Complex<f64>>,
     inner: Vec<Complex<f64>>,

@@ -1,4 +1,4 @@
-//! Sheets as the simulation sees them: refined, folded, with rays along their length.
+//! Sheets as the simulation sees them: refined, folded, with a ray pattern along their length.
 
 pub(crate) mod arc_length;
 pub(crate) mod nodes;

@@ -1,28 +1,28 @@
-//! Values at evenly spaced nodes along each sheet, one at each end, and straight between them.
+//! Piecewise linear functions on uniformly spaced nodes along each sheet.
 
-/// The node before a share of a sheet's length among `count` of them (two or more), and how far the share is on the way to the next, 0 to 1.
+/// Node before a fraction of a sheet's length with `count` nodes (two or more), and the interpolation fraction.
 #[inline]
-pub(crate) fn split(share: f64, count: usize) -> (usize, f64) {
-    let place = share.clamp(0.0, 1.0) * (count - 1) as f64;
-    let node = (place as usize).min(count - 2);
-    (node, place - node as f64)
+pub(crate) fn split(fraction: f64, count: usize) -> (usize, f64) {
+    let coordinate = fraction.clamp(0.0, 1.0) * (count - 1) as f64;
+    let node = (coordinate as usize).min(count - 2);
+    (node, coordinate - node as f64)
 }
 
-/// How many nodes each sheet has: the more, the longer it is.
+/// Number of nodes per sheet, in proportion to its length.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Layout {
-    /// Where each sheet's begin, and the end of all.
+pub(crate) struct NodeLayout {
+    /// Start of each sheet's nodes, and the total.
     starts: Vec<usize>,
 }
 
-impl Layout {
-    /// Cuts sheets of those lengths into about `all` stretches together, each into `bounds` of them at least and at most.
+impl NodeLayout {
+    /// Divides sheets of these lengths into about `all` intervals, each sheet into at least and at most `bounds`.
     pub(crate) fn new(lengths: &[f64], all: f64, bounds: [f64; 2]) -> Self {
         let whole = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let mut starts = vec![0];
         for length in lengths {
-            let stretches = (all * length / whole).round().clamp(bounds[0], bounds[1]) as usize;
-            starts.push(starts[starts.len() - 1] + stretches + 1);
+            let intervals = (all * length / whole).round().clamp(bounds[0], bounds[1]) as usize;
+            starts.push(starts[starts.len() - 1] + intervals + 1);
         }
         Self { starts }
     }
@@ -35,50 +35,50 @@ impl Layout {
 
 /// A value at each node.
 #[derive(Clone, Debug)]
-pub(crate) struct Nodes<'a> {
-    layout: &'a Layout,
+pub(crate) struct NodeValues<'a> {
+    layout: &'a NodeLayout,
     values: Vec<f64>,
 }
 
-impl<'a> Nodes<'a> {
+impl<'a> NodeValues<'a> {
     /// All of them 0.
-    pub(crate) fn new(layout: &'a Layout) -> Self {
+    pub(crate) fn new(layout: &'a NodeLayout) -> Self {
         Self { layout, values: vec![0.0; layout.starts[layout.starts.len() - 1]] }
     }
 
-    /// Length of the sheets, km: half a stretch on each side of a node.
-    pub(crate) fn of_lengths(layout: &'a Layout, lengths: &[f64]) -> Self {
+    /// Sheet length per node, km: half an interval on each side.
+    pub(crate) fn of_lengths(layout: &'a NodeLayout, lengths: &[f64]) -> Self {
         let mut nodes = Self::new(layout);
         for (sheet, length) in lengths.iter().enumerate() {
             let nodes = &mut nodes.values[layout.starts[sheet]..layout.starts[sheet + 1]];
             let last = nodes.len() - 1;
-            let stretch = length / last as f64;
-            nodes.fill(stretch);
-            (nodes[0], nodes[last]) = (0.5 * stretch, 0.5 * stretch);
+            let interval = length / last as f64;
+            nodes.fill(interval);
+            (nodes[0], nodes[last]) = (0.5 * interval, 0.5 * interval);
         }
         nodes
     }
 
-    /// The node before a place, over all sheets, and how far the place is on the way to the next.
+    /// Index of the node before a position, over all sheets, and the interpolation fraction.
     #[inline]
-    fn split(&self, sheet: u32, share: f32) -> (usize, f64) {
-        let (node, part) = split(f64::from(share), self.layout.count(sheet as usize));
-        (self.layout.starts[sheet as usize] + node, part)
+    fn split(&self, sheet: u32, fraction: f32) -> (usize, f64) {
+        let (node, t) = split(f64::from(fraction), self.layout.count(sheet as usize));
+        (self.layout.starts[sheet as usize] + node, t)
     }
 
-    /// Adds a value to the two nodes around a place.
+    /// Adds a value with linear weights to the two nodes around a position.
     #[inline]
-    pub(crate) fn add(&mut self, sheet: u32, share: f32, value: f64) {
-        let (node, part) = self.split(sheet, share);
-        self.values[node] += value * (1.0 - part);
-        self.values[node + 1] += value * part;
+    pub(crate) fn add(&mut self, sheet: u32, fraction: f32, value: f64) {
+        let (node, t) = self.split(sheet, fraction);
+        self.values[node] += value * (1.0 - t);
+        self.values[node + 1] += value * t;
     }
 
-    /// Value at a place, linear between nodes.
+    /// Value at a position, linear between nodes.
     #[inline]
-    pub(crate) fn at(&self, sheet: u32, share: f32) -> f64 {
-        let (node, part) = self.split(sheet, share);
-        self.values[node] + part * (self.values[node + 1] - self.values[node])
+    pub(crate) fn at(&self, sheet: u32, fraction: f32) -> f64 {
+        let (node, t) = self.split(sheet, fraction);
+        self.values[node] + t * (self.values[node + 1] - self.values[node])
     }
 
     /// Both together.
@@ -92,11 +92,11 @@ impl<'a> Nodes<'a> {
         self.values.iter().sum()
     }
 
-    /// What a unit of weight gets of these powers at each node, so that all is given out, but nowhere more than `most_uneven` times what it
-    /// would be if all were even. Where there is next to no weight, not everything can be given out there.
-    pub(crate) fn shared_by(mut self, weights: &Self, most_uneven: f64) -> Self {
+    /// Power per unit of weight at each node, so that the total is distributed but nowhere more than
+    /// `max_concentration` times the mean. Power of nodes with nearly no weight cannot be distributed completely there.
+    pub(crate) fn distributed_by(mut self, weights: &Self, max_concentration: f64) -> Self {
         let (whole, weight) = (self.sum(), weights.sum());
-        let most = if weight > 0.0 { most_uneven * whole / weight } else { 0.0 };
+        let most = if weight > 0.0 { max_concentration * whole / weight } else { 0.0 };
         let mut given = 0.0;
         for (power, weight) in self.values.iter_mut().zip(&weights.values) {
             *power = (*power / weight.max(f64::MIN_POSITIVE)).min(most);
@@ -121,32 +121,32 @@ mod tests {
     #[test]
     fn ends_and_middle_lie_at_their_nodes() {
         assert_eq!(
-            [-0.1, 0.0, 0.125, 1.0, 7.0].map(|share| split(share, 5)),
+            [-0.1, 0.0, 0.125, 1.0, 7.0].map(|fraction| split(fraction, 5)),
             [(0, 0.0), (0, 0.0), (0, 0.5), (3, 1.0), (3, 1.0),]
         );
     }
 
     #[test]
     fn long_sheets_have_more_nodes_and_all_of_them_no_more_than_asked_for() {
-        let layout = Layout::new(&[300.0, 100.0, 0.0], 40.0, [4.0, 25.0]);
+        let layout = NodeLayout::new(&[300.0, 100.0, 0.0], 40.0, [4.0, 25.0]);
         assert_eq!([0, 1, 2].map(|sheet| layout.count(sheet)), [26, 11, 5]);
-        assert_eq!(Layout::new(&[], 40.0, [4.0, 25.0]), Layout { starts: vec![0] });
+        assert_eq!(NodeLayout::new(&[], 40.0, [4.0, 25.0]), NodeLayout { starts: vec![0] });
     }
 
     #[test]
     fn what_is_given_out_is_all_there_is() {
-        let layout = Layout::new(&[300.0, 100.0], 12.0, [2.0, 25.0]);
-        let lengths = Nodes::of_lengths(&layout, &[300.0, 100.0]);
+        let layout = NodeLayout::new(&[300.0, 100.0], 12.0, [2.0, 25.0]);
+        let lengths = NodeValues::of_lengths(&layout, &[300.0, 100.0]);
         assert!((lengths.sum() - 400.0).abs() < 1e-9);
-        let mut weights = Nodes::new(&layout);
-        for (sheet, share, weight) in [(0, 0.1, 3.0), (0, 0.57, 1.0), (1, 0.2, 2.0)] {
-            weights.add(sheet, share, weight);
+        let mut weights = NodeValues::new(&layout);
+        for (sheet, fraction, weight) in [(0, 0.1, 3.0), (0, 0.57, 1.0), (1, 0.2, 2.0)] {
+            weights.add(sheet, fraction, weight);
         }
-        let factors = lengths.shared_by(&weights, 1e9);
+        let factors = lengths.distributed_by(&weights, 1e9);
         let given: f64 = factors.values.iter().zip(&weights.values).map(|(factor, weight)| factor * weight).sum();
         assert!((given - 400.0).abs() < 1e-9, "{given}");
         // To nobody nothing can be given.
-        let factors = Nodes::of_lengths(&layout, &[300.0, 100.0]).shared_by(&Nodes::new(&layout), 6.0);
+        let factors = NodeValues::of_lengths(&layout, &[300.0, 100.0]).distributed_by(&NodeValues::new(&layout), 6.0);
         assert!(factors.values.iter().all(|factor| *factor == 0.0));
     }
 }

@@ -1,4 +1,4 @@
-//! How bright and how hard the precipitation is along the sheets: rays, black rays, pulsation.
+//! Patterns of brightness and energy along the sheets: rays, black rays, pulsation.
 
 use bansho_base::{
     math::{
@@ -12,60 +12,61 @@ use super::nodes::split;
 use crate::{AuroraParameters, PulsationParameters, RayParameters};
 use fearless_simd::{Level, dispatch};
 
-/// Octaves of the rays: groups of rays, rays, and streaks in them.
+/// Fractal noise of the rays: groups, rays, and fine structure.
 const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
-/// Nodes of the table for the length of the finest cell of noise: with straight lines between them within a hundredth of it.
+/// Table nodes per cell of the finest octave: linear interpolation is then accurate to a hundredth.
 const NODES_PER_CELL: f64 = 12.0;
-/// Most nodes of all sheets together for each particle: finer rays are finer than what particles show.
+/// Maximum table nodes per particle: finer rays are not resolved by particles.
 const NODES_PER_PARTICLE: f64 = 0.5;
-/// Where the coordinate runs so many times as fast as the sheet is long, rays begin to fade, and so many times they are gone: they would be so
-/// much narrower, or stand beside others where it jumps.
-const FAST: f64 = 1.5;
-const GONE: f64 = 3.0;
-/// Width of a black ray beside the distance between two.
+/// Stretching of the coordinate relative to arc length at which rays start to fade and have vanished: they would be
+/// compressed or discontinuous.
+const FADE_START_STRETCH: f64 = 1.5;
+const FADE_END_STRETCH: f64 = 3.0;
+/// Width of a black ray relative to their distance.
 const BLACK_WIDTH: f32 = 0.12;
 
-/// The pattern along the sheets at a moment.
+/// The pattern generator.
 #[derive(Clone, Debug)]
-pub(crate) struct Rays {
+pub(crate) struct RayPattern {
     rays: RayParameters,
     pulsation: PulsationParameters,
     noise: [Noise<2>; 2],
     black: Noise<2>,
     patches: Noise<2>,
-    /// What noise is divided by so that its variance is 1.
+    /// Standard deviation of the noise, for normalization.
     deviation: f32,
     most_nodes: f64,
 }
 
-/// The noises of rays on both sides, of black rays and of patches.
+/// Noise of the rays on both sides, of black rays and of patches.
 type Noises = [f32; 4];
 
-/// The noises along the sheets at a moment, in a table: they cost what the sheets' detail costs, not the particles.
+/// Tabulated noise along the sheets at one time: the cost depends on the detail of the sheets, not on the number of
+/// particles.
 pub(crate) struct RayTable {
-    /// By sheet, evenly spaced over its length.
+    /// By sheet, uniformly spaced.
     sheets: Vec<Vec<Noises>>,
 }
 
-/// Sixteen places on the sheets.
-pub(crate) struct Places {
+/// Inputs for a batch of positions.
+pub(crate) struct PatternInputs {
     /// The noises there.
     pub(crate) noises: [Noises; LANES],
-    /// Which side of the sheet, from -1 to 1 within its thickness.
+    /// Lateral position, -1 to 1 within the thickness.
     pub(crate) side: [f32; LANES],
 }
 
-/// What the pattern does at sixteen places.
-pub(crate) struct Pattern {
-    /// Factor of the power, before it is shared out.
+/// Pattern factors for a batch of positions.
+pub(crate) struct PatternSample {
+    /// Power factor before normalization.
     pub(crate) brightness: [f32; LANES],
-    /// Factor of the power after it has been shared out: what makes the whole aurora darker.
+    /// Power factor after normalization, which darkens the whole aurora.
     pub(crate) dimming: [f32; LANES],
     /// Factor of the energy.
     pub(crate) hardness: [f32; LANES],
 }
 
-impl Rays {
+impl RayPattern {
     pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
         let [a, b, c, d] = key.words(0, 0, Purpose::named("aurora rays"));
         let noise = |seed, fractal| Noise::new(seed, fractal, [0; 2]).expect("few octaves without a period are noise");
@@ -83,26 +84,32 @@ impl Rays {
         }
     }
 
-    /// The noises at a time along sheets of those lengths in km; `alongs` gives the coordinate after every so many equal parts of a sheet.
-    pub(crate) fn table(&self, lengths: &[f64], alongs: impl Fn(usize, usize) -> Vec<f64>, time: f64) -> RayTable {
+    /// Tabulates the noise for sheets of these lengths in km; `arc_coordinates` returns the coordinate at equally
+    /// spaced nodes of a sheet.
+    pub(crate) fn table(
+        &self,
+        lengths: &[f64],
+        arc_coordinates: impl Fn(usize, usize) -> Vec<f64>,
+        time: f64,
+    ) -> RayTable {
         let level = Level::new();
         let node = self.node_km().max(lengths.iter().sum::<f64>() / self.most_nodes);
         let sheet = |(sheet, length): (usize, &f64)| {
             let last = (length / node).max(1.0).ceil();
-            let places = alongs(sheet, last as usize);
-            let mut nodes = Vec::with_capacity(places.len().next_multiple_of(LANES));
-            for places in places.chunks(LANES) {
-                let batch = std::array::from_fn(|lane| places[lane.min(places.len() - 1)]);
+            let coordinates = arc_coordinates(sheet, last as usize);
+            let mut nodes = Vec::with_capacity(coordinates.len().next_multiple_of(LANES));
+            for coordinates in coordinates.chunks(LANES) {
+                let batch = std::array::from_fn(|lane| coordinates[lane.min(coordinates.len() - 1)]);
                 let noises = self.noises(level, &batch, time);
-                nodes.extend((0..places.len()).map(|lane| noises.map(|values| values[lane])));
+                nodes.extend((0..coordinates.len()).map(|lane| noises.map(|values| values[lane])));
             }
-            fade(&mut nodes, &places, length / last, self.rays.scale_km);
+            fade(&mut nodes, &coordinates, length / last, self.rays.scale_km);
             nodes
         };
         RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
     }
 
-    /// Distance of nodes that shows the finest of what is asked for.
+    /// Node spacing for the finest requested pattern.
     fn node_km(&self) -> f64 {
         let finest = |strength: f64, scale: f64| if strength > 0.0 { scale } else { f64::INFINITY };
         let rays = finest(self.rays.contrast.max(self.rays.energy), self.rays.scale_km);
@@ -111,56 +118,56 @@ impl Rays {
         rays.min(others) / NODES_PER_CELL
     }
 
-    /// The pattern at sixteen places at a time.
-    pub(crate) fn at(&self, level: Level, places: &Places, time: f64) -> Pattern {
-        dispatch!(level, _simd => self.combined(places, time))
+    /// The pattern at sixteen positions at a time.
+    pub(crate) fn at(&self, level: Level, coordinates: &PatternInputs, time: f64) -> PatternSample {
+        dispatch!(level, _simd => self.combined(coordinates, time))
     }
 
     #[inline(always)]
-    fn combined(&self, places: &Places, time: f64) -> Pattern {
-        let mut pattern = Pattern { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
+    fn combined(&self, coordinates: &PatternInputs, time: f64) -> PatternSample {
+        let mut sample = PatternSample { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
         for i in 0..LANES {
-            let [left, right, black, patch] = places.noises[i];
-            let share = (0.5 + 0.5 * places.side[i]).clamp(0.0, 1.0);
-            // Two patterns mix to less than the variance of one.
-            let variance = share * share + (1.0 - share) * (1.0 - share);
-            let mixed = (left + share * (right - left)) / (self.deviation * variance.sqrt());
-            pattern.brightness[i] = approximations::exp(self.rays.contrast as f32 * mixed);
-            pattern.hardness[i] = approximations::exp(self.rays.energy as f32 * mixed);
-            pattern.dimming[i] = self.darkness(black) * self.pulse(patch, time);
+            let [left, right, black, patch] = coordinates.noises[i];
+            let fraction = (0.5 + 0.5 * coordinates.side[i]).clamp(0.0, 1.0);
+            // A blend of two independent patterns has less variance than one; normalized.
+            let variance = fraction * fraction + (1.0 - fraction) * (1.0 - fraction);
+            let mixed = (left + fraction * (right - left)) / (self.deviation * variance.sqrt());
+            sample.brightness[i] = approximations::exp(self.rays.contrast as f32 * mixed);
+            sample.hardness[i] = approximations::exp(self.rays.energy as f32 * mixed);
+            sample.dimming[i] = self.darkness(black) * self.pulse(patch, time);
         }
-        pattern
+        sample
     }
 
-    /// The noise of the rays on both sides, of black rays and of patches; what is not asked for is 0.
-    fn noises(&self, level: Level, places: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
+    /// Noise of the rays on both sides, of black rays and of patches; 0 for disabled patterns.
+    fn noises(&self, level: Level, coordinates: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
         let rays = &self.rays;
-        let (way, age) = (rays.shear_km_per_s * time, time / rays.life_s);
-        // Groups of rays are four rays long. Black rays run against the rays of the one side.
+        let (shift, age) = (rays.shear_km_per_s * time, time / rays.life_s);
+        // Groups of rays are four rays long. Black rays drift against the rays of one side.
         let [group, black, patch] = [4.0 * rays.scale_km, rays.black_scale_km, self.pulsation.patch_km];
         let wanted = [
-            (rays.contrast.max(rays.energy), &self.noise[0], way, group, age),
-            (rays.contrast.max(rays.energy), &self.noise[1], -way, group, age),
-            (rays.black_rays, &self.black, -way, black, age),
+            (rays.contrast.max(rays.energy), &self.noise[0], shift, group, age),
+            (rays.contrast.max(rays.energy), &self.noise[1], -shift, group, age),
+            (rays.black_rays, &self.black, -shift, black, age),
             (self.pulsation.depth, &self.patches, 0.0, patch, 0.0),
         ];
-        wanted.map(|(strength, noise, way, scale, age)| {
+        wanted.map(|(strength, noise, shift, scale, age)| {
             if strength > 0.0 {
-                values(level, noise, places.map(|along| (along - way) / scale), age)
+                values(level, noise, coordinates.map(|coordinate| (coordinate - shift) / scale), age)
             } else {
                 [0.0; LANES]
             }
         })
     }
 
-    /// Black rays are where a noise passes 0.
+    /// Black rays are the zero crossings of a noise.
     #[inline(always)]
     fn darkness(&self, noise: f32) -> f32 {
         let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
         1.0 - self.rays.black_rays as f32 * depth.sqrt()
     }
 
-    /// Patches go bright and dark, each in its own time.
+    /// Patches pulsate with independent phases.
     #[inline(always)]
     fn pulse(&self, noise: f32, time: f64) -> f32 {
         let turns = time / self.pulsation.period_s;
@@ -170,13 +177,13 @@ impl Rays {
     }
 }
 
-/// Fades the rays of nodes of a sheet, `spacing` km apart, about those between which the coordinate runs fast or jumps: over `scale` km to
-/// both sides.
-fn fade(nodes: &mut [Noises], places: &[f64], spacing: f64, scale: f64) {
+/// Fades the rays near nodes where the coordinate is stretched or discontinuous, over `scale` km on both sides; nodes
+/// are `spacing` km apart.
+fn fade(nodes: &mut [Noises], coordinates: &[f64], spacing: f64, scale: f64) {
     let mut strengths = vec![1.0_f64; nodes.len()];
-    for (node, pair) in places.windows(2).enumerate() {
+    for (node, pair) in coordinates.windows(2).enumerate() {
         let speed = (pair[1] - pair[0]).abs() / spacing.max(f64::MIN_POSITIVE);
-        let strength = ((GONE - speed) / (GONE - FAST)).clamp(0.0, 1.0);
+        let strength = ((FADE_END_STRETCH - speed) / (FADE_END_STRETCH - FADE_START_STRETCH)).clamp(0.0, 1.0);
         for end in [node, node + 1] {
             strengths[end] = strengths[end].min(strength);
         }
@@ -195,27 +202,27 @@ fn fade(nodes: &mut [Noises], places: &[f64], spacing: f64, scale: f64) {
 }
 
 impl RayTable {
-    /// The noises at a share of a sheet's length.
+    /// The noises at a fraction of a sheet's length.
     #[inline]
-    pub(crate) fn at(&self, sheet: u32, share: f64) -> Noises {
+    pub(crate) fn at(&self, sheet: u32, fraction: f64) -> Noises {
         let nodes = &self.sheets[sheet as usize];
-        let (node, part) = split(share, nodes.len());
-        let (low, high, part) = (&nodes[node], &nodes[node + 1], part as f32);
+        let (node, t) = split(fraction, nodes.len());
+        let (low, high, t) = (&nodes[node], &nodes[node + 1], t as f32);
         let mut noises = [0.0; 4];
         for k in 0..4 {
-            noises[k] = low[k] + part * (high[k] - low[k]);
+            noises[k] = low[k] + t * (high[k] - low[k]);
         }
         noises
     }
 }
 
-/// Noise at sixteen places, in cells, and an age, in lives.
-fn values(level: Level, noise: &Noise<2>, places: [f64; LANES], age: f64) -> [f32; LANES] {
+/// Noise for a batch of coordinates, in cells, and a time, in lifetimes.
+fn values(level: Level, noise: &Noise<2>, coordinates: [f64; LANES], age: f64) -> [f32; LANES] {
     let (mut cells, mut fractions) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
     let age = Coordinate::from_f64(age);
     for i in 0..LANES {
-        let place = Coordinate::from_f64(places[i]);
-        (cells[0][i], fractions[0][i]) = (place.cell, place.fraction);
+        let coordinate = Coordinate::from_f64(coordinates[i]);
+        (cells[0][i], fractions[0][i]) = (coordinate.cell, coordinate.fraction);
         (cells[1][i], fractions[1][i]) = (age.cell, age.fraction);
     }
     dispatch!(level, _simd => noise.lanes(&cells, &fractions))
@@ -234,15 +241,15 @@ mod tests {
     }
 
     /// Brightness, dimming and hardness every 50 m along the left side of a sheet.
-    fn along(parameters: &AuroraParameters, time: f64) -> [Vec<f64>; 3] {
-        let rays = Rays::new(parameters, KEY);
+    fn coordinate(parameters: &AuroraParameters, time: f64) -> [Vec<f64>; 3] {
+        let rays = RayPattern::new(parameters, KEY);
         let mut all: [Vec<f64>; 3] = Default::default();
         // A sheet of 800 km whose coordinate is its length.
         let table = rays.table(&[800.0], |_, last| evenly(800.0, last), time);
         for first in 0..1000 {
-            let place = |lane: usize| table.at(0, (first * LANES + lane) as f64 / 16_000.0);
-            let places = Places { noises: std::array::from_fn(place), side: [-1.0; LANES] };
-            let Pattern { brightness, dimming, hardness } = rays.at(Level::new(), &places, time);
+            let coordinate = |lane: usize| table.at(0, (first * LANES + lane) as f64 / 16_000.0);
+            let coordinates = PatternInputs { noises: std::array::from_fn(coordinate), side: [-1.0; LANES] };
+            let PatternSample { brightness, dimming, hardness } = rays.at(Level::new(), &coordinates, time);
             for (all, values) in all.iter_mut().zip([brightness, dimming, hardness]) {
                 all.extend(values.map(f64::from));
             }
@@ -260,24 +267,24 @@ mod tests {
         let mut parameters = AuroraParameters::default();
         parameters.rays.contrast = 0.5;
         parameters.rays.energy = 0.1;
-        let [brightness, dimming, hardness] = along(&parameters, 3.0);
+        let [brightness, dimming, hardness] = coordinate(&parameters, 3.0);
         let logarithm = |values: &[f64]| values.iter().map(|value| bansho_base::math::ln(*value)).collect::<Vec<_>>();
         assert!((deviation(&logarithm(&brightness)) / 0.5 - 1.0).abs() < 0.15);
         assert!((deviation(&logarithm(&hardness)) / 0.1 - 1.0).abs() < 0.15);
         assert!(dimming.iter().all(|dimming| *dimming == 1.0));
         parameters.rays.contrast = 0.0;
-        assert!(along(&parameters, 3.0)[0].iter().all(|brightness| *brightness == 1.0));
+        assert!(coordinate(&parameters, 3.0)[0].iter().all(|brightness| *brightness == 1.0));
     }
 
     #[test]
     fn the_table_holds_the_finest_noise() {
-        let rays = Rays::new(&AuroraParameters::default(), KEY);
+        let rays = RayPattern::new(&AuroraParameters::default(), KEY);
         let table = rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0);
         for first in 0..500 {
-            let along = std::array::from_fn(|lane| 0.0371 * (first * LANES + lane) as f64);
-            let [left, ..] = rays.noises(Level::new(), &along, 2.0);
+            let coordinate = std::array::from_fn(|lane| 0.0371 * (first * LANES + lane) as f64);
+            let [left, ..] = rays.noises(Level::new(), &coordinate, 2.0);
             for lane in 0..LANES {
-                assert!((table.at(0, along[lane] / 300.0)[0] - left[lane]).abs() < 0.01 * rays.deviation * 4.0);
+                assert!((table.at(0, coordinate[lane] / 300.0)[0] - left[lane]).abs() < 0.01 * rays.deviation * 4.0);
             }
         }
     }
@@ -287,7 +294,7 @@ mod tests {
         let nodes = |particles: i64| {
             let mut parameters = AuroraParameters::default();
             (parameters.particles.count, parameters.rays.scale_km) = (particles, 0.05);
-            let table = Rays::new(&parameters, KEY).table(&[2000.0, 500.0], |_, last| evenly(1.0, last), 1.0);
+            let table = RayPattern::new(&parameters, KEY).table(&[2000.0, 500.0], |_, last| evenly(1.0, last), 1.0);
             table.sheets.iter().map(Vec::len).collect::<Vec<_>>()
         };
         assert_eq!(nodes(500), [201, 51]);
@@ -298,18 +305,22 @@ mod tests {
     #[test]
     fn rays_fade_where_the_coordinate_jumps() {
         let parameters = AuroraParameters::default();
-        let rays = Rays::new(&parameters, KEY);
+        let rays = RayPattern::new(&parameters, KEY);
         // 50 km beyond the middle of the sheet all else.
         let jump = |_, last| {
-            evenly(300.0, last).into_iter().map(|along| along + if along > 150.0 { 50.0 } else { 0.0 }).collect()
+            evenly(300.0, last)
+                .into_iter()
+                .map(|coordinate| coordinate + if coordinate > 150.0 { 50.0 } else { 0.0 })
+                .collect()
         };
         let (even, torn) = (rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0), rays.table(&[300.0], jump, 2.0));
-        let step = |table: &RayTable, share: f64| (table.at(0, share + 2e-4)[0] - table.at(0, share - 2e-4)[0]).abs();
+        let step =
+            |table: &RayTable, fraction: f64| (table.at(0, fraction + 2e-4)[0] - table.at(0, fraction - 2e-4)[0]).abs();
         assert!(step(&torn, 0.5) < 0.1 * f64::from(rays.deviation) as f32, "{}", step(&torn, 0.5));
         // A ray away it is as it was.
         let away = 0.5 - 1.1 * parameters.rays.scale_km / 300.0;
         assert_eq!(torn.at(0, away), even.at(0, away));
-        let ten = (1..60).map(|place| torn.at(0, f64::from(place) / 60.0)[0].abs()).fold(0.0, f32::max);
+        let ten = (1..60).map(|coordinate| torn.at(0, f64::from(coordinate) / 60.0)[0].abs()).fold(0.0, f32::max);
         assert!(ten > rays.deviation, "elsewhere there are rays");
     }
 
@@ -318,9 +329,9 @@ mod tests {
         let mut parameters = AuroraParameters::default();
         parameters.rays.shear_km_per_s = 3.0;
         parameters.rays.life_s = 1e5;
-        let [before, ..] = along(&parameters, 1.0);
-        let [after, ..] = along(&parameters, 1.5);
-        // 1.5 km are 30 places; on the left they run onward.
+        let [before, ..] = coordinate(&parameters, 1.0);
+        let [after, ..] = coordinate(&parameters, 1.5);
+        // 1.5 km are 30 positions; on the left they run onward.
         let moved = |shift: isize| -> f64 {
             (100..15_000).map(|i| (after[(i as isize + shift) as usize] - before[i]).abs()).sum()
         };
@@ -331,7 +342,7 @@ mod tests {
     fn black_rays_are_narrow_and_dark() {
         let mut parameters = AuroraParameters::default();
         parameters.rays.black_rays = 1.0;
-        let [_, dimming, _] = along(&parameters, 3.0);
+        let [_, dimming, _] = coordinate(&parameters, 3.0);
         let dark = dimming.iter().filter(|dimming| **dimming < 0.3).count() as f64 / dimming.len() as f64;
         let whole = dimming.iter().filter(|dimming| **dimming == 1.0).count() as f64 / dimming.len() as f64;
         assert!((0.02..0.3).contains(&dark) && whole > 0.5, "{dark} {whole}");
@@ -342,7 +353,7 @@ mod tests {
         let mut parameters = AuroraParameters::default();
         parameters.pulsation.depth = 0.8;
         parameters.pulsation.period_s = 5.0;
-        let at = |time: f64| along(&parameters, time)[1].clone();
+        let at = |time: f64| coordinate(&parameters, time)[1].clone();
         let same = at(1.0).iter().zip(at(6.0)).all(|(a, b)| (a - b).abs() < 1e-5);
         let range =
             (0..20).map(|i| at(0.25 * f64::from(i))[7]).fold((1.0_f64, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));

@@ -1,32 +1,33 @@
-//! The in-between shape as the particles see it: smooth through its control points, with folds that travel along it.
+//! The refined in-between shape: a smooth curve through the control points, with folds that travel along it.
 
 use bansho_base::{
     math::{self, DVec2, lerp, random::Key},
     noise::{Coordinate, Fractal, Noise},
 };
 
-use super::arc_length::{Along, Mark};
+use super::arc_length::{ArcLengthMap, ArcPosition};
 use crate::{
     AuroraParameters, FoldParameters,
-    shapes::{Bridge, Neighbourhood, Segments, Shape, Sheet, lengths},
+    shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetSampler, cumulative_lengths},
 };
 
-/// Pieces that a fold is made of, unless all sheets together would have too many.
+/// Segments per fold, unless there would be too many.
 const PIECES_PER_FOLD: f64 = 12.0;
-/// Pieces are not shorter than L_thr over this.
+/// Minimum segment length is L_thr divided by this.
 const PIECES_PER_THICKNESS: f64 = 4.0;
-/// Points nearer than so many pieces may have changed places.
+/// Points closer than this many segments may be swapped.
 const NEAR_PIECES: f64 = 2.0;
-/// Most pieces of all sheets together, and for each particle, but not fewer than so many, nor than there are segments between control points.
-const MOST_PIECES: f64 = 20_000.0;
+/// Maximum segments of all sheets, per particle and in total, and the minimum of that limit; never fewer than one per
+/// control segment.
+const MAX_SEGMENTS: f64 = 20_000.0;
 const PIECES_PER_PARTICLE: f64 = 0.05;
-const FEW_PIECES: f64 = 2_000.0;
-/// Gradient noise seldom leaves half of its bounds: this makes its swings those that are asked for.
+const MIN_MAX_SEGMENTS: f64 = 2_000.0;
+/// Normalization: gradient noise rarely exceeds half of its range.
 const SWING: f64 = 2.0;
 
-/// How the shape is made finer and folded.
+/// Parameters of refinement and folds.
 #[derive(Clone, Debug)]
-pub(crate) struct Folding {
+pub(crate) struct FoldModel {
     parameters: FoldParameters,
     noise: Noise<2>,
     piece_km: f64,
@@ -34,104 +35,109 @@ pub(crate) struct Folding {
     half_km: f64,
 }
 
-impl Folding {
+impl FoldModel {
     pub(crate) fn new(aurora: &AuroraParameters, key: Key) -> Self {
         let parameters = aurora.folds.clone();
         let [seed, ..] = key.words(0, 0, bansho_base::math::random::Purpose::named("aurora folds"));
         let fractal = Fractal { octaves: 2, ..Fractal::default() };
         let noise = Noise::new(seed, fractal, [0; 2]).expect("two octaves without a period are noise");
         let fold = if parameters.amplitude_km > 0.0 { parameters.scale_km / PIECES_PER_FOLD } else { f64::INFINITY };
-        // Nothing finer than a part of its thickness can be seen of a sheet.
+        // Detail finer than a fraction of the thickness is not visible.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
-        let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(FEW_PIECES, MOST_PIECES);
+        let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(MIN_MAX_SEGMENTS, MAX_SEGMENTS);
         Self { noise, piece_km, most_pieces, half_km: aurora.extent_km / 2.0, parameters }
     }
 
-    /// How far the sheet swings at a coordinate along it and a time, km.
+    /// Lateral displacement of the sheet at a coordinate and a time, km.
     fn swing(&self, along: f64, time: f64) -> f64 {
         let FoldParameters { amplitude_km, scale_km, speed_km_per_s, life_s, .. } = self.parameters;
-        let place = [(along - speed_km_per_s * time) / scale_km, time / life_s];
-        SWING * amplitude_km * f64::from(self.noise.at(place.map(Coordinate::from_f64)))
+        let coordinates = [(along - speed_km_per_s * time) / scale_km, time / life_s];
+        SWING * amplitude_km * f64::from(self.noise.at(coordinates.map(Coordinate::from_f64)))
     }
 }
 
-/// The finer, folded shape, where everything on it is found by nearness.
+/// The refined, folded shape with nearest-point queries.
 #[derive(Clone, Debug)]
-pub(crate) struct Course {
+pub(crate) struct RefinedShape {
     pub(crate) shape: Shape,
-    /// The coordinate along the sheets at each point of the finer shape, km.
-    alongs: Vec<Vec<f64>>,
-    /// Share of the sheet's length before each point.
-    shares: Vec<Vec<f64>>,
-    /// The sheet and point at which each segment begins, over all sheets in turn.
+    /// Arc-length coordinate of each point, km.
+    arc_coordinates: Vec<Vec<f64>>,
+    /// Fraction of the sheet's length at each point.
+    fractions: Vec<Vec<f64>>,
+    /// Sheet and index of the start of each segment, over all sheets.
     starts: Vec<[u32; 2]>,
-    /// What there is along each segment, in the same order.
-    parts: Vec<Part>,
-    near: Neighbourhood,
+    /// Attributes of each segment, in the same order.
+    attributes: Vec<SegmentAttributes>,
+    near: NearestSegmentGrid,
 }
 
-/// What there is at the start of a segment, and by how much it is more at its end.
+/// Attributes at the start of a segment, and their change to its end.
 #[derive(Clone, Copy, Debug)]
-struct Part {
-    share: [f64; 2],
+struct SegmentAttributes {
+    fraction: [f64; 2],
     flux: [f64; 2],
     energy: [f64; 2],
-    /// One over its length, 1/km, negative where the sheet is listed against the way of its coordinate; 0 where it has no length.
+    /// One over its length, 1/km, negative where the sheet is listed against its coordinate; 0 for a degenerate
+    /// segment.
     per_length: f64,
     sheet: u32,
 }
 
-/// The place of a sheet that is nearest to a particle.
+/// The point of a sheet that is nearest to a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Projection {
+pub(crate) struct SheetProjection {
     pub(crate) sheet: u32,
-    pub(crate) share: f64,
+    pub(crate) fraction: f64,
     pub(crate) flux: f64,
     pub(crate) energy: f64,
-    /// Distance, km, negative on the left of the way along which the sheet's coordinate has grown.
+    /// Signed distance, km, negative to the left of the coordinate's direction.
     pub(crate) side: f64,
 }
 
-impl Course {
-    /// The course of `shape` and the bridges over its gaps at a time; particles within `reach` km find it.
+impl RefinedShape {
+    /// Refines `shape` and the bridges over its gaps at a time, for queries within `reach` km.
     pub(crate) fn new(
         (shape, bridges): (&Shape, &[Bridge]),
-        along: &Along,
-        folding: &Folding,
+        along: &ArcLengthMap,
+        folds: &FoldModel,
         time: f64,
         reach: f64,
     ) -> Self {
-        // Each segment between control points is made of whole pieces, up to one more than fit.
+        // Each control segment has a whole number of segments, at most one more than would fit.
         let segments: usize = shape.sheets.iter().map(|sheet| sheet.points.len().saturating_sub(1)).sum();
-        let piece = folding.piece_km.max(shape.length() / (folding.most_pieces - segments as f64).max(1.0));
-        let (mut fine, mut marks) = (Shape::default(), Vec::new());
+        let piece = folds.piece_km.max(shape.length() / (folds.most_pieces - segments as f64).max(1.0));
+        let (mut fine, mut arc_positions) = (Shape::default(), Vec::new());
         for (index, sheet) in shape.sheets.iter().enumerate() {
-            let (mut refined, own) = refine(sheet, piece, |point, part| along.between(index, point, part));
-            if folding.parameters.amplitude_km > 0.0 {
-                fold(&mut refined, &own, folding, time);
+            let (mut refined, own) = refine(sheet, piece, |point, t| along.interpolate(index, point, t));
+            if folds.parameters.amplitude_km > 0.0 {
+                fold(&mut refined, &own, folds, time);
             }
             fine.sheets.push(refined);
-            marks.push(own);
+            arc_positions.push(own);
         }
         for bridge in bridges {
-            let (refined, own) = span(bridge, &fine, &marks, piece);
+            let (refined, own) = bridge_sheet(bridge, &fine, &arc_positions, piece);
             fine.sheets.push(refined);
-            marks.push(own);
+            arc_positions.push(own);
         }
-        let (mut shares, mut starts) = (Vec::new(), Vec::new());
+        let (mut fractions, mut starts) = (Vec::new(), Vec::new());
         for (index, sheet) in fine.sheets.iter().enumerate() {
             starts.extend((1..sheet.points.len()).map(|point| [index as u32, point as u32 - 1]));
-            shares.push(length_shares(&sheet.points));
+            fractions.push(length_fractions(&sheet.points));
         }
-        let parts = starts.iter().map(|start| Part::new(&fine, &marks, &shares, *start)).collect();
-        let alongs = marks.iter().map(|marks| marks.iter().map(|mark| mark.along).collect()).collect();
-        let near = Neighbourhood::new(&fine, reach);
-        Self { shape: fine, alongs, shares, starts, parts, near }
+        let attributes =
+            starts.iter().map(|start| SegmentAttributes::new(&fine, &arc_positions, &fractions, *start)).collect();
+        let arc_coordinates = arc_positions
+            .iter()
+            .map(|arc_positions| arc_positions.iter().map(|arc_position| arc_position.coordinate).collect())
+            .collect();
+        let near = NearestSegmentGrid::new(&fine, reach);
+        Self { shape: fine, arc_coordinates, fractions, starts, attributes, near }
     }
 
     /// Its segments, to be sampled.
-    pub(crate) fn segments(&self) -> Segments<'_> {
-        Segments::new(&self.shape)
+    pub(crate) fn segments(&self) -> SheetSampler<'_> {
+        SheetSampler::new(&self.shape)
     }
 
     /// Length of each sheet, km.
@@ -140,46 +146,50 @@ impl Course {
         self.shape.sheets.iter().map(|sheet| length(&sheet.points)).collect()
     }
 
-    /// The place at a share of a sheet's length, km.
-    pub(crate) fn place(&self, sheet: usize, share: f64) -> DVec2 {
-        let (point, part) = self.split(sheet, share);
+    /// The position at a fraction of a sheet's length, km.
+    pub(crate) fn position(&self, sheet: usize, fraction: f64) -> DVec2 {
+        let (point, t) = self.split(sheet, fraction);
         let points = &self.shape.sheets[sheet].points;
-        points[point].lerp(points[point + 1], part)
+        points[point].lerp(points[point + 1], t)
     }
 
-    /// The coordinate after every `last`th part of a sheet's length, from its beginning to its end, km.
-    pub(crate) fn alongs(&self, sheet: usize, last: usize) -> Vec<f64> {
-        let (alongs, shares) = (&self.alongs[sheet], &self.shares[sheet]);
+    /// Coordinates at `last + 1` equally spaced fractions of a sheet's length, km.
+    pub(crate) fn arc_coordinates(&self, sheet: usize, last: usize) -> Vec<f64> {
+        let (arc_coordinates, fractions) = (&self.arc_coordinates[sheet], &self.fractions[sheet]);
         let mut after = 1;
         let at = |node: usize| {
-            let share = node as f64 / last as f64;
-            while after + 1 < shares.len() && shares[after] <= share {
+            let fraction = node as f64 / last as f64;
+            while after + 1 < fractions.len() && fractions[after] <= fraction {
                 after += 1;
             }
-            lerp(alongs[after - 1], alongs[after], part_between([shares[after - 1], shares[after]], share))
+            lerp(
+                arc_coordinates[after - 1],
+                arc_coordinates[after],
+                fraction_between([fractions[after - 1], fractions[after]], fraction),
+            )
         };
         (0..=last).map(at).collect()
     }
 
-    /// The point before a share of a sheet's length, and how far it is on the way to the next.
-    fn split(&self, sheet: usize, share: f64) -> (usize, f64) {
-        let shares = &self.shares[sheet];
-        let after = shares.partition_point(|end| *end <= share).clamp(1, shares.len() - 1);
-        (after - 1, part_between([shares[after - 1], shares[after]], share))
+    /// Point before a fraction of a sheet's length, and the interpolation fraction.
+    fn split(&self, sheet: usize, fraction: f64) -> (usize, f64) {
+        let fractions = &self.fractions[sheet];
+        let after = fractions.partition_point(|end| *end <= fraction).clamp(1, fractions.len() - 1);
+        (after - 1, fraction_between([fractions[after - 1], fractions[after]], fraction))
     }
 
-    /// Each piece of the sheets in turn, in parts of at most the share `most` of its sheet's length: its sheet, the share of the sheet's length
-    /// before its middle, the flux factor there, its length in km.
+    /// All segments, subdivided to at most the fraction `most` of their sheet's length: sheet, fraction of the length
+    /// at its middle, flux factor, length in km.
     pub(crate) fn pieces(&self, most: impl Fn(usize) -> f64) -> impl Iterator<Item = (usize, f64, f64, f64)> {
         self.starts.iter().flat_map(move |start| {
-            let [number, index] = start.map(|part| part as usize);
-            let (sheet, shares) = (&self.shape.sheets[number], &self.shares[number]);
+            let [number, index] = start.map(|t| t as usize);
+            let (sheet, fractions) = (&self.shape.sheets[number], &self.fractions[number]);
             let length = sheet.points[index].distance(sheet.points[index + 1]);
-            let count = ((shares[index + 1] - shares[index]) / most(number)).ceil().max(1.0);
-            (0..count as usize).map(move |part| {
-                let middle = (part as f64 + 0.5) / count;
+            let count = ((fractions[index + 1] - fractions[index]) / most(number)).ceil().max(1.0);
+            (0..count as usize).map(move |t| {
+                let middle = (t as f64 + 0.5) / count;
                 let at = |values: &[f64]| lerp(values[index], values[index + 1], middle);
-                (number, at(shares), at(&sheet.flux), length / count)
+                (number, at(fractions), at(&sheet.flux), length / count)
             })
         })
     }
@@ -194,127 +204,141 @@ impl Course {
         self.near.nearest(point).map(|(segment, _)| self.starts[segment].map(|number| number as usize))
     }
 
-    /// `point`, or if it is farther than `most` km from the shape, the place on the way to it that is not; itself beyond the reach.
-    pub(crate) fn held(&self, point: DVec2, most: f64) -> DVec2 {
-        let Some(nearest) = self.near.nearest_place(point).filter(|nearest| nearest.square > most * most) else {
+    /// `point`, moved toward the shape if it is farther than `most` km from it; unchanged beyond the reach.
+    pub(crate) fn clamp_distance(&self, point: DVec2, most: f64) -> DVec2 {
+        let Some(nearest) = self.near.nearest_point(point).filter(|nearest| nearest.distance_squared > most * most)
+        else {
             return point;
         };
         let [sheet, index] = self.starts[nearest.segment].map(|number| number as usize);
         let points = &self.shape.sheets[sheet].points;
-        let place = points[index].lerp(points[index + 1], nearest.share);
-        place + (point - place) * (most / math::sqrt(nearest.square))
+        let coordinates = points[index].lerp(points[index + 1], nearest.fraction);
+        coordinates + (point - coordinates) * (most / math::sqrt(nearest.distance_squared))
     }
 
-    /// The place nearest to `point`; none beyond the reach.
+    /// The position nearest to `point`; none beyond the reach.
     #[inline]
-    pub(crate) fn foot(&self, point: DVec2) -> Option<Projection> {
-        let nearest = self.near.nearest_place(point)?;
-        let part = &self.parts[nearest.segment];
-        let at = |[start, more]: [f64; 2]| start + nearest.share * more;
-        Some(Projection {
-            sheet: part.sheet,
-            share: at(part.share),
-            flux: at(part.flux),
-            energy: at(part.energy),
-            side: nearest.side * part.per_length,
+    pub(crate) fn project(&self, point: DVec2) -> Option<SheetProjection> {
+        let nearest = self.near.nearest_point(point)?;
+        let t = &self.attributes[nearest.segment];
+        let at = |[start, more]: [f64; 2]| start + nearest.fraction * more;
+        Some(SheetProjection {
+            sheet: t.sheet,
+            fraction: at(t.fraction),
+            flux: at(t.flux),
+            energy: at(t.energy),
+            side: nearest.cross * t.per_length,
         })
     }
 }
 
-impl Part {
-    fn new(shape: &Shape, marks: &[Vec<Mark>], shares: &[Vec<f64>], [sheet, index]: [u32; 2]) -> Self {
+impl SegmentAttributes {
+    fn new(
+        shape: &Shape,
+        arc_positions: &[Vec<ArcPosition>],
+        fractions: &[Vec<f64>],
+        [sheet, index]: [u32; 2],
+    ) -> Self {
         let (number, index) = (sheet as usize, index as usize);
         let on = &shape.sheets[number];
         let along = |values: &[f64]| [values[index], values[index + 1] - values[index]];
         let length = on.points[index].distance(on.points[index + 1]);
         Self {
-            share: along(&shares[number]),
+            fraction: along(&fractions[number]),
             flux: along(&on.flux),
             energy: along(&on.energy),
-            per_length: if length > 0.0 { marks[number][index].direction / length } else { 0.0 },
+            per_length: if length > 0.0 { arc_positions[number][index].direction / length } else { 0.0 },
             sheet,
         }
     }
 }
 
-/// How far a share of the length is from the one to the other.
-fn part_between([before, end]: [f64; 2], share: f64) -> f64 {
-    ((share - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+/// How far a fraction of the length is from the one to the other.
+fn fraction_between([before, end]: [f64; 2], fraction: f64) -> f64 {
+    ((fraction - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
-/// Share of the length before each point; 0 everywhere where there is no length.
-fn length_shares(points: &[DVec2]) -> Vec<f64> {
-    let ends = lengths(points);
+/// Fraction of the length at each point; 0 everywhere for a line without length.
+fn length_fractions(points: &[DVec2]) -> Vec<f64> {
+    let ends = cumulative_lengths(points);
     let length = ends.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
     ends.iter().map(|end| end / length).collect()
 }
 
-/// A smooth line through a sheet's points in pieces of about that length, and the coordinate along it at each of its points.
-fn refine(sheet: &Sheet, piece_km: f64, along: impl Fn(usize, f64) -> Mark) -> (Sheet, Vec<Mark>) {
-    let points = in_order(&sheet.points, NEAR_PIECES * piece_km);
+/// Refines a sheet to a cubic Hermite curve in segments of about that length, and interpolates the coordinate.
+fn refine(sheet: &Sheet, piece_km: f64, arc_position: impl Fn(usize, f64) -> ArcPosition) -> (Sheet, Vec<ArcPosition>) {
+    let points = without_swapped_points(&sheet.points, NEAR_PIECES * piece_km);
     let headings = headings(&points);
-    let (mut fine, mut marks) = (Sheet::default(), Vec::new());
-    let mut push = |point: DVec2, index: usize, part: f64| {
+    let (mut fine, mut arc_positions) = (Sheet::default(), Vec::new());
+    let mut push = |point: DVec2, index: usize, t: f64| {
         fine.points.push(point);
-        fine.flux.push(lerp(sheet.flux[index], sheet.flux[index + 1], part));
-        fine.energy.push(lerp(sheet.energy[index], sheet.energy[index + 1], part));
-        marks.push(along(index, part));
+        fine.flux.push(lerp(sheet.flux[index], sheet.flux[index + 1], t));
+        fine.energy.push(lerp(sheet.energy[index], sheet.energy[index + 1], t));
+        arc_positions.push(arc_position(index, t));
     };
     for (index, pair) in points.windows(2).enumerate() {
-        let way = pair[1] - pair[0];
-        let length = way.length();
-        let tangents = [headings[index], headings[index + 1]].map(|heading| not_back(heading, way) * length);
+        let displacement = pair[1] - pair[0];
+        let length = displacement.length();
+        let tangents = [headings[index], headings[index + 1]]
+            .map(|heading| without_backward_component(heading, displacement) * length);
         let pieces = (length / piece_km).ceil().max(1.0) as usize;
         for number in 0..pieces {
-            let part = number as f64 / pieces as f64;
-            push(hermite([pair[0], pair[1]], tangents, part), index, part);
+            let t = number as f64 / pieces as f64;
+            push(hermite([pair[0], pair[1]], tangents, t), index, t);
         }
     }
     if let Some(last) = points.len().checked_sub(2) {
         push(points[last + 1], last, 1.0);
     }
-    (fine, marks)
+    (fine, arc_positions)
 }
 
-/// The light over a gap as a sheet of its own, from the one end of a sheet to that of another, and the coordinate along it, which goes on from
-/// the first.
-fn span(bridge: &Bridge, fine: &Shape, marks: &[Vec<Mark>], piece_km: f64) -> (Sheet, Vec<Mark>) {
+/// A bridge as a sheet between two ends; the coordinate continues that of the first.
+fn bridge_sheet(
+    bridge: &Bridge,
+    fine: &Shape,
+    arc_positions: &[Vec<ArcPosition>],
+    piece_km: f64,
+) -> (Sheet, Vec<ArcPosition>) {
     let point = |(sheet, at_end): (usize, bool)| if at_end { fine.sheets[sheet].points.len() - 1 } else { 0 };
     let [from, to] = bridge.ends.map(|end| fine.sheets[end.0].points[point(end)]);
-    let begin = marks[bridge.ends[0].0][point(bridge.ends[0])];
+    let begin = arc_positions[bridge.ends[0].0][point(bridge.ends[0])];
     let direction = if bridge.ends[0].1 { begin.direction } else { -begin.direction };
     let length = from.distance(to);
     let pieces = (length / piece_km).ceil().max(1.0) as usize;
     let (mut sheet, mut own) = (Sheet::default(), Vec::new());
     for number in 0..=pieces {
-        let part = number as f64 / pieces as f64;
-        sheet.points.push(from.lerp(to, part));
+        let t = number as f64 / pieces as f64;
+        sheet.points.push(from.lerp(to, t));
         sheet.flux.push(bridge.flux);
         sheet.energy.push(bridge.energy);
-        own.push(Mark { along: begin.along + direction * part * length, direction });
+        own.push(ArcPosition { coordinate: begin.coordinate + direction * t * length, direction });
     }
     (sheet, own)
 }
 
-/// The points in the order in which the sheet passes them: two nearer than `near_km` that lie the wrong way round between their neighbours, as
-/// where a fold is born, change places. Else the sheet would pass there three times, as bright.
-fn in_order(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
+/// Swaps neighboring points closer than `near_km` that are in the wrong order, as occurs where a fold forms. Otherwise
+/// the sheet would pass there three times and be three times as bright.
+fn without_swapped_points(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
     let mut points = points.to_vec();
     for index in 1..points.len().saturating_sub(2) {
         let [before, one, other, after] = [0, 1, 2, 3].map(|next| points[index - 1 + next]);
-        let way = other - one;
-        if way.length() < near_km && way.dot(one - before) < 0.0 && way.dot(after - other) < 0.0 {
+        let displacement = other - one;
+        if displacement.length() < near_km
+            && displacement.dot(one - before) < 0.0
+            && displacement.dot(after - other) < 0.0
+        {
             points.swap(index, index + 1);
         }
     }
     points
 }
 
-/// The direction of the sheet at each point: that of the circle through it and its neighbours.
+/// Tangent direction at each point: that of the circle through it and its neighbors.
 fn headings(points: &[DVec2]) -> Vec<DVec2> {
     let weighted = |from: usize| {
-        let way = points[from + 1] - points[from];
-        way / way.length_squared().max(1e-12)
+        let displacement = points[from + 1] - points[from];
+        displacement / displacement.length_squared().max(1e-12)
     };
     let last = points.len() - 1;
     let heading = |index: usize| {
@@ -325,48 +349,49 @@ fn headings(points: &[DVec2]) -> Vec<DVec2> {
     (0..points.len()).map(heading).collect()
 }
 
-/// A heading without what of it goes against the way: a curve that first went back would pass there three times, as bright.
-fn not_back(heading: DVec2, way: DVec2) -> DVec2 {
-    let back = (heading.dot(way) / way.length_squared().max(1e-12)).min(0.0);
-    heading - way * back
+/// Removes the backward component of a tangent, which would make the curve pass there three times.
+fn without_backward_component(heading: DVec2, displacement: DVec2) -> DVec2 {
+    let back = (heading.dot(displacement) / displacement.length_squared().max(1e-12)).min(0.0);
+    heading - displacement * back
 }
 
-/// Cubic from one point to the other with those tangents.
+/// Cubic Hermite interpolation.
 fn hermite([a, b]: [DVec2; 2], [at_a, at_b]: [DVec2; 2], t: f64) -> DVec2 {
-    let (square, rest) = (t * t, 1.0 - t);
+    let (distance_squared, rest) = (t * t, 1.0 - t);
     let rest_square = rest * rest;
-    a * (rest_square * (1.0 + 2.0 * t)) + b * (square * (3.0 - 2.0 * t)) + at_a * (t * rest_square)
-        - at_b * (square * rest)
+    a * (rest_square * (1.0 + 2.0 * t)) + b * (distance_squared * (3.0 - 2.0 * t)) + at_a * (t * rest_square)
+        - at_b * (distance_squared * rest)
 }
 
-/// Swings every point of the sheet to its side, and along it so that crests lean over: by the way of the coordinate.
-fn fold(sheet: &mut Sheet, marks: &[Mark], folding: &Folding, time: f64) {
+/// Displaces every point laterally, and along the sheet so that crests lean over, relative to the coordinate's
+/// direction.
+fn fold(sheet: &mut Sheet, arc_positions: &[ArcPosition], folds: &FoldModel, time: f64) {
     let headings = headings(&sheet.points);
-    let half = DVec2::splat(folding.half_km);
-    for ((point, heading), mark) in sheet.points.iter_mut().zip(headings).zip(marks) {
-        let swing = mark.direction * folding.swing(mark.along, time);
-        *point = (*point + swing * (heading.perp() + folding.parameters.curl * heading)).clamp(-half, half);
+    let half = DVec2::splat(folds.half_km);
+    for ((point, heading), arc_position) in sheet.points.iter_mut().zip(headings).zip(arc_positions) {
+        let swing = arc_position.direction * folds.swing(arc_position.coordinate, time);
+        *point = (*point + swing * (heading.perp() + folds.parameters.curl * heading)).clamp(-half, half);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shapes::lengths as ways;
+    use crate::shapes::cumulative_lengths as ways;
 
-    fn folding(folds: FoldParameters) -> Folding {
-        Folding::new(&AuroraParameters { folds, ..AuroraParameters::default() }, Key::new(3, "folds"))
+    fn folds(folds: FoldParameters) -> FoldModel {
+        FoldModel::new(&AuroraParameters { folds, ..AuroraParameters::default() }, Key::new(3, "folds"))
     }
 
     #[test]
     fn crests_travel_along_the_sheet_as_fast_as_told() {
         for speed_km_per_s in [-3.0, 0.0, 5.0] {
-            let folding = folding(FoldParameters { speed_km_per_s, life_s: 1e4, ..FoldParameters::default() });
+            let folds = folds(FoldParameters { speed_km_per_s, life_s: 1e4, ..FoldParameters::default() });
             let (mut apart, mut all) = (0.0, 0.0);
-            for place in 0..200 {
-                let along = f64::from(place);
-                let swing = folding.swing(along, 1.0);
-                let later = folding.swing(along + 4.0 * speed_km_per_s, 5.0);
+            for coordinates in 0..200 {
+                let along = f64::from(coordinates);
+                let swing = folds.swing(along, 1.0);
+                let later = folds.swing(along + 4.0 * speed_km_per_s, 5.0);
                 apart += (later - swing) * (later - swing);
                 all += swing * swing;
             }
@@ -376,16 +401,19 @@ mod tests {
 
     /// How far crests lean: the mean of what points are moved along the sheet beside how far they are moved to its side.
     fn leaning(curl: f64) -> f64 {
-        let folding = folding(FoldParameters { curl, ..FoldParameters::default() });
+        let folds = folds(FoldParameters { curl, ..FoldParameters::default() });
         let points: Vec<DVec2> = (0..400).map(|east| DVec2::new(f64::from(east) - 200.0, 0.0)).collect();
-        let marks: Vec<Mark> = ways(&points).into_iter().map(|along| Mark { along, direction: 1.0 }).collect();
+        let arc_positions: Vec<ArcPosition> =
+            ways(&points).into_iter().map(|coordinate| ArcPosition { coordinate, direction: 1.0 }).collect();
         let mut sheet = Sheet { flux: vec![1.0; 400], energy: vec![1.0; 400], points: points.clone() };
-        fold(&mut sheet, &marks, &folding, 2.0);
+        fold(&mut sheet, &arc_positions, &folds, 2.0);
         let moved = || sheet.points.iter().zip(&points).map(|(now, was)| *now - *was);
-        let [product, square] =
-            [moved().map(|way| way.x * way.y).sum::<f64>(), moved().map(|way| way.y * way.y).sum::<f64>()];
-        assert!(square > 100.0);
-        product / square
+        let [product, distance_squared] = [
+            moved().map(|displacement| displacement.x * displacement.y).sum::<f64>(),
+            moved().map(|displacement| displacement.y * displacement.y).sum::<f64>(),
+        ];
+        assert!(distance_squared > 100.0);
+        product / distance_squared
     }
 
     #[test]

@@ -7,18 +7,18 @@ use bansho_base::{
 
 use super::*;
 use crate::{
-    shapes::{Listing, MotionParameters},
+    shapes::{ControlPointIds, MotionParameters},
     simulate::sheets::{
-        arc_length::Along,
-        rays::{Places, Rays},
-        refined_shape::{Course, Folding},
+        arc_length::ArcLengthMap,
+        rays::{PatternInputs, RayPattern},
+        refined_shape::{FoldModel, RefinedShape},
     },
 };
 use fearless_simd::Level;
 
 const KEY: Key = Key::new(8, "arrivals");
 
-/// A sheet at that place south.
+/// A sheet at that position south.
 fn row(from: f64, to: f64, south: f64) -> SheetParameters {
     SheetParameters { smooth: false, ..line([from, south], [to, south]) }
 }
@@ -34,36 +34,44 @@ fn reached(sheets: Vec<SheetParameters>) -> ShapeParameters {
 
 /// What is seen of the sheets at a moment.
 struct Seen {
-    course: Course,
-    /// The logarithm of the rays' brightness at places beside the sheets, some on their left and some on their right.
+    refined: RefinedShape,
+    /// The logarithm of the rays' brightness at positions beside the sheets, some on their left and some on their right.
     rays: Vec<f32>,
 }
 
 impl Seen {
-    fn new(parameters: &AuroraParameters, sequence: &Sequence, along: &Along, time: f64, places: &[DVec2]) -> Self {
-        let folding = Folding::new(parameters, KEY);
+    fn new(
+        parameters: &AuroraParameters,
+        sequence: &Sequence,
+        along: &ArcLengthMap,
+        time: f64,
+        positions: &[DVec2],
+    ) -> Self {
+        let folds = FoldModel::new(parameters, KEY);
         let (shape, bridges) = (sequence.at(time), sequence.bridges(time));
-        let course = Course::new((&shape, &bridges), along, &folding, time, 40.0);
-        let rays = Rays::new(parameters, KEY);
-        let table = rays.table(&course.sheet_lengths(), |sheet, last| course.alongs(sheet, last), time);
-        let bright = |place: &DVec2| {
+        let refined = RefinedShape::new((&shape, &bridges), along, &folds, time, 40.0);
+        let rays = RayPattern::new(parameters, KEY);
+        let table = rays.table(&refined.sheet_lengths(), |sheet, last| refined.arc_coordinates(sheet, last), time);
+        let bright = |position: &DVec2| {
             // While a sheet turns it passes some of them far away.
-            let Some(foot) = course.foot(*place) else { return 0.0 };
-            let places =
-                Places { noises: [table.at(foot.sheet, foot.share); LANES], side: [foot.side.signum() as f32; LANES] };
-            approximations::ln(rays.at(Level::new(), &places, time).brightness[0])
+            let Some(projection) = refined.project(*position) else { return 0.0 };
+            let positions = PatternInputs {
+                noises: [table.at(projection.sheet, projection.fraction); LANES],
+                side: [projection.side.signum() as f32; LANES],
+            };
+            approximations::ln(rays.at(Level::new(), &positions, time).brightness[0])
         };
-        let rays = places.iter().map(bright).collect();
-        Self { course, rays }
+        let rays = positions.iter().map(bright).collect();
+        Self { refined, rays }
     }
 
     /// Farthest that a point of one is from the other, km, both ways.
     fn apart(&self, other: &Self) -> f64 {
-        let one_way = |from: &Course, to: &Course| {
+        let one_way = |from: &RefinedShape, to: &RefinedShape| {
             let points = from.shape.sheets.iter().flat_map(|sheet| &sheet.points);
             points.map(|point| to.distance(*point).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
         };
-        one_way(&self.course, &other.course).max(one_way(&other.course, &self.course))
+        one_way(&self.refined, &other.refined).max(one_way(&other.refined, &self.refined))
     }
 }
 
@@ -72,28 +80,28 @@ impl Seen {
 enum Known {
     /// As the sequence says.
     ByNumber,
-    /// By their places in the list of sheets, as if these never changed.
-    ByPlace,
+    /// By their positions in the list of sheets, as if these never changed.
+    ByPosition,
 }
 
-/// The most that folds move, km, and that rays change at fixed places, from just before `arrivals` to just after them.
+/// The most that folds move, km, and that rays change at fixed positions, from just before `arrivals` to just after them.
 fn jumps(
     parameters: &AuroraParameters,
     sequence: &Sequence,
     arrivals: &[f64],
-    places: &[DVec2],
+    positions: &[DVec2],
     known: Known,
 ) -> [f64; 2] {
-    let follow = |along: &Along, time: f64| {
+    let follow = |along: &ArcLengthMap, time: f64| {
         let shape = sequence.at(time);
         match known {
-            Known::ByNumber => along.follow(&shape, &sequence.listing(time)),
-            Known::ByPlace => along.follow(&shape, &Listing::alone(&in_turn(&shape))),
+            Known::ByNumber => along.transfer(&shape, &sequence.control_point_ids(time)),
+            Known::ByPosition => along.transfer(&shape, &ControlPointIds::alone(&in_turn(&shape))),
         }
     };
-    let (mut along, mut time, mut most) = (Along::alone(&sequence.at(0.0)), 0.0, [0.0_f64; 2]);
+    let (mut along, mut time, mut most) = (ArcLengthMap::alone(&sequence.at(0.0)), 0.0, [0.0_f64; 2]);
     if known == Known::ByNumber {
-        along = Along::begin(&sequence.at(0.0), &sequence.listing(0.0));
+        along = ArcLengthMap::from_lengths(&sequence.at(0.0), &sequence.control_point_ids(0.0));
     }
     for arrival in arrivals {
         while time < arrival - 0.04 {
@@ -104,7 +112,7 @@ fn jumps(
         let [before, after] = [-1e-6, 1e-6].map(|offset| {
             time = arrival + offset;
             along = follow(&along, time);
-            Seen::new(parameters, sequence, &along, time, places)
+            Seen::new(parameters, sequence, &along, time, positions)
         });
         let rays = before.rays.iter().zip(&after.rays).map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max);
         most = [most[0].max(before.apart(&after)), most[1].max(rays)];
@@ -118,11 +126,11 @@ fn in_turn(shape: &Shape) -> Vec<Vec<usize>> {
     shape.sheets.iter().map(|sheet| numbers.by_ref().take(sheet.points.len()).collect()).collect()
 }
 
-/// Places 9 km to both sides of a sheet along 300 km.
+/// Positions 9 km to both sides of a sheet along 300 km.
 fn beside(south: f64) -> Vec<DVec2> {
-    let place =
+    let position =
         |index: i32| DVec2::new(f64::from(index) * 7.0 - 150.0, south + if index % 2 == 0 { 9.0 } else { -9.0 });
-    (0..43).map(place).collect()
+    (0..43).map(position).collect()
 }
 
 #[test]
@@ -134,11 +142,11 @@ fn nothing_jumps_where_sheets_were_drawn_in_another_order_and_direction() {
         reached(vec![row(-200.0, 200.0, 100.0), row(-200.0, 200.0, 0.0)]),
     ]);
     let sequence = sequence(&parameters);
-    let places = [beside(8.0), beside(105.0)].concat();
-    let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &places, Known::ByNumber);
+    let positions = [beside(8.0), beside(105.0)].concat();
+    let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByNumber);
     assert!(folds < 1e-3 && rays < 1e-2, "folds jump by {folds} km, rays by {rays}");
     // What the figures are of a pattern that goes by the list of sheets.
-    let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &places, Known::ByPlace);
+    let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByPosition);
     assert!(folds > 1.0 && rays > 0.3, "{folds} {rays}");
 }
 
@@ -156,11 +164,11 @@ fn nothing_jumps_where_a_sheet_joins_one_of_the_other_direction() {
         split,
     ]);
     let sequence = sequence(&parameters);
-    let places: Vec<DVec2> = beside(0.0).into_iter().filter(|place| place.x.abs() > 60.0).collect();
-    let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &places, Known::ByNumber);
+    let positions: Vec<DVec2> = beside(0.0).into_iter().filter(|position| position.x.abs() > 60.0).collect();
+    let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByNumber);
     assert!(rays < 1e-2, "rays jump by {rays}, folds by {folds} km");
-    // Where they grow together; a split in the very place of that join moves the one segment there.
-    let [folds, _] = jumps(&parameters, &sequence, &sequence.arrivals()[1..2], &places, Known::ByNumber);
+    // Where they grow together; a split in the very position of that join moves the one segment there.
+    let [folds, _] = jumps(&parameters, &sequence, &sequence.arrivals()[1..2], &positions, Known::ByNumber);
     assert!(folds < 0.2, "folds jump by {folds} km");
 }
 
@@ -176,8 +184,8 @@ fn nothing_jumps_where_a_loop_begins_again() {
     let sequence =
         Sequence::new(&parameters.shapes, &MotionParameters::default(), parameters.extent_km, &assets, Some(9.0))
             .unwrap();
-    let places = [beside(0.0), beside(240.0)].concat();
-    let [folds, rays] = jumps(&parameters, &sequence, &[3.0, 6.0, 9.0, 12.0, 18.0], &places, Known::ByNumber);
+    let positions = [beside(0.0), beside(240.0)].concat();
+    let [folds, rays] = jumps(&parameters, &sequence, &[3.0, 6.0, 9.0, 12.0, 18.0], &positions, Known::ByNumber);
     // A segment that is whole pieces long but for rounding has one more or less a moment later: 50 m in the line through a fold.
     assert!(folds < 0.1 && rays < 1e-2, "folds jump by {folds} km, rays by {rays}");
 }

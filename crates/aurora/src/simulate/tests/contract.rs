@@ -7,7 +7,7 @@ use bansho_base::{
 };
 
 use super::*;
-use crate::{FieldSolver, shapes::ShapeFault};
+use crate::{FieldSolver, shapes::ShapeError};
 
 fn stepped(threads: usize) -> Vec<u8> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -68,7 +68,7 @@ fn a_snapshot_holds_numbers_only() {
     let bytes = simulation.snapshot();
     let count = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
     // Behind version, steps, next number, support, time and renewals: the two courses of the coordinate, each with coordinates, ways and
-    // places of every sheet.
+    // positions of every sheet.
     let (mut at, mut starts) = (40, Vec::new());
     for _ in 0..2 {
         let sheets = count(at);
@@ -103,7 +103,7 @@ fn a_snapshot_holds_numbers_only() {
 }
 
 /// Random valid parameters at a bearable cost.
-fn random(trial: u64) -> Result<AuroraSimulation, ShapeFault> {
+fn random(trial: u64) -> Result<AuroraSimulation, ShapeError> {
     let key = Key::new(trial, "random aurora");
     let mut count = 0;
     let mut next = || {
@@ -130,10 +130,10 @@ fn all_valid_parameters_give_numbers() {
         (0..5).for_each(|_| simulation.step());
         let particles = simulation.particles();
         let half = (simulation.parameters().extent_km / 2.0) as f32;
-        for values in particles.numbers() {
+        for values in particles.float_arrays() {
             assert!(values.iter().all(|value| value.is_finite()), "trial {trial}");
         }
-        assert!(particles.positions.iter().flatten().all(|place| place.abs() <= half), "trial {trial}");
+        assert!(particles.positions.iter().flatten().all(|position| position.abs() <= half), "trial {trial}");
         assert!(particles.fades.iter().all(|fade| (0.0..=1.0).contains(fade)), "trial {trial}");
         assert!(particles.energies_ev.iter().all(|energy| (0.0..=1e5).contains(energy)), "trial {trial}");
         assert!(simulation.afterglow().red.powers_w().iter().all(|power| power.is_finite()), "trial {trial}");
@@ -160,14 +160,14 @@ fn gauss_seidel_and_the_transform_move_particles_alike() {
         relaxed.step();
     }
     let cell = exact.parameters().cell_km();
-    let places = |simulation: &AuroraSimulation| {
+    let positions = |simulation: &AuroraSimulation| {
         let particles = simulation.particles();
-        let mut places: Vec<(u64, DVec2)> =
-            (0..particles.len()).map(|index| (particles.ids[index], particles.place(index))).collect();
-        places.sort_by_key(|place| place.0);
-        places
+        let mut positions: Vec<(u64, DVec2)> =
+            (0..particles.len()).map(|index| (particles.ids[index], particles.position(index))).collect();
+        positions.sort_by_key(|position| position.0);
+        positions
     };
-    for ((id, a), (other, b)) in places(&exact).into_iter().zip(places(&relaxed)) {
+    for ((id, a), (other, b)) in positions(&exact).into_iter().zip(positions(&relaxed)) {
         assert!(id == other && a.distance(b) < 0.01 * cell, "{id}: {a} {b}");
     }
 }

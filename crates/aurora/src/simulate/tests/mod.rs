@@ -73,19 +73,19 @@ fn merging() -> Vec<ShapeParameters> {
 fn live(simulation: &AuroraSimulation) -> Vec<(DVec2, f64)> {
     let particles = simulation.particles();
     let live = (0..particles.len()).filter(|index| !particles.dying[*index]);
-    live.map(|index| (particles.place(index), f64::from(particles.powers_w[index]))).collect()
+    live.map(|index| (particles.position(index), f64::from(particles.powers_w[index]))).collect()
 }
 
-/// Sums of power over stretches of the shape, each a 50th of its length, by the nearest of many points on it; and counts.
-fn stretches(shape: &Shape, particles: &[(DVec2, f64)]) -> [Vec<f64>; 2] {
-    const STRETCHES: usize = 50;
-    const POINTS: usize = 10 * STRETCHES;
-    let segments = crate::shapes::Segments::new(shape);
+/// Sums of power over intervals of the shape, each a 50th of its length, by the nearest of many points on it; and counts.
+fn intervals(shape: &Shape, particles: &[(DVec2, f64)]) -> [Vec<f64>; 2] {
+    const INTERVALS: usize = 50;
+    const POINTS: usize = 10 * INTERVALS;
+    let segments = crate::shapes::SheetSampler::new(shape);
     let points: Vec<DVec2> =
         (0..POINTS).filter_map(|i| Some(segments.sample((i as f64 + 0.5) / POINTS as f64)?.point)).collect();
-    let mut sums = [vec![0.0; STRETCHES], vec![0.0; STRETCHES]];
-    for (place, power) in particles {
-        let distance = |index: &usize| points[*index].distance_squared(*place);
+    let mut sums = [vec![0.0; INTERVALS], vec![0.0; INTERVALS]];
+    for (position, power) in particles {
+        let distance = |index: &usize| points[*index].distance_squared(*position);
         let nearest = (0..POINTS).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
         sums[0][nearest / 10] += power;
         sums[1][nearest / 10] += 1.0;

@@ -5,15 +5,15 @@ use bansho_base::math::random::Key;
 use super::*;
 use crate::{
     FieldCharge, RelocationParameters,
-    shapes::{FRAME_S, Listing, Sheet},
+    shapes::{ControlPointIds, FRAME_S, Sheet},
     simulate::{
         AuroraParticles,
-        field::{residual, scatter::scatter, sheet_field::FieldMaker},
-        forces::Mover,
+        field::{relative_residual, sheet_charge::scatter, sheet_field::FieldBuilder},
+        forces::Integrator,
         relocation::Relocation,
         sheets::{
-            arc_length::Along,
-            refined_shape::{Course, Folding},
+            arc_length::ArcLengthMap,
+            refined_shape::{FoldModel, RefinedShape},
         },
     },
 };
@@ -28,21 +28,21 @@ fn sheet(points: &[[f64; 2]]) -> Sheet {
     }
 }
 
-fn course(parameters: &AuroraParameters, sheets: &[&[[f64; 2]]], reach: f64) -> Course {
+fn refined(parameters: &AuroraParameters, sheets: &[&[[f64; 2]]], reach: f64) -> RefinedShape {
     let shape = Shape { sheets: sheets.iter().map(|points| sheet(points)).collect() };
-    Course::new((&shape, &[]), &Along::alone(&shape), &Folding::new(parameters, KEY), 0.0, reach)
+    RefinedShape::new((&shape, &[]), &ArcLengthMap::alone(&shape), &FoldModel::new(parameters, KEY), 0.0, reach)
 }
 
 #[test]
 fn scatter_is_even_where_segments_overlap() {
     let parameters = AuroraParameters { thickness_km: bansho_base::parameters::Auto::Set(40.0), ..small() };
     // Two sheets 20 km apart that reach 20 km to each side: 60 km by 200 km, nothing counted twice.
-    let course = course(&parameters, &[&[[-100.0, 0.0], [100.0, 0.0]], &[[-100.0, 20.0], [100.0, 20.0]]], 60.0);
-    let places = scatter(&course, 20.0, 40_000, KEY, 0);
-    assert!((places.len() as f64 / 40_000.0 - 0.75).abs() < 0.01, "a quarter is nearer to the other sheet");
-    let rows = |from: f64, to: f64| places.iter().filter(|c| (from..to).contains(&c.place.y)).count() as f64;
+    let refined = refined(&parameters, &[&[[-100.0, 0.0], [100.0, 0.0]], &[[-100.0, 20.0], [100.0, 20.0]]], 60.0);
+    let positions = scatter(&refined, 20.0, 40_000, KEY, 0);
+    assert!((positions.len() as f64 / 40_000.0 - 0.75).abs() < 0.01, "a quarter is nearer to the other sheet");
+    let rows = |from: f64, to: f64| positions.iter().filter(|c| (from..to).contains(&c.position.y)).count() as f64;
     assert!((rows(0.0, 20.0) / rows(-20.0, 0.0) - 1.0).abs() < 0.03);
-    assert!(places.iter().all(|c| course.distance(c.place).is_some_and(|distance| distance <= 20.0 + 1e-9)));
+    assert!(positions.iter().all(|c| refined.distance(c.position).is_some_and(|distance| distance <= 20.0 + 1e-9)));
 }
 
 #[test]
@@ -50,11 +50,11 @@ fn the_coordinate_runs_evenly_along_points_that_lie_unevenly() {
     let parameters =
         AuroraParameters { folds: crate::FoldParameters { amplitude_km: 0.0, ..small().folds }, ..small() };
     let points = [[-50.0, 0.0], [-48.0, 0.0], [10.0, 0.0], [10.0, 0.0], [20.0, 0.0]];
-    let course = course(&parameters, &[&points], 20.0);
+    let refined = refined(&parameters, &[&points], 20.0);
     for last in [1, 7, 64] {
-        let alongs = course.alongs(0, last);
-        assert_eq!(alongs.len(), last + 1);
-        for (node, along) in alongs.iter().enumerate() {
+        let arc_coordinates = refined.arc_coordinates(0, last);
+        assert_eq!(arc_coordinates.len(), last + 1);
+        for (node, along) in arc_coordinates.iter().enumerate() {
             let even = 70.0 * node as f64 / last as f64;
             assert!((along - even).abs() < 0.3, "{along} km for {even} at {node} of {last}");
         }
@@ -66,7 +66,7 @@ fn points_that_have_changed_places_make_no_loop() {
     // The middle of an S as it is born: two of its points have not turned round yet.
     let middle =
         [[30.0, -1.5], [20.0, -1.0], [10.0, 0.0], [-0.3, 0.7], [0.3, 0.9], [-10.0, 1.5], [-20.0, 2.0], [-30.0, 3.0]];
-    let length = course(&small(), &[&middle], 20.0).sheet_lengths()[0];
+    let length = refined(&small(), &[&middle], 20.0).sheet_lengths()[0];
     let straight = DVec2::from(middle[0]).distance(middle[7].into());
     assert!(length < 1.02 * straight, "{length} for {straight}");
 }
@@ -75,15 +75,15 @@ fn points_that_have_changed_places_make_no_loop() {
 fn the_field_solves_its_equation_and_is_lowest_on_the_sheet() {
     let mut parameters = small();
     parameters.field.noise = 0.0;
-    let maker = FieldMaker::new(&parameters, KEY);
+    let builder = FieldBuilder::new(&parameters, KEY);
     let cell = parameters.cell_km();
     let half = parameters.half_thickness_km();
-    let course = course(&parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
-    let scattered = scatter(&course, half, 200_000, KEY, 0);
-    let field = maker.make(&course, &scattered, 0.0);
+    let refined = refined(&parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
+    let scattered = scatter(&refined, half, 200_000, KEY, 0);
+    let field = builder.build(&refined, &scattered, 0.0);
     let potential = &field.potential;
-    let source = maker.source(&course, &scattered, &field.counts);
-    let left = residual(potential, &source, maker.screening);
+    let source = builder.charge_density(&refined, &scattered, &field.counts);
+    let left = relative_residual(potential, &source, builder.screening);
     assert!(left < 1e-10, "{left}");
     let lowest = potential.values().iter().copied().fold(f64::INFINITY, f64::min);
     assert!(lowest < 0.0 && potential.values().iter().all(|value| *value <= 0.0));
@@ -98,19 +98,19 @@ fn the_field_solves_its_equation_and_is_lowest_on_the_sheet() {
 }
 
 /// A field without charges.
-fn nothing(parameters: &AuroraParameters) -> crate::simulate::field::sheet_field::Field {
-    let course = course(parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
-    FieldMaker::new(parameters, KEY).make(&course, &[], 0.0)
+fn nothing(parameters: &AuroraParameters) -> crate::simulate::field::sheet_field::ElectricField {
+    let refined = refined(parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
+    FieldBuilder::new(parameters, KEY).build(&refined, &[], 0.0)
 }
 
 #[test]
 fn sheets_that_do_not_pull_make_no_field() {
     let mut parameters = small();
     parameters.field.pull = 0.0;
-    let maker = FieldMaker::new(&parameters, KEY);
-    let course = course(&parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
-    let scattered = scatter(&course, parameters.half_thickness_km(), 2_000, KEY, 0);
-    let field = maker.make(&course, &scattered, 0.5);
+    let builder = FieldBuilder::new(&parameters, KEY);
+    let refined = refined(&parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
+    let scattered = scatter(&refined, parameters.half_thickness_km(), 2_000, KEY, 0);
+    let field = builder.build(&refined, &scattered, 0.5);
     assert!(field.potential.values().iter().all(|value| *value == 0.0));
     let sample = field.sample(10.0, 5.0);
     assert_eq!((sample.potential, sample.field), (0.0, [0.0; 2]));
@@ -126,18 +126,18 @@ fn a_free_particle_keeps_its_way_and_the_magnetic_field_turns_it() {
     let mut particles = AuroraParticles::default();
     particles.push(0, DVec2::ZERO, [30.0, 0.0], 1.0);
     let none = [vec![0.0], vec![0.0]];
-    Mover::new(&parameters).advance(&mut particles, &field, &none);
+    Integrator::new(&parameters).advance(&mut particles, &field, &none);
     // A quarter turn per frame, and 30 km/s for a frame are 1 km.
-    let (place, velocity) = (particles.place(0), particles.velocities.each_ref().map(|v| v[0]));
-    assert!((place - DVec2::new(0.0, -1.0)).length() < 1e-5, "{place}");
+    let (position, velocity) = (particles.position(0), particles.velocities.each_ref().map(|v| v[0]));
+    assert!((position - DVec2::new(0.0, -1.0)).length() < 1e-5, "{position}");
     assert!(velocity[0].abs() < 1e-4 && (velocity[1] + 30.0).abs() < 1e-4, "{velocity:?}");
     // Eq. (2.19) and (2.20) with a push of 9 km/s^2 along x and weight 0.4, without the bound on energy.
     parameters.field.turn_deg_per_frame = 0.0;
     parameters.particles.limit_energy = false;
     let mut particles = AuroraParticles::default();
     particles.push(0, DVec2::ZERO, [0.0, 0.0], 1.0);
-    Mover::new(&parameters).advance(&mut particles, &field, &[vec![9.0], vec![0.0]]);
-    assert!((particles.place(0).x - 0.5 * 3.6 / 900.0).abs() < 1e-7);
+    Integrator::new(&parameters).advance(&mut particles, &field, &[vec![9.0], vec![0.0]]);
+    assert!((particles.position(0).x - 0.5 * 3.6 / 900.0).abs() < 1e-7);
     assert!((particles.velocities[0][0] - 3.6 / 30.0).abs() < 1e-6);
 }
 
@@ -146,10 +146,10 @@ fn kinetic_and_potential_energy_do_not_grow() {
     let mut parameters = small();
     parameters.particles.friction_per_s = 0.0;
     parameters.field.noise = 0.5;
-    let maker = FieldMaker::new(&parameters, KEY);
-    let course = course(&parameters, &[&[[-200.0, 0.0], [0.0, 60.0], [200.0, 0.0]]], 40.0);
-    let scattered = scatter(&course, parameters.half_thickness_km(), 20_000, KEY, 0);
-    let field = maker.make(&course, &scattered, 1.0);
+    let builder = FieldBuilder::new(&parameters, KEY);
+    let refined = refined(&parameters, &[&[[-200.0, 0.0], [0.0, 60.0], [200.0, 0.0]]], 40.0);
+    let scattered = scatter(&refined, parameters.half_thickness_km(), 20_000, KEY, 0);
+    let field = builder.build(&refined, &scattered, 1.0);
     let mut particles = AuroraParticles::default();
     for id in 0..500 {
         let [u, v, ..] = KEY.uniforms(id, 0, bansho_base::math::random::Purpose(0)).map(f64::from);
@@ -165,7 +165,7 @@ fn kinetic_and_potential_energy_do_not_grow() {
     };
     let none = [vec![0.0; 500], vec![0.0; 500]];
     let depth = field.potential.values().iter().fold(0.0_f64, |least, value| least.min(*value)).abs();
-    let mover = Mover::new(&parameters);
+    let mover = Integrator::new(&parameters);
     for _ in 0..60 {
         let before = energies(&particles);
         mover.advance(&mut particles, &field, &none);
@@ -178,23 +178,27 @@ fn kinetic_and_potential_energy_do_not_grow() {
 }
 
 /// A straight sheet on a grid of cells of 10 km, with as many particles as are asked for in the cell at (0, 0)...(10, 10).
-fn relocated(count: usize, place: impl Fn(f64, f64) -> DVec2, table: RelocationParameters) -> (AuroraParticles, u64) {
+fn relocated(
+    count: usize,
+    position: impl Fn(f64, f64) -> DVec2,
+    table: RelocationParameters,
+) -> (AuroraParticles, u64) {
     let mut parameters = AuroraParameters { extent_km: 600.0, ..small() };
     parameters.field.cells = 60;
     parameters.field.noise = 0.0;
     parameters.particles.count = 1_000_000;
     parameters.particles.relocation = table;
-    let course = course(&parameters, &[&[[-200.0, 5.0], [200.0, 5.0]]], 60.0);
-    let maker = FieldMaker::new(&parameters, KEY);
-    let scattered = scatter(&course, 5.0, 20_000, KEY, 0);
-    let field = maker.make(&course, &scattered, 0.0);
+    let refined = refined(&parameters, &[&[[-200.0, 5.0], [200.0, 5.0]]], 60.0);
+    let builder = FieldBuilder::new(&parameters, KEY);
+    let scattered = scatter(&refined, 5.0, 20_000, KEY, 0);
+    let field = builder.build(&refined, &scattered, 0.0);
     let mut particles = AuroraParticles::default();
     for id in 0..count as u64 {
         let [u, v, ..] = KEY.uniforms(id, 0, bansho_base::math::random::Purpose(7)).map(f64::from);
-        particles.push(id, place(u, v), [2.0, -1.0], 1.0);
+        particles.push(id, position(u, v), [2.0, -1.0], 1.0);
     }
     let mut next = count as u64;
-    Relocation::new(&parameters, KEY).relocate(&mut particles, (&field, &course, &scattered), 0, &mut next);
+    Relocation::new(&parameters, KEY).relocate(&mut particles, (&field, &refined, &scattered), 0, &mut next);
     (particles, next)
 }
 
@@ -207,7 +211,7 @@ fn table_3_3_to_the_letter() {
     let table = || RelocationParameters { scaled: false, ..RelocationParameters::default() };
     // 700 in a cell: 200 too many, of which the 100 farthest from the line at z = 5 die.
     let (particles, _) = relocated(700, in_cell, table());
-    let distance = |index: &usize| (particles.place(*index).y - 5.0).abs();
+    let distance = |index: &usize| (particles.position(*index).y - 5.0).abs();
     let (dead, alive): (Vec<usize>, Vec<usize>) = (0..700).partition(|index| particles.dying[*index]);
     assert_eq!(dead.len(), 100);
     let nearest_dead = dead.iter().map(distance).fold(f64::INFINITY, f64::min);
@@ -216,14 +220,18 @@ fn table_3_3_to_the_letter() {
     assert_eq!(relocated(520, in_cell, table()).0.dying.iter().filter(|dying| **dying).count(), 20);
     // 47 where 50 should be: 3 are born there, and 10 in each other near cell, 39 of them along 400 km.
     let (particles, next) = relocated(47, in_cell, table());
-    let born: Vec<DVec2> = (47..particles.len()).map(|index| particles.place(index)).collect();
+    let born: Vec<DVec2> = (47..particles.len()).map(|index| particles.position(index)).collect();
     let here = born.iter().filter(|p| (0.0..10.0).contains(&p.x) && (0.0..10.0).contains(&p.y)).count();
     assert_eq!((here, born.len(), next), (3, 3 + 390, 47 + 393));
     assert!(particles.fades[47..].iter().all(|fade| *fade == 0.0));
     // Those that are born have the mean velocity of the cells around; far away there is nobody.
     let east = |index: usize| particles.velocities[0][index];
     assert!((47..particles.len()).all(|i| east(i)
-        == if particles.place(i).x.abs() < 10.0 || (10.0..20.0).contains(&particles.place(i).x) { 2.0 } else { 0.0 }));
+        == if particles.position(i).x.abs() < 10.0 || (10.0..20.0).contains(&particles.position(i).x) {
+            2.0
+        } else {
+            0.0
+        }));
 }
 
 #[test]
@@ -236,27 +244,27 @@ fn strays_die() {
 #[test]
 fn the_coordinate_stays_with_the_sheet_when_it_splits() {
     let whole = Shape { sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [30.0, 0.0]])] };
-    let along = Along::alone(&whole);
-    assert_eq!(along.sheets, [[0.0, 10.0, 20.0, 30.0]]);
+    let along = ArcLengthMap::alone(&whole);
+    assert_eq!(along.coordinates, [[0.0, 10.0, 20.0, 30.0]]);
     let parts = Shape {
         sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [14.0, 0.0]]), sheet(&[[16.0, 0.0], [20.0, 0.0], [30.0, 0.0]])],
     };
     let numbers = [vec![0, 1, 4], vec![5, 2, 3]];
-    let mut split = along.follow(&parts, &Listing::alone(&numbers));
-    assert_eq!(split.sheets, [[0.0, 10.0, 14.0], [16.0, 20.0, 30.0]]);
+    let mut split = along.transfer(&parts, &ControlPointIds::alone(&numbers));
+    assert_eq!(split.coordinates, [[0.0, 10.0, 14.0], [16.0, 20.0, 30.0]]);
     // The second part runs away and shrinks to half; its coordinate comes with it and then follows its length.
     let far = Shape { sheets: vec![parts.sheets[0].clone(), sheet(&[[90.0, 9.0], [92.0, 9.0], [97.0, 9.0]])] };
-    split = split.follow(&far, &Listing::alone(&numbers));
-    assert_eq!(split.sheets[1], [16.0, 20.0, 30.0]);
+    split = split.transfer(&far, &ControlPointIds::alone(&numbers));
+    assert_eq!(split.coordinates[1], [16.0, 20.0, 30.0]);
     (0..1000).for_each(|_| split.relax(0.1));
-    let length = split.sheets[1][2] - split.sheets[1][0];
-    assert!((length - 7.0).abs() < 1e-6 && (split.sheets[1].iter().sum::<f64>() - 66.0).abs() < 1e-6);
+    let length = split.coordinates[1][2] - split.coordinates[1][0];
+    assert!((length - 7.0).abs() < 1e-6 && (split.coordinates[1].iter().sum::<f64>() - 66.0).abs() < 1e-6);
     // Joined again, the break stays where it was, and neither part is squeezed into it.
     let joined = Shape { sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [90.0, 9.0], [97.0, 9.0]])] };
-    let mut again = split.follow(&joined, &Listing::alone(&[vec![0, 1, 5, 3]]));
+    let mut again = split.transfer(&joined, &ControlPointIds::alone(&[vec![0, 1, 5, 3]]));
     (0..100).for_each(|_| again.relax(0.1));
-    assert!((again.sheets[0][1] - again.sheets[0][0] - 10.0).abs() < 1e-6);
-    assert!((again.sheets[0][3] - again.sheets[0][2] - 7.0).abs() < 1e-3);
+    assert!((again.coordinates[0][1] - again.coordinates[0][0] - 10.0).abs() < 1e-6);
+    assert!((again.coordinates[0][3] - again.coordinates[0][2] - 7.0).abs() < 1e-3);
 }
 
 #[test]
@@ -276,7 +284,7 @@ fn power_is_flux_times_area_and_follows_the_drawn_flux() {
     assert!((power / expected - 1.0).abs() < 0.01, "{power} {expected}");
     let particles = simulation.particles();
     let east: f64 = (0..particles.len())
-        .filter(|index| particles.place(*index).x > 0.0)
+        .filter(|index| particles.position(*index).x > 0.0)
         .map(|index| f64::from(particles.powers_w[index]))
         .sum();
     assert!((east / expected - 0.75).abs() < 0.02, "{}", east / expected);

@@ -1,7 +1,7 @@
 //! Particles go where the shapes are.
 
 use super::*;
-use crate::{RepulsionKernel, shapes::Neighbourhood, simulate::field::sheet_charge::LineCharge};
+use crate::{RepulsionKernel, shapes::NearestSegmentGrid, simulate::field::sheet_charge::SheetCharge};
 
 /// Seconds after a shape is reached from which on particles are where they shall be, how often that is looked at, and for how long.
 const SETTLED_S: f64 = 1.5;
@@ -9,7 +9,7 @@ const MOMENT_STEPS: u64 = 15;
 const WATCHED_S: f64 = 3.5;
 
 /// What particles must do at one moment: how many lie within L_thr of the target, how many in the gaps, and what the least stretch holds of
-/// its share of the power and of the particles.
+/// its fraction of the power and of the particles.
 struct Moment {
     within: f64,
     in_gaps: f64,
@@ -18,18 +18,18 @@ struct Moment {
 
 fn moment(simulation: &AuroraSimulation, target: &Shape) -> Moment {
     let half = simulation.parameters().half_thickness_km();
-    let near = Neighbourhood::new(target, 2.0 * half);
+    let near = NearestSegmentGrid::new(target, 2.0 * half);
     let particles = live(simulation);
-    let distances: Vec<Option<f64>> = particles.iter().map(|(place, _)| near.distance(*place)).collect();
-    let share = |count: usize| count as f64 / particles.len() as f64;
+    let distances: Vec<Option<f64>> = particles.iter().map(|(position, _)| near.distance(*position)).collect();
+    let fraction = |count: usize| count as f64 / particles.len() as f64;
     let least = |sums: &[f64]| {
         let mean = sums.iter().sum::<f64>() / sums.len() as f64;
         sums.iter().copied().fold(f64::INFINITY, f64::min) / mean
     };
-    let [powers, counts] = stretches(target, &particles);
+    let [powers, counts] = intervals(target, &particles);
     Moment {
-        within: share(distances.iter().flatten().filter(|distance| **distance <= half).count()),
-        in_gaps: share(distances.iter().filter(|distance| distance.is_none()).count()),
+        within: fraction(distances.iter().flatten().filter(|distance| **distance <= half).count()),
+        in_gaps: fraction(distances.iter().filter(|distance| distance.is_none()).count()),
         least: [least(&powers), least(&counts)],
     }
 }
@@ -89,31 +89,31 @@ fn narrow_s() -> SheetParameters {
     through(points)
 }
 
-/// Of all stretches of the sheets, folded as they are, that are as long as a fiftieth of them all: the least share that one holds of the
+/// Of all intervals of the sheets, folded as they are, that are as long as a fiftieth of them all: the least fraction that one holds of the
 /// particles that are due to it.
 fn least_stretch(simulation: &AuroraSimulation) -> f64 {
-    /// Bins of such a stretch, by which one is moved on to the next.
+    /// Bins of such an interval, by which one is moved on to the next.
     const BINS: usize = 4;
-    let course = simulation.course();
-    let lengths = course.sheet_lengths();
+    let refined = simulation.refined_shape();
+    let lengths = refined.sheet_lengths();
     let (total, particles) = (lengths.iter().sum::<f64>(), simulation.particles());
     let bins = |length: &f64| ((50 * BINS) as f64 * length / total).round() as usize;
     let mut counts: Vec<Vec<f64>> = lengths.iter().map(|length| vec![0.0; bins(length)]).collect();
     let mut living = 0.0;
     for index in (0..particles.len()).filter(|index| !particles.dying[*index]) {
         living += 1.0;
-        let Some(foot) = course.foot(particles.place(index)) else { continue };
-        let counts = &mut counts[foot.sheet as usize];
+        let Some(projection) = refined.project(particles.position(index)) else { continue };
+        let counts = &mut counts[projection.sheet as usize];
         let last = counts.len().saturating_sub(1);
-        if let Some(bin) = counts.get_mut(((foot.share * (last + 1) as f64) as usize).min(last)) {
+        if let Some(bin) = counts.get_mut(((projection.fraction * (last + 1) as f64) as usize).min(last)) {
             *bin += 1.0;
         }
     }
-    let stretches = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
+    let intervals = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
         let due = living * BINS as f64 * length / (total * counts.len() as f64);
-        counts.windows(BINS).map(move |stretch| stretch.iter().sum::<f64>() / due)
+        counts.windows(BINS).map(move |interval| interval.iter().sum::<f64>() / due)
     });
-    stretches.fold(f64::INFINITY, f64::min)
+    intervals.fold(f64::INFINITY, f64::min)
 }
 
 /// With the particles, cells and folds of a scene that says nothing of them, on arrival and ever after.
@@ -151,8 +151,8 @@ fn there_are_about_as_many_particles_as_are_asked_for() {
     let mut simulation = simulation(AuroraParameters { shapes: becoming(Form::Peel), ..small() });
     for _ in 0..120 {
         simulation.step();
-        let share = simulation.particles().len() as f64 / 12_000.0;
-        assert!((0.9..1.2).contains(&share), "{share} at {} s", simulation.time());
+        let fraction = simulation.particles().len() as f64 / 12_000.0;
+        assert!((0.9..1.2).contains(&fraction), "{fraction} at {} s", simulation.time());
     }
 }
 
@@ -168,7 +168,7 @@ fn greatest_jumps(shapes: Vec<ShapeParameters>) -> [f64; 2] {
         let particles = simulation.particles();
         for index in 0..particles.len() {
             let block =
-                ((particles.place(index) / extent + 0.5) * BLOCKS as f64).clamp(DVec2::ZERO, DVec2::splat(15.9));
+                ((particles.position(index) / extent + 0.5) * BLOCKS as f64).clamp(DVec2::ZERO, DVec2::splat(15.9));
             blocks[block.y as usize * BLOCKS + block.x as usize] += f64::from(particles.powers_w[index]);
         }
         blocks
@@ -197,26 +197,26 @@ fn nothing_jumps_from_frame_to_frame_through_split_merge_and_relocation() {
     }
 }
 
-/// Median distance from a particle of a straight sheet to its nearest neighbour, beside that of as many strewn at random.
+/// Median distance from a particle of a straight sheet to its nearest neighbor, beside that of as many strewn at random.
 fn parting(kernel: RepulsionKernel) -> f64 {
     let mut parameters = AuroraParameters { shapes: vec![shape(vec![line([-200.0, 0.0], [200.0, 0.0])])], ..small() };
     parameters.particles.kernel = kernel;
     let mut simulation = simulation(parameters);
     (0..90).for_each(|_| simulation.step());
-    let mut places: Vec<DVec2> = live(&simulation).into_iter().map(|(place, _)| place).collect();
-    places.sort_by(|a, b| a.x.total_cmp(&b.x));
-    let middle: Vec<usize> = (0..places.len()).filter(|index| places[*index].x.abs() < 100.0).collect();
+    let mut positions: Vec<DVec2> = live(&simulation).into_iter().map(|(position, _)| position).collect();
+    positions.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let middle: Vec<usize> = (0..positions.len()).filter(|index| positions[*index].x.abs() < 100.0).collect();
     let nearest = |index: &usize| {
         // Along the sheet none of those beyond 200 in the list is nearer.
-        let near = index.saturating_sub(200)..(index + 200).min(places.len());
+        let near = index.saturating_sub(200)..(index + 200).min(positions.len());
         near.filter(|other| other != index)
-            .map(|other| places[other].distance(places[*index]))
+            .map(|other| positions[other].distance(positions[*index]))
             .fold(f64::INFINITY, f64::min)
     };
     let mut distances: Vec<f64> = middle.iter().map(nearest).collect();
     distances.sort_by(f64::total_cmp);
-    let rms =
-        (middle.iter().map(|index| places[*index].y * places[*index].y).sum::<f64>() / middle.len() as f64).sqrt();
+    let rms = (middle.iter().map(|index| positions[*index].y * positions[*index].y).sum::<f64>() / middle.len() as f64)
+        .sqrt();
     // Over an even band of that rms half width.
     let area = 200.0 * 2.0 * rms * 3f64.sqrt();
     let random = (std::f64::consts::LN_2 / std::f64::consts::PI * area / middle.len() as f64).sqrt();
@@ -250,8 +250,8 @@ fn contrast_along(kernel: RepulsionKernel, particles: i64) -> f64 {
             (0..15).for_each(|_| simulation.step());
             // Away from the ends.
             let mut bins = vec![0.0_f64; (200.0 / width) as usize];
-            for (place, _) in live(&simulation).into_iter().filter(|(place, _)| place.x >= -100.0) {
-                if let Some(bin) = bins.get_mut(((place.x + 100.0) / width) as usize) {
+            for (position, _) in live(&simulation).into_iter().filter(|(position, _)| position.x >= -100.0) {
+                if let Some(bin) = bins.get_mut(((position.x + 100.0) / width) as usize) {
                     *bin += 1.0;
                 }
             }
@@ -286,11 +286,11 @@ fn what_is_found_along_the_sheets_is_bounded_by_the_particles_not_by_the_drawn_s
         let mut parameters =
             AuroraParameters { shapes: vec![shape((0..rows).map(sheet).collect())], ..AuroraParameters::default() };
         parameters.particles.count = particles;
-        let course = simulation(parameters).course();
-        let lengths = course.sheet_lengths().iter().sum::<f64>();
+        let refined = simulation(parameters).refined_shape();
+        let lengths = refined.sheet_lengths().iter().sum::<f64>();
         let spacing = AuroraParameters::default().cell_km();
-        let charge = LineCharge::even(&course, spacing, particles as f64).count();
-        (lengths, course.pieces(|_| 1.0).count(), charge)
+        let charge = SheetCharge::even(&refined, spacing, particles as f64).count();
+        (lengths, refined.pieces(|_| 1.0).count(), charge)
     };
     let (short, pieces, charge) = of(1, 120_000);
     assert!((short / 400.0 - 1.0).abs() < 0.05 && pieces > 150 && charge > 150, "{short} km, {pieces}, {charge}");

@@ -299,7 +299,7 @@ impl Hand<'_> {
 
     /// Where the control point leaves shape `before` that arrives nearest to the pointer.
     fn arrival(&self, drawing: &Drawing, before: usize) -> Option<DVec2> {
-        let ways = drawing.ways(before);
+        let ways = drawing.control_point_paths(before);
         let off = |way: &&[DVec2; 2]| way[1].distance(self.point());
         let nearest = ways.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b)));
         nearest.filter(|way| off(way) < self.reach(Tool::Link)).map(|way| way[0])

@@ -68,7 +68,7 @@ impl AuroraEditor {
             for sheet in drawing.lines(source) {
                 painter.line(plane.line(&sheet), Stroke::new(3.0, FAINT));
             }
-            for way in drawing.ways(source).iter().flatten().step_by(WAYS_APART) {
+            for way in drawing.control_point_paths(source).iter().flatten().step_by(WAYS_APART) {
                 painter.line_segment(way.map(|end| plane.to_screen(end)), Stroke::new(1.0, WAY));
             }
         }

@@ -241,7 +241,7 @@ impl Drawing {
 
     /// Where in shape `shape` a point of the one before arrives.
     fn arrival_of(&self, shape: usize, from: DVec2) -> Option<DVec2> {
-        let strands = self.ways(shape - 1);
+        let strands = self.control_point_paths(shape - 1);
         let on = |ways: &Vec<[DVec2; 2]>| {
             let [leaving, arriving] = [0, 1].map(|end| ways.iter().map(|way| way[end]).collect::<Vec<_>>());
             let on = lines::nearest(&leaving, from)?;

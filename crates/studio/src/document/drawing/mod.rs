@@ -16,7 +16,7 @@ use bansho::{
     Assets,
     aurora::{
         AuroraParameters,
-        shapes::{Sequence, ShapeFault},
+        shapes::{Sequence, ShapeError},
     },
     base::{
         math::DVec2,
@@ -55,14 +55,14 @@ pub enum Refusal {
     Faulty(String),
     /// Shapes that an aurora cannot take.
     #[error("shape {}: {}", shape_number(.0), .0.kind)]
-    Shape(ShapeFault),
+    Shape(ShapeError),
     /// The text cannot be edited.
     #[error(transparent)]
     Edit(#[from] EditError),
 }
 
 /// The shape that a fault is about, as a person counts.
-fn shape_number(fault: &ShapeFault) -> usize {
+fn shape_number(fault: &ShapeError) -> usize {
     let number = fault.key.split('.').nth(1).and_then(|segment| segment.parse::<usize>().ok());
     number.unwrap_or_default() + 1
 }
@@ -126,13 +126,13 @@ impl Drawing {
             let Some([_, middle]) = ways.get(ways.len() / 2) else { return false };
             lines::nearest_among(&all, *middle).is_some_and(|(own, _)| own == sheet)
         };
-        let strands = shape.checked_sub(1).map(|before| self.ways(before)).unwrap_or_default();
+        let strands = shape.checked_sub(1).map(|before| self.control_point_paths(before)).unwrap_or_default();
         strands.iter().filter(arrives).map(|ways| ways.iter().map(|way| way[0]).collect()).collect()
     }
 
     /// Where the points of shape `shape` go on the way to the next, km, strand by strand.
-    pub fn ways(&self, shape: usize) -> Vec<Vec<[DVec2; 2]>> {
-        self.sequence.ways(shape)
+    pub fn control_point_paths(&self, shape: usize) -> Vec<Vec<[DVec2; 2]>> {
+        self.sequence.control_point_paths(shape)
     }
 }
 

@@ -41,7 +41,7 @@ impl Drawing {
     /// The strands from shape `before` to the next, in the order of its sheets and along each.
     fn strands(&self, before: usize) -> Strands {
         let [leaving, arriving] = [before, before + 1].map(|shape| self.lines(shape));
-        let ways = self.ways(before);
+        let ways = self.control_point_paths(before);
         let ends = ways.iter().filter_map(|strand| {
             let [from, to] = *strand.get(strand.len() / 2)?;
             Some((lines::nearest_among(&leaving, from)?.0, lines::nearest_among(&arriving, to)?.0))

@@ -67,7 +67,7 @@ fn a_split_cuts_what_the_sheet_became() {
     let drawing = change(&mut document, &drawing.draw(1, Some(0), &bent));
     let drawing = change(&mut document, &drawing.split(1, 0, 0.5));
     assert_eq!([drawing.lines(0).len(), drawing.lines(1).len()], [1, 2]);
-    assert_eq!(drawing.ways(0).len(), 2);
+    assert_eq!(drawing.control_point_paths(0).len(), 2);
     let ends = [drawing.points(1, 0), drawing.points(1, 1)];
     assert!(ends[0].last().unwrap().x < -5.0 && ends[1].first().unwrap().x > 5.0, "{ends:?}");
     assert!((ends[0].last().unwrap().y - 60.0).abs() < 2.0, "{ends:?}");
@@ -145,8 +145,9 @@ fn sheets_and_points_are_told_what_they_become() {
     let drawing = change(&mut document, &drawing.add_shape());
     let exchanged = change(&mut document, &drawing.correspond(1, (0, 0.3), 1));
     assert!(document.text().contains("link = [{ from = 1, to = 2 }]"), "{}", document.text());
-    let crosses =
-        |drawing: &Drawing, shape: usize| drawing.ways(shape)[0].iter().all(|[from, to]| (to.y - from.y).abs() > 59.0);
+    let crosses = |drawing: &Drawing, shape: usize| {
+        drawing.control_point_paths(shape)[0].iter().all(|[from, to]| (to.y - from.y).abs() > 59.0)
+    };
     assert!(crosses(&exchanged, 0) && !crosses(&exchanged, 1), "only that transition goes otherwise");
     let back = change(&mut document, &exchanged.correspond(1, (0, 0.3), 0));
     assert!(!crosses(&back, 0));
@@ -155,7 +156,7 @@ fn sheets_and_points_are_told_what_they_become() {
     let [from, to] = moved.linked(1)[0].1;
     assert!((from.x + 100.0).abs() < 1e-6 && to.x.abs() < 1e-6, "{from} {to}");
     let arrives = |drawing: &Drawing, from: f64| {
-        let ways = drawing.ways(0).concat();
+        let ways = drawing.control_point_paths(0).concat();
         ways.iter()
             .filter(|way| way[0].y.abs() < 1.0)
             .map(|way| ((way[0].x - from).abs(), way[1].x))

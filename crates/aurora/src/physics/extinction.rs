@@ -1,4 +1,4 @@
-//! What the air between an observer and the sky takes away: light of auroras, and of stars.
+//! Extinction in the atmosphere between the observer and the aurora, by wavelength and air mass.
 
 use bansho_base::{math, parameters::Range};
 
@@ -7,7 +7,7 @@ pub use bansho_base::world::sky::air_mass;
 /// Magnitudes of a transmittance of 1/e.
 const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;
 
-/// Magnitudes lost overhead; they may be many in haze.
+/// Zenith extinction in magnitudes; it may be large in haze.
 const MAGNITUDES: Range = Range::new(0.0, 5.0);
 
 bansho_base::parameters! {
@@ -26,18 +26,18 @@ bansho_base::parameters! {
 }
 
 impl Extinction {
-    /// Magnitudes lost overhead at a wavelength.
+    /// Zenith extinction at a wavelength, magnitudes.
     #[must_use]
     pub fn magnitudes(&self, wavelength_nm: f64) -> f64 {
         let ratio = 550.0 / wavelength_nm;
-        // The exponent 4.08 contains the dispersion of air in the visible.
+        // The exponent 4.08 includes the dispersion of air in the visible.
         let scattered = self.rayleigh * math::pow(ratio, 4.08) + self.aerosol * math::pow(ratio, self.angstrom);
-        // The Chappuis band, nearly a Gaussian about 595 nm.
+        // The Chappuis band, approximately a Gaussian about 595 nm.
         let from_centre = (wavelength_nm - 595.0) / 50.0;
         scattered + self.ozone * math::exp(-0.5 * from_centre * from_centre)
     }
 
-    /// The share of light that arrives from `elevation` radians above the horizon.
+    /// Transmittance at `elevation` radians above the horizon.
     #[must_use]
     pub fn transmittance(&self, wavelength_nm: f64, elevation: f64) -> f64 {
         math::exp(-self.magnitudes(wavelength_nm) * air_mass(elevation) / MAGNITUDES_PER_OPTICAL_DEPTH)

@@ -5,16 +5,16 @@ use bansho_base::host::{assets::AssetError, plural::counted};
 /// Shapes from which no aurora can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: {kind}")]
-pub struct ShapeFault {
+pub struct ShapeError {
     /// The parameter within the aurora's table, as in `shapes.1.sheets.0.points.7` (counting from 0).
     pub key: String,
     /// What is wrong.
-    pub kind: ShapeFaultKind,
+    pub kind: ShapeErrorKind,
 }
 
 /// What can be wrong with shapes. Sheets, points and segments count from 1 here, as a person counts.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ShapeFaultKind {
+pub enum ShapeErrorKind {
     /// Nothing that could be a line.
     #[error("sheet {sheet} has {}; allowed: at least 2, at different places", counted(*.found, "point"))]
     TooFewPoints {
@@ -114,7 +114,7 @@ pub enum ShapeFaultKind {
     #[error(
         "the first shape has none before it; `split`, `merge` and `link` stand at the shape that the change leads to"
     )]
-    NothingBefore,
+    ChangeBeforeFirstShape,
     /// A sheet that is not there.
     #[error("there is no sheet {sheet} in the shape before; allowed: 1 to {count}")]
     NoSuchSheet {
@@ -143,7 +143,7 @@ pub enum ShapeFaultKind {
     },
     /// A split said in two ways.
     #[error("says both `segment` and `at`; allowed: one of them")]
-    SegmentAndShare,
+    SegmentAndPosition,
     /// Two splits of one segment.
     #[error("segment {segment} of sheet {sheet} is split already; allowed: one split a segment")]
     SplitTwice {
@@ -159,7 +159,7 @@ pub enum ShapeFaultKind {
     NotAnEnd {
         /// The sheet.
         sheet: usize,
-        /// Share of its length.
+        /// Fraction of its length.
         at: f64,
     },
     /// Two merges of one end.
@@ -184,16 +184,16 @@ pub enum ShapeFaultKind {
     },
     /// A link that says where a point arrives and not where it leaves.
     #[error("says `arrives`, but not which point does; allowed: together with `at`")]
-    HalfALink,
+    ArrivalWithoutPoint,
     /// A link that says where a point leaves and not where it arrives, of a sheet that is all one.
     #[error(
         "says `at`, but not where that point arrives; allowed: together with `arrives`, or alone where the sheet splits"
     )]
-    NowhereToArrive,
+    PointWithoutArrival,
     /// Linked points that change their order.
     #[error("two linked points of a sheet would pass each other; allowed: points in the order of the sheet")]
     LinksCross,
-    /// A link where nothing goes by place.
+    /// A link where nothing goes by position.
     #[error("sheets and points go in drawing order here; allowed with `correspondence = \"automatic\"`")]
     LinkInOrder,
     /// A sheet that is said in several ways.
@@ -204,7 +204,7 @@ pub enum ShapeFaultKind {
     },
     /// A path of an SVG file that is not named.
     #[error("names a path of an SVG file, but no file; allowed: together with `path`")]
-    StrokeOfNoFile,
+    StrokeWithoutFile,
     /// A time that is said in two ways.
     #[error("says both `after_s` and `after_frames`; allowed: one of them")]
     SecondsAndFrames,
@@ -212,7 +212,7 @@ pub enum ShapeFaultKind {
     #[error(
         "the first shape is there at the beginning; allowed: at the shapes after it, and `hold_s` here says how long it stays"
     )]
-    FirstShapeIsThere,
+    TimeBeforeFirstShape,
     /// Electrons of an energy that the tables of the air do not hold.
     #[error(
         "at {at} of its length sheet {sheet} has electrons of {energy_ev:.0} eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV"
@@ -220,7 +220,7 @@ pub enum ShapeFaultKind {
     EnergyOutside {
         /// The entry of the shape's list of sheets.
         sheet: usize,
-        /// Share of its length.
+        /// Fraction of its length.
         at: f64,
         /// The energy, eV.
         energy_ev: f64,
