@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, process::Command};
 
 /// Each crate with those of the workspace that it may depend on: the table of ARCHITECTURE.md.
-const MAY_KNOW: [(&str, &[&str]); 7] = [
+const MAY_KNOW: [(&str, &[&str]); 8] = [
     ("bansho-base", &[]),
     ("bansho-models", &["bansho-base"]),
     ("bansho-render", &["bansho-base", "bansho-models"]),
@@ -11,13 +11,14 @@ const MAY_KNOW: [(&str, &[&str]); 7] = [
     // The job needs to draw and to write: the one edge from the face to files, behind the feature `files`.
     ("bansho", &["bansho-base", "bansho-models", "bansho-render", "bansho-media"]),
     ("bansho-cli", &["bansho"]),
-    ("bansho-studio", &["bansho"]),
+    ("bansho-egui-software", &[]),
+    ("bansho-studio", &["bansho", "bansho-egui-software"]),
 ];
 
 /// Dependencies with the only crates that may have them.
 const RESERVED: [(&str, &[&str]); 9] = [
     ("wgpu", &["bansho-studio"]),
-    ("egui", &["bansho-studio"]),
+    ("egui", &["bansho-egui-software"]),
     ("eframe", &["bansho-studio"]),
     ("clap", &["bansho-cli"]),
     ("clap_complete", &["bansho-cli"]),

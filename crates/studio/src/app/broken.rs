@@ -6,7 +6,7 @@ use crate::document::Revision;
 
 /// Frames of one state of the document that panicked.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Broken {
+pub(crate) struct Broken {
     of: Option<Revision>,
     frames: BTreeSet<i64>,
     /// Whether no frame of it can be drawn, as where a phenomenon cannot even be made.
@@ -15,7 +15,7 @@ pub(super) struct Broken {
 
 impl Broken {
     /// Notes that `revision` panicked at `frame`, or altogether.
-    pub(super) fn note(&mut self, revision: Revision, frame: Option<i64>) {
+    pub(crate) fn note(&mut self, revision: Revision, frame: Option<i64>) {
         if self.of != Some(revision) {
             *self = Self { of: Some(revision), ..Self::default() };
         }
@@ -24,7 +24,7 @@ impl Broken {
     }
 
     /// Whether `frame` of `revision` panicked.
-    pub(super) fn holds(&self, revision: Revision, frame: i64) -> bool {
+    pub(crate) fn holds(&self, revision: Revision, frame: i64) -> bool {
         self.of == Some(revision) && (self.whole || self.frames.contains(&frame))
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use eframe::egui::{Context, Panel, ThemePreference, Ui};
 
-use super::store::Store;
+use crate::session::settings_store::Store;
 
 /// Sizes of the panels and what is open.
 #[derive(Clone, Debug, Default, PartialEq)]

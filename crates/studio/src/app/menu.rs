@@ -3,7 +3,10 @@
 use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
-use crate::{beginnings::BEGINNINGS, document::recovery::Recovered, examples};
+use crate::{
+    document::files::autosave::Recovered,
+    scenes::{examples, new_scene::BEGINNINGS},
+};
 
 impl Studio {
     /// The bar at the top.

@@ -1,47 +1,31 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
-mod aurora;
-mod broken;
-mod curve_editor;
-mod curves_view;
+pub(crate) mod broken;
 mod files;
-mod gesture;
-mod hands;
-mod icon;
-mod inspector;
-mod keyed;
 mod layout;
 mod menu;
-mod problems;
-mod rate;
-mod relink;
-mod scene_panel;
-mod session;
+pub(crate) mod panels;
+pub(crate) mod rate;
 mod shortcuts;
-mod stages_view;
 mod status;
-mod store;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests;
-mod text_panel;
-mod things;
-mod timeline;
-mod value;
 mod viewport;
+pub(crate) mod widgets;
 
 use std::time::Duration;
 
 use eframe::egui;
 
-use self::{
-    aurora::AuroraEditor, files::Files, inspector::Inspector, layout::Layout, problems::Wanted, scene_panel::Subject,
-    stages_view::StagesView, store::Store, text_panel::TextPanel, viewport::Viewport,
+pub use self::shortcuts::function_keys;
+use self::{files::Files, layout::Layout, viewport::Viewport};
+pub use super::session::{AssetsOf, Session};
+pub use crate::editors::flame_sheet::stages_ui::image as screen_image;
+use crate::{
+    editors::{aurora::AuroraEditor, flame_sheet::stages_ui::StagesView},
+    session::settings_store::Store,
 };
-pub use self::{
-    session::{AssetsOf, Session},
-    shortcuts::function_keys,
-    stages_view::image as screen_image,
-};
+use panels::{inspector::Inspector, problems::Wanted, scene::Subject, text::TextPanel};
 
 /// The kind of phenomenon whose shapes are drawn.
 const KIND_WITH_SHAPES: &str = "aurora";
@@ -117,13 +101,13 @@ impl Studio {
     }
 
     /// The window closes: what is kept for the next time is written.
-    pub fn end(&mut self) {
+    pub fn on_exit(&mut self) {
         self.files.unsaved.end();
         self.layout.keep();
     }
 
     /// Shows everything and takes in what hands do.
-    pub fn show(&mut self, ui: &mut egui::Ui) {
+    pub fn ui(&mut self, ui: &mut egui::Ui) {
         if ui.ctx().cumulative_pass_nr() == 0 {
             self.layout.apply_theme(ui.ctx());
         }
@@ -135,7 +119,7 @@ impl Studio {
         self.files.tend(ui, &mut self.session, &self.subject);
         egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
         egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
-        egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
+        egui::Panel::bottom("timeline").show(ui, |ui| panels::timeline::show(ui, &mut self.session));
         self.follow_opening();
         if self.shows.picture_alone {
             self.session.stages = None;
@@ -176,7 +160,7 @@ impl Studio {
     }
 
     fn side_panels(&mut self, ui: &mut egui::Ui) {
-        match problems::show(ui, &self.session) {
+        match panels::problems::show(ui, &self.session) {
             Some(Wanted::Sight(span)) => {
                 self.shows.text = true;
                 self.text.jump_to(span);
@@ -186,7 +170,7 @@ impl Studio {
         }
         let Self { session, subject, text, stages, inspector, layout, shows, .. } = self;
         layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, session, subject));
+            egui::ScrollArea::vertical().show(ui, |ui| panels::scene::show(ui, session, subject));
         });
         if shows.text {
             layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
@@ -249,12 +233,12 @@ fn now_and_hands(ui: &egui::Ui) -> (f64, bool) {
 }
 
 #[cfg(not(target_arch = "wasm32"))]
-impl crate::program::Program for Studio {
-    fn show(&mut self, ui: &mut egui::Ui, _settle: &mut dyn FnMut()) {
-        Self::show(self, ui);
+impl bansho_egui_software::App for Studio {
+    fn ui(&mut self, ui: &mut egui::Ui, _wait_until_presented: &mut dyn FnMut()) {
+        Self::ui(self, ui);
     }
 
-    fn end(&mut self) {
-        Self::end(self);
+    fn on_exit(&mut self) {
+        Self::on_exit(self);
     }
 }

@@ -2,14 +2,14 @@
 
 /// Pictures a second, as they come while time passes.
 #[derive(Default)]
-pub(super) struct Rate {
+pub(crate) struct Rate {
     last: Option<f64>,
     mean_s: Option<f64>,
 }
 
 impl Rate {
     /// A picture came at `now`, s.
-    pub(super) fn came(&mut self, now: f64) {
+    pub(crate) fn came(&mut self, now: f64) {
         /// Share of the newest interval in the mean.
         const NEWEST: f64 = 0.15;
         if let Some(last) = self.last.replace(now) {
@@ -19,7 +19,7 @@ impl Rate {
     }
 
     /// How many come a second, once two came.
-    pub(super) fn pictures_per_s(&self) -> Option<f64> {
+    pub(crate) fn pictures_per_s(&self) -> Option<f64> {
         self.mean_s.map(|mean| 1.0 / mean)
     }
 }

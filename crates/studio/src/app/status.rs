@@ -2,9 +2,9 @@
 
 use eframe::egui::{ProgressBar, Ui};
 
-use super::{
-    files::Files,
-    icon::{self, Icon},
+use super::files::Files;
+use crate::{
+    app::widgets::icon::{self, Icon},
     session::Session,
 };
 

@@ -11,14 +11,15 @@ use bansho::{
     base::parameters::Value,
     render::scene::{Place, operation::Operation},
 };
-use web_time::Instant;
 
 use crate::{
     app::{Session, screen_image},
-    document::{Document, drawing::Refusal},
-    examples::Bundle,
+    document::Document,
+    editors::aurora::document::Refusal,
     player::{StartError, ThreadPlayer},
+    scenes::examples::Bundle,
 };
+use web_time::Instant;
 
 pub use window::{WindowBench, WindowSpeed};
 

@@ -10,8 +10,8 @@ use super::{BenchError, CHANGES, SUBJECTS, Subject, change, nineteenth};
 use crate::{
     app::{Session, Studio},
     document::{Document, Revision},
-    program::Program,
 };
+use bansho_egui_software::App;
 
 /// How long a scene plays before it counts, while previews find their size, and how long it counts.
 const WARM_UP: Duration = Duration::from_secs(2);
@@ -84,7 +84,7 @@ impl WindowBench {
             return Ok(());
         };
         self.before(subject)?;
-        self.studio.show(ui);
+        self.studio.ui(ui);
         self.after();
         let session = self.studio.session();
         let faults = session.document.error().map(ToString::to_string);
@@ -152,8 +152,8 @@ fn frame_size(ctx: &egui::Context) -> egui::Vec2 {
     ctx.input(|input| input.content_rect().size())
 }
 
-impl Program for WindowBench {
-    fn show(&mut self, ui: &mut egui::Ui, settle: &mut dyn FnMut()) {
+impl App for WindowBench {
+    fn ui(&mut self, ui: &mut egui::Ui, wait_until_presented: &mut dyn FnMut()) {
         if let (Step::Open, Some(subject)) = (&self.step, self.subject)
             && frame_size(ui.ctx()) != window_of(subject)
         {
@@ -161,7 +161,7 @@ impl Program for WindowBench {
         }
         if let Step::Change { painting: true, .. } = self.step {
             // The last frame is on its way to the screen; until it is there nobody has seen the picture.
-            settle();
+            wait_until_presented();
         }
         if let Err(error) = self.frame(ui) {
             let _ = self.results.send(Err(error));
@@ -175,5 +175,5 @@ impl Program for WindowBench {
         }
     }
 
-    fn end(&mut self) {}
+    fn on_exit(&mut self) {}
 }

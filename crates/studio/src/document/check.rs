@@ -176,7 +176,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::examples::Bundle;
+    use crate::scenes::examples::Bundle;
 
     fn draft(text: &str) -> Option<Result<Arc<Plan>, SceneError>> {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());

@@ -1,17 +1,13 @@
 //! The scene as text: edits that keep its comments, undo, faults at their lines, and the last plan that was good.
 
 mod check;
-pub mod drawing;
 pub mod files;
 mod history;
 mod named_files;
 pub(crate) mod phenomena;
-pub mod recovery;
 pub mod stages;
 #[cfg(test)]
 mod tests;
-#[cfg(not(target_arch = "wasm32"))]
-pub mod watch;
 
 use std::sync::{
     Arc,
@@ -190,7 +186,7 @@ impl Document {
     }
 
     /// Goes on to `text`, which says `values`, as [`edit`](Self::edit) does.
-    fn go_on(&mut self, label: &str, text: String, values: Table) {
+    pub(crate) fn go_on(&mut self, label: &str, text: String, values: Table) {
         self.history.note(label, &self.text, &text);
         if *text != *self.text {
             (self.text, self.revision) = (text.into(), Revision::next());

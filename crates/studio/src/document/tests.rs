@@ -8,10 +8,12 @@ use bansho::{
 
 use super::{
     files::{self, Outside, Recent},
-    recovery::{self, Autosave},
     *,
 };
-use crate::document::phenomena::operations;
+use crate::document::{
+    files::autosave::{self, Autosave},
+    phenomena::operations,
+};
 
 const SCENE: &str = "\
 # A fire in the rain.
@@ -226,13 +228,13 @@ fn unsaved_work_outlives_its_studio_but_a_living_ones_is_left_alone() {
     document.edit("height", &[height(1.0)]).unwrap();
     autosave.keep(&document, Some("scenes/fire.toml".as_ref())).unwrap();
     other.keep(&scene(), None).unwrap();
-    assert_eq!(recovery::recoverable(folder.path()), [], "both are running");
+    assert_eq!(autosave::recoverable(folder.path()), [], "both are running");
     drop(autosave);
-    let found = recovery::recoverable(folder.path());
+    let found = autosave::recoverable(folder.path());
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].origin.as_str(), found[0].text.as_str()), ("scenes/fire.toml", &**document.text()));
     found[0].forget();
-    assert_eq!(recovery::recoverable(folder.path()), []);
+    assert_eq!(autosave::recoverable(folder.path()), []);
 }
 
 #[test]

@@ -2,12 +2,12 @@
 
 use std::{ffi::OsString, path::PathBuf};
 
-use super::{USAGE, painting::Painting};
+use super::{USAGE, renderer_choice::RendererChoice};
 
 /// All of it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Asked {
-    pub(super) painter: Painting,
+    pub(super) painter: RendererChoice,
     pub(super) work: Work,
 }
 
@@ -27,18 +27,19 @@ impl Asked {
     /// # Errors
     /// What is to be told where they make no sense.
     pub(super) fn of(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, String> {
-        let mut painter = Painting::default();
+        let mut painter = RendererChoice::default();
         let mut rest = Vec::new();
         let mut arguments = arguments.into_iter();
         while let Some(argument) = arguments.next() {
             let text = argument.to_string_lossy();
             match text.strip_prefix("--painter") {
                 Some("") => {
-                    let name =
-                        arguments.next().ok_or_else(|| format!("error: --painter needs one of {}", Painting::NAMES))?;
-                    painter = Painting::named(&name.to_string_lossy())?;
+                    let name = arguments
+                        .next()
+                        .ok_or_else(|| format!("error: --painter needs one of {}", RendererChoice::NAMES))?;
+                    painter = RendererChoice::named(&name.to_string_lossy())?;
                 }
-                Some(value) if value.starts_with('=') => painter = Painting::named(&value[1..])?,
+                Some(value) if value.starts_with('=') => painter = RendererChoice::named(&value[1..])?,
                 _ => rest.push(argument),
             }
         }
@@ -72,12 +73,12 @@ mod tests {
     #[test]
     fn the_painter_is_named_anywhere() {
         let scene = Work::Scene(Some("a.toml".into()));
-        assert_eq!(asked(&["a.toml"]), Ok(Asked { painter: Painting::Auto, work: scene }));
+        assert_eq!(asked(&["a.toml"]), Ok(Asked { painter: RendererChoice::Auto, work: scene }));
         for arguments in [["--painter", "software", "a.toml"], ["a.toml", "--painter", "software"]] {
-            assert_eq!(asked(&arguments).unwrap().painter, Painting::Software);
+            assert_eq!(asked(&arguments).unwrap().painter, RendererChoice::Software);
         }
         let bench = asked(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
-        assert_eq!(bench, Asked { painter: Painting::Gpu, work: Work::BenchWindow("rain".into()) });
+        assert_eq!(bench, Asked { painter: RendererChoice::Gpu, work: Work::BenchWindow("rain".into()) });
     }
 
     #[test]

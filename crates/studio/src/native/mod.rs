@@ -10,21 +10,21 @@ use std::{
 use bansho::{Assets, media::plates::FileAssets};
 use bansho_studio::{
     app::{Session, Studio, window_size},
-    beginnings::FLAME_SHEET,
     bench,
     document::{Document, files},
     player::{StartError, ThreadPlayer},
-    software::window::Build,
+    scenes::new_scene::FLAME_SHEET,
 };
-use eframe::egui;
 
 use self::{
     arguments::{Asked, Work},
-    painting::Painting,
+    renderer_choice::RendererChoice,
 };
+use bansho_egui_software::window::Build;
+use eframe::egui;
 
 mod arguments;
-mod painting;
+mod renderer_choice;
 
 const USAGE: &str = "usage: bansho-studio [--painter auto|gpu|software] [SCENE]
        bansho-studio --bench [NAME]           pictures a second of each phenomenon here
@@ -68,7 +68,7 @@ fn bench(wanted: &str) -> ExitCode {
 }
 
 /// The same with the window.
-fn bench_window(painter: Painting, wanted: String) -> ExitCode {
+fn bench_window(painter: RendererChoice, wanted: String) -> ExitCode {
     let (sender, results) = mpsc::channel();
     let build: Build = Box::new(move |ctx| {
         let session = session(ctx, Document::new("scene", FLAME_SHEET), None)?;
@@ -104,7 +104,7 @@ fn fail(message: &str) -> ExitCode {
     ExitCode::FAILURE
 }
 
-fn run(painter: Painting, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
+fn run(painter: RendererChoice, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
     let (opened, fault) = match scene.as_deref().map(files::open).transpose() {
         Ok(opened) => (opened, None),
         Err(error) => (None, Some(error.to_string())),

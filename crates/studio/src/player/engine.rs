@@ -12,10 +12,10 @@ use bansho::{
     },
     render::fingerprint,
 };
-use web_time::Instant;
 
-use super::{Event, Picture, Wish, states::States};
+use super::{Event, Picture, Wish, snapshot_cache::States};
 use crate::document::{Checker, Revision, stages};
+use web_time::Instant;
 
 /// Why a wish is not fulfilled.
 #[derive(Debug, thiserror::Error)]

@@ -6,23 +6,16 @@
 
 mod engine;
 mod interruption;
-#[cfg(target_arch = "wasm32")]
-mod message;
-mod pace;
-#[cfg(any(test, target_arch = "wasm32"))]
-mod pending;
-#[cfg(any(test, target_arch = "wasm32"))]
-mod reply;
-pub mod shoot;
-mod slices;
-mod states;
+mod polled;
+mod preview_size;
+pub mod render_job;
+mod snapshot_cache;
 #[cfg(test)]
 pub(crate) mod tests;
 #[cfg(not(target_arch = "wasm32"))]
 mod thread;
 mod transport;
-#[cfg(target_arch = "wasm32")]
-mod worker;
+pub(crate) mod web;
 
 use std::{sync::Arc, time::Duration};
 
@@ -30,13 +23,13 @@ use bansho::{Assets, Plan, SceneError};
 
 use crate::document::Revision;
 
-pub use pace::{Pace, Took};
-pub use slices::SlicePlayer;
+pub use polled::SlicePlayer;
+pub use preview_size::{Pace, Took};
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{StartError, ThreadPlayer};
 pub use transport::Transport;
 #[cfg(target_arch = "wasm32")]
-pub use worker::{WorkerPlayer, serve};
+pub use web::worker::{WorkerPlayer, serve};
 
 /// What a window wants to see.
 #[derive(Clone)]

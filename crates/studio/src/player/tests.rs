@@ -262,8 +262,8 @@ fn the_range_repeats_and_stays_within_the_shot() {
 
 /// The file that the job writes of frame `number`.
 fn file_of(text: &str, folder: &std::path::Path, number: i64) -> std::path::PathBuf {
-    let job = shoot::job(text, &folder.join("scene.toml"), Some(number));
-    let mut shooting = shoot::Shooting::start(job, || {}).unwrap();
+    let job = render_job::job(text, &folder.join("scene.toml"), Some(number));
+    let mut shooting = render_job::Shooting::start(job, || {}).unwrap();
     loop {
         match shooting.finished() {
             Some(result) => {
@@ -298,15 +298,15 @@ fn a_still_is_the_file_that_render_writes() {
 #[test]
 fn a_panic_while_rendering_is_told_in_its_own_words() {
     let folder = tempfile::tempdir().unwrap();
-    let job = shoot::job(SCENE, &folder.path().join("scene.toml"), Some(5));
-    let mut shooting = shoot::Shooting::start(job, || panic!("broken on purpose")).unwrap();
+    let job = render_job::job(SCENE, &folder.path().join("scene.toml"), Some(5));
+    let mut shooting = render_job::Shooting::start(job, || panic!("broken on purpose")).unwrap();
     let ended = loop {
         match shooting.finished() {
             Some(ended) => break ended,
             None => std::thread::sleep(Duration::from_millis(2)),
         }
     };
-    assert_eq!(ended, Err(shoot::Ended::Panicked("broken on purpose".into())));
+    assert_eq!(ended, Err(render_job::Ended::Panicked("broken on purpose".into())));
 }
 
 #[test]

@@ -2,37 +2,37 @@
 //! lie, on the disk or at the browser, is for its `Shelf` to know.
 
 #[cfg(target_arch = "wasm32")]
-pub(super) mod browser;
-#[cfg(not(target_arch = "wasm32"))]
-mod chooser;
-#[cfg(not(target_arch = "wasm32"))]
-mod disk;
-#[cfg(not(target_arch = "wasm32"))]
-mod moving;
+pub(crate) mod browser_io;
 #[cfg(target_arch = "wasm32")]
-mod page;
-mod question;
-#[cfg(target_arch = "wasm32")]
-mod tabs;
+mod browser_tabs;
+#[cfg(not(target_arch = "wasm32"))]
+mod dialog;
+#[cfg(not(target_arch = "wasm32"))]
+mod native;
+mod questions;
+pub(crate) mod relink;
+#[cfg(not(target_arch = "wasm32"))]
+mod save_as;
 mod unsaved;
+#[cfg(target_arch = "wasm32")]
+mod web;
 
 use std::path::PathBuf;
 
 use eframe::egui::{self, Ui};
 
-#[cfg(not(target_arch = "wasm32"))]
-use self::disk::Shelf;
-#[cfg(target_arch = "wasm32")]
-use self::page::Shelf;
-use self::{
-    question::{Answer, Leaving, Question, answer},
-    unsaved::Unsaved,
-};
-use super::{scene_panel::Subject, session::Session, store::Store};
+use self::unsaved::Unsaved;
 use crate::{
-    document::{Document, files, recovery::Recovered},
-    player::shoot::Ended,
+    app::panels::scene::Subject,
+    document::{Document, files, files::autosave::Recovered},
+    player::render_job::Ended,
+    session::{Session, settings_store::Store},
 };
+#[cfg(not(target_arch = "wasm32"))]
+use native::Shelf;
+use questions::{Answer, Leaving, Question, answer};
+#[cfg(target_arch = "wasm32")]
+use web::Shelf;
 
 /// Files of the window: what lies where, and what waits to be asked.
 pub(super) struct Files {
@@ -162,7 +162,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{examples::Bundle, player::SlicePlayer};
+    use crate::{player::SlicePlayer, scenes::examples::Bundle};
 
     #[test]
     fn a_panic_while_rendering_is_told_and_the_work_kept_at_once() {

@@ -5,15 +5,15 @@ use std::time::Duration;
 use eframe::egui::Ui;
 
 #[cfg(target_arch = "wasm32")]
-use super::tabs::Tabs;
+use super::browser_tabs::Tabs;
 #[cfg(not(target_arch = "wasm32"))]
-use crate::document::recovery::Autosave;
+use crate::document::files::autosave::Autosave;
 use crate::{
-    app::{session::Session, store::Store},
     document::{
         Revision,
-        recovery::{self, Recovered},
+        files::autosave::{self, Recovered},
     },
+    session::{Session, settings_store::Store},
 };
 
 /// Seconds between two keepings.
@@ -52,7 +52,7 @@ impl Unsaved {
             Err(error) => (None, Some(error.to_string())),
         };
         Self {
-            recovered: folder.as_deref().map(recovery::recoverable).unwrap_or_default(),
+            recovered: folder.as_deref().map(autosave::recoverable).unwrap_or_default(),
             reopened: Vec::new(),
             last_kept: 0.0,
             kept: None,
@@ -110,7 +110,7 @@ impl Unsaved {
     #[cfg(target_arch = "wasm32")]
     fn keep(&mut self, session: &mut Session) -> bool {
         let document = &session.document;
-        let work = document.is_dirty().then(|| recovery::kept(document.name(), document.text()));
+        let work = document.is_dirty().then(|| autosave::kept(document.name(), document.text()));
         let kept = self.tabs.keep(work.as_deref());
         if !kept {
             session.set_notice(Some("the browser keeps no unsaved work here; save it now and then".into()));

@@ -4,7 +4,7 @@ use eframe::egui::{Event, Modifiers, Pos2, Rect, Role, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, choosing, drag, drawn, press, release, sky, text, window};
-use crate::document::drawing::{Drawing, Factor};
+use crate::editors::aurora::document::{Drawing, Factor};
 
 fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
     harness.get_by_label(name).rect()

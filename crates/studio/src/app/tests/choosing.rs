@@ -10,7 +10,7 @@ use eframe::egui::{DroppedFile, Event, Key, Modifiers, Role};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, SCENE, drawn, sky, text, window};
-use crate::document::drawing::Drawing;
+use crate::editors::aurora::document::Drawing;
 
 /// Types `path` as the name that the window asks for, and answers with `button`.
 pub(super) fn answer(harness: &mut Harness<'_, Studio>, path: &Path, button: &str) {

@@ -217,7 +217,7 @@ fn the_window_offers_to_draw_a_frame_once_more_that_panicked() {
     let revision = session.document.revision();
     let mut harness = Harness::builder()
         .with_size(vec2(1200.0, 800.0))
-        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+        .build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     harness.run_steps(2);
     assert!(harness.query_by_label("Retry").is_none());
     fake.panic(revision, 0);
@@ -235,7 +235,7 @@ fn the_window_says_what_is_a_draft_or_a_live_state_and_draws_it_exactly_when_ask
     let (session, fake) = session();
     let mut harness = Harness::builder()
         .with_size(vec2(1200.0, 800.0))
-        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+        .build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     harness.run_steps(2);
     fake.fulfil(0.01);
     harness.run_steps(2);

@@ -50,7 +50,7 @@ fn window(text: &str) -> Harness<'static, Studio> {
 fn window_by(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, Studio> {
     let session = Session::new(Document::new("fire.toml", text), None, Box::<SlicePlayer>::default(), assets);
     let builder = builder.with_max_steps(64);
-    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     drawn(&mut harness);
     harness
 }

@@ -15,7 +15,7 @@ use egui_kittest::{
 use image::{Rgba, RgbaImage};
 
 use super::{super::Studio, SCENE, drawn, sky, window_by};
-use crate::software::{Area, Painter};
+use bansho_egui_software::{Area, Painter};
 
 /// Small, for they are kept with the code.
 const SIZE: [f32; 2] = [960.0, 620.0];

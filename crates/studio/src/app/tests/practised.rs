@@ -4,7 +4,7 @@ use eframe::egui::{Pos2, pos2};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, text, window};
-use crate::{beginnings::FLAME_SHEET, document::drawing::Drawing};
+use crate::{editors::aurora::document::Drawing, scenes::new_scene::FLAME_SHEET};
 
 /// Times of the keystroke-level model, s (Card, Moran and Newell, "The keystroke-level model for user performance time with interactive
 /// systems", 1980): to think of the next step, to point at something, to press or let go a button, and to draw, for each line of a stroke

@@ -1,0 +1,90 @@
+//! Pages of one server share what the browser keeps. Each keeps its unsaved work under a name of its own, and holds a lock of that
+//! name for as long as it lives (Web Locks), so that a living page's work is not mistaken for a dead one's. A browser that has no
+//! locks, as for pages that come over plain HTTP, offers the work of living pages too; they keep it again when it changes.
+
+use std::{cell::RefCell, rc::Rc};
+
+use eframe::egui::Context;
+use js_sys::{Array, Function, Promise, Reflect};
+use wasm_bindgen::{JsCast, JsValue, closure::Closure};
+use wasm_bindgen_futures::{JsFuture, spawn_local};
+
+use crate::{document::files::autosave::Recovered, session::settings_store::Store};
+
+/// The names under which pages keep their work.
+pub(super) struct Tabs {
+    store: Store,
+    /// What all of them begin with.
+    beginning: &'static str,
+    /// This page's.
+    own: String,
+    /// Work of pages that are no more; filled once the browser has said which these are.
+    found: Rc<RefCell<Vec<Recovered>>>,
+    looked: bool,
+}
+
+impl Tabs {
+    /// Takes a name that begins with `beginning`.
+    pub(super) fn begin(store: Store, beginning: &'static str) -> Self {
+        let own = format!("{beginning} {:.0} {:.0}", js_sys::Date::now(), 1e9 * js_sys::Math::random());
+        // Without a lock the work is offered to other pages too.
+        let _ = hold(&own);
+        Self { store, beginning, own, found: Rc::default(), looked: false }
+    }
+
+    /// Work of pages that are no more, once it is known.
+    pub(super) fn found(&mut self, ctx: &Context) -> Vec<Recovered> {
+        if !std::mem::replace(&mut self.looked, true) {
+            let kept = self.store.names(self.beginning).into_iter().filter(|name| *name != self.own).collect();
+            spawn_local(look(self.store.clone(), kept, self.found.clone(), ctx.clone()));
+        }
+        self.found.take()
+    }
+
+    /// Keeps `work`, or nothing; whether it could.
+    pub(super) fn keep(&self, work: Option<&str>) -> bool {
+        match work {
+            Some(work) => self.store.write(&self.own, work),
+            None => {
+                self.store.forget(&self.own);
+                true
+            }
+        }
+    }
+}
+
+/// Finds those of the works `kept` that no living page holds.
+async fn look(store: Store, kept: Vec<String>, found: Rc<RefCell<Vec<Recovered>>>, ctx: Context) {
+    let held = held().await.unwrap_or_default();
+    let dead = kept.into_iter().filter(|name| !held.contains(name));
+    let work =
+        dead.filter_map(|name| Some(Recovered { kept_in: name.clone().into(), ..Recovered::of(&store.read(&name)?)? }));
+    found.borrow_mut().extend(work);
+    ctx.request_repaint();
+}
+
+fn locks() -> Result<JsValue, JsValue> {
+    let navigator = Reflect::get(&js_sys::global(), &"navigator".into())?;
+    Reflect::get(&navigator, &"locks".into())
+}
+
+fn method(of: &JsValue, name: &str) -> Result<Function, JsValue> {
+    Reflect::get(of, &name.into())?.dyn_into()
+}
+
+/// Holds the lock `name` until the page is gone.
+fn hold(name: &str) -> Result<(), JsValue> {
+    let locks = locks()?;
+    let forever = Closure::once_into_js(|| JsValue::from(Promise::new(&mut |_, _| {})));
+    method(&locks, "request")?.call2(&locks, &name.into(), &forever)?;
+    Ok(())
+}
+
+/// The names of all locks that are held.
+async fn held() -> Result<Vec<String>, JsValue> {
+    let locks = locks()?;
+    let asked: Promise = method(&locks, "query")?.call0(&locks)?.dyn_into()?;
+    let answer = JsFuture::from(asked).await?;
+    let held: Array = Reflect::get(&answer, &"held".into())?.dyn_into()?;
+    Ok(held.iter().filter_map(|lock| Reflect::get(&lock, &"name".into()).ok()?.as_string()).collect())
+}

@@ -1,0 +1,117 @@
+//! Questions in the middle of the window: what to open, where to save, whether to leave unsaved work.
+
+use std::path::PathBuf;
+
+#[cfg(not(target_arch = "wasm32"))]
+use bansho::render::scene::Place;
+use eframe::egui::Ui;
+
+#[cfg(not(target_arch = "wasm32"))]
+use super::dialog::Chooser;
+use crate::document::files::autosave::Recovered;
+
+/// A question that waits for an answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Question {
+    /// Which file to open.
+    #[cfg(not(target_arch = "wasm32"))]
+    Open(Chooser),
+    /// Which file this place shall name.
+    #[cfg(not(target_arch = "wasm32"))]
+    Relink(Place, Chooser),
+    /// Which file to save to, and where to then.
+    #[cfg(not(target_arch = "wasm32"))]
+    SaveAs(Chooser, Option<Leaving>),
+    /// Whether this file may be replaced by what is saved, what is said of it, and where to then.
+    #[cfg(not(target_arch = "wasm32"))]
+    Replace(PathBuf, String, Option<Leaving>),
+    /// Whether unsaved work may be left, to open this or to close.
+    Leave(Leaving),
+    /// Whether what is rendered may be stopped, to close.
+    StopRendering,
+    /// Whether to take what another program wrote, and where to once this is saved over it.
+    #[cfg(not(target_arch = "wasm32"))]
+    ChangedOutside(Option<Leaving>),
+}
+
+/// Where to, once unsaved work may be left.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Leaving {
+    /// A scene, and where it lies if it lies anywhere.
+    Open {
+        name: String,
+        text: String,
+        path: Option<PathBuf>,
+    },
+    /// Work of a studio that did not end well.
+    Recover(Recovered),
+    Close,
+}
+
+/// What a question was answered with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    Do,
+    Save,
+    Cancel,
+}
+
+/// Asks; what was answered, once it was.
+pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
+    let mut chosen = question.body(ui).then_some(Answer::Do);
+    ui.horizontal(|ui| {
+        for (text, answer) in question.choices() {
+            if ui.button(*text).clicked() {
+                chosen = Some(*answer);
+            }
+        }
+    });
+    chosen
+}
+
+impl Question {
+    /// What is asked; whether it is answered thereby, as by a double-click on a file.
+    fn body(&mut self, ui: &mut Ui) -> bool {
+        let said = match self {
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Open(chooser) => return chooser.show(ui, "Open which scene?"),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Relink(_, chooser) => return chooser.show(ui, "Which file in its stead?"),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::SaveAs(chooser, _) => {
+                // A double-click chooses a name, to be saved over only after a question.
+                chooser.show(ui, "Save as");
+                return false;
+            }
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Replace(_, said, _) => said.as_str(),
+            Self::Leave(_) => "There is unsaved work.",
+            Self::StopRendering => {
+                "Pictures are being rendered. Whole frames stay, and rendering the shot goes on from there."
+            }
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::ChangedOutside(_) => "Another program changed the file, and there is unsaved work here.",
+        };
+        ui.label(said);
+        false
+    }
+
+    /// Its answers, as its buttons say them.
+    fn choices(&self) -> &'static [(&'static str, Answer)] {
+        use Answer::{Cancel, Do, Save};
+        match self {
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Open(_) => &[("Open", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Relink(..) => &[("Relink", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::SaveAs(..) => &[("Save", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Replace(..) => &[("Replace it", Do), ("Another name", Save), ("Cancel", Cancel)],
+            Self::Leave(_) => &[("Save", Save), ("Leave it", Do), ("Cancel", Cancel)],
+            Self::StopRendering => &[("Stop and close", Do), ("Cancel", Cancel)],
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::ChangedOutside(_) => &[("Take theirs", Do), ("Save mine", Save), ("Decide later", Cancel)],
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Every parameter of what is chosen, made from the descriptors: the one list that parser, book and schema read too.
+
+use bansho::{
+    base::parameters::{Descriptor, Kind, TableDescriptor, Value},
+    render::scene::{Place, operation::Operation},
+};
+
+use super::scene::Subject;
+use crate::{
+    app::{
+        viewport::handles::stands_for_one,
+        widgets::{
+            icon::{self, Icon},
+            keyframes,
+            value::{Widget, somewhere_in},
+        },
+    },
+    session::Session,
+};
+use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, TextEdit, Ui, vec2};
+
+/// The panel, and what is looked for in it.
+#[derive(Default)]
+pub(crate) struct Inspector {
+    wanted: String,
+}
+
+impl Inspector {
+    /// Shows the parameters of `subject`: all, or those whose names or descriptions hold what is looked for.
+    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
+        let Some(descriptor) = subject.descriptor() else { return };
+        let place = subject.place();
+        ui.heading(subject.title(&session.document));
+        ui.weak(&descriptor.doc);
+        ui.horizontal(|ui| {
+            let label = ui.label("Find").id;
+            let field = TextEdit::singleline(&mut self.wanted).hint_text("a parameter").desired_width(f32::INFINITY);
+            ui.add(field).labelled_by(label);
+        });
+        ui.separator();
+        if subject.index.is_some() && subject.place().find(session.document.values()).is_none() {
+            ui.label("It is not in the scene any more.");
+            return;
+        }
+        let wanted = Sought::new(&self.wanted);
+        if !wanted.is_in(descriptor) {
+            ui.weak("Nothing here is called so.");
+        }
+        table(ui, session, &place, descriptor, &wanted);
+    }
+}
+
+/// What is looked for; empty for everything.
+struct Sought(String);
+
+impl Sought {
+    fn new(text: &str) -> Self {
+        Self(text.trim().to_lowercase())
+    }
+
+    fn is_everything(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether a parameter, or any within it, is looked for.
+    fn is(&self, parameter: &Descriptor) -> bool {
+        let said = |text: &str| text.to_lowercase().contains(&self.0);
+        let within = match &parameter.kind {
+            Kind::Table(inner) => self.is_in(inner()),
+            Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.is_in(inner())),
+            _ => false,
+        };
+        within || said(&words(parameter.key)) || said(&parameter.doc)
+    }
+
+    fn is_in(&self, table: &TableDescriptor) -> bool {
+        table.parameters.iter().any(|parameter| self.is(parameter))
+    }
+}
+
+fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, wanted: &Sought) {
+    // Where a section itself is looked for, all of it is.
+    let all = Sought(String::new());
+    let wanted = if wanted.is_in(descriptor) { wanted } else { &all };
+    for parameter in descriptor.parameters.iter().filter(|parameter| wanted.is(parameter)) {
+        let own = place.key(parameter.key);
+        match &parameter.kind {
+            Kind::Table(inner) => section(ui, session, &own, parameter.key, inner(), wanted),
+            Kind::List { item, .. } => list(ui, session, &own, parameter, item, wanted),
+            _ => row(ui, session, &own, parameter),
+        }
+    }
+}
+
+/// A part that opens by itself while something in it is looked for.
+fn header(title: &str, place: &Place, wanted: &Sought) -> CollapsingHeader {
+    CollapsingHeader::new(words(title)).id_salt(place).open((!wanted.is_everything()).then_some(true))
+}
+
+fn section(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    title: &str,
+    descriptor: &TableDescriptor,
+    wanted: &Sought,
+) {
+    let shown = header(title, place, wanted).show(ui, |ui| {
+        table(ui, session, place, descriptor, wanted);
+    });
+    shown.header_response.on_hover_text(&descriptor.doc);
+}
+
+/// The items of a list; tables among them are sections.
+fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, wanted: &Sought) {
+    let shown = header(parameter.key, place, wanted).show(ui, |ui| {
+        let stated = place.find(session.document.values()).map(|node| node.value.clone());
+        let is_stated = stated.is_some();
+        let items = match stated.or_else(|| parameter.default.clone()) {
+            Some(Value::List(items)) => items,
+            _ => Vec::new(),
+        };
+        // A part of the usual list can only be changed in a list that is stated.
+        let usual = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
+        let before = if is_stated || items.is_empty() { Vec::new() } else { vec![usual] };
+        if let (true, Kind::Table(inner)) = (items.is_empty() && stands_for_one(place), item) {
+            // Changing anything of the usual one states it.
+            let usual = place.index(0);
+            section(ui, session, &usual, &format!("{usual}, as usual"), inner(), wanted);
+        }
+        for (index, node) in items.iter().enumerate() {
+            list_item(ui, session, &place.index(index), item, &node.value, wanted, &before);
+        }
+        if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
+            let append = Operation::Append { place: place.clone(), value: somewhere_in(item) };
+            session.edit("add", &[before.as_slice(), &[append]].concat());
+        }
+    });
+    shown.header_response.on_hover_text(&parameter.doc);
+}
+
+/// An item of a list, and what must be done `before` it can be changed.
+fn list_item(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    kind: &Kind,
+    value: &Value,
+    wanted: &Sought,
+    before: &[Operation],
+) {
+    ui.horizontal(|ui| {
+        if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
+            session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
+        }
+        match kind {
+            Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner(), wanted),
+            kind => {
+                let label = ui.label(place.to_string()).id;
+                if let Some(value) = (Widget { kind, unit: "", label, usual: None }).show(ui, value) {
+                    session.edit(
+                        &place.to_string(),
+                        &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
+                    );
+                }
+            }
+        }
+    });
+}
+
+/// One parameter: its name, its value at the present time, its key, and the way back to its default.
+fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
+    let stated = place.find(session.document.values()).map(|node| node.value.clone());
+    let time = session.transport.time_s();
+    let unstated = session.unstated(place).or_else(|| parameter.default.clone());
+    let present = stated.as_ref().or(unstated.as_ref()).and_then(|value| keyframes::at(value, time));
+    let curve = matches!(parameter.kind, Kind::Curve { .. });
+    let name = RichText::new(words(parameter.key));
+    let name = if stated.is_some() { name.strong() } else { name };
+    ui.horizontal_wrapped(|ui| {
+        let label = name_column(ui, name).on_hover_text(help(parameter)).id;
+        let Some(present) = present else {
+            if ui.button("Set").labelled_by(label).clicked() {
+                session.edit(
+                    parameter.key,
+                    &[Operation::Set { place: place.clone(), value: somewhere_in(&parameter.kind) }],
+                );
+            }
+            return;
+        };
+        if curve {
+            reset(ui, session, place, parameter, stated.is_some());
+            ui.end_row();
+        }
+        let usual = parameter.default.as_ref();
+        let widget = Widget { kind: &parameter.kind, unit: parameter.unit, label, usual };
+        if let Some(value) = widget.show(ui, &present) {
+            session.set(parameter.key, place, value);
+        }
+        if parameter.animatable() {
+            key_button(ui, session, place, stated.as_ref(), present);
+        }
+        if !curve {
+            reset(ui, session, place, parameter, stated.is_some());
+        }
+    });
+}
+
+/// The name in a column of its own, so that values stand under one another.
+fn name_column(ui: &mut Ui, name: RichText) -> Response {
+    const WIDTH: f32 = 118.0;
+    let size = vec2(WIDTH, ui.spacing().interact_size.y);
+    let layout = Layout::left_to_right(Align::Center);
+    ui.allocate_ui_with_layout(size, layout, |ui| {
+        ui.set_min_width(WIDTH);
+        ui.add(Label::new(name).truncate())
+    })
+    .inner
+}
+
+fn reset(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {
+    let name = format!("Default of {}", words(parameter.key));
+    if stated && icon::button(ui, Icon::Reset, &name).clicked() {
+        session.edit("default", &[Operation::Remove { place: place.clone() }]);
+    }
+}
+
+/// A diamond: full where a key stands at the present time. It makes one or takes it out.
+fn key_button(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<&Value>, present: Value) {
+    let time = session.transport.time_s();
+    let half = 0.5 * session.transport.frame_s();
+    let keys = stated.map(keyframes::keys).unwrap_or_default();
+    let here = keys.iter().map(|(own, _)| *own).find(|own| (own - time).abs() < half);
+    let (sign, doc) = match here {
+        Some(_) => (Icon::KeyHere, "Take out the key at this time"),
+        None if keys.is_empty() => (Icon::Key, "Key the value at this time"),
+        None => (Icon::Keyed, "Keyed; key the value at this time"),
+    };
+    if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
+        match here {
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: place.clone(), time }]),
+            None => session.key(place, present),
+        }
+    }
+}
+
+/// What a parameter is, its unit and what it may be, as the book says it.
+fn help(parameter: &Descriptor) -> String {
+    let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
+    format!("{}{unit}\n\nAllowed: {}.", parameter.doc, parameter.kind.expectation())
+}
+
+/// A key in words.
+pub(crate) fn words(key: &str) -> String {
+    key.replace('_', " ")
+}

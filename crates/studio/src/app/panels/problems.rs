@@ -1,0 +1,55 @@
+//! What is wrong with the scene, each fault with its line; clicking it leads there.
+
+use bansho::{
+    base::parameters::{ProblemKind, Span},
+    render::scene::Place,
+};
+
+use crate::session::Session;
+use eframe::egui::{self, RichText, Ui};
+
+/// What is wanted of a fault.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Wanted {
+    /// To see it in the text.
+    Sight(Span),
+    /// Another file in stead of one that cannot be had.
+    File(Place),
+}
+
+/// Shows the faults, if there are any; what a hand wants of one.
+pub(crate) fn show(ui: &mut Ui, session: &Session) -> Option<Wanted> {
+    let error = session.document.error()?.clone();
+    let mut wanted = None;
+    egui::Panel::bottom("problems").resizable(true).show(ui, |ui| {
+        let count = error.problems.len() + error.omitted;
+        let faults = if count == 1 { "1 fault".to_owned() } else { format!("{count} faults") };
+        ui.strong(format!("{faults}; the last good picture stays"));
+        egui::ScrollArea::vertical().max_height(120.0).show(ui, |ui| {
+            for problem in &error.problems {
+                let line = problem.span.as_ref().map(|span| error.position(span.start).0);
+                let text = line.map_or_else(|| problem.to_string(), |line| format!("line {line}: {problem}"));
+                let colour = ui.visuals().error_fg_color;
+                ui.horizontal_wrapped(|ui| {
+                    if ui.link(RichText::new(text).color(colour)).clicked() {
+                        wanted = problem.span.clone().map(Wanted::Sight);
+                    }
+                    let missing = matches!(problem.kind, ProblemKind::Asset(_));
+                    if missing && ui.small_button("Relink").on_hover_text("Choose another file in its stead").clicked()
+                    {
+                        wanted = Some(Wanted::File(place(&problem.path)));
+                    }
+                });
+            }
+        });
+    });
+    wanted
+}
+
+/// The place that a problem's path names.
+fn place(path: &str) -> Place {
+    path.split('.').fold(Place::root(), |place, segment| match segment.parse() {
+        Ok(index) => place.index(index),
+        Err(_) => place.key(segment),
+    })
+}

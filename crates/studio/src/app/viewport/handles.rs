@@ -1,0 +1,83 @@
+//! What stands somewhere in the scene and can be dragged there: lamps, flames and their burners.
+
+use bansho::{
+    base::{
+        math::DVec3,
+        parameters::{Table, Value},
+    },
+    render::scene::{Place, Segment},
+};
+
+use crate::{app::widgets::keyframes, session::Session};
+
+/// One of them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Thing {
+    /// The value that says where it stands.
+    pub(super) place: Place,
+    /// What its value counts from, m.
+    pub(super) origin: DVec3,
+    /// Where it is now, m.
+    pub(super) point: DVec3,
+    /// What it is called.
+    pub(super) name: String,
+}
+
+/// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own. A list that is not stated
+/// stands for one part.
+const STANDING: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
+
+/// Whether the list at `place` stands for one usual part where it is not stated.
+pub(crate) fn stands_for_one(place: &Place) -> bool {
+    let [Segment::Key(kind), Segment::Index(_), Segment::Key(parts)] = place.segments() else { return false };
+    STANDING.contains(&(kind, parts))
+}
+
+/// All that hands can move at the present time: what stands somewhere, or while keyframes are recorded what can be keyed.
+pub(super) fn things(session: &Session) -> Vec<Thing> {
+    let mut things = standing(session);
+    if session.recording {
+        things.retain(|thing| keyframes::animatable(&thing.place));
+    }
+    things
+}
+
+fn standing(session: &Session) -> Vec<Thing> {
+    let Some(plan) = session.plan() else { return Vec::new() };
+    let time = session.transport.time_s();
+    let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.stands());
+    let mut things: Vec<Thing> = lights
+        .map(|(index, light)| Thing {
+            place: Place::root().key("light").index(index).key("position"),
+            origin: DVec3::ZERO,
+            point: DVec3::from(light.position.at(time)),
+            name: format!("light {}", index + 1),
+        })
+        .collect();
+    let root = session.document.values();
+    for listed in session.document.phenomena() {
+        let Some((_, parts)) = STANDING.iter().find(|(kind, _)| *kind == listed.kind) else { continue };
+        let origin = position(root, &listed.place(), time);
+        let own = listed.place().key("position");
+        things.push(Thing { place: own, origin: DVec3::ZERO, point: origin, name: listed.name.clone() });
+        let list = listed.place().key(parts);
+        let count = match list.find(root).map(|node| &node.value) {
+            Some(Value::List(items)) => items.len(),
+            _ => 0,
+        };
+        // One that is not stated stands where the phenomenon does, and moves by itself only over time.
+        let unstated = usize::from(session.recording && count == 0);
+        things.extend((0..count + unstated).map(|index| Thing {
+            place: list.index(index).key("position"),
+            origin,
+            point: origin + position(root, &list.index(index), time),
+            name: format!("{} {parts} {}", listed.name, index + 1),
+        }));
+    }
+    things
+}
+
+/// The `position` of the table at `place`; the origin where it states none.
+fn position(root: &Table, place: &Place, time: f64) -> DVec3 {
+    keyframes::vector(root, &place.key("position"), time).unwrap_or_default()
+}

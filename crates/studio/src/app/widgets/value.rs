@@ -1,0 +1,253 @@
+//! Widgets for values, one for each kind of parameter. They know nothing of scenes.
+
+use bansho::base::parameters::{Choice, Kind, Node, Value};
+use eframe::egui::{self, Color32, DragValue, Id, Ui};
+
+use super::curve_editor::{self, Allowed};
+
+/// What a value is edited with.
+pub(crate) struct Widget<'a> {
+    /// What it may be.
+    pub(crate) kind: &'a Kind,
+    /// Its unit.
+    pub(crate) unit: &'a str,
+    /// The label that names it, for screen readers.
+    pub(crate) label: Id,
+    /// What it usually is: sliders are finest around it.
+    pub(crate) usual: Option<&'a Value>,
+}
+
+/// Beside a slider: a number without its unit, and the buttons after it, points of the screen.
+const BESIDE: f32 = 114.0;
+
+/// Sliders are so wide at least, points of the screen.
+const NARROWEST: f32 = 40.0;
+
+impl Widget<'_> {
+    /// Shows `value`; what it becomes where a hand changed it.
+    pub(crate) fn show(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
+        match self.kind {
+            Kind::Bool => self.checkbox(ui, value),
+            Kind::Integer { min, max } => self.integer(ui, value, [*min, *max]),
+            Kind::Number { min, max } => {
+                let usual = self.usual.and_then(Value::as_number);
+                let number = self.number(ui, value.as_number()?, [*min, *max], usual)?;
+                Some(Value::Number(number))
+            }
+            Kind::Vector { min, max, .. } => self.vector(ui, value, [*min, *max]),
+            Kind::Text | Kind::Asset | Kind::Rational { .. } => self.text(ui, value),
+            Kind::Choice(choices) => self.choice(ui, value, choices),
+            Kind::Curve { x, y, rising } => {
+                curve_editor::show(ui, self.label, value, Allowed { x: *x, y: *y, rising: *rising })
+            }
+            Kind::Animated(inner) | Kind::Optional(inner) => Widget { kind: inner, ..*self }.show(ui, value),
+            Kind::Auto(inner) => self.auto(ui, value, inner),
+            Kind::List { .. } | Kind::Table(_) => {
+                ui.weak("in the text");
+                None
+            }
+        }
+    }
+
+    fn checkbox(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
+        let mut on = *value == Value::Bool(true);
+        let changed = ui.checkbox(&mut on, "").labelled_by(self.label).changed();
+        changed.then_some(Value::Bool(on))
+    }
+
+    fn integer(&self, ui: &mut Ui, value: &Value, [min, max]: [i64; 2]) -> Option<Value> {
+        let mut number = value.as_number()? as i64;
+        let bounds = [min as f64, max as f64];
+        let usual = self.usual.and_then(Value::as_number);
+        let slid = self.slider(ui, number as f64, bounds, usual).map(|slid| slid.round() as i64);
+        let drag = DragValue::new(&mut number).range(min..=max).clamp_existing_to_range(false).suffix(self.suffix());
+        let dragged = ui.add(drag).labelled_by(self.label).changed().then_some(number);
+        slid.or(dragged).map(Value::Integer)
+    }
+
+    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
+        let slid = self.slider(ui, number, bounds, usual).map(decimal);
+        let dragged = self.drag(ui, number, bounds);
+        slid.or(dragged)
+    }
+
+    fn drag(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
+        let speed = speed(number);
+        let drag = DragValue::new(&mut number).range(min..=max).speed(speed).max_decimals(4);
+        // What a file says beyond its bounds is a fault to be told, not to be mended by being looked at.
+        let drag = drag.clamp_existing_to_range(false);
+        let changed = ui.add(drag.suffix(self.suffix())).labelled_by(self.label).changed();
+        changed.then(|| decimal(number))
+    }
+
+    /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
+    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
+        let scale = Scale::over(bounds, usual)?;
+        let unit =
+            ui.painter().layout_no_wrap(self.suffix(), egui::TextStyle::Button.resolve(ui.style()), Color32::WHITE);
+        let beside = BESIDE + unit.size().x;
+        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - beside).max(NARROWEST);
+        let slider = egui::Slider::new(&mut number, bounds[0]..=bounds[1]).show_value(false);
+        let slider = slider.clamping(egui::SliderClamping::Edits);
+        let slider = match scale {
+            Scale::Even => slider,
+            Scale::Decades { least } => slider.logarithmic(true).smallest_positive(least),
+        };
+        ui.add(slider).labelled_by(self.label).changed().then_some(number)
+    }
+
+    fn suffix(&self) -> String {
+        match self.unit {
+            "" => String::new(),
+            "degrees" => "°".to_owned(),
+            unit => format!(" {unit}"),
+        }
+    }
+
+    /// Numbers beside one another; where they have bounds, each below the other with a slider.
+    fn vector(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
+        let Value::List(items) = value else { return None };
+        let usual = |index: usize| match self.usual {
+            Some(Value::List(items)) => items.get(index)?.value.as_number(),
+            _ => None,
+        };
+        let whole = items.iter().all(|item| matches!(item.value, Value::Integer(_)));
+        let mut edited = items.clone();
+        let mut changed = false;
+        let slides = Scale::over(bounds, usual(0)).is_some();
+        let part = Self { unit: if slides { self.unit } else { "" }, ..*self };
+        let mut show = |ui: &mut Ui, index: usize, item: &mut Node| {
+            let Some(number) = item.value.as_number() else { return };
+            if let Some(number) = part.number(ui, number, bounds, usual(index)) {
+                changed = true;
+                item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
+            }
+        };
+        if slides {
+            ui.vertical(|ui| {
+                for (index, item) in edited.iter_mut().enumerate() {
+                    ui.horizontal(|ui| show(ui, index, item));
+                }
+            });
+        } else {
+            ui.horizontal(|ui| {
+                edited.iter_mut().enumerate().for_each(|(index, item)| show(ui, index, item));
+                ui.weak(self.unit);
+            });
+        }
+        changed.then_some(Value::List(edited))
+    }
+
+    fn text(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
+        let mut text = match value {
+            Value::Text(text) => text.clone(),
+            number => number.to_string(),
+        };
+        let changed = ui.text_edit_singleline(&mut text).labelled_by(self.label).changed();
+        let number = || text.parse::<f64>().ok().filter(|_| matches!(self.kind, Kind::Rational { .. }));
+        changed.then(|| number().map_or_else(|| Value::Text(text.clone()), Value::Number))
+    }
+
+    fn choice(&self, ui: &mut Ui, value: &Value, choices: &[Choice]) -> Option<Value> {
+        let Value::Text(name) = value else { return None };
+        let mut chosen = None;
+        let combo = egui::ComboBox::from_id_salt(self.label).selected_text(name.as_str()).show_ui(ui, |ui| {
+            for choice in choices {
+                if ui.selectable_label(choice.name == name, choice.name).on_hover_text(choice.doc).clicked() {
+                    chosen = Some(Value::Text(choice.name.to_owned()));
+                }
+            }
+        });
+        combo.response.labelled_by(self.label);
+        chosen
+    }
+
+    fn auto(&self, ui: &mut Ui, value: &Value, inner: &Kind) -> Option<Value> {
+        let mut auto = *value == Value::Text("auto".into());
+        let mut edited = None;
+        ui.horizontal(|ui| {
+            if ui.checkbox(&mut auto, "auto").changed() {
+                edited = Some(if auto { Value::Text("auto".into()) } else { somewhere_in(inner) });
+            } else if !auto {
+                edited = Widget { kind: inner, ..*self }.show(ui, value);
+            }
+        });
+        edited
+    }
+}
+
+/// A value that `kind` allows, to begin with where nothing better is known.
+pub(crate) fn somewhere_in(kind: &Kind) -> Value {
+    match kind {
+        Kind::Bool => Value::Bool(false),
+        Kind::Integer { min, max } => Value::Integer(1.clamp(*min, *max)),
+        Kind::Number { min, max } | Kind::Rational { min, max } => Value::Number(1.0_f64.clamp(*min, *max)),
+        Kind::Vector { length, min, max } => Value::numbers(vec![0.0_f64.clamp(*min, *max); *length]),
+        Kind::Text | Kind::Asset => Value::Text(String::new()),
+        Kind::Choice(choices) => Value::Text(choices.first().map_or_else(String::new, |choice| choice.name.into())),
+        Kind::Curve { x, y, .. } => {
+            let point = |x: f64| Node::from(Value::numbers([x, y[1]]));
+            Value::List(vec![point(x[0]), point(x[1])])
+        }
+        Kind::Animated(inner) | Kind::Optional(inner) | Kind::Auto(inner) => somewhere_in(inner),
+        Kind::List { .. } => Value::List(Vec::new()),
+        Kind::Table(_) => Value::Table(bansho::base::parameters::Table::default()),
+    }
+}
+
+/// How a slider divides what is allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scale {
+    Even,
+    /// By decades, down to `least`.
+    Decades {
+        least: f64,
+    },
+}
+
+impl Scale {
+    /// For `[min, max]` around what is `usual`; `None` without bounds that a hand could mean.
+    fn over([min, max]: [f64; 2], usual: Option<f64>) -> Option<Self> {
+        /// Limits so far apart only say that a value is a number.
+        const FARTHEST: f64 = 2e6;
+        /// Ratios from which on the same step is too coarse below and too fine above.
+        const WIDE: f64 = 50.0;
+        if !(min < max && max - min < FARTHEST) {
+            return None;
+        }
+        let usual = usual.filter(|usual| *usual > 0.0);
+        let wide = match usual {
+            Some(usual) => max / usual >= WIDE,
+            None => min > 0.0 && max / min >= WIDE,
+        };
+        let least = if min > 0.0 { min } else { usual.map_or(1e-6 * max, |usual| 1e-3 * usual) };
+        Some(if wide { Self::Decades { least } } else { Self::Even })
+    }
+}
+
+/// What a pixel of dragging changes a number by: a hundredth of it, and never nothing.
+fn speed(number: f64) -> f64 {
+    (number.abs() * 0.01).max(0.002)
+}
+
+/// The number to the places that a person would write: a file is read by people too.
+fn decimal(number: f64) -> f64 {
+    let rounded = (number * 10_000.0).round() / 10_000.0;
+    // Numbers so small that nothing would be left of them keep all their places.
+    if rounded == 0.0 || !rounded.is_finite() { number } else { rounded }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sliders_go_by_decades_where_the_range_does() {
+        assert_eq!(Scale::over([0.0, 1.0], Some(0.5)), Some(Scale::Even));
+        assert_eq!(Scale::over([-40.0, 40.0], None), Some(Scale::Even));
+        assert_eq!(Scale::over([0.0, 1000.0], Some(2.0)), Some(Scale::Decades { least: 0.002 }));
+        assert_eq!(Scale::over([0.01, 100.0], None), Some(Scale::Decades { least: 0.01 }));
+        assert_eq!(Scale::over([f64::MIN, f64::MAX], Some(1.0)), None);
+        assert_eq!(Scale::over([1.0, 1.0], None), None);
+    }
+}

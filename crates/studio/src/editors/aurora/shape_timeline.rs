@@ -1,0 +1,154 @@
+//! The shapes on a line of time: chosen, added, moved in time, removed.
+
+use bansho::{
+    base::parameters::Value,
+    render::scene::{Place, operation::Operation},
+};
+
+use super::{AuroraEditor, document::Drawing, pointer::Gesture};
+use crate::session::Session;
+use eframe::egui::{self, Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
+
+/// A shape that is dragged on the line: the line keeps its end meanwhile, and the shape its distance from the pointer.
+#[derive(Clone, Copy)]
+pub(super) struct Grip {
+    end_s: f64,
+    offset: f32,
+}
+
+/// Shows the line and its buttons.
+pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+    /// A narrower line has a row of its own.
+    const BESIDE: f32 = 220.0;
+    let beside = ui.horizontal(|ui| {
+        buttons(editor, ui, session, drawing);
+        let beside = ui.available_width() >= BESIDE;
+        if beside {
+            line(editor, ui, session, drawing);
+        }
+        beside
+    });
+    if !beside.inner {
+        line(editor, ui, session, drawing);
+    }
+}
+
+/// What is done with the shape that is shown on the right.
+fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+    if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
+        add(editor, ui, session, drawing);
+        return;
+    }
+    let several = drawing.arrivals().len() > 1;
+    let remove = ui.add_enabled(several, egui::Button::new("Remove shape"));
+    if remove.on_hover_text("Without the shape that is shown on the right").clicked() {
+        let removal = drawing.remove_shape(editor.target);
+        editor.change(session, "remove shape", &removal, ui.cursor().min);
+        return;
+    }
+    if editor.target > 0 {
+        let label = ui.label("reached after").id;
+        let mut after_s = drawing.after_s(editor.target);
+        let drag = egui::DragValue::new(&mut after_s).range(0.1..=1e5).speed(0.05).max_decimals(2).suffix(" s");
+        let drag = drag.clamp_existing_to_range(false);
+        if ui.add(drag).labelled_by(label).changed() {
+            let change = drawing.retime(editor.target, after_s);
+            editor.change(session, "time of shape", &change, ui.cursor().min);
+        }
+    }
+}
+
+fn add(editor: &mut AuroraEditor, ui: &Ui, session: &mut Session, drawing: &Drawing) {
+    let operations = drawing.add_shape();
+    if !editor.change(session, "add shape", &operations, ui.cursor().min) {
+        return;
+    }
+    let Ok(drawing) = editor.drawing(session) else { return };
+    let last = drawing.arrivals().len() - 1;
+    lengthen_shot(session, drawing.arrivals()[last]);
+    choose(editor, session, &drawing, last);
+    editor.next = Some(0);
+}
+
+/// A shot that ends before the last shape is reached would never show it.
+fn lengthen_shot(session: &mut Session, until_s: f64) {
+    let needed = (until_s / session.transport.frame_s()).ceil() as i64 + 1;
+    let frames = session.transport.frames();
+    if frames.end() - frames.start() + 1 < needed {
+        let place = Place::root().key("picture").key("frames");
+        session.edit("add shape", &[Operation::Set { place, value: Value::Integer(needed) }]);
+    }
+}
+
+/// Draws shape `shape` from now on, and shows the moment when it is reached.
+pub(super) fn choose(editor: &mut AuroraEditor, session: &mut Session, drawing: &Drawing, shape: usize) {
+    (editor.target, editor.next) = (shape, None);
+    (editor.gesture, editor.refusal) = (Gesture::None, None);
+    let arrival = drawing.arrivals().get(shape).copied().unwrap_or_default();
+    session.transport.set_playing(false);
+    session.go_to_time(arrival);
+}
+
+fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+    const HANDLE: f32 = 22.0;
+    let (response, painter) = ui.allocate_painter(vec2(ui.available_width().max(120.0), 22.0), Sense::hover());
+    let rect = response.rect.shrink2(vec2(0.5 * HANDLE + 2.0, 2.0));
+    let visuals = ui.visuals().clone();
+    painter.hline(rect.x_range(), rect.center().y, Stroke::new(2.0, visuals.widgets.inactive.bg_fill));
+    let arrivals = drawing.arrivals();
+    let end = editor.grip.map_or_else(|| line_end_s(session, arrivals), |grip| grip.end_s);
+    let x_of = |time: f64| rect.left() + (time / end).min(1.0) as f32 * rect.width();
+    painter.vline(
+        x_of(session.transport.time_s()),
+        response.rect.y_range(),
+        Stroke::new(1.0, visuals.weak_text_color()),
+    );
+    for (shape, &arrival) in arrivals.iter().enumerate() {
+        let handle = Rect::from_center_size(pos2(x_of(arrival), rect.center().y), vec2(HANDLE, 18.0));
+        let response = ui.interact(handle, ui.scope_id().with(("shape", shape)), Sense::click_and_drag());
+        let name = format!("Shape {}", shape + 1);
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+        let chosen = shape == editor.target;
+        let fill = if chosen { visuals.selection.bg_fill } else { visuals.widgets.inactive.bg_fill };
+        painter.rect_filled(handle, CornerRadius::same(3), fill);
+        let colour = if chosen { Color32::WHITE } else { visuals.text_color() };
+        painter.text(handle.center(), Align2::CENTER_CENTER, shape + 1, FontId::proportional(12.0), colour);
+        let response = response.on_hover_text(format!("{name}, reached at {arrival:.2} s; drag to move it in time"));
+        if response.clicked() || response.drag_started() {
+            choose(editor, session, drawing, shape);
+        }
+        if response.drag_started() {
+            let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(handle.center());
+            editor.grip = Some(Grip { end_s: end, offset: from.x - handle.center().x });
+        }
+        if let (Some(grip), Some(at), true) = (editor.grip, response.interact_pointer_pos(), response.dragged()) {
+            let wanted = f64::from((at.x - grip.offset - rect.left()) / rect.width()) * end;
+            move_in_time(editor, session, drawing, (shape, wanted - arrival), handle.center());
+        }
+        if response.drag_stopped() {
+            editor.grip = None;
+        }
+    }
+}
+
+/// Where the line ends, s: it holds the whole shot, and every shape.
+fn line_end_s(session: &Session, arrivals: &[f64]) -> f64 {
+    let frames = session.transport.frames();
+    let shot_s = (frames.end() - frames.start()).max(1) as f64 * session.transport.frame_s();
+    arrivals.iter().copied().fold(shot_s, f64::max)
+}
+
+/// Lets a shape come `later` by so many seconds. The first one is there from the beginning.
+fn move_in_time(
+    editor: &mut AuroraEditor,
+    session: &mut Session,
+    drawing: &Drawing,
+    (shape, later): (usize, f64),
+    at: Pos2,
+) {
+    let change = drawing.retime(shape, drawing.after_s(shape) + later);
+    // Less than what is written of a time is none.
+    if shape > 0 && later.abs() >= 0.005 {
+        editor.change(session, "time of shape", &change, at);
+    }
+}

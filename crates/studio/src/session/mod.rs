@@ -1,0 +1,484 @@
+//! What the window works on: the document, its file, its player and the time. No widgets.
+
+pub(crate) mod settings_store;
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use bansho::{
+    Assets, Plan,
+    base::{
+        camera::CameraParameters,
+        parameters::{Parameters, Value},
+    },
+    render::scene::{Place, Segment, edit::EditError, operation::Operation},
+};
+
+use crate::{
+    app::{broken::Broken, rate::Rate, widgets::keyframes},
+    document::{Document, Revision},
+    editors::aurora::document::{Drawing, Refusal},
+    player::{Event, Pace, Picture, Player, Took, Transport, Wish},
+    scenes::examples::Bundle,
+};
+
+use web_time::Instant;
+
+/// Makes the assets of a scene that lies in a folder. A scene without a file finds those of the examples first, and given ones.
+pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+
+/// What a hand does not notice that waits for a picture.
+const AT_ONCE: Duration = Duration::from_millis(40);
+
+/// The table of the camera.
+const CAMERA: &str = "camera";
+
+/// A document that is open, with its player.
+pub struct Session {
+    /// The scene.
+    pub document: Document,
+    /// Its file, once it has one.
+    pub path: Option<PathBuf>,
+    /// The time.
+    pub transport: Transport,
+    /// Whether hands in the viewport leave keyframes.
+    pub recording: bool,
+    /// Counts documents that were opened here.
+    pub opened: u64,
+    /// Whether pictures may be simulated with fewer particles than the scene has.
+    pub draft: bool,
+    /// The flame sheet whose stages are seen.
+    pub stages: Option<usize>,
+    /// Whether unsaved work must be kept at once.
+    pub keep_now: bool,
+    player: Box<dyn Player>,
+    assets_of: AssetsOf,
+    bundle: Bundle,
+    assets: Arc<dyn Assets>,
+    pace: Pace,
+    picture: Option<Picture>,
+    drawn: u64,
+    /// Pictures of the stages, each with its number.
+    stage_pictures: Vec<(Picture, u64)>,
+    asked: Option<Asked>,
+    /// What panicked, which is not drawn again.
+    broken: Broken,
+    notice: Option<String>,
+    rate: Rate,
+    /// A time that is gone to once the scene is checked, s.
+    seek: Option<f64>,
+}
+
+/// What was wished for last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Asked {
+    revision: Revision,
+    number: Option<i64>,
+    within: [usize; 2],
+    draft: bool,
+    stages: Option<usize>,
+}
+
+impl Session {
+    /// Opens `document`, which lies in `path`.
+    pub fn new(document: Document, path: Option<PathBuf>, player: Box<dyn Player>, assets_of: AssetsOf) -> Self {
+        let bundle = Bundle::default();
+        Self {
+            assets: assets(&bundle, path.as_deref(), assets_of),
+            bundle,
+            document,
+            path,
+            transport: Transport::default(),
+            recording: false,
+            opened: 0,
+            draft: true,
+            stages: None,
+            keep_now: false,
+            stage_pictures: Vec::new(),
+            player,
+            assets_of,
+            pace: Pace::default(),
+            picture: None,
+            drawn: 0,
+            asked: None,
+            broken: Broken::default(),
+            notice: None,
+            rate: Rate::default(),
+            seek: None,
+        }
+    }
+
+    /// Opens another document in place of this one.
+    pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
+        self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
+        (self.document, self.path) = (document, path);
+        (self.picture, self.asked, self.broken, self.notice) = (None, None, Broken::default(), None);
+        (self.stages, self.stage_pictures, self.pace) = (None, Vec::new(), Pace::default());
+        (self.transport, self.seek, self.rate) = (Transport::default(), None, Rate::default());
+        self.opened += 1;
+    }
+
+    /// Reads all assets anew, as after one was replaced.
+    pub fn reload_assets(&mut self) {
+        self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_of);
+        // What was broken by a file may be whole with another.
+        self.retry();
+    }
+
+    /// Draws what panicked once more.
+    pub fn retry(&mut self) {
+        (self.asked, self.broken) = (None, Broken::default());
+    }
+
+    /// Takes the bytes of a file that no folder holds.
+    pub fn give(&mut self, name: &str, bytes: Vec<u8>) {
+        self.player.give(name, &bytes);
+        self.bundle.give(name, bytes);
+        self.reload_assets();
+    }
+
+    /// The last picture, and which it is.
+    pub fn picture(&self) -> Option<(&Picture, u64)> {
+        self.picture.as_ref().map(|picture| (picture, self.drawn))
+    }
+
+    /// The last picture of a stage of the flame sheet that is chosen, and which it is.
+    pub fn stage(&self, stage: usize) -> Option<(&Picture, u64)> {
+        self.stage_pictures.get(stage).map(|(picture, drawn)| (picture, *drawn))
+    }
+
+    /// The last good plan.
+    pub fn plan(&self) -> Option<&Arc<Plan>> {
+        self.document.plan()
+    }
+
+    /// Whether a picture is under way.
+    pub fn is_busy(&self) -> bool {
+        self.player.is_busy()
+    }
+
+    /// Pictures a second while time passes.
+    pub fn pictures_per_s(&self) -> Option<f64> {
+        self.rate.pictures_per_s().filter(|_| self.transport.is_playing())
+    }
+
+    /// What the user should know.
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.as_deref()
+    }
+
+    /// Tells the user something, or takes it back.
+    pub fn set_notice(&mut self, notice: Option<String>) {
+        self.notice = notice;
+    }
+
+    /// Whether the present frame panicked.
+    pub fn is_broken(&self) -> bool {
+        self.broken.holds(self.document.revision(), self.transport.number())
+    }
+
+    /// Carries out `operations`; what cannot be done is told.
+    pub fn edit(&mut self, label: &str, operations: &[Operation]) {
+        match self.document.edit(label, operations) {
+            Ok(()) => self.notice = None,
+            Err(EditError::Syntax(reason)) => {
+                self.notice = Some(format!("the text is not TOML; mend it or undo first: {reason}"));
+            }
+            Err(error) => self.notice = Some(error.to_string()),
+        }
+    }
+
+    /// Carries out `operations` on the shapes of aurora `index`; what it has then.
+    ///
+    /// # Errors
+    /// An aurora cannot take the shapes that would come of them; nothing is changed then.
+    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<Drawing, Refusal> {
+        let drawing = self.document.reshape(label, operations, index, &self.assets)?;
+        self.notice = None;
+        Ok(drawing)
+    }
+
+    /// Goes to the frame at `time`, s; once the scene is checked, also where that makes the shot longer.
+    pub fn go_to_time(&mut self, time: f64) {
+        self.seek = (!self.document.is_checked()).then_some(time);
+        self.seek_now(time);
+    }
+
+    fn seek_now(&mut self, time: f64) {
+        let first = *self.transport.frames().start();
+        self.transport.go_to(first + (time / self.transport.frame_s()).round() as i64);
+    }
+
+    /// Where the scene's pictures and drawings come from.
+    pub fn assets(&self) -> &Arc<dyn Assets> {
+        &self.assets
+    }
+
+    /// Sets the value at `place`; where it is keyed, as it is at the present time. While keyframes are recorded, all that may be keyed is.
+    pub fn set(&mut self, label: &str, place: &Place, value: Value) {
+        self.set_all(label, [(place.clone(), value)]);
+    }
+
+    /// Sets several values in one step.
+    pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (Place, Value)>) {
+        let keyed =
+            |place: &Place| place.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
+        let operation = |(place, value): (Place, Value)| {
+            if keyed(&place) || (self.recording && keyframes::animatable(&place)) {
+                self.keyframe(&place, value)
+            } else {
+                Operation::Set { place, value }
+            }
+        };
+        let operations: Vec<Operation> = values.into_iter().map(operation).collect();
+        self.edit_as_seen(label, operations);
+    }
+
+    /// Keys `value` at `place` now.
+    pub fn key(&mut self, place: &Place, value: Value) {
+        let key = self.keyframe(place, value);
+        self.edit_as_seen("key", vec![key]);
+    }
+
+    /// What stands at `place` of a good scene whether or not the text states it, where that is not simply the parameter's default: a
+    /// camera that is not told where to look may look up at the sky.
+    pub fn unstated(&self, place: &Place) -> Option<Value> {
+        let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
+        let camera = &self.plan().filter(|_| root == CAMERA)?.scene().camera;
+        camera.to_table().get(key).map(|node| node.value.clone())
+    }
+
+    /// Carries out `operations`, and states what they would change unseen: a camera that looks up by itself no longer does once it is
+    /// told where to stand or to look.
+    fn edit_as_seen(&mut self, label: &str, operations: Vec<Operation>) {
+        let camera = Place::root().key(CAMERA);
+        let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
+        let told = [&position, &target].map(|place| place.find(self.document.values()).is_some());
+        let tells = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
+        let usual = CameraParameters::default().to_table();
+        let mut all = Vec::new();
+        if tells && told == [false; 2] {
+            for (place, key) in [(position, "position"), (target, "target"), (field, "vertical_fov_deg")] {
+                let stated = place.find(self.document.values()).is_some();
+                let present =
+                    self.unstated(&place).filter(|value| usual.get(key).is_none_or(|node| node.value != *value));
+                all.extend(present.filter(|_| !stated).map(|value| Operation::Set { place, value }));
+            }
+        }
+        all.extend(operations);
+        self.edit(label, &all);
+    }
+
+    /// The operation that keys `place` now.
+    pub fn keyframe(&self, place: &Place, value: Value) -> Operation {
+        Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
+    }
+
+    /// What [`listen`](Self::listen) and then [`follow`](Self::follow) do.
+    pub fn update(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
+        self.listen(now, hands);
+        self.follow(now, viewport, hands)
+    }
+
+    /// Takes in what the player did. `hands` tells that something is being dragged, so that speed matters more than size.
+    pub fn listen(&mut self, now: f64, hands: bool) {
+        for event in self.player.poll() {
+            self.take_in(event, now, hands);
+        }
+        if !self.transport.is_playing() {
+            self.rate = Rate::default();
+        }
+    }
+
+    /// Lets time pass and says what is to be drawn for a viewport of `viewport` pixels. How long the window may sleep, s.
+    pub fn follow(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
+        let hurry = hands || self.transport.is_playing();
+        let shown = self.picture.as_ref().is_some_and(|picture| picture.number == self.transport.number());
+        self.transport.tick(now, shown || self.is_broken());
+        self.wish(viewport, hurry);
+        if self.player.waits_for_poll() {
+            return Some(0.0);
+        }
+        self.transport.sleep_s(now).filter(|_| !self.is_busy())
+    }
+
+    /// Waits a moment for a picture that comes at once, as after a change of something quick, so that it is painted together with the
+    /// change and not a whole frame of the window later. While time passes nothing waits: pictures are drawn beside painting then.
+    pub fn wait(&mut self, now: f64, hands: bool) {
+        let began = Instant::now();
+        let quick =
+            self.picture.as_ref().is_some_and(|picture| picture.draw_s + picture.advance_s < AT_ONCE.as_secs_f64());
+        while quick && !self.transport.is_playing() && self.is_busy() {
+            let Some(left) = AT_ONCE.checked_sub(began.elapsed()) else { return };
+            self.player.wait(left);
+            self.listen(now, hands);
+        }
+    }
+
+    fn wish(&mut self, viewport: [usize; 2], hurry: bool) {
+        let share = if hurry { self.pace.share() } else { 1.0 };
+        let number = self.plan().map(|_| self.transport.number());
+        let asked = Asked {
+            revision: self.document.revision(),
+            number,
+            within: viewport.map(|side| ((side as f64 * share).round() as usize).max(1)),
+            draft: self.draft,
+            stages: self.stages.filter(|_| !hurry || self.is_quick()),
+        };
+        // In a hurry a frame is drawn once, whatever size would have been better.
+        let same = |last: Asked| last == Asked { within: if hurry { last.within } else { asked.within }, ..asked };
+        if self.asked.is_some_and(same) || self.is_broken() {
+            return;
+        }
+        self.asked = Some(asked);
+        self.send(asked, false);
+    }
+
+    /// Whether there is time for more than the picture itself.
+    fn is_quick(&self) -> bool {
+        const QUICK_S: f64 = 0.05;
+        self.picture.as_ref().is_none_or(|picture| picture.draw_s + picture.advance_s < QUICK_S)
+    }
+
+    /// Draws the present frame once more from the scene's beginning, at the viewport's full size.
+    pub fn draw_exactly(&mut self) {
+        if let Some(asked) = self.asked {
+            self.send(asked, true);
+        }
+    }
+
+    fn send(&mut self, asked: Asked, exact: bool) {
+        let wish = self.wish_for(asked, exact);
+        self.player.wish(wish);
+    }
+
+    /// The wish for the finished picture of frame `number`, for a player of its own.
+    pub fn finished(&self, number: i64) -> Wish {
+        let revision = self.document.revision();
+        let asked = Asked { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
+        Wish { still: true, ..self.wish_for(asked, true) }
+    }
+
+    /// The bytes of a file that the studio brought along, or was given.
+    pub fn bundled(&self, name: &str) -> Option<&[u8]> {
+        self.bundle.bytes(name)
+    }
+
+    /// Files that no folder holds, by name.
+    pub fn given(&self) -> &[(String, Arc<[u8]>)] {
+        self.bundle.given()
+    }
+
+    fn wish_for(&self, asked: Asked, exact: bool) -> Wish {
+        Wish {
+            revision: asked.revision,
+            name: self.document.name().to_owned(),
+            text: self.document.text().clone(),
+            assets: self.assets.clone(),
+            number: asked.number,
+            within: asked.within,
+            exact,
+            draft: asked.draft,
+            still: false,
+            stages: asked.stages,
+        }
+    }
+
+    /// News of a document that was open before is none.
+    fn take_in(&mut self, event: Event, now: f64, hands: bool) {
+        if event.revision().is_some_and(|revision| !self.document.has_been(revision)) {
+            return;
+        }
+        match event {
+            Event::Judged { revision, outcome } => self.judged(revision, outcome),
+            Event::Drawn(picture) => self.show(picture, now, hands),
+            Event::Stage(stage, picture) => {
+                self.drawn += 1;
+                let stages = &mut self.stage_pictures;
+                if let Some(own) = stages.get_mut(stage) {
+                    *own = (picture, self.drawn);
+                } else {
+                    stages.push((picture, self.drawn));
+                }
+            }
+            Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
+            // Finished pictures are asked of other players.
+            Event::Failed { .. } | Event::Still { .. } => {}
+            Event::Panicked { revision, number, message } => {
+                if revision == self.document.revision() {
+                    // One that was checked breaks at some frames only.
+                    let checked = self.plan().filter(|_| self.document.is_checked());
+                    let frame = checked.map(|plan| number.unwrap_or(plan.frames().start));
+                    self.broken.note(revision, frame);
+                }
+                self.transport.set_playing(false);
+                self.notice = Some(self.told_of_panic(&message));
+            }
+        }
+    }
+
+    /// What the user is told where a phenomenon panicked and said `message`; the work is saved at once.
+    pub(super) fn told_of_panic(&mut self, message: &str) -> String {
+        self.keep_now = true;
+        format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue())
+    }
+
+    /// Saves the work beside its file after a panic, and says so.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn rescue(&self) -> String {
+        let Some(path) = self.path.as_ref().filter(|_| self.document.is_dirty()) else { return String::new() };
+        match crate::document::files::rescue(self.document.text(), path) {
+            Ok(beside) => format!("; the scene was saved as {}", beside.display()),
+            Err(error) => format!("; the scene could not be saved beside its file: {error}"),
+        }
+    }
+
+    /// The browser keeps the work at once, for a page writes no files by itself.
+    #[cfg(target_arch = "wasm32")]
+    fn rescue(&self) -> String {
+        if self.document.is_dirty() { "; the browser keeps the scene".into() } else { String::new() }
+    }
+
+    fn judged(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
+        self.document.judge(revision, outcome);
+        if let Some(plan) = self.document.plan() {
+            let frames = plan.frames();
+            self.transport.set_shot(frames.start..=frames.end - 1, 1.0 / plan.fps().frame_s());
+            if let Some(asked) = self.asked.as_mut().filter(|asked| asked.number.is_none()) {
+                // The scene's first frame is being drawn, which nobody knew the number of.
+                asked.number = Some(frames.start);
+                self.transport.go_to(frames.start);
+            }
+        }
+        if let Some(time) = self.seek.take_if(|_| self.document.is_checked()) {
+            self.seek_now(time);
+        }
+    }
+
+    fn show(&mut self, picture: Picture, now: f64, hands: bool) {
+        /// Wanted of a preview while something is dragged, s.
+        const AT_HAND_S: f64 = 0.05;
+        if hands || self.transport.is_playing() {
+            let target = if hands { AT_HAND_S } else { self.transport.frame_s() };
+            let Picture { size: [width, height], draw_s, advance_s, .. } = picture;
+            self.pace.learn(Took { pixels: width * height, draw_s, advance_s }, target);
+            self.rate.came(now);
+        }
+        self.drawn += 1;
+        self.picture = Some(picture);
+    }
+}
+
+/// What a scene in `path` finds.
+fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn Assets> {
+    let files = assets_of(folder(path));
+    if path.is_some() { files } else { Arc::new(bundle.clone().before(files)) }
+}
+
+/// The folder that paths in a scene are relative to.
+pub(super) fn folder(path: Option<&Path>) -> &Path {
+    path.and_then(Path::parent).unwrap_or(Path::new(""))
+}
