@@ -195,13 +195,13 @@ impl Texture {
     pub(super) fn taps(&self, at: f32, axis: usize) -> Taps {
         if self.options.magnification == TextureFilter::Nearest {
             let texel = self.wrapped(at.floor() as i32, axis);
-            return Taps { texels: [texel; 2], share: 0.0 };
+            return Taps { texels: [texel; 2], fraction: 0.0 };
         }
         let floor = (at - 0.5).floor();
         // Saturates, so that nothing overflows.
         let first = (floor as i32).min(i32::MAX - 1);
-        let share = if floor.is_finite() { at - 0.5 - floor } else { 0.0 };
-        Taps { texels: [self.wrapped(first, axis), self.wrapped(first + 1, axis)], share }
+        let fraction = if floor.is_finite() { at - 0.5 - floor } else { 0.0 };
+        Taps { texels: [self.wrapped(first, axis), self.wrapped(first + 1, axis)], fraction }
     }
 
     /// The mixture of four texels, 0 to 255.
@@ -210,9 +210,9 @@ impl Texture {
         for (side, row) in sides.iter_mut().zip(down.texels) {
             let row = self.row(row);
             let [left, right] = across.texels.map(|texel| row[texel].to_array());
-            *side = mix(left.map(f32::from), right.map(f32::from), across.share);
+            *side = mix(left.map(f32::from), right.map(f32::from), across.fraction);
         }
-        mix(sides[0], sides[1], down.share)
+        mix(sides[0], sides[1], down.fraction)
     }
 
     /// The colour at `at`, texels.
@@ -230,13 +230,13 @@ impl Texture {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Taps {
     pub(super) texels: [usize; 2],
-    pub(super) share: f32,
+    pub(super) fraction: f32,
 }
 
-fn mix(from: [f32; 4], to: [f32; 4], share: f32) -> [f32; 4] {
+fn mix(from: [f32; 4], to: [f32; 4], fraction: f32) -> [f32; 4] {
     let mut mixture = from;
     for c in 0..4 {
-        mixture[c] += (to[c] - from[c]) * share;
+        mixture[c] += (to[c] - from[c]) * fraction;
     }
     mixture
 }

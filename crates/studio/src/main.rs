@@ -5,7 +5,7 @@ fn main() {
     match web_sys::window() {
         Some(_) => wasm_bindgen_futures::spawn_local(web::main()),
         // The page's worker runs the same program.
-        None => bansho_studio::player::serve(),
+        None => bansho_studio::player::run_worker(),
     }
 }
 

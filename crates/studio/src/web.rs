@@ -6,7 +6,7 @@ use bansho::Assets;
 use bansho_studio::{
     app::{Session, Studio, function_keys},
     document::Document,
-    player::{Player, SlicePlayer, WorkerPlayer},
+    player::{Player, PolledPlayer, WorkerPlayer},
     scenes::examples::{Bundle, SCENES},
 };
 use eframe::egui::{self, Context};
@@ -51,7 +51,7 @@ struct Page {
 impl eframe::App for Page {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.studio.ui(ui);
-        self.unsaved.set(self.studio.would_lose_something());
+        self.unsaved.set(self.studio.has_unfinished_work());
         let session = self.studio.session();
         let notice = session.notice().unwrap_or_default();
         if self.told != notice {
@@ -101,7 +101,7 @@ fn keep_keys_from_browser(window: &Window) -> Result<(), JsValue> {
 fn player(ctx: Context) -> Box<dyn Player> {
     match WorkerPlayer::start(move || ctx.request_repaint()) {
         Ok(player) => Box::new(player),
-        Err(_) => Box::<SlicePlayer>::default(),
+        Err(_) => Box::<PolledPlayer>::default(),
     }
 }
 

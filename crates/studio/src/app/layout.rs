@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use eframe::egui::{Context, Panel, ThemePreference, Ui};
 
-use crate::session::settings_store::Store;
+use crate::session::settings_store::SettingsStore;
 
 /// Sizes of the panels and what is open.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Layout {
-    store: Store,
+    store: SettingsStore,
     values: BTreeMap<String, f32>,
     /// What was kept last.
     kept: BTreeMap<String, f32>,
@@ -32,7 +32,7 @@ const THEME: &str = "theme";
 
 impl Layout {
     /// The layout in `store`; the usual one where there is none.
-    pub(super) fn read(store: Store) -> Self {
+    pub(super) fn read(store: SettingsStore) -> Self {
         let text = store.read(NAME).unwrap_or_default();
         let pair = |line: &str| {
             let (key, value) = line.rsplit_once(' ')?;
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn a_layout_is_there_again_at_the_next_start() {
         let home = tempfile::tempdir().unwrap();
-        let store = Store::new(Some(home.path().to_path_buf()));
+        let store = SettingsStore::new(Some(home.path().to_path_buf()));
         let mut layout = Layout::read(store.clone());
         assert_eq!(layout.get("inspector", 330.0), 330.0);
         assert_eq!(layout.window_size(), [1400.0, 860.0]);
@@ -133,6 +133,6 @@ mod tests {
             [damaged.get("inspector", 5.0), damaged.get("scene", 6.0), damaged.get("text", 0.0)],
             [5.0, 6.0, 1.0]
         );
-        Layout::read(Store::default()).keep();
+        Layout::read(SettingsStore::default()).keep();
     }
 }

@@ -4,8 +4,8 @@ use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
 use crate::{
-    document::files::autosave::Recovered,
-    scenes::{examples, new_scene::BEGINNINGS},
+    document::files::autosave::RecoveredWork,
+    scenes::{examples, new_scene::NEW_SCENES},
 };
 
 impl Studio {
@@ -15,7 +15,7 @@ impl Studio {
             ui.menu_button("File", |ui| self.file_menu(ui));
             ui.menu_button("Edit", |ui| self.edit_menu(ui));
             ui.menu_button("View", |ui| self.view_menu(ui));
-            self.offer_recovered(ui);
+            self.recover_menu_ui(ui);
             let star = if self.session.document.is_dirty() { " •" } else { "" };
             ui.weak(format!("{}{star}", self.session.document.name()));
         });
@@ -23,7 +23,7 @@ impl Studio {
 
     fn file_menu(&mut self, ui: &mut Ui) {
         ui.menu_button("New", |ui| {
-            for (name, text) in BEGINNINGS {
+            for (name, text) in NEW_SCENES {
                 if ui.button(name).clicked() {
                     self.files.open_bundled(&mut self.session, "scene", text);
                 }
@@ -82,9 +82,9 @@ impl Studio {
     }
 
     fn view_menu(&mut self, ui: &mut Ui) {
-        ui.checkbox(&mut self.shows.text, "Text");
-        ui.checkbox(&mut self.shows.picture_alone, "Only the picture");
-        ui.checkbox(&mut self.shows.shortcuts, "Shortcuts");
+        ui.checkbox(&mut self.visible_panels.text, "Text");
+        ui.checkbox(&mut self.visible_panels.picture_only, "Only the picture");
+        ui.checkbox(&mut self.visible_panels.shortcuts, "Shortcuts");
         ui.separator();
         let mut theme = ui.ctx().options(|options| options.theme_preference);
         for (choice, name) in [
@@ -98,11 +98,11 @@ impl Studio {
     }
 
     /// Unsaved work of a studio that did not end well.
-    fn offer_recovered(&mut self, ui: &mut Ui) {
+    fn recover_menu_ui(&mut self, ui: &mut Ui) {
         if self.files.unsaved.recovered.is_empty() {
             return;
         }
-        let name = |recovered: &Recovered| match recovered.origin.as_str() {
+        let name = |recovered: &RecoveredWork| match recovered.origin.as_str() {
             "" => "a scene never saved".to_owned(),
             origin => origin.to_owned(),
         };

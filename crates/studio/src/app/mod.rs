@@ -1,11 +1,9 @@
 //! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
 
-pub(crate) mod broken;
 mod files;
 mod layout;
 mod menu;
 pub(crate) mod panels;
-pub(crate) mod rate;
 mod shortcuts;
 mod status;
 #[cfg(all(test, not(target_arch = "wasm32")))]
@@ -19,13 +17,13 @@ use eframe::egui;
 
 pub use self::shortcuts::function_keys;
 use self::{files::Files, layout::Layout, viewport::Viewport};
-pub use super::session::{AssetsOf, Session};
+pub use super::session::{AssetsForFolder, Session};
 pub use crate::editors::flame_sheet::stages_ui::image as screen_image;
 use crate::{
     editors::{aurora::AuroraEditor, flame_sheet::stages_ui::StagesView},
-    session::settings_store::Store,
+    session::{selection::Selection, settings_store::SettingsStore},
 };
-use panels::{inspector::Inspector, problems::Wanted, scene::Subject, text::TextPanel};
+use panels::{inspector::Inspector, problems::ProblemAction, text::TextPanel};
 
 /// The kind of phenomenon whose shapes are drawn.
 const KIND_WITH_SHAPES: &str = "aurora";
@@ -39,14 +37,14 @@ const KIND_WITH_STAGES: &str = "flame_sheet";
 /// The whole window.
 pub struct Studio {
     session: Session,
-    subject: Subject,
+    selection: Selection,
     viewport: Viewport,
     aurora: AuroraEditor,
     stages: StagesView,
     inspector: Inspector,
     text: TextPanel,
     files: Files,
-    shows: Shows,
+    visible_panels: VisiblePanels,
     layout: Layout,
     /// Which of the documents that were opened is shown.
     opened: u64,
@@ -56,34 +54,34 @@ pub struct Studio {
 
 /// How large the window was when it was closed last, or is at first, points of the screen.
 pub fn window_size(home: Option<&std::path::Path>) -> [f32; 2] {
-    Layout::read(Store::new(home.map(Into::into))).window_size()
+    Layout::read(SettingsStore::new(home.map(Into::into))).window_size()
 }
 
 /// Which parts of the window are open.
 #[derive(Clone, Copy, Debug, Default)]
-struct Shows {
+struct VisiblePanels {
     text: bool,
     shortcuts: bool,
     /// Nothing but the picture and its tools.
-    picture_alone: bool,
+    picture_only: bool,
 }
 
 impl Studio {
     /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
-        let subject = Subject::first_of(&session.document);
-        let store = Store::new(home);
+        let selection = Selection::first_of(&session.document);
+        let store = SettingsStore::new(home);
         let layout = Layout::read(store.clone());
         Self {
             session,
-            subject,
+            selection,
             viewport: Viewport::default(),
             aurora: AuroraEditor::default(),
             stages: StagesView::default(),
             inspector: Inspector::default(),
             text: TextPanel::default(),
             files: Files::new(&store),
-            shows: Shows { text: layout.get("text shown", 0.0) > 0.0, ..Shows::default() },
+            visible_panels: VisiblePanels { text: layout.get("text shown", 0.0) > 0.0, ..VisiblePanels::default() },
             layout,
             opened: 0,
             field: None,
@@ -96,7 +94,7 @@ impl Studio {
     }
 
     /// Whether something would be lost if the window closed now: work, or pictures under way.
-    pub fn would_lose_something(&self) -> bool {
+    pub fn has_unfinished_work(&self) -> bool {
         self.session.document.is_dirty() || self.files.progress().is_some()
     }
 
@@ -111,17 +109,17 @@ impl Studio {
         if ui.ctx().cumulative_pass_nr() == 0 {
             self.layout.apply_theme(ui.ctx());
         }
-        let (now, hands) = now_and_hands(ui);
+        let (now, dragging) = time_and_dragging(ui);
         // Before anything is shown, so that a picture is on the screen as soon as it is there.
-        self.session.listen(now, hands);
-        self.begin_gestures(ui.ctx());
-        self.take_shortcuts(ui.ctx());
-        self.files.tend(ui, &mut self.session, &self.subject);
+        self.session.poll_player(now, dragging);
+        self.begin_undo_steps(ui.ctx());
+        self.handle_shortcuts(ui.ctx());
+        self.files.poll(ui, &mut self.session, &self.selection);
         egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
         egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
         egui::Panel::bottom("timeline").show(ui, |ui| panels::timeline::show(ui, &mut self.session));
-        self.follow_opening();
-        if self.shows.picture_alone {
+        self.reset_on_open();
+        if self.visible_panels.picture_only {
             self.session.stages = None;
         } else {
             self.panels(ui);
@@ -129,30 +127,31 @@ impl Studio {
         let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
         egui::CentralPanel::default()
             .frame(bare)
-            .show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
-        if self.shows.shortcuts {
-            shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
+            .show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.selection));
+        if self.visible_panels.shortcuts {
+            shortcuts::window(ui.ctx(), &mut self.visible_panels.shortcuts);
         }
-        self.end_gestures(ui);
+        self.end_undo_steps(ui);
         self.layout.note_theme(ui.ctx());
-        self.layout.note("text shown", f32::from(u8::from(self.shows.text)));
+        self.layout.note("text shown", f32::from(u8::from(self.visible_panels.text)));
         self.layout.note_window(ui.ctx());
-        self.follow(ui);
+        self.request_frame(ui);
     }
 
     /// Begins with what a hand would reach for first in a scene that was just opened.
-    fn follow_opening(&mut self) {
-        let gone = self.subject.index.is_some() && self.subject.place().find(self.session.document.values()).is_none();
+    fn reset_on_open(&mut self) {
+        let gone =
+            self.selection.index.is_some() && self.selection.place().find(self.session.document.values()).is_none();
         if self.opened != self.session.opened || gone {
             self.opened = self.session.opened;
-            self.subject = Subject::first_of(&self.session.document);
+            self.selection = Selection::first_of(&self.session.document);
             self.aurora = AuroraEditor::default();
         }
     }
 
     fn panels(&mut self, ui: &mut egui::Ui) {
         self.side_panels(ui);
-        if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
+        if let (KIND_WITH_SHAPES, Some(index)) = (self.selection.key, self.selection.index) {
             let panel = egui::Panel::bottom("aurora").resizable(true);
             let Self { aurora, session, layout, .. } = self;
             layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
@@ -161,42 +160,42 @@ impl Studio {
 
     fn side_panels(&mut self, ui: &mut egui::Ui) {
         match panels::problems::show(ui, &self.session) {
-            Some(Wanted::Sight(span)) => {
-                self.shows.text = true;
+            Some(ProblemAction::Sight(span)) => {
+                self.visible_panels.text = true;
                 self.text.jump_to(span);
             }
-            Some(Wanted::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
+            Some(ProblemAction::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
             None => {}
         }
-        let Self { session, subject, text, stages, inspector, layout, shows, .. } = self;
+        let Self { session, selection, text, stages, inspector, layout, visible_panels, .. } = self;
         layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| panels::scene::show(ui, session, subject));
+            egui::ScrollArea::vertical().show(ui, |ui| panels::scene::show(ui, session, selection));
         });
-        if shows.text {
+        if visible_panels.text {
             layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
         }
         layout.panel("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
             session.stages = None;
-            if let (KIND_WITH_STAGES, Some(index)) = (subject.key, subject.index) {
+            if let (KIND_WITH_STAGES, Some(index)) = (selection.key, selection.index) {
                 stages.show(ui, session, index);
             }
             // A row that is too wide is scrolled to: it must not widen the panel, which would widen the rows.
-            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, subject));
+            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, selection));
         });
     }
 
     /// What is done from one press to its letting go, in one field, or by one turn of the wheel is one step of the history.
-    fn begin_gestures(&mut self, ctx: &egui::Context) {
+    fn begin_undo_steps(&mut self, ctx: &egui::Context) {
         let field = ctx.memory(egui::Memory::focused);
         let (pressed, held) = ctx.input(|input| (input.pointer.any_pressed(), input.pointer.any_down()));
         if pressed || (self.field != field && !held) {
-            self.session.document.seal();
+            self.session.document.end_step();
         }
         self.field = field;
     }
 
     /// When everything is let go, what was done is done.
-    fn end_gestures(&mut self, ui: &egui::Ui) {
+    fn end_undo_steps(&mut self, ui: &egui::Ui) {
         /// Turns of the wheel that follow one another faster are one, s.
         const TURN_S: f32 = 0.5;
         let typing = ui.ctx().egui_wants_keyboard_input();
@@ -208,7 +207,7 @@ impl Studio {
             return;
         }
         if !turned {
-            self.session.document.seal();
+            self.session.document.end_step();
         }
         // Pages end without being asked.
         if cfg!(target_arch = "wasm32") {
@@ -216,18 +215,18 @@ impl Studio {
         }
     }
 
-    fn follow(&mut self, ui: &egui::Ui) {
-        let (now, hands) = now_and_hands(ui);
-        if let Some(sleep_s) = self.session.follow(now, self.viewport.pixels(), hands) {
+    fn request_frame(&mut self, ui: &egui::Ui) {
+        let (now, dragging) = time_and_dragging(ui);
+        if let Some(sleep_s) = self.session.advance_time(now, self.viewport.pixels(), dragging) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
         }
-        self.session.wait(now, hands);
+        self.session.wait(now, dragging);
         self.viewport.take_picture(ui, &self.session);
     }
 }
 
 /// What time it is, s, and whether something is being dragged.
-fn now_and_hands(ui: &egui::Ui) -> (f64, bool) {
+fn time_and_dragging(ui: &egui::Ui) -> (f64, bool) {
     let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
     (now, held && ui.ctx().dragged_id().is_some())
 }

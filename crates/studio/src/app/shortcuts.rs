@@ -18,7 +18,7 @@ pub(super) enum Action {
     FrameOn,
     FirstFrame,
     Text,
-    PictureAlone,
+    PictureOnly,
     Shortcuts,
 }
 
@@ -60,25 +60,25 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
     plain(Key::ArrowLeft, Action::FrameBack, "Frame back"),
     plain(Key::ArrowRight, Action::FrameOn, "Frame on"),
     plain(Key::Home, Action::FirstFrame, "First frame"),
-    plain(Key::F, Action::PictureAlone, "Only the picture, or everything"),
+    plain(Key::F, Action::PictureOnly, "Only the picture, or everything"),
     plain(Key::Questionmark, Action::Shortcuts, "These shortcuts"),
 ];
 
 impl Studio {
     /// Does what pressed keys say. Keys that write something belong to whatever is being typed in.
-    pub(super) fn take_shortcuts(&mut self, ctx: &Context) {
+    pub(super) fn handle_shortcuts(&mut self, ctx: &Context) {
         let typing = ctx.egui_wants_keyboard_input();
         for shortcut in &SHORTCUTS {
             let mine = !typing || shortcut.keys.modifiers.command || is_function(shortcut.keys.logical_key);
             if mine && ctx.input_mut(|input| pressed(input, shortcut)) {
-                self.act(ctx, shortcut.action);
+                self.perform(ctx, shortcut.action);
             }
         }
     }
 
-    fn act(&mut self, ctx: &Context, action: Action) {
+    fn perform(&mut self, ctx: &Context, action: Action) {
         if matches!(action, Action::Save | Action::Open | Action::RenderStill | Action::RenderShot) {
-            self.viewport.let_go(&mut self.session);
+            self.viewport.end_wind_drag(&mut self.session);
         }
         let transport = &mut self.session.transport;
         match action {
@@ -96,9 +96,9 @@ impl Studio {
             Action::FrameBack => transport.step(-1),
             Action::FrameOn => transport.step(1),
             Action::FirstFrame => transport.go_to(*transport.range().start()),
-            Action::Text => self.shows.text = !self.shows.text,
-            Action::PictureAlone => self.shows.picture_alone = !self.shows.picture_alone,
-            Action::Shortcuts => self.shows.shortcuts = !self.shows.shortcuts,
+            Action::Text => self.visible_panels.text = !self.visible_panels.text,
+            Action::PictureOnly => self.visible_panels.picture_only = !self.visible_panels.picture_only,
+            Action::Shortcuts => self.visible_panels.shortcuts = !self.visible_panels.shortcuts,
         }
     }
 }

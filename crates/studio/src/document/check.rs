@@ -66,7 +66,7 @@ impl Checker {
 
 /// A fault that another [`check`] found, in words.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct ReportedProblem {
     /// The bytes of the text that it is about, if it lies anywhere.
     pub span: Option<Span>,
     /// The parameter.
@@ -77,7 +77,7 @@ pub struct Found {
     pub asset: Option<String>,
 }
 
-impl From<&Problem> for Found {
+impl From<&Problem> for ReportedProblem {
     fn from(problem: &Problem) -> Self {
         let Problem { span, path, kind } = problem;
         let (asset, reason) = match kind {
@@ -88,9 +88,9 @@ impl From<&Problem> for Found {
     }
 }
 
-impl From<Found> for Problem {
-    fn from(found: Found) -> Self {
-        let Found { span, path, reason, asset } = found;
+impl From<ReportedProblem> for Problem {
+    fn from(found: ReportedProblem) -> Self {
+        let ReportedProblem { span, path, reason, asset } = found;
         let kind = match asset {
             Some(path) => ProblemKind::Asset(AssetError { path, problem: AssetProblem::Told(reason) }),
             None => ProblemKind::Conflict(reason),
@@ -108,7 +108,7 @@ pub fn recheck(
     name: &str,
     text: &str,
     assets: &Arc<dyn Assets>,
-    found: Result<f32, Vec<Found>>,
+    found: Result<f32, Vec<ReportedProblem>>,
 ) -> Result<Arc<Plan>, SceneError> {
     let scene = Scene::reparse(name, text, KINDS)?;
     match found {
@@ -267,7 +267,7 @@ mod tests {
         let counting = Arc::new(Counting::default());
         let assets: Arc<dyn Assets> = counting.clone();
         let error = check("scene", text, &assets).err().unwrap();
-        let found: Vec<Found> = error.problems.iter().map(Found::from).collect();
+        let found: Vec<ReportedProblem> = error.problems.iter().map(ReportedProblem::from).collect();
         let made = counting.meshes.load(Ordering::Relaxed);
         let told = recheck("scene", text, &assets, Err(found)).err().unwrap();
         assert_eq!(counting.meshes.load(Ordering::Relaxed), made);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 /// Most steps that are kept.
-const LONGEST: usize = 1000;
+const MAX_STEPS: usize = 1000;
 
 #[derive(Default)]
 pub(super) struct History {
@@ -31,18 +31,18 @@ impl History {
             Some(last) => last.after = after.into(),
             None => {
                 self.done.push(Step { label: label.to_owned(), before: before.clone(), after: after.into() });
-                self.done.drain(..self.done.len().saturating_sub(LONGEST));
+                self.done.drain(..self.done.len().saturating_sub(MAX_STEPS));
             }
         }
         self.open = true;
     }
 
-    pub(super) fn seal(&mut self) {
+    pub(super) fn end_step(&mut self) {
         self.open = false;
     }
 
     /// Forgets the last step where it is called `label` and still open; the text before it.
-    pub(super) fn abandon(&mut self, label: &str) -> Option<Arc<str>> {
+    pub(super) fn discard_step(&mut self, label: &str) -> Option<Arc<str>> {
         let open = std::mem::take(&mut self.open);
         let step = self.done.pop_if(|step| open && step.label == label)?;
         Some(step.before)

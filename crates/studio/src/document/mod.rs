@@ -3,6 +3,7 @@
 mod check;
 pub mod files;
 mod history;
+pub(crate) mod keyframes;
 mod named_files;
 pub(crate) mod phenomena;
 pub mod stages;
@@ -24,9 +25,9 @@ use bansho::{
     },
 };
 
-pub use check::{Checker, Found, check, recheck};
+pub use check::{Checker, ReportedProblem, check, recheck};
 pub use named_files::named_files;
-pub use phenomena::{Listed, operations};
+pub use phenomena::{PhenomenonEntry, operations};
 
 use history::History;
 
@@ -55,12 +56,12 @@ pub struct Document {
     history: History,
     values: Table,
     syntax: Option<Problem>,
-    verdict: Verdict,
+    check_state: CheckState,
 }
 
 /// What checking found out so far.
 #[derive(Default)]
-struct Verdict {
+struct CheckState {
     of: Option<Revision>,
     plan: Option<Arc<Plan>>,
     error: Option<Arc<SceneError>>,
@@ -81,7 +82,7 @@ impl Document {
             history: History::default(),
             values: Table::default(),
             syntax: None,
-            verdict: Verdict::default(),
+            check_state: CheckState::default(),
         };
         document.read();
         document
@@ -108,7 +109,7 @@ impl Document {
     }
 
     /// Whether `revision` is, or was, a state of this document rather than of another.
-    pub fn has_been(&self, revision: Revision) -> bool {
+    pub fn includes_revision(&self, revision: Revision) -> bool {
         (self.first..=self.revision).contains(&revision)
     }
 
@@ -119,11 +120,11 @@ impl Document {
 
     /// Whether it differs from what lies in its file.
     pub fn is_dirty(&self) -> bool {
-        self.gone || self.differs()
+        self.gone || self.is_modified()
     }
 
     /// Whether something was done here since it was saved or opened.
-    pub fn differs(&self) -> bool {
+    pub fn is_modified(&self) -> bool {
         self.text != self.saved
     }
 
@@ -133,48 +134,48 @@ impl Document {
     }
 
     /// Notes whether its file was taken away.
-    pub fn mark_gone(&mut self, gone: bool) {
+    pub fn set_file_missing(&mut self, gone: bool) {
         self.gone = gone;
     }
 
     /// The last plan that was good, if there ever was one.
     pub fn plan(&self) -> Option<&Arc<Plan>> {
-        self.verdict.plan.as_ref()
+        self.check_state.plan.as_ref()
     }
 
     /// What is wrong with the text, as far as is known.
     pub fn error(&self) -> Option<&Arc<SceneError>> {
-        self.verdict.error.as_ref()
+        self.check_state.error.as_ref()
     }
 
     /// Whether this state has been checked.
     pub fn is_checked(&self) -> bool {
-        self.verdict.of == Some(self.revision)
+        self.check_state.of == Some(self.revision)
     }
 
     /// Takes what [`check`] found out about state `revision`; stale news is no news.
-    pub fn judge(&mut self, revision: Revision, outcome: Result<Arc<Plan>, SceneError>) {
+    pub fn set_check_result(&mut self, revision: Revision, outcome: Result<Arc<Plan>, SceneError>) {
         if revision != self.revision {
             return;
         }
-        self.verdict.of = Some(revision);
+        self.check_state.of = Some(revision);
         match outcome {
             Ok(plan) => {
-                self.verdict.plan = Some(plan);
-                self.verdict.error = None;
+                self.check_state.plan = Some(plan);
+                self.check_state.error = None;
             }
-            Err(error) => self.verdict.error = Some(Arc::new(error)),
+            Err(error) => self.check_state.error = Some(Arc::new(error)),
         }
     }
 
     /// Checks this state here and now.
     pub fn check_now(&mut self, assets: &Arc<dyn Assets>) {
         let outcome = check(&self.name, &self.text, assets);
-        self.judge(self.revision, outcome);
+        self.set_check_result(self.revision, outcome);
     }
 
     /// Carries out `operations` as a step of the history. Steps of one label that follow one another, as those of a slider that is
-    /// dragged, are one until [`seal`](Self::seal).
+    /// dragged, are one until [`end_step`](Self::end_step).
     ///
     /// # Errors
     /// The text is no TOML, or an operation leads nowhere; nothing is changed then.
@@ -186,7 +187,7 @@ impl Document {
     }
 
     /// Goes on to `text`, which says `values`, as [`edit`](Self::edit) does.
-    pub(crate) fn go_on(&mut self, label: &str, text: String, values: Table) {
+    pub(crate) fn apply_text(&mut self, label: &str, text: String, values: Table) {
         self.history.note(label, &self.text, &text);
         if *text != *self.text {
             (self.text, self.revision) = (text.into(), Revision::next());
@@ -194,20 +195,20 @@ impl Document {
         }
     }
 
-    /// Replaces the whole text, as typing does; typing is one step until [`seal`](Self::seal).
+    /// Replaces the whole text, as typing does; typing is one step until [`end_step`](Self::end_step).
     pub fn replace(&mut self, label: &str, text: &str) {
         self.history.note(label, &self.text, text);
         self.show(text.into());
     }
 
     /// Ends a step: what comes next is a step of its own.
-    pub fn seal(&mut self) {
-        self.history.seal();
+    pub fn end_step(&mut self) {
+        self.history.end_step();
     }
 
     /// Takes back the step `label` while it is still open, as if it had never been.
-    pub fn abandon(&mut self, label: &str) {
-        if let Some(text) = self.history.abandon(label) {
+    pub fn discard_step(&mut self, label: &str) {
+        if let Some(text) = self.history.discard_step(label) {
             self.show(text);
         }
     }

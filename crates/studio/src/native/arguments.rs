@@ -6,7 +6,7 @@ use super::{USAGE, renderer_choice::RendererChoice};
 
 /// All of it.
 #[derive(Debug, PartialEq)]
-pub(super) struct Asked {
+pub(super) struct Arguments {
     pub(super) painter: RendererChoice,
     pub(super) work: Work,
 }
@@ -21,7 +21,7 @@ pub(super) enum Work {
     Scene(Option<PathBuf>),
 }
 
-impl Asked {
+impl Arguments {
     /// Reads the program's arguments.
     ///
     /// # Errors
@@ -66,19 +66,19 @@ impl Asked {
 mod tests {
     use super::*;
 
-    fn asked(arguments: &[&str]) -> Result<Asked, String> {
-        Asked::of(arguments.iter().map(OsString::from))
+    fn asked(arguments: &[&str]) -> Result<Arguments, String> {
+        Arguments::of(arguments.iter().map(OsString::from))
     }
 
     #[test]
     fn the_painter_is_named_anywhere() {
         let scene = Work::Scene(Some("a.toml".into()));
-        assert_eq!(asked(&["a.toml"]), Ok(Asked { painter: RendererChoice::Auto, work: scene }));
+        assert_eq!(asked(&["a.toml"]), Ok(Arguments { painter: RendererChoice::Auto, work: scene }));
         for arguments in [["--painter", "software", "a.toml"], ["a.toml", "--painter", "software"]] {
             assert_eq!(asked(&arguments).unwrap().painter, RendererChoice::Software);
         }
         let bench = asked(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
-        assert_eq!(bench, Asked { painter: RendererChoice::Gpu, work: Work::BenchWindow("rain".into()) });
+        assert_eq!(bench, Arguments { painter: RendererChoice::Gpu, work: Work::BenchWindow("rain".into()) });
     }
 
     #[test]

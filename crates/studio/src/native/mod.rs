@@ -17,7 +17,7 @@ use bansho_studio::{
 };
 
 use self::{
-    arguments::{Asked, Work},
+    arguments::{Arguments, Work},
     renderer_choice::RendererChoice,
 };
 use bansho_egui_software::window::Build;
@@ -35,7 +35,7 @@ const USAGE: &str = "usage: bansho-studio [--painter auto|gpu|software] [SCENE]
 const TITLE: &str = "Bansho Studio";
 
 pub(super) fn main() -> ExitCode {
-    let asked = match Asked::of(std::env::args_os().skip(1)) {
+    let asked = match Arguments::of(std::env::args_os().skip(1)) {
         Ok(asked) => asked,
         Err(message) => return fail(&message),
     };
@@ -54,13 +54,13 @@ pub(super) fn main() -> ExitCode {
 /// How fast the studio follows hands here, of the phenomena whose name contains `wanted`.
 fn bench(wanted: &str) -> ExitCode {
     for speed in bench::measure(wanted) {
-        let bench::Speed { name, pictures_per_s, advance_s, draw_s, answer_s } = match speed {
+        let bench::Speed { name, frames_per_s, advance_s, draw_s, answer_s } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
         let [advance, draw, answer] = [advance_s, draw_s, answer_s].map(|seconds| 1000.0 * seconds);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
+            "{name:24} {frames_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
              19 of 20 changes show within {answer:4.0} ms"
         ));
     }
@@ -78,13 +78,13 @@ fn bench_window(painter: RendererChoice, wanted: String) -> ExitCode {
         return fail(&format!("error: {error}"));
     }
     for speed in results {
-        let bench::WindowSpeed { name, pictures_per_s, played_size, answer_s, size } = match speed {
+        let bench::WindowSpeed { name, frames_per_s, played_size, answer_s, size } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
         let ([width, height], [whole_width, whole_height]) = (played_size, size);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s of {width} x {height}, \
+            "{name:24} {frames_per_s:6.1} pictures/s of {width} x {height}, \
              19 of 20 changes painted at {whole_width} x {whole_height} within {:4.0} ms",
             1000.0 * answer_s
         ));

@@ -13,13 +13,13 @@ use bansho::{
     render::fingerprint,
 };
 
-use super::{Event, Picture, Wish, snapshot_cache::States};
+use super::{Event, FrameRequest, Picture, snapshot_cache::SnapshotCache};
 use crate::document::{Checker, Revision, stages};
 use web_time::Instant;
 
 /// Why a wish is not fulfilled.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Unfulfilled {
+pub(super) enum RequestError {
     /// No picture can be drawn, or it was stopped.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -28,7 +28,7 @@ pub(super) enum Unfulfilled {
     Media(#[from] MediaError),
 }
 
-impl Unfulfilled {
+impl RequestError {
     /// Whether the observer asked to stop.
     pub(super) fn is_stop(&self) -> bool {
         matches!(self, Self::Render(RenderError::Cancelled(_)))
@@ -39,68 +39,70 @@ impl Unfulfilled {
 #[derive(Default)]
 pub(super) struct Engine {
     /// What was judged last.
-    judged: Option<Judged>,
+    checked: Option<Checked>,
     checker: Checker,
     /// The last good plan, at the scene's own size, and whether it is a draft.
     plan: Option<(Arc<Plan>, bool)>,
-    shot: Option<Opened>,
+    shot: Option<OpenShot>,
     /// Of finished pictures; each goes on from the one before.
-    still: Option<(Arc<Plan>, Box<dyn Shot>)>,
-    states: States,
+    full_quality: Option<(Arc<Plan>, Box<dyn Shot>)>,
+    snapshots: SnapshotCache,
     stages: StageShots,
 }
 
 /// A state of a document, with its assets, and whether it was judged as a draft if it could be one.
-struct Judged {
+struct Checked {
     revision: Revision,
     assets: Arc<dyn Assets>,
     draft: bool,
 }
 
 /// A shot, with the plan and the size that it was last planned for.
-struct Opened {
+struct OpenShot {
     shot: Box<dyn Shot>,
     of: Arc<Plan>,
     size: [usize; 2],
 }
 
 impl Engine {
-    /// Fulfils `wish` and tells `emit` what came of it. Stops when `observer` says so; another call then goes on.
+    /// Fulfils `request` and tells `emit` what came of it. Stops when `observer` says so; another call then goes on.
     ///
     /// # Errors
     /// No picture can be drawn or made a file, or the observer asked to stop.
-    pub(super) fn fulfil(
+    pub(super) fn process(
         &mut self,
-        wish: &Wish,
+        request: &FrameRequest,
         observer: &dyn Observer,
         emit: &mut dyn FnMut(Event),
-    ) -> Result<(), Unfulfilled> {
-        let draft = wish.draft && !wish.exact && !wish.still;
-        let Wish { name, text, assets, .. } = wish;
-        let same =
-            |last: &Judged| (last.revision, last.draft) == (wish.revision, draft) && Arc::ptr_eq(&last.assets, assets);
-        if !self.judged.as_ref().is_some_and(same) {
+    ) -> Result<(), RequestError> {
+        let draft = request.draft && !request.exact && !request.full_quality;
+        let FrameRequest { name, text, assets, .. } = request;
+        let same = |last: &Checked| {
+            (last.revision, last.draft) == (request.revision, draft) && Arc::ptr_eq(&last.assets, assets)
+        };
+        if !self.checked.as_ref().is_some_and(same) {
             let drafted = if draft { self.checker.check_draft(name, text, assets) } else { None };
             let is_draft = drafted.is_some();
             let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
-            self.judged = Some(Judged { revision: wish.revision, assets: assets.clone(), draft });
+            self.checked = Some(Checked { revision: request.revision, assets: assets.clone(), draft });
             if let Ok(plan) = &outcome {
                 self.plan = Some((plan.clone(), is_draft));
             }
-            emit(Event::Judged { revision: wish.revision, outcome });
+            emit(Event::Checked { revision: request.revision, outcome });
         }
         let Some((plan, draft)) = self.plan.clone() else { return Ok(()) };
-        if wish.still {
-            let number = wish.number.unwrap_or(plan.frames().start);
-            emit(Event::Still { number, png: self.finish(&plan, number, observer)? });
+        if request.full_quality {
+            let number = request.number.unwrap_or(plan.frames().start);
+            emit(Event::FullQualityFrame { number, png: self.finish(&plan, number, observer)? });
             return Ok(());
         }
-        let picture = self.draw(&plan, wish, observer)?;
+        let picture = self.draw(&plan, request, observer)?;
         emit(Event::Drawn(Picture { draft, ..picture }));
-        if let Some(sheet) = wish.stages {
-            self.stages.turn_to(&plan, sheet, wish)?;
+        if let Some(sheet) = request.stages {
+            self.stages.set_plan(&plan, sheet, request)?;
             for (stage, opened) in self.stages.shots.iter_mut().enumerate() {
-                let picture = opened.draw(wish, wish.number.unwrap_or(plan.frames().start), &mut None, observer)?;
+                let picture =
+                    opened.draw(request, request.number.unwrap_or(plan.frames().start), &mut None, observer)?;
                 emit(Event::Stage(stage, picture));
             }
         }
@@ -109,52 +111,57 @@ impl Engine {
 
     /// Forgets the shot, as after a panic in it.
     #[cfg(not(target_arch = "wasm32"))]
-    pub(super) fn forget(&mut self) {
-        *self = Self { judged: self.judged.take(), plan: self.plan.take(), ..Self::default() };
+    pub(super) fn reset_after_panic(&mut self) {
+        *self = Self { checked: self.checked.take(), plan: self.plan.take(), ..Self::default() };
     }
 
     /// The file of the finished frame `number`. Where it was stopped, or the last one ended, it goes on.
-    fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, Unfulfilled> {
-        let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(of, plan));
-        let (_, shot) = self.still.insert(match begun {
+    fn finish(&mut self, plan: &Arc<Plan>, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, RequestError> {
+        let begun = self.full_quality.take().filter(|(of, _)| Arc::ptr_eq(of, plan));
+        let (_, shot) = self.full_quality.insert(match begun {
             Some(begun) => begun,
             None => (plan.clone(), CpuBackend.open(plan.clone())?),
         });
         let frame = bansho::draw(shot.as_mut(), number, observer)?;
-        let png = encoded(&frame);
+        let png = encode_png(&frame);
         shot.recycle(frame);
         Ok(png?)
     }
 
-    fn draw(&mut self, plan: &Arc<Plan>, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
-        let number = wish.number.unwrap_or(plan.frames().start);
-        let size = fitted(plan.size(), wish.within);
-        let opened = open(&mut self.shot, plan, size, wish.exact)?;
-        opened.draw(wish, number, &mut Some(&mut self.states), observer)
+    fn draw(
+        &mut self,
+        plan: &Arc<Plan>,
+        request: &FrameRequest,
+        observer: &dyn Observer,
+    ) -> Result<Picture, RenderError> {
+        let number = request.number.unwrap_or(plan.frames().start);
+        let size = fit_within(plan.size(), request.within);
+        let opened = open(&mut self.shot, plan, size, request.exact)?;
+        opened.draw(request, number, &mut Some(&mut self.snapshots), observer)
     }
 }
 
-impl Opened {
-    /// Draws frame `number`, by way of the nearest of `states` where there are any.
+impl OpenShot {
+    /// Draws frame `number`, by way of the nearest of `snapshots` where there are any.
     fn draw(
         &mut self,
-        wish: &Wish,
+        request: &FrameRequest,
         number: i64,
-        states: &mut Option<&mut States>,
+        snapshots: &mut Option<&mut SnapshotCache>,
         observer: &dyn Observer,
     ) -> Result<Picture, RenderError> {
         let Self { shot, of, size } = self;
         let began = Instant::now();
-        states.iter_mut().for_each(|states| states.seek(of, shot.as_mut(), number));
+        snapshots.iter_mut().for_each(|snapshots| snapshots.seek(of, shot.as_mut(), number));
         shot.advance(number, observer)?;
-        states.iter_mut().for_each(|states| states.keep(of, shot.as_ref(), number));
+        snapshots.iter_mut().for_each(|snapshots| snapshots.store(of, shot.as_ref(), number));
         let advanced = Instant::now();
         shot.draw(observer)?;
         let mut frame = shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
-        let pixels = shown(&mut frame);
+        let pixels = to_display_pixels(&mut frame);
         shot.recycle(frame);
         Ok(Picture {
-            revision: wish.revision,
+            revision: request.revision,
             number,
             size: *size,
             scene_size: of.size(),
@@ -172,18 +179,18 @@ impl Opened {
 struct StageShots {
     /// Of which plan and which sheet.
     of: Option<(Arc<Plan>, usize)>,
-    shots: Vec<Opened>,
+    shots: Vec<OpenShot>,
 }
 
 impl StageShots {
-    fn turn_to(&mut self, plan: &Arc<Plan>, sheet: usize, wish: &Wish) -> Result<(), RenderError> {
+    fn set_plan(&mut self, plan: &Arc<Plan>, sheet: usize, request: &FrameRequest) -> Result<(), RenderError> {
         if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(of, plan) && *own == sheet) {
             return Ok(());
         }
         // Of a text with faults there are none; the last pictures stay.
-        let plans = stages::plans(&wish.name, &wish.text, &wish.assets, sheet).unwrap_or_default();
-        let open = |plan: Arc<Plan>| -> Result<Opened, RenderError> {
-            Ok(Opened { shot: CpuBackend.open(plan.clone())?, size: plan.size(), of: plan })
+        let plans = stages::plans(&request.name, &request.text, &request.assets, sheet).unwrap_or_default();
+        let open = |plan: Arc<Plan>| -> Result<OpenShot, RenderError> {
+            Ok(OpenShot { shot: CpuBackend.open(plan.clone())?, size: plan.size(), of: plan })
         };
         self.shots = plans.into_iter().map(open).collect::<Result<_, _>>()?;
         self.of = Some((plan.clone(), sheet));
@@ -193,32 +200,32 @@ impl StageShots {
 
 /// The shot of `plan` at `size`: the one there is where it can go on, else a new one.
 fn open<'a>(
-    slot: &'a mut Option<Opened>,
+    slot: &'a mut Option<OpenShot>,
     plan: &Arc<Plan>,
     size: [usize; 2],
     exact: bool,
-) -> Result<&'a mut Opened, RenderError> {
+) -> Result<&'a mut OpenShot, RenderError> {
     let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && Arc::ptr_eq(&opened.of, plan)));
     let opened = match usable {
-        None => Opened { shot: CpuBackend.open(Arc::new(plan.at_size(size)))?, of: plan.clone(), size },
+        None => OpenShot { shot: CpuBackend.open(Arc::new(plan.at_size(size)))?, of: plan.clone(), size },
         Some(opened) if Arc::ptr_eq(&opened.of, plan) && opened.size == size => opened,
         Some(mut opened) => {
             opened.shot.replan(Arc::new(plan.at_size(size)))?;
-            Opened { of: plan.clone(), size, ..opened }
+            OpenShot { of: plan.clone(), size, ..opened }
         }
     };
     Ok(slot.insert(opened))
 }
 
 /// The largest size of `size`'s proportions that fits `within`; `size` itself where that does.
-fn fitted(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
+fn fit_within(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
     let ratio = |axis: usize| within[axis] as f64 / size[axis] as f64;
     let scale = ratio(0).min(ratio(1)).min(1.0);
     size.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 
 /// The frame over black: premultiplied light over black is the light itself.
-fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
+fn to_display_pixels(frame: &mut Frame) -> Vec<[u8; 4]> {
     let opaque = std::mem::replace(&mut frame.opaque, true);
     let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     frame.opaque = opaque;
@@ -229,10 +236,10 @@ fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
 }
 
 /// The frame as `bansho render` writes it unless it is told otherwise.
-fn encoded(frame: &Frame) -> Result<Vec<u8>, MediaError> {
-    let shown = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
+fn encode_png(frame: &Frame) -> Result<Vec<u8>, MediaError> {
+    let to_display_pixels = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let fingerprint = fingerprint::of_png(frame.header.fingerprint, BitDepth::Eight, AlphaConvention::Encoded);
-    png::encode(&shown, &fingerprint, PngEffort::default(), Path::new("still.png"))
+    png::encode(&to_display_pixels, &fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 
 #[cfg(test)]
@@ -247,8 +254,8 @@ mod tests {
         let plan = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
         let mut shot = CpuBackend.open(plan).unwrap();
         let mut frame = bansho::draw(shot.as_mut(), 0, &bansho::Unobserved).unwrap();
-        assert!(encoded(&frame).unwrap().starts_with(b"\x89PNG"));
+        assert!(encode_png(&frame).unwrap().starts_with(b"\x89PNG"));
         frame.beauty = Image::filled(png::SIDE_LIMIT + 1, 1, [0.0; 4]);
-        assert!(matches!(encoded(&frame), Err(MediaError::Size { .. })));
+        assert!(matches!(encode_png(&frame), Err(MediaError::Size { .. })));
     }
 }

@@ -1,7 +1,7 @@
 //! Pictures of a document, drawn off the window's thread, and the time that is played.
 //!
-//! A window says what it wants to see ([`Wish`]); the newest wish wins. Natively a thread with a rayon pool fulfils it
-//! (`ThreadPlayer`), in a page a worker (`WorkerPlayer`), in which [`SlicePlayer`] works in slices between two looks at what
+//! A window says what it wants to see ([`FrameRequest`]); the newest wish wins. Natively a thread with a rayon pool fulfils it
+//! (`ThreadPlayer`), in a page a worker (`WorkerPlayer`), in which [`PolledPlayer`] works in slices between two looks at what
 //! is wanted. All report [`Event`]s.
 
 mod engine;
@@ -23,17 +23,17 @@ use bansho::{Assets, Plan, SceneError};
 
 use crate::document::Revision;
 
-pub use polled::SlicePlayer;
-pub use preview_size::{Pace, Took};
+pub use polled::PolledPlayer;
+pub use preview_size::{FrameTiming, PreviewScale};
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{StartError, ThreadPlayer};
 pub use transport::Transport;
 #[cfg(target_arch = "wasm32")]
-pub use web::worker::{WorkerPlayer, serve};
+pub use web::worker::{WorkerPlayer, run_worker};
 
 /// What a window wants to see.
 #[derive(Clone)]
-pub struct Wish {
+pub struct FrameRequest {
     /// The state of the document.
     pub revision: Revision,
     /// What errors call it.
@@ -51,7 +51,7 @@ pub struct Wish {
     /// Whether it may be simulated with fewer particles.
     pub draft: bool,
     /// Whether the finished picture is wanted, as `bansho render` writes it, in place of one for a window.
-    pub still: bool,
+    pub full_quality: bool,
     /// The flame sheet whose stages are wanted besides.
     pub stages: Option<usize>,
 }
@@ -82,7 +82,7 @@ pub struct Picture {
 /// What a player reports.
 pub enum Event {
     /// A state of the document was checked.
-    Judged {
+    Checked {
         /// Which.
         revision: Revision,
         /// Its plan, or its faults.
@@ -93,7 +93,7 @@ pub enum Event {
     /// A small picture of a stage of the flame sheet that was asked for, which of [`stages`](crate::document::stages::names).
     Stage(usize, Picture),
     /// The finished picture of a frame is there.
-    Still {
+    FullQualityFrame {
         /// The frame.
         number: i64,
         /// The file that `bansho render` writes, a PNG.
@@ -121,17 +121,17 @@ impl Event {
     /// The state of the document that it is about.
     pub fn revision(&self) -> Option<Revision> {
         match self {
-            Self::Judged { revision, .. } | Self::Failed { revision, .. } | Self::Panicked { revision, .. } => {
+            Self::Checked { revision, .. } | Self::Failed { revision, .. } | Self::Panicked { revision, .. } => {
                 Some(*revision)
             }
             Self::Drawn(picture) | Self::Stage(_, picture) => Some(picture.revision),
-            Self::Still { .. } => None,
+            Self::FullQualityFrame { .. } => None,
         }
     }
 }
 
 /// What a panic said.
-fn said(panic: &(dyn std::any::Any + Send)) -> String {
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())
 }
@@ -139,7 +139,7 @@ fn said(panic: &(dyn std::any::Any + Send)) -> String {
 /// Fulfils wishes.
 pub trait Player {
     /// What is wanted now, in place of anything that was.
-    fn wish(&mut self, wish: Wish);
+    fn request(&mut self, request: FrameRequest);
 
     /// What happened since the last time. A player without threads works here: it cuts simulations short, but neither a check nor a
     /// drawing, which take as long as the scene makes them.
@@ -153,8 +153,8 @@ pub trait Player {
 
     /// Takes the bytes of a file that no folder holds. Only players that work elsewhere need them: others find the file in
     /// the assets of a wish.
-    fn give(&mut self, _name: &str, _bytes: &[u8]) {}
+    fn add_file(&mut self, _name: &str, _bytes: &[u8]) {}
 
     /// Whether nothing more happens unless it is polled.
-    fn waits_for_poll(&self) -> bool;
+    fn needs_polling(&self) -> bool;
 }

@@ -1,20 +1,20 @@
 //! How large a picture may be to keep up: whole where the machine is fast, smaller where it is not and that helps.
 
 /// Shares of the window's size that a preview may have, the largest first.
-const SHARES: [f64; 7] = [1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
+const SCALES: [f64; 7] = [1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
 
 /// Where no size keeps up, a larger picture is worth so many times the time of the smallest.
-const WORTH: f64 = 1.5;
+const WORTHWHILE_FACTOR: f64 = 1.5;
 
 /// A larger picture must fit with room to spare, so that sizes do not flicker.
-const ROOM: f64 = 0.7;
+const HEADROOM: f64 = 0.7;
 
 /// Chooses how large previews are, by how long they take.
 ///
 /// Drawing takes `fixed + each n` for n pixels: streaks and particles are prepared whatever the size. Pictures of two sizes tell
 /// the two apart; at one size only their sum is known, and both grow and shrink with it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pace {
+pub struct PreviewScale {
     step: usize,
     /// What is known of drawing, once a picture came.
     known: Option<CostModel>,
@@ -33,7 +33,7 @@ struct CostModel {
 
 /// How long a picture took.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Took {
+pub struct FrameTiming {
     /// Pixels.
     pub pixels: usize,
     /// Drawing, s.
@@ -63,30 +63,31 @@ impl CostModel {
     }
 }
 
-impl Pace {
+impl PreviewScale {
     /// The share of the window's sides that the next preview should have.
-    pub fn share(&self) -> f64 {
-        SHARES[self.step]
+    pub fn scale(&self) -> f64 {
+        SCALES[self.step]
     }
 
     /// Learns how long a preview of the present share took where `target_s` is wanted, s.
-    pub fn learn(&mut self, took: Took, target_s: f64) {
-        let pixels = took.pixels.max(1) as f64;
-        let cost = CostModel::after(self.known, pixels, took.draw_s);
+    pub fn record(&mut self, timing: FrameTiming, target_s: f64) {
+        let pixels = timing.pixels.max(1) as f64;
+        let cost = CostModel::after(self.known, pixels, timing.draw_s);
         self.known = Some(cost);
-        let present = self.share();
+        let present = self.scale();
         let seconds = |step: usize| {
-            let ratio = SHARES[step] / present;
-            took.advance_s + cost.seconds(pixels * ratio * ratio)
+            let ratio = SCALES[step] / present;
+            timing.advance_s + cost.seconds(pixels * ratio * ratio)
         };
-        let worthwhile = |step: usize, room: f64| {
-            let smallest = seconds(SHARES.len() - 1);
-            seconds(step) <= (room * target_s).max(if smallest > target_s { WORTH * smallest } else { 0.0 })
+        let worthwhile = |step: usize, headroom: f64| {
+            let smallest = seconds(SCALES.len() - 1);
+            seconds(step)
+                <= (headroom * target_s).max(if smallest > target_s { WORTHWHILE_FACTOR * smallest } else { 0.0 })
         };
         if !worthwhile(self.step, 1.0) {
-            self.step = (self.step + 1..SHARES.len()).find(|&step| worthwhile(step, 1.0)).unwrap_or(SHARES.len() - 1);
+            self.step = (self.step + 1..SCALES.len()).find(|&step| worthwhile(step, 1.0)).unwrap_or(SCALES.len() - 1);
         } else {
-            self.step = (0..self.step).find(|&step| worthwhile(step, ROOM)).unwrap_or(self.step);
+            self.step = (0..self.step).find(|&step| worthwhile(step, HEADROOM)).unwrap_or(self.step);
         }
     }
 }
@@ -96,59 +97,60 @@ mod tests {
     use super::*;
 
     /// The shares that a pace comes to where drawing 1e6 pixels takes `fixed` and `whole` more, s.
-    fn shares(advance_s: f64, fixed: f64, whole: f64, pictures: usize) -> Vec<f64> {
-        let mut pace = Pace::default();
-        let mut shares = Vec::new();
+    fn scales(advance_s: f64, fixed: f64, whole: f64, pictures: usize) -> Vec<f64> {
+        let mut preview_scale = PreviewScale::default();
+        let mut scales = Vec::new();
         for _ in 0..pictures {
-            let part = pace.share() * pace.share();
-            pace.learn(Took { pixels: (1e6 * part) as usize, draw_s: fixed + whole * part, advance_s }, 0.1);
-            shares.push(pace.share());
+            let part = preview_scale.scale() * preview_scale.scale();
+            preview_scale
+                .record(FrameTiming { pixels: (1e6 * part) as usize, draw_s: fixed + whole * part, advance_s }, 0.1);
+            scales.push(preview_scale.scale());
         }
-        shares
+        scales
     }
 
     #[test]
     fn previews_shrink_as_far_as_it_takes_and_grow_when_there_is_room() {
-        assert_eq!(shares(0.0, 0.0, 0.39, 4), [0.5; 4], "a quarter of the pixels");
-        assert_eq!(shares(0.0, 0.0, 100.0, 2), [0.125; 2], "never smaller than an eighth");
-        assert_eq!(shares(0.0, 0.0, 0.09, 2), [1.0; 2]);
-        let mut pace = Pace::default();
-        pace.learn(Took { pixels: 100, draw_s: 0.4, advance_s: 0.0 }, 0.1);
-        pace.learn(Took { pixels: 25, draw_s: 0.02, advance_s: 0.0 }, 0.1);
-        assert_eq!(pace.share(), 0.75);
+        assert_eq!(scales(0.0, 0.0, 0.39, 4), [0.5; 4], "a quarter of the pixels");
+        assert_eq!(scales(0.0, 0.0, 100.0, 2), [0.125; 2], "never smaller than an eighth");
+        assert_eq!(scales(0.0, 0.0, 0.09, 2), [1.0; 2]);
+        let mut preview_scale = PreviewScale::default();
+        preview_scale.record(FrameTiming { pixels: 100, draw_s: 0.4, advance_s: 0.0 }, 0.1);
+        preview_scale.record(FrameTiming { pixels: 25, draw_s: 0.02, advance_s: 0.0 }, 0.1);
+        assert_eq!(preview_scale.scale(), 0.75);
     }
 
     #[test]
     fn they_stay_large_where_shrinking_does_not_help() {
-        let settled = shares(0.0, 1.9, 0.1, 12);
+        let settled = scales(0.0, 1.9, 0.1, 12);
         assert_eq!(settled[0], 0.1875, "nothing was known");
         assert_eq!(settled[1..], [1.0; 11]);
-        assert_eq!(shares(1.9, 0.0, 0.05, 12)[11], 1.0, "the simulation takes its time at any size");
+        assert_eq!(scales(1.9, 0.0, 0.05, 12)[11], 1.0, "the simulation takes its time at any size");
     }
 
     #[test]
     fn they_shrink_as_far_as_it_helps() {
-        let settled = *shares(0.0, 1.9, 14.0, 12).last().unwrap();
+        let settled = *scales(0.0, 1.9, 14.0, 12).last().unwrap();
         assert!((0.1875..0.375).contains(&settled), "{settled}");
-        assert_eq!(shares(0.0, 0.05, 0.19, 12), [0.5; 12], "0.05 + 0.19 / 4 is just enough");
+        assert_eq!(scales(0.0, 0.05, 0.19, 12), [0.5; 12], "0.05 + 0.19 / 4 is just enough");
     }
 
     #[test]
     fn a_busier_machine_shrinks_them_for_as_long_as_it_is_busy() {
-        let mut pace = Pace::default();
-        let mut learn = |busy: f64| {
-            let part = pace.share() * pace.share();
-            pace.learn(
-                Took { pixels: (1e6 * part) as usize, draw_s: busy * (0.01 + 0.05 * part), advance_s: 0.0 },
+        let mut preview_scale = PreviewScale::default();
+        let mut record = |busy: f64| {
+            let part = preview_scale.scale() * preview_scale.scale();
+            preview_scale.record(
+                FrameTiming { pixels: (1e6 * part) as usize, draw_s: busy * (0.01 + 0.05 * part), advance_s: 0.0 },
                 0.1,
             );
-            pace.share()
+            preview_scale.scale()
         };
-        assert_eq!(learn(1.0), 1.0);
-        assert!(learn(4.0) < 1.0);
+        assert_eq!(record(1.0), 1.0);
+        assert!(record(4.0) < 1.0);
         for _ in 0..8 {
-            learn(1.0);
+            record(1.0);
         }
-        assert_eq!(learn(1.0), 1.0);
+        assert_eq!(record(1.0), 1.0);
     }
 }

@@ -16,14 +16,14 @@ use bansho::{
 };
 
 /// A job under way.
-pub struct Shooting {
+pub struct RenderJob {
     progress: Arc<Progress>,
     worker: Option<JoinHandle<Result<PathBuf, String>>>,
 }
 
 /// Why a job ended without all its pictures.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Ended {
+pub enum JobFailure {
     /// It could not go on, or was stopped.
     Failed(String),
     /// A phenomenon panicked, and said this.
@@ -75,7 +75,7 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
     Job { resume: number.is_none(), frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }
 }
 
-impl Shooting {
+impl RenderJob {
     /// Starts `job`; `wake` is called whenever something changed.
     ///
     /// # Errors
@@ -111,16 +111,16 @@ impl Shooting {
     }
 
     /// The first file, or why there is none, once it has ended.
-    pub fn finished(&mut self) -> Option<Result<PathBuf, Ended>> {
+    pub fn finished(&mut self) -> Option<Result<PathBuf, JobFailure>> {
         let worker = self.worker.take_if(|worker| worker.is_finished())?;
         Some(match worker.join() {
-            Ok(result) => result.map_err(Ended::Failed),
-            Err(panic) => Err(Ended::Panicked(super::said(panic.as_ref()))),
+            Ok(result) => result.map_err(JobFailure::Failed),
+            Err(panic) => Err(JobFailure::Panicked(super::panic_text(panic.as_ref()))),
         })
     }
 }
 
-impl Drop for Shooting {
+impl Drop for RenderJob {
     fn drop(&mut self) {
         self.stop();
     }

@@ -5,13 +5,13 @@ use std::{collections::BTreeMap, sync::Arc};
 use bansho::{Plan, Shot, render::fingerprint};
 
 /// Bytes of states that are kept.
-const MOST_BYTES: usize = 256 << 20;
+const MAX_BYTES: usize = 256 << 20;
 /// Frames between two states.
-const APART: i64 = 10;
+const FRAMES_APART: i64 = 10;
 
 /// States of one plan, by frame.
 #[derive(Default)]
-pub(super) struct States {
+pub(super) struct SnapshotCache {
     of: Option<(Arc<Plan>, [u8; 32])>,
     by_frame: BTreeMap<i64, Vec<u8>>,
     bytes: usize,
@@ -19,10 +19,10 @@ pub(super) struct States {
     last: Option<i64>,
 }
 
-impl States {
+impl SnapshotCache {
     /// Brings `shot` nearer to frame `number` where that lies behind it and a state does not.
     pub(super) fn seek(&mut self, plan: &Arc<Plan>, shot: &mut dyn Shot, number: i64) {
-        self.turn_to(plan);
+        self.set_plan(plan);
         if self.last.is_none_or(|last| last <= number) {
             return;
         }
@@ -33,11 +33,11 @@ impl States {
     }
 
     /// Keeps the state at frame `number` where it is worth it: only states that the plan leads to are.
-    pub(super) fn keep(&mut self, plan: &Arc<Plan>, shot: &dyn Shot, number: i64) {
-        self.turn_to(plan);
+    pub(super) fn store(&mut self, plan: &Arc<Plan>, shot: &dyn Shot, number: i64) {
+        self.set_plan(plan);
         self.last = Some(number);
-        let near = self.by_frame.range(number - APART + 1..=number).next().is_some();
-        if near || !shot.is_exact() || self.bytes >= MOST_BYTES {
+        let near = self.by_frame.range(number - FRAMES_APART + 1..=number).next().is_some();
+        if near || !shot.is_exact() || self.bytes >= MAX_BYTES {
             return;
         }
         let state = shot.snapshot();
@@ -46,7 +46,7 @@ impl States {
     }
 
     /// States of another plan are of no use.
-    fn turn_to(&mut self, plan: &Arc<Plan>) {
+    fn set_plan(&mut self, plan: &Arc<Plan>) {
         if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, plan)) {
             return;
         }

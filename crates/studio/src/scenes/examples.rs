@@ -77,26 +77,26 @@ const FILES: &[(&str, &[u8])] = files!(
 /// The files of the examples, and others that were given by hand, read when they are asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Bundle {
-    given: Vec<(String, Arc<[u8]>)>,
+    added_files: Vec<(String, Arc<[u8]>)>,
 }
 
 impl Bundle {
     /// Keeps the bytes of the file `name`, in stead of any of that name.
-    pub fn give(&mut self, name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) {
+    pub fn add_file(&mut self, name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) {
         let name = name.into();
-        self.given.retain(|(other, _)| *other != name);
-        self.given.push((name, bytes.into()));
+        self.added_files.retain(|(other, _)| *other != name);
+        self.added_files.push((name, bytes.into()));
     }
 
     /// The files that were given, by name.
-    pub fn given(&self) -> &[(String, Arc<[u8]>)] {
-        &self.given
+    pub fn added_files(&self) -> &[(String, Arc<[u8]>)] {
+        &self.added_files
     }
 
     /// The bytes of the file `name`, if it is one of these.
     pub fn bytes(&self, name: &str) -> Option<&[u8]> {
-        let given = self.given.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
-        given.or_else(|| FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes))
+        let added_files = self.added_files.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
+        added_files.or_else(|| FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes))
     }
 
     fn found(&self, name: &str) -> Result<&[u8], AssetError> {
@@ -104,24 +104,24 @@ impl Bundle {
     }
 
     /// These files, and all others where `files` finds them.
-    pub fn before(self, files: Arc<dyn Assets>) -> BundleBefore {
-        BundleBefore { bundle: self, files }
+    pub fn overlay_on(self, files: Arc<dyn Assets>) -> OverlayAssets {
+        OverlayAssets { bundle: self, files }
     }
 }
 
 /// A [`Bundle`], and other assets for what it lacks.
-pub struct BundleBefore {
+pub struct OverlayAssets {
     bundle: Bundle,
     files: Arc<dyn Assets>,
 }
 
-impl BundleBefore {
+impl OverlayAssets {
     fn of(&self, name: &str) -> &dyn Assets {
         if self.bundle.bytes(name).is_some() { &self.bundle } else { self.files.as_ref() }
     }
 }
 
-impl Assets for BundleBefore {
+impl Assets for OverlayAssets {
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
         self.of(path).picture(path, frame)
     }
@@ -207,7 +207,7 @@ mod tests {
     fn given_files_come_first_and_others_are_missing() {
         let mut bundle = Bundle::default();
         assert_eq!(bundle.text("drawing.svg").unwrap_err().problem, AssetProblem::Missing);
-        bundle.give("drawing.svg", "<svg/>".as_bytes());
+        bundle.add_file("drawing.svg", "<svg/>".as_bytes());
         assert_eq!(&*bundle.text("drawing.svg").unwrap(), "<svg/>");
     }
 }

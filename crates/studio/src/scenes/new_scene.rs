@@ -1,7 +1,7 @@
 //! What a new scene begins with: one phenomenon, and what it needs to be seen.
 
 /// Each kind of beginning: what it is called, and its scene.
-pub const BEGINNINGS: [(&str, &str); 5] = [
+pub const NEW_SCENES: [(&str, &str); 5] = [
     ("Flame sheet", FLAME_SHEET),
     ("Particle flame", PARTICLE_FLAME),
     ("Rain", RAIN),
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn every_beginning_but_nothing_is_a_scene_that_shows_something() {
-        for (name, text) in BEGINNINGS {
+        for (name, text) in NEW_SCENES {
             let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
             let quick = text.replace("[[aurora]]", "[[aurora]]\nparticles = { count = 2000 }");
             let scene = parse_scene(name, &quick, assets.as_ref()).unwrap();

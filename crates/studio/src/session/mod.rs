@@ -1,6 +1,8 @@
 //! What the window works on: the document, its file, its player and the time. No widgets.
 
+pub(crate) mod selection;
 pub(crate) mod settings_store;
+pub(crate) mod status;
 
 use std::{
     path::{Path, PathBuf},
@@ -18,20 +20,20 @@ use bansho::{
 };
 
 use crate::{
-    app::{broken::Broken, rate::Rate, widgets::keyframes},
-    document::{Document, Revision},
-    editors::aurora::document::{Drawing, Refusal},
-    player::{Event, Pace, Picture, Player, Took, Transport, Wish},
+    document::{Document, Revision, keyframes},
+    editors::aurora::document::{AuroraDrawing, ShapeEditError},
+    player::{Event, FrameRequest, FrameTiming, Picture, Player, PreviewScale, Transport},
     scenes::examples::Bundle,
 };
+use status::{FrameRate, PanickedFrames};
 
 use web_time::Instant;
 
 /// Makes the assets of a scene that lies in a folder. A scene without a file finds those of the examples first, and given ones.
-pub type AssetsOf = fn(&Path) -> Arc<dyn Assets>;
+pub type AssetsForFolder = fn(&Path) -> Arc<dyn Assets>;
 
 /// What a hand does not notice that waits for a picture.
-const AT_ONCE: Duration = Duration::from_millis(40);
+const MAX_WAIT: Duration = Duration::from_millis(40);
 
 /// The table of the camera.
 const CAMERA: &str = "camera";
@@ -53,28 +55,28 @@ pub struct Session {
     /// The flame sheet whose stages are seen.
     pub stages: Option<usize>,
     /// Whether unsaved work must be kept at once.
-    pub keep_now: bool,
+    pub autosave_now: bool,
     player: Box<dyn Player>,
-    assets_of: AssetsOf,
+    assets_for_folder: AssetsForFolder,
     bundle: Bundle,
     assets: Arc<dyn Assets>,
-    pace: Pace,
+    preview_scale: PreviewScale,
     picture: Option<Picture>,
     drawn: u64,
     /// Pictures of the stages, each with its number.
     stage_pictures: Vec<(Picture, u64)>,
-    asked: Option<Asked>,
+    last_request: Option<LastRequest>,
     /// What panicked, which is not drawn again.
-    broken: Broken,
+    panicked_frames: PanickedFrames,
     notice: Option<String>,
-    rate: Rate,
+    frame_rate: FrameRate,
     /// A time that is gone to once the scene is checked, s.
     seek: Option<f64>,
 }
 
 /// What was wished for last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Asked {
+struct LastRequest {
     revision: Revision,
     number: Option<i64>,
     within: [usize; 2],
@@ -84,10 +86,15 @@ struct Asked {
 
 impl Session {
     /// Opens `document`, which lies in `path`.
-    pub fn new(document: Document, path: Option<PathBuf>, player: Box<dyn Player>, assets_of: AssetsOf) -> Self {
+    pub fn new(
+        document: Document,
+        path: Option<PathBuf>,
+        player: Box<dyn Player>,
+        assets_for_folder: AssetsForFolder,
+    ) -> Self {
         let bundle = Bundle::default();
         Self {
-            assets: assets(&bundle, path.as_deref(), assets_of),
+            assets: assets(&bundle, path.as_deref(), assets_for_folder),
             bundle,
             document,
             path,
@@ -96,47 +103,48 @@ impl Session {
             opened: 0,
             draft: true,
             stages: None,
-            keep_now: false,
+            autosave_now: false,
             stage_pictures: Vec::new(),
             player,
-            assets_of,
-            pace: Pace::default(),
+            assets_for_folder,
+            preview_scale: PreviewScale::default(),
             picture: None,
             drawn: 0,
-            asked: None,
-            broken: Broken::default(),
+            last_request: None,
+            panicked_frames: PanickedFrames::default(),
             notice: None,
-            rate: Rate::default(),
+            frame_rate: FrameRate::default(),
             seek: None,
         }
     }
 
     /// Opens another document in place of this one.
     pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
-        self.assets = assets(&self.bundle, path.as_deref(), self.assets_of);
+        self.assets = assets(&self.bundle, path.as_deref(), self.assets_for_folder);
         (self.document, self.path) = (document, path);
-        (self.picture, self.asked, self.broken, self.notice) = (None, None, Broken::default(), None);
-        (self.stages, self.stage_pictures, self.pace) = (None, Vec::new(), Pace::default());
-        (self.transport, self.seek, self.rate) = (Transport::default(), None, Rate::default());
+        (self.picture, self.last_request, self.panicked_frames, self.notice) =
+            (None, None, PanickedFrames::default(), None);
+        (self.stages, self.stage_pictures, self.preview_scale) = (None, Vec::new(), PreviewScale::default());
+        (self.transport, self.seek, self.frame_rate) = (Transport::default(), None, FrameRate::default());
         self.opened += 1;
     }
 
     /// Reads all assets anew, as after one was replaced.
     pub fn reload_assets(&mut self) {
-        self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_of);
+        self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_for_folder);
         // What was broken by a file may be whole with another.
         self.retry();
     }
 
     /// Draws what panicked once more.
     pub fn retry(&mut self) {
-        (self.asked, self.broken) = (None, Broken::default());
+        (self.last_request, self.panicked_frames) = (None, PanickedFrames::default());
     }
 
     /// Takes the bytes of a file that no folder holds.
-    pub fn give(&mut self, name: &str, bytes: Vec<u8>) {
-        self.player.give(name, &bytes);
-        self.bundle.give(name, bytes);
+    pub fn add_file(&mut self, name: &str, bytes: Vec<u8>) {
+        self.player.add_file(name, &bytes);
+        self.bundle.add_file(name, bytes);
         self.reload_assets();
     }
 
@@ -161,8 +169,8 @@ impl Session {
     }
 
     /// Pictures a second while time passes.
-    pub fn pictures_per_s(&self) -> Option<f64> {
-        self.rate.pictures_per_s().filter(|_| self.transport.is_playing())
+    pub fn frames_per_s(&self) -> Option<f64> {
+        self.frame_rate.frames_per_s().filter(|_| self.transport.is_playing())
     }
 
     /// What the user should know.
@@ -176,8 +184,8 @@ impl Session {
     }
 
     /// Whether the present frame panicked.
-    pub fn is_broken(&self) -> bool {
-        self.broken.holds(self.document.revision(), self.transport.number())
+    pub fn has_panicked(&self) -> bool {
+        self.panicked_frames.contains(self.document.revision(), self.transport.number())
     }
 
     /// Carries out `operations`; what cannot be done is told.
@@ -195,8 +203,13 @@ impl Session {
     ///
     /// # Errors
     /// An aurora cannot take the shapes that would come of them; nothing is changed then.
-    pub fn reshape(&mut self, label: &str, operations: &[Operation], index: usize) -> Result<Drawing, Refusal> {
-        let drawing = self.document.reshape(label, operations, index, &self.assets)?;
+    pub fn edit_shapes(
+        &mut self,
+        label: &str,
+        operations: &[Operation],
+        index: usize,
+    ) -> Result<AuroraDrawing, ShapeEditError> {
+        let drawing = self.document.edit_shapes(label, operations, index, &self.assets)?;
         self.notice = None;
         Ok(drawing)
     }
@@ -234,18 +247,18 @@ impl Session {
             }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
-        self.edit_as_seen(label, operations);
+        self.edit_keeping_view(label, operations);
     }
 
     /// Keys `value` at `place` now.
     pub fn key(&mut self, place: &Place, value: Value) {
         let key = self.keyframe(place, value);
-        self.edit_as_seen("key", vec![key]);
+        self.edit_keeping_view("key", vec![key]);
     }
 
     /// What stands at `place` of a good scene whether or not the text states it, where that is not simply the parameter's default: a
     /// camera that is not told where to look may look up at the sky.
-    pub fn unstated(&self, place: &Place) -> Option<Value> {
+    pub fn implied_value(&self, place: &Place) -> Option<Value> {
         let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
         let camera = &self.plan().filter(|_| root == CAMERA)?.scene().camera;
         camera.to_table().get(key).map(|node| node.value.clone())
@@ -253,7 +266,7 @@ impl Session {
 
     /// Carries out `operations`, and states what they would change unseen: a camera that looks up by itself no longer does once it is
     /// told where to stand or to look.
-    fn edit_as_seen(&mut self, label: &str, operations: Vec<Operation>) {
+    fn edit_keeping_view(&mut self, label: &str, operations: Vec<Operation>) {
         let camera = Place::root().key(CAMERA);
         let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
         let told = [&position, &target].map(|place| place.find(self.document.values()).is_some());
@@ -264,7 +277,7 @@ impl Session {
             for (place, key) in [(position, "position"), (target, "target"), (field, "vertical_fov_deg")] {
                 let stated = place.find(self.document.values()).is_some();
                 let present =
-                    self.unstated(&place).filter(|value| usual.get(key).is_none_or(|node| node.value != *value));
+                    self.implied_value(&place).filter(|value| usual.get(key).is_none_or(|node| node.value != *value));
                 all.extend(present.filter(|_| !stated).map(|value| Operation::Set { place, value }));
             }
         }
@@ -277,29 +290,29 @@ impl Session {
         Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
     }
 
-    /// What [`listen`](Self::listen) and then [`follow`](Self::follow) do.
-    pub fn update(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
-        self.listen(now, hands);
-        self.follow(now, viewport, hands)
+    /// What [`poll_player`](Self::poll_player) and then [`advance_time`](Self::advance_time) do.
+    pub fn update(&mut self, now: f64, viewport: [usize; 2], dragging: bool) -> Option<f64> {
+        self.poll_player(now, dragging);
+        self.advance_time(now, viewport, dragging)
     }
 
-    /// Takes in what the player did. `hands` tells that something is being dragged, so that speed matters more than size.
-    pub fn listen(&mut self, now: f64, hands: bool) {
+    /// Takes in what the player did. `dragging` tells that something is being dragged, so that speed matters more than size.
+    pub fn poll_player(&mut self, now: f64, dragging: bool) {
         for event in self.player.poll() {
-            self.take_in(event, now, hands);
+            self.handle_event(event, now, dragging);
         }
         if !self.transport.is_playing() {
-            self.rate = Rate::default();
+            self.frame_rate = FrameRate::default();
         }
     }
 
     /// Lets time pass and says what is to be drawn for a viewport of `viewport` pixels. How long the window may sleep, s.
-    pub fn follow(&mut self, now: f64, viewport: [usize; 2], hands: bool) -> Option<f64> {
-        let hurry = hands || self.transport.is_playing();
+    pub fn advance_time(&mut self, now: f64, viewport: [usize; 2], dragging: bool) -> Option<f64> {
+        let interactive = dragging || self.transport.is_playing();
         let shown = self.picture.as_ref().is_some_and(|picture| picture.number == self.transport.number());
-        self.transport.tick(now, shown || self.is_broken());
-        self.wish(viewport, hurry);
-        if self.player.waits_for_poll() {
+        self.transport.tick(now, shown || self.has_panicked());
+        self.request(viewport, interactive);
+        if self.player.needs_polling() {
             return Some(0.0);
         }
         self.transport.sleep_s(now).filter(|_| !self.is_busy())
@@ -307,34 +320,36 @@ impl Session {
 
     /// Waits a moment for a picture that comes at once, as after a change of something quick, so that it is painted together with the
     /// change and not a whole frame of the window later. While time passes nothing waits: pictures are drawn beside painting then.
-    pub fn wait(&mut self, now: f64, hands: bool) {
+    pub fn wait(&mut self, now: f64, dragging: bool) {
         let began = Instant::now();
         let quick =
-            self.picture.as_ref().is_some_and(|picture| picture.draw_s + picture.advance_s < AT_ONCE.as_secs_f64());
+            self.picture.as_ref().is_some_and(|picture| picture.draw_s + picture.advance_s < MAX_WAIT.as_secs_f64());
         while quick && !self.transport.is_playing() && self.is_busy() {
-            let Some(left) = AT_ONCE.checked_sub(began.elapsed()) else { return };
+            let Some(left) = MAX_WAIT.checked_sub(began.elapsed()) else { return };
             self.player.wait(left);
-            self.listen(now, hands);
+            self.poll_player(now, dragging);
         }
     }
 
-    fn wish(&mut self, viewport: [usize; 2], hurry: bool) {
-        let share = if hurry { self.pace.share() } else { 1.0 };
+    fn request(&mut self, viewport: [usize; 2], interactive: bool) {
+        let scale = if interactive { self.preview_scale.scale() } else { 1.0 };
         let number = self.plan().map(|_| self.transport.number());
-        let asked = Asked {
+        let last_request = LastRequest {
             revision: self.document.revision(),
             number,
-            within: viewport.map(|side| ((side as f64 * share).round() as usize).max(1)),
+            within: viewport.map(|side| ((side as f64 * scale).round() as usize).max(1)),
             draft: self.draft,
-            stages: self.stages.filter(|_| !hurry || self.is_quick()),
+            stages: self.stages.filter(|_| !interactive || self.is_quick()),
         };
         // In a hurry a frame is drawn once, whatever size would have been better.
-        let same = |last: Asked| last == Asked { within: if hurry { last.within } else { asked.within }, ..asked };
-        if self.asked.is_some_and(same) || self.is_broken() {
+        let same = |last: LastRequest| {
+            last == LastRequest { within: if interactive { last.within } else { last_request.within }, ..last_request }
+        };
+        if self.last_request.is_some_and(same) || self.has_panicked() {
             return;
         }
-        self.asked = Some(asked);
-        self.send(asked, false);
+        self.last_request = Some(last_request);
+        self.send(last_request, false);
     }
 
     /// Whether there is time for more than the picture itself.
@@ -344,57 +359,57 @@ impl Session {
     }
 
     /// Draws the present frame once more from the scene's beginning, at the viewport's full size.
-    pub fn draw_exactly(&mut self) {
-        if let Some(asked) = self.asked {
-            self.send(asked, true);
+    pub fn redraw_exact(&mut self) {
+        if let Some(last_request) = self.last_request {
+            self.send(last_request, true);
         }
     }
 
-    fn send(&mut self, asked: Asked, exact: bool) {
-        let wish = self.wish_for(asked, exact);
-        self.player.wish(wish);
+    fn send(&mut self, last_request: LastRequest, exact: bool) {
+        let request = self.request_for(last_request, exact);
+        self.player.request(request);
     }
 
     /// The wish for the finished picture of frame `number`, for a player of its own.
-    pub fn finished(&self, number: i64) -> Wish {
+    pub fn full_quality_request(&self, number: i64) -> FrameRequest {
         let revision = self.document.revision();
-        let asked = Asked { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
-        Wish { still: true, ..self.wish_for(asked, true) }
+        let last_request = LastRequest { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
+        FrameRequest { full_quality: true, ..self.request_for(last_request, true) }
     }
 
     /// The bytes of a file that the studio brought along, or was given.
-    pub fn bundled(&self, name: &str) -> Option<&[u8]> {
+    pub fn bundled_file(&self, name: &str) -> Option<&[u8]> {
         self.bundle.bytes(name)
     }
 
     /// Files that no folder holds, by name.
-    pub fn given(&self) -> &[(String, Arc<[u8]>)] {
-        self.bundle.given()
+    pub fn added_files(&self) -> &[(String, Arc<[u8]>)] {
+        self.bundle.added_files()
     }
 
-    fn wish_for(&self, asked: Asked, exact: bool) -> Wish {
-        Wish {
-            revision: asked.revision,
+    fn request_for(&self, last_request: LastRequest, exact: bool) -> FrameRequest {
+        FrameRequest {
+            revision: last_request.revision,
             name: self.document.name().to_owned(),
             text: self.document.text().clone(),
             assets: self.assets.clone(),
-            number: asked.number,
-            within: asked.within,
+            number: last_request.number,
+            within: last_request.within,
             exact,
-            draft: asked.draft,
-            still: false,
-            stages: asked.stages,
+            draft: last_request.draft,
+            full_quality: false,
+            stages: last_request.stages,
         }
     }
 
     /// News of a document that was open before is none.
-    fn take_in(&mut self, event: Event, now: f64, hands: bool) {
-        if event.revision().is_some_and(|revision| !self.document.has_been(revision)) {
+    fn handle_event(&mut self, event: Event, now: f64, dragging: bool) {
+        if event.revision().is_some_and(|revision| !self.document.includes_revision(revision)) {
             return;
         }
         match event {
-            Event::Judged { revision, outcome } => self.judged(revision, outcome),
-            Event::Drawn(picture) => self.show(picture, now, hands),
+            Event::Checked { revision, outcome } => self.checked(revision, outcome),
+            Event::Drawn(picture) => self.show(picture, now, dragging),
             Event::Stage(stage, picture) => {
                 self.drawn += 1;
                 let stages = &mut self.stage_pictures;
@@ -406,23 +421,23 @@ impl Session {
             }
             Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
             // Finished pictures are asked of other players.
-            Event::Failed { .. } | Event::Still { .. } => {}
+            Event::Failed { .. } | Event::FullQualityFrame { .. } => {}
             Event::Panicked { revision, number, message } => {
                 if revision == self.document.revision() {
                     // One that was checked breaks at some frames only.
                     let checked = self.plan().filter(|_| self.document.is_checked());
                     let frame = checked.map(|plan| number.unwrap_or(plan.frames().start));
-                    self.broken.note(revision, frame);
+                    self.panicked_frames.note(revision, frame);
                 }
                 self.transport.set_playing(false);
-                self.notice = Some(self.told_of_panic(&message));
+                self.notice = Some(self.panic_message(&message));
             }
         }
     }
 
     /// What the user is told where a phenomenon panicked and said `message`; the work is saved at once.
-    pub(super) fn told_of_panic(&mut self, message: &str) -> String {
-        self.keep_now = true;
+    pub(super) fn panic_message(&mut self, message: &str) -> String {
+        self.autosave_now = true;
         format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue())
     }
 
@@ -442,14 +457,15 @@ impl Session {
         if self.document.is_dirty() { "; the browser keeps the scene".into() } else { String::new() }
     }
 
-    fn judged(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
-        self.document.judge(revision, outcome);
+    fn checked(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
+        self.document.set_check_result(revision, outcome);
         if let Some(plan) = self.document.plan() {
             let frames = plan.frames();
             self.transport.set_shot(frames.start..=frames.end - 1, 1.0 / plan.fps().frame_s());
-            if let Some(asked) = self.asked.as_mut().filter(|asked| asked.number.is_none()) {
+            if let Some(last_request) = self.last_request.as_mut().filter(|last_request| last_request.number.is_none())
+            {
                 // The scene's first frame is being drawn, which nobody knew the number of.
-                asked.number = Some(frames.start);
+                last_request.number = Some(frames.start);
                 self.transport.go_to(frames.start);
             }
         }
@@ -458,14 +474,14 @@ impl Session {
         }
     }
 
-    fn show(&mut self, picture: Picture, now: f64, hands: bool) {
+    fn show(&mut self, picture: Picture, now: f64, dragging: bool) {
         /// Wanted of a preview while something is dragged, s.
-        const AT_HAND_S: f64 = 0.05;
-        if hands || self.transport.is_playing() {
-            let target = if hands { AT_HAND_S } else { self.transport.frame_s() };
+        const DRAG_TARGET_S: f64 = 0.05;
+        if dragging || self.transport.is_playing() {
+            let target = if dragging { DRAG_TARGET_S } else { self.transport.frame_s() };
             let Picture { size: [width, height], draw_s, advance_s, .. } = picture;
-            self.pace.learn(Took { pixels: width * height, draw_s, advance_s }, target);
-            self.rate.came(now);
+            self.preview_scale.record(FrameTiming { pixels: width * height, draw_s, advance_s }, target);
+            self.frame_rate.record_frame(now);
         }
         self.drawn += 1;
         self.picture = Some(picture);
@@ -473,9 +489,9 @@ impl Session {
 }
 
 /// What a scene in `path` finds.
-fn assets(bundle: &Bundle, path: Option<&Path>, assets_of: AssetsOf) -> Arc<dyn Assets> {
-    let files = assets_of(folder(path));
-    if path.is_some() { files } else { Arc::new(bundle.clone().before(files)) }
+fn assets(bundle: &Bundle, path: Option<&Path>, assets_for_folder: AssetsForFolder) -> Arc<dyn Assets> {
+    let files = assets_for_folder(folder(path));
+    if path.is_some() { files } else { Arc::new(bundle.clone().overlay_on(files)) }
 }
 
 /// The folder that paths in a scene are relative to.

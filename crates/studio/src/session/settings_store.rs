@@ -8,12 +8,12 @@ use crate::app::files::browser_io;
 
 /// Where they are kept.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Store {
+pub(crate) struct SettingsStore {
     #[cfg(not(target_arch = "wasm32"))]
     home: Option<PathBuf>,
 }
 
-impl Store {
+impl SettingsStore {
     /// In `home`; nowhere without one.
     #[cfg(not(target_arch = "wasm32"))]
     pub(crate) fn new(home: Option<PathBuf>) -> Self {

@@ -9,23 +9,23 @@ use js_sys::{Array, Function, Promise, Reflect};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 
-use crate::{document::files::autosave::Recovered, session::settings_store::Store};
+use crate::{document::files::autosave::RecoveredWork, session::settings_store::SettingsStore};
 
 /// The names under which pages keep their work.
-pub(super) struct Tabs {
-    store: Store,
+pub(super) struct BrowserTabs {
+    store: SettingsStore,
     /// What all of them begin with.
     beginning: &'static str,
     /// This page's.
     own: String,
     /// Work of pages that are no more; filled once the browser has said which these are.
-    found: Rc<RefCell<Vec<Recovered>>>,
+    found: Rc<RefCell<Vec<RecoveredWork>>>,
     looked: bool,
 }
 
-impl Tabs {
+impl BrowserTabs {
     /// Takes a name that begins with `beginning`.
-    pub(super) fn begin(store: Store, beginning: &'static str) -> Self {
+    pub(super) fn begin(store: SettingsStore, beginning: &'static str) -> Self {
         let own = format!("{beginning} {:.0} {:.0}", js_sys::Date::now(), 1e9 * js_sys::Math::random());
         // Without a lock the work is offered to other pages too.
         let _ = hold(&own);
@@ -33,7 +33,7 @@ impl Tabs {
     }
 
     /// Work of pages that are no more, once it is known.
-    pub(super) fn found(&mut self, ctx: &Context) -> Vec<Recovered> {
+    pub(super) fn found(&mut self, ctx: &Context) -> Vec<RecoveredWork> {
         if !std::mem::replace(&mut self.looked, true) {
             let kept = self.store.names(self.beginning).into_iter().filter(|name| *name != self.own).collect();
             spawn_local(look(self.store.clone(), kept, self.found.clone(), ctx.clone()));
@@ -54,11 +54,12 @@ impl Tabs {
 }
 
 /// Finds those of the works `kept` that no living page holds.
-async fn look(store: Store, kept: Vec<String>, found: Rc<RefCell<Vec<Recovered>>>, ctx: Context) {
+async fn look(store: SettingsStore, kept: Vec<String>, found: Rc<RefCell<Vec<RecoveredWork>>>, ctx: Context) {
     let held = held().await.unwrap_or_default();
     let dead = kept.into_iter().filter(|name| !held.contains(name));
-    let work =
-        dead.filter_map(|name| Some(Recovered { kept_in: name.clone().into(), ..Recovered::of(&store.read(&name)?)? }));
+    let work = dead.filter_map(|name| {
+        Some(RecoveredWork { kept_in: name.clone().into(), ..RecoveredWork::of(&store.read(&name)?)? })
+    });
     found.borrow_mut().extend(work);
     ctx.request_repaint();
 }

@@ -6,7 +6,7 @@ use eframe::egui::{self, Ui};
 
 /// A folder and a name in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Chooser {
+pub(super) struct FileDialog {
     folder: PathBuf,
     name: String,
     /// What names of files end in.
@@ -26,14 +26,14 @@ const SCENES: &[&str] = &[".toml"];
 /// What scenes name.
 const PICTURES: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".svg", ".glb", ".gltf"];
 
-impl Chooser {
+impl FileDialog {
     /// Begins in the folder of `path`, or where the program was started.
     pub(super) fn beside(path: Option<&Path>) -> Self {
         let folder = path.and_then(Path::parent).unwrap_or(Path::new("."));
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let mut chooser = Self { folder, name: String::new(), endings: SCENES, entries: Vec::new() };
-        chooser.read();
-        chooser
+        let mut dialog = Self { folder, name: String::new(), endings: SCENES, entries: Vec::new() };
+        dialog.read();
+        dialog
     }
 
     /// The same with a name to begin with.
@@ -45,9 +45,9 @@ impl Chooser {
     /// The same for what scenes name.
     #[must_use]
     pub(super) fn of_pictures(self) -> Self {
-        let mut chooser = Self { endings: PICTURES, ..self };
-        chooser.read();
-        chooser
+        let mut dialog = Self { endings: PICTURES, ..self };
+        dialog.read();
+        dialog
     }
 
     /// What is chosen; a whole path may be typed as the name.
@@ -130,13 +130,13 @@ mod tests {
         for name in ["b.toml", "a.toml", "picture.png", ".hidden.toml"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
-        let mut chooser = Chooser::beside(Some(&folder.path().join("b.toml")));
+        let mut dialog = FileDialog::beside(Some(&folder.path().join("b.toml")));
         let listed = [Entry::Folder("zoo".into()), Entry::File("a.toml".into()), Entry::File("b.toml".into())];
-        assert_eq!(chooser.entries, listed);
-        let pictures = chooser.clone().of_pictures();
+        assert_eq!(dialog.entries, listed);
+        let pictures = dialog.clone().of_pictures();
         assert_eq!(pictures.entries, [Entry::Folder("zoo".into()), Entry::File("picture.png".into())]);
-        chooser.go_to(folder.path().join("zoo"));
-        assert!(chooser.entries.is_empty());
-        assert_eq!(chooser.naming("c.toml".into()).path(), folder.path().join("zoo/c.toml"));
+        dialog.go_to(folder.path().join("zoo"));
+        assert!(dialog.entries.is_empty());
+        assert_eq!(dialog.naming("c.toml".into()).path(), folder.path().join("zoo/c.toml"));
     }
 }

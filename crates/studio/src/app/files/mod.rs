@@ -1,5 +1,5 @@
 //! The window's files: what is opened and saved, what is kept while it is unsaved, what waits to be asked. Where files
-//! lie, on the disk or at the browser, is for its `Shelf` to know.
+//! lie, on the disk or at the browser, is for its `PlatformFiles` to know.
 
 #[cfg(target_arch = "wasm32")]
 pub(crate) mod browser_io;
@@ -21,31 +21,30 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, Ui};
 
-use self::unsaved::Unsaved;
+use self::unsaved::UnsavedWork;
 use crate::{
-    app::panels::scene::Subject,
-    document::{Document, files, files::autosave::Recovered},
-    player::render_job::Ended,
-    session::{Session, settings_store::Store},
+    document::{Document, files, files::autosave::RecoveredWork},
+    player::render_job::JobFailure,
+    session::{Session, selection::Selection, settings_store::SettingsStore},
 };
 #[cfg(not(target_arch = "wasm32"))]
-use native::Shelf;
-use questions::{Answer, Leaving, Question, answer};
+use native::PlatformFiles;
+use questions::{Answer, PendingAction, Question, answer};
 #[cfg(target_arch = "wasm32")]
-use web::Shelf;
+use web::PlatformFiles;
 
 /// Files of the window: what lies where, and what waits to be asked.
 pub(super) struct Files {
     question: Option<Question>,
-    pub(super) unsaved: Unsaved,
+    pub(super) unsaved: UnsavedWork,
     closing: bool,
-    shelf: Shelf,
+    platform: PlatformFiles,
 }
 
 impl Files {
     /// Files of a window that keeps what it must in `store`.
-    pub(super) fn new(store: &Store) -> Self {
-        Self { question: None, unsaved: Unsaved::new(store), closing: false, shelf: Shelf::new(store) }
+    pub(super) fn new(store: &SettingsStore) -> Self {
+        Self { question: None, unsaved: UnsavedWork::new(store), closing: false, platform: PlatformFiles::new(store) }
     }
 
     /// Opens a scene that the studio brings along, after asking where that would lose work.
@@ -55,26 +54,26 @@ impl Files {
 
     /// Opens a scene that was read, after asking where that would lose work.
     fn open_text(&mut self, session: &mut Session, name: &str, text: String, path: Option<PathBuf>) {
-        self.leave_after_asking(session, Leaving::Open { name: name.to_owned(), text, path });
+        self.confirm_then(session, PendingAction::Open { name: name.to_owned(), text, path });
     }
 
     /// Opens work of a studio that did not end well, after asking where that would lose work.
-    pub(super) fn recover(&mut self, session: &mut Session, recovered: Recovered) {
-        self.leave_after_asking(session, Leaving::Recover(recovered));
+    pub(super) fn recover(&mut self, session: &mut Session, recovered: RecoveredWork) {
+        self.confirm_then(session, PendingAction::Recover(recovered));
     }
 
-    fn leave_after_asking(&mut self, session: &mut Session, leaving: Leaving) {
+    fn confirm_then(&mut self, session: &mut Session, action: PendingAction) {
         if session.document.is_dirty() {
-            self.question = Some(Question::Leave(leaving));
+            self.question = Some(Question::Leave(action));
         } else {
-            self.leave(session, leaving);
+            self.proceed(session, action);
         }
     }
 
-    /// What must be done now and then, and the question that waits. `subject` is what is chosen.
-    pub(super) fn tend(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
-        self.unsaved.tend(ui, session);
-        self.tend_shelf(ui, session, subject);
+    /// What must be done now and then, and the question that waits. `selection` is what is chosen.
+    pub(super) fn poll(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+        self.unsaved.poll_autosave(ui, session);
+        self.poll_platform(ui, session, selection);
         self.hold_close(ui, session);
         self.ask(ui, session);
     }
@@ -86,7 +85,7 @@ impl Files {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         } else if wants && (session.document.is_dirty() || self.progress().is_some()) {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::CancelClose);
-            self.leave_after_asking(session, Leaving::Close);
+            self.confirm_then(session, PendingAction::Close);
         }
     }
 
@@ -106,11 +105,11 @@ impl Files {
 
     fn answered(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match question {
-            Question::Leave(leaving) => {
+            Question::Leave(action) => {
                 if answer == Answer::Save {
-                    self.save_and(session, Some(leaving));
+                    self.save_and(session, Some(action));
                 } else {
-                    self.leave(session, leaving);
+                    self.proceed(session, action);
                 }
             }
             Question::StopRendering => {
@@ -122,38 +121,38 @@ impl Files {
         }
     }
 
-    fn leave(&mut self, session: &mut Session, leaving: Leaving) {
-        match leaving {
-            Leaving::Open { name, text, path } => session.open(Document::new(name, text), path),
-            Leaving::Recover(recovered) => {
+    fn proceed(&mut self, session: &mut Session, action: PendingAction) {
+        match action {
+            PendingAction::Open { name, text, path } => session.open(Document::new(name, text), path),
+            PendingAction::Recover(recovered) => {
                 let (document, path) = reopened(&recovered);
                 session.open(document, path);
                 self.unsaved.keep_in_stead(recovered, session);
             }
-            Leaving::Close if self.progress().is_some() => self.question = Some(Question::StopRendering),
-            Leaving::Close => self.closing = true,
+            PendingAction::Close if self.progress().is_some() => self.question = Some(Question::StopRendering),
+            PendingAction::Close => self.closing = true,
         }
     }
 }
 
 /// Tells the user how rendering ended: with this, or why not. After a panic the work is kept at once.
-fn tell_end(session: &mut Session, ended: Result<String, Ended>) {
+fn report_end(session: &mut Session, ended: Result<String, JobFailure>) {
     let told = match ended {
-        Ok(told) | Err(Ended::Failed(told)) => told,
-        Err(Ended::Panicked(message)) => session.told_of_panic(&message),
+        Ok(told) | Err(JobFailure::Failed(told)) => told,
+        Err(JobFailure::Panicked(message)) => session.panic_message(&message),
     };
     session.set_notice(Some(told));
 }
 
 /// What was `recovered`, as an edit of what lies in its file now.
-fn reopened(recovered: &Recovered) -> (Document, Option<PathBuf>) {
+fn reopened(recovered: &RecoveredWork) -> (Document, Option<PathBuf>) {
     let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
     // A page knows names, but no files.
     let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
     let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
     let mut document = Document::new(named.map_or("scene", String::as_str), saved);
     document.replace("recover", &recovered.text);
-    document.seal();
+    document.end_step();
     (document, path)
 }
 
@@ -162,16 +161,16 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{player::SlicePlayer, scenes::examples::Bundle};
+    use crate::{player::PolledPlayer, scenes::examples::Bundle};
 
     #[test]
     fn a_panic_while_rendering_is_told_and_the_work_kept_at_once() {
         let document = Document::new("scene", "bansho = 1\n");
-        let mut session = Session::new(document, None, Box::<SlicePlayer>::default(), |_| Arc::new(Bundle::default()));
-        tell_end(&mut session, Err(Ended::Failed("the disk is full".into())));
-        assert_eq!((session.notice(), session.keep_now), (Some("the disk is full"), false));
-        tell_end(&mut session, Err(Ended::Panicked("broken on purpose".into())));
+        let mut session = Session::new(document, None, Box::<PolledPlayer>::default(), |_| Arc::new(Bundle::default()));
+        report_end(&mut session, Err(JobFailure::Failed("the disk is full".into())));
+        assert_eq!((session.notice(), session.autosave_now), (Some("the disk is full"), false));
+        report_end(&mut session, Err(JobFailure::Panicked("broken on purpose".into())));
         assert!(session.notice().is_some_and(|notice| notice.contains("panicked") && notice.contains("on purpose")));
-        assert!(session.keep_now);
+        assert!(session.autosave_now);
     }
 }

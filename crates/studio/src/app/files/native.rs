@@ -9,31 +9,30 @@ use bansho::render::scene::Place;
 
 use super::{
     Files,
-    dialog::Chooser,
-    questions::{Answer, Leaving, Question},
-    save_as, tell_end,
+    dialog::FileDialog,
+    questions::{Answer, PendingAction, Question},
+    report_end, save_as,
 };
 use crate::{
-    app::panels::scene::Subject,
-    document::files::{self, Outside, Recent, watch::Watch},
-    player::render_job::{self, Shooting},
-    session::{Session, settings_store::Store},
+    document::files::{self, ExternalChange, Recent, watch::FileWatcher},
+    player::render_job::{self, RenderJob},
+    session::{Session, selection::Selection, settings_store::SettingsStore},
 };
 use eframe::egui::{Context, Ui};
 
 const BUSY: &str = "pictures are being rendered already; wait for them, or stop that with the cross beside its bar";
 
 /// What the window knows of the disk.
-pub(super) struct Shelf {
+pub(super) struct PlatformFiles {
     recent: Recent,
-    watch: Option<Watch>,
-    shooting: Option<Shooting>,
+    watch: Option<FileWatcher>,
+    render_job: Option<RenderJob>,
 }
 
-impl Shelf {
-    pub(super) fn new(store: &Store) -> Self {
+impl PlatformFiles {
+    pub(super) fn new(store: &SettingsStore) -> Self {
         let recent = store.file("recent").map(Recent::read).unwrap_or_default();
-        Self { recent, watch: None, shooting: None }
+        Self { recent, watch: None, render_job: None }
     }
 
     fn remember(&mut self, path: &Path) {
@@ -45,12 +44,12 @@ impl Shelf {
 impl Files {
     /// Asks which file to open.
     pub(in crate::app) fn ask_to_open(&mut self, _ctx: &Context, session: &mut Session) {
-        self.question = Some(Question::Open(Chooser::beside(session.path.as_deref())));
+        self.question = Some(Question::Open(FileDialog::beside(session.path.as_deref())));
     }
 
     /// Asks which file `place` shall name.
     pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, place: Place) {
-        self.question = Some(Question::Relink(place, Chooser::beside(session.path.as_deref()).of_pictures()));
+        self.question = Some(Question::Relink(place, FileDialog::beside(session.path.as_deref()).of_pictures()));
     }
 
     /// Saves, or asks where to.
@@ -58,63 +57,63 @@ impl Files {
         self.save_and(session, None);
     }
 
-    /// Saves, or asks where to, and goes to `leaving` once that is done.
-    pub(super) fn save_and(&mut self, session: &mut Session, leaving: Option<Leaving>) {
-        let Some(path) = session.path.clone() else { return self.ask_where_to_save(session, leaving) };
-        match files::outside(&session.document, &path) {
+    /// Saves, or asks where to, and goes to `action` once that is done.
+    pub(super) fn save_and(&mut self, session: &mut Session, action: Option<PendingAction>) {
+        let Some(path) = session.path.clone() else { return self.ask_where_to_save(session, action) };
+        match files::external_change(&session.document, &path) {
             // What is there was never seen here.
-            Outside::Changed(text) if *text != **session.document.text() => {
-                self.question = Some(Question::ChangedOutside(leaving));
+            ExternalChange::Changed(text) if *text != **session.document.text() => {
+                self.question = Some(Question::ChangedExternally(action));
             }
-            Outside::Unreadable(reason) => {
+            ExternalChange::Unreadable(reason) => {
                 let what = format!("What lies in {} cannot be read: {reason}", path.display());
-                self.question = Some(Question::Replace(path, what, leaving));
+                self.question = Some(Question::Replace(path, what, action));
             }
-            _ => self.save_to(session, path, leaving),
+            _ => self.save_to(session, path, action),
         }
     }
 
-    fn ask_where_to_save(&mut self, session: &Session, leaving: Option<Leaving>) {
+    fn ask_where_to_save(&mut self, session: &Session, action: Option<PendingAction>) {
         let name = match &session.path {
             Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             None if session.document.name().ends_with(".toml") => session.document.name().to_owned(),
             None => "scene.toml".to_owned(),
         };
-        self.question = Some(Question::SaveAs(Chooser::beside(session.path.as_deref()).naming(name), leaving));
+        self.question = Some(Question::SaveAs(FileDialog::beside(session.path.as_deref()).naming(name), action));
     }
 
     /// Saves to `path`, whose name shall end as those of scenes do, unless another file would be lost.
-    fn save_as(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
+    fn save_as(&mut self, session: &mut Session, path: PathBuf, action: Option<PendingAction>) {
         let path = files::named_as_scene(path);
         if path.exists() && session.path.as_ref() != Some(&path) {
             let what = format!("There is a file of that name: {}", path.display());
-            self.question = Some(Question::Replace(path, what, leaving));
+            self.question = Some(Question::Replace(path, what, action));
         } else {
-            self.save_to(session, path, leaving);
+            self.save_to(session, path, action);
         }
     }
 
-    fn save_to(&mut self, session: &mut Session, path: PathBuf, leaving: Option<Leaving>) {
+    fn save_to(&mut self, session: &mut Session, path: PathBuf, action: Option<PendingAction>) {
         let moves = session.path.as_ref() != Some(&path);
         if let Err(reason) = write(session, &path, moves) {
             session.set_notice(Some(reason));
             return;
         }
         session.set_notice(None);
-        self.shelf.remember(&path);
+        self.platform.remember(&path);
         if moves {
             session.path = Some(path);
             session.reload_assets();
         }
-        if let Some(leaving) = leaving {
-            self.leave(session, leaving);
+        if let Some(action) = action {
+            self.proceed(session, action);
         }
     }
 
     fn open(&mut self, session: &mut Session, path: PathBuf) {
         match files::read(&path) {
             Ok(text) => {
-                self.shelf.remember(&path);
+                self.platform.remember(&path);
                 self.open_text(session, &path.display().to_string(), text, Some(path));
             }
             Err(error) => session.set_notice(Some(error.to_string())),
@@ -127,7 +126,7 @@ impl Files {
             self.ask_where_to_save(session, None);
         }
         ui.menu_button("Recent", |ui| {
-            for path in self.shelf.recent.paths().to_vec() {
+            for path in self.platform.recent.paths().to_vec() {
                 if ui.button(path.display().to_string()).clicked() {
                     self.open(session, path);
                 }
@@ -156,7 +155,7 @@ impl Files {
     }
 
     /// Renders the present frame, or the whole shot, as `bansho render` does.
-    fn render(&mut self, session: &mut Session, still: bool) {
+    fn render(&mut self, session: &mut Session, full_quality: bool) {
         let Some(path) = session.path.clone() else {
             session.set_notice(Some("save the scene first; pictures are written beside its name, in out/".into()));
             return;
@@ -165,57 +164,59 @@ impl Files {
             session.set_notice(Some(BUSY.into()));
             return;
         }
-        let number = still.then(|| session.transport.number());
-        match Shooting::start(render_job::job(session.document.text(), &path, number), || {}) {
-            Ok(shooting) => self.shelf.shooting = Some(shooting),
+        let number = full_quality.then(|| session.transport.number());
+        match RenderJob::start(render_job::job(session.document.text(), &path, number), || {}) {
+            Ok(render_job) => self.platform.render_job = Some(render_job),
             Err(error) => session.set_notice(Some(format!("the system gives no thread to render on: {error}"))),
         }
     }
 
     /// Frames that are rendered, and all; 0 until they are counted. `None` where nothing is.
     pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
-        self.shelf.shooting.as_ref().map(Shooting::progress)
+        self.platform.render_job.as_ref().map(RenderJob::progress)
     }
 
     /// Asks what is rendered to stop; whole frames stay.
     pub(in crate::app) fn stop_rendering(&mut self) {
-        self.shelf.shooting.iter().for_each(Shooting::stop);
+        self.platform.render_job.iter().for_each(RenderJob::stop);
     }
 
-    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session, subject: &Subject) {
-        self.watch_outside(ui, session);
-        self.take_dropped(ui, session, subject);
+    pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
+        self.poll_external_change(ui, session);
+        self.take_dropped(ui, session, selection);
         self.finish_job(ui, session);
     }
 
     /// Takes in what another program wrote into the file.
-    fn watch_outside(&mut self, ui: &Ui, session: &mut Session) {
+    fn poll_external_change(&mut self, ui: &Ui, session: &mut Session) {
         let Some(path) = session.path.clone() else { return };
-        if self.shelf.watch.as_ref().is_none_or(|watch| watch.path() != path) {
+        if self.platform.watch.as_ref().is_none_or(|watch| watch.path() != path) {
             let ctx = ui.ctx().clone();
             // Without a thread to look, the file is not watched.
-            self.shelf.watch = Watch::start(&path, move || ctx.request_repaint()).ok();
+            self.platform.watch = FileWatcher::start(&path, move || ctx.request_repaint()).ok();
         }
-        if !self.shelf.watch.as_ref().is_some_and(Watch::touched) {
+        if !self.platform.watch.as_ref().is_some_and(FileWatcher::touched) {
             return;
         }
-        match files::outside(&session.document, &path) {
-            Outside::Same => session.document.mark_gone(!path.exists()),
-            Outside::Gone => {
-                session.document.mark_gone(true);
+        match files::external_change(&session.document, &path) {
+            ExternalChange::Same => session.document.set_file_missing(!path.exists()),
+            ExternalChange::Gone => {
+                session.document.set_file_missing(true);
                 session.set_notice(Some(format!("{}: the file is gone; saving writes it anew", path.display())));
             }
-            Outside::Unreadable(reason) => {
+            ExternalChange::Unreadable(reason) => {
                 let notice = format!("{}: another program wrote what cannot be read: {reason}", path.display());
                 session.set_notice(Some(notice));
             }
-            Outside::Changed(_) if session.document.differs() => self.question = Some(Question::ChangedOutside(None)),
-            Outside::Changed(text) => take_outside(session, &text),
+            ExternalChange::Changed(_) if session.document.is_modified() => {
+                self.question = Some(Question::ChangedExternally(None))
+            }
+            ExternalChange::Changed(text) => apply_external_change(session, &text),
         }
     }
 
     /// A scene is opened, all else laid into the one that is open.
-    fn take_dropped(&mut self, ui: &Ui, session: &mut Session, subject: &Subject) {
+    fn take_dropped(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         let dropped: Vec<PathBuf> =
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         let scene = dropped.iter().position(|path| files::is_named_as_scene(path));
@@ -226,41 +227,41 @@ impl Files {
                     session.set_notice(Some("of the files that were dropped, only the scene was taken".into()));
                 }
             }
-            None => dropped.iter().for_each(|path| session.lay_over(path, subject)),
+            None => dropped.iter().for_each(|path| session.drop_file(path, selection)),
         }
     }
 
     fn finish_job(&mut self, ui: &Ui, session: &mut Session) {
-        let Some(shooting) = &mut self.shelf.shooting else { return };
+        let Some(render_job) = &mut self.platform.render_job else { return };
         ui.ctx().request_repaint_after(Duration::from_millis(200));
-        if let Some(result) = shooting.finished() {
-            self.shelf.shooting = None;
-            tell_end(session, result.map(|file| format!("written: {}", file.display())));
+        if let Some(result) = render_job.finished() {
+            self.platform.render_job = None;
+            report_end(session, result.map(|file| format!("written: {}", file.display())));
         }
     }
 
     pub(super) fn answered_about_disk(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match (question, answer) {
-            (Question::Open(chooser), _) => self.open(session, chooser.path()),
-            (Question::Relink(place, chooser), _) => session.relink(&place, &chooser.path()),
-            (Question::SaveAs(chooser, leaving), _) => self.save_as(session, chooser.path(), leaving),
-            (Question::Replace(path, _, leaving), Answer::Do) => self.save_to(session, path, leaving),
-            (Question::Replace(_, _, leaving), _) => self.ask_where_to_save(session, leaving),
-            (Question::ChangedOutside(_), Answer::Do) => {
-                let there = session.path.as_ref().map(|path| files::outside(&session.document, path));
+            (Question::Open(dialog), _) => self.open(session, dialog.path()),
+            (Question::Relink(place, dialog), _) => session.relink(&place, &dialog.path()),
+            (Question::SaveAs(dialog, action), _) => self.save_as(session, dialog.path(), action),
+            (Question::Replace(path, _, action), Answer::Do) => self.save_to(session, path, action),
+            (Question::Replace(_, _, action), _) => self.ask_where_to_save(session, action),
+            (Question::ChangedExternally(_), Answer::Do) => {
+                let there = session.path.as_ref().map(|path| files::external_change(&session.document, path));
                 // As it is now: the other program may have gone on writing.
                 match there {
-                    Some(Outside::Changed(text)) => take_outside(session, &text),
-                    Some(Outside::Unreadable(reason)) => session.set_notice(Some(reason)),
-                    Some(Outside::Same | Outside::Gone) | None => {}
+                    Some(ExternalChange::Changed(text)) => apply_external_change(session, &text),
+                    Some(ExternalChange::Unreadable(reason)) => session.set_notice(Some(reason)),
+                    Some(ExternalChange::Same | ExternalChange::Gone) | None => {}
                 }
             }
-            (Question::ChangedOutside(leaving), Answer::Save) => {
+            (Question::ChangedExternally(action), Answer::Save) => {
                 if let Some(path) = session.path.clone() {
-                    self.save_to(session, path, leaving);
+                    self.save_to(session, path, action);
                 }
             }
-            (Question::ChangedOutside(_), Answer::Cancel) | (Question::Leave(_) | Question::StopRendering, _) => {}
+            (Question::ChangedExternally(_), Answer::Cancel) | (Question::Leave(_) | Question::StopRendering, _) => {}
         }
     }
 }
@@ -276,8 +277,8 @@ fn write(session: &mut Session, path: &Path, moves: bool) -> Result<(), String> 
 }
 
 /// Takes what another program wrote as an edit that can be undone.
-fn take_outside(session: &mut Session, text: &str) {
+fn apply_external_change(session: &mut Session, text: &str) {
     session.document.replace("edited elsewhere", text);
-    session.document.seal();
+    session.document.end_step();
     session.document.mark_saved(text.into());
 }

@@ -7,36 +7,36 @@ use bansho::render::scene::Place;
 use eframe::egui::Ui;
 
 #[cfg(not(target_arch = "wasm32"))]
-use super::dialog::Chooser;
-use crate::document::files::autosave::Recovered;
+use super::dialog::FileDialog;
+use crate::document::files::autosave::RecoveredWork;
 
 /// A question that waits for an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     /// Which file to open.
     #[cfg(not(target_arch = "wasm32"))]
-    Open(Chooser),
+    Open(FileDialog),
     /// Which file this place shall name.
     #[cfg(not(target_arch = "wasm32"))]
-    Relink(Place, Chooser),
+    Relink(Place, FileDialog),
     /// Which file to save to, and where to then.
     #[cfg(not(target_arch = "wasm32"))]
-    SaveAs(Chooser, Option<Leaving>),
+    SaveAs(FileDialog, Option<PendingAction>),
     /// Whether this file may be replaced by what is saved, what is said of it, and where to then.
     #[cfg(not(target_arch = "wasm32"))]
-    Replace(PathBuf, String, Option<Leaving>),
+    Replace(PathBuf, String, Option<PendingAction>),
     /// Whether unsaved work may be left, to open this or to close.
-    Leave(Leaving),
+    Leave(PendingAction),
     /// Whether what is rendered may be stopped, to close.
     StopRendering,
     /// Whether to take what another program wrote, and where to once this is saved over it.
     #[cfg(not(target_arch = "wasm32"))]
-    ChangedOutside(Option<Leaving>),
+    ChangedExternally(Option<PendingAction>),
 }
 
 /// Where to, once unsaved work may be left.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Leaving {
+pub(super) enum PendingAction {
     /// A scene, and where it lies if it lies anywhere.
     Open {
         name: String,
@@ -44,7 +44,7 @@ pub(super) enum Leaving {
         path: Option<PathBuf>,
     },
     /// Work of a studio that did not end well.
-    Recover(Recovered),
+    Recover(RecoveredWork),
     Close,
 }
 
@@ -74,13 +74,13 @@ impl Question {
     fn body(&mut self, ui: &mut Ui) -> bool {
         let said = match self {
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Open(chooser) => return chooser.show(ui, "Open which scene?"),
+            Self::Open(dialog) => return dialog.show(ui, "Open which scene?"),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Relink(_, chooser) => return chooser.show(ui, "Which file in its stead?"),
+            Self::Relink(_, dialog) => return dialog.show(ui, "Which file in its stead?"),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::SaveAs(chooser, _) => {
+            Self::SaveAs(dialog, _) => {
                 // A double-click chooses a name, to be saved over only after a question.
-                chooser.show(ui, "Save as");
+                dialog.show(ui, "Save as");
                 return false;
             }
             #[cfg(not(target_arch = "wasm32"))]
@@ -90,7 +90,7 @@ impl Question {
                 "Pictures are being rendered. Whole frames stay, and rendering the shot goes on from there."
             }
             #[cfg(not(target_arch = "wasm32"))]
-            Self::ChangedOutside(_) => "Another program changed the file, and there is unsaved work here.",
+            Self::ChangedExternally(_) => "Another program changed the file, and there is unsaved work here.",
         };
         ui.label(said);
         false
@@ -111,7 +111,7 @@ impl Question {
             Self::Leave(_) => &[("Save", Save), ("Leave it", Do), ("Cancel", Cancel)],
             Self::StopRendering => &[("Stop and close", Do), ("Cancel", Cancel)],
             #[cfg(not(target_arch = "wasm32"))]
-            Self::ChangedOutside(_) => &[("Take theirs", Do), ("Save mine", Save), ("Decide later", Cancel)],
+            Self::ChangedExternally(_) => &[("Take theirs", Do), ("Save mine", Save), ("Decide later", Cancel)],
         }
     }
 }

@@ -8,9 +8,9 @@ use bansho::{
 };
 
 use crate::{
-    app::{KIND_WITH_BURNERS, KIND_WITH_SHAPES, panels::scene::Subject},
-    editors::aurora::document::Drawing,
-    session::{Session, folder},
+    app::{KIND_WITH_BURNERS, KIND_WITH_SHAPES},
+    editors::aurora::document::AuroraDrawing,
+    session::{Session, folder, selection::Selection},
 };
 
 /// What a file that is dropped becomes, by the ending of its name.
@@ -34,18 +34,18 @@ impl Session {
         Value::Text(relative.to_string_lossy().replace('\\', "/"))
     }
 
-    /// Takes a file that was dropped on the window while `subject` is chosen: a drawing becomes the first shape of the aurora, a mesh
+    /// Takes a file that was dropped on the window while `selection` is chosen: a drawing becomes the first shape of the aurora, a mesh
     /// burns in the flame, a picture is the plate.
-    pub(super) fn lay_over(&mut self, file: &Path, subject: &Subject) {
+    pub(super) fn drop_file(&mut self, file: &Path, selection: &Selection) {
         let ending = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let is_one_of = |endings: &[&str]| endings.contains(&ending.as_str());
         // It may be another file of a name that was read before.
         self.reload_assets();
-        self.document.seal();
+        self.document.end_step();
         if is_one_of(&DRAWINGS) {
-            self.draw_from(file, subject.index_of(KIND_WITH_SHAPES));
+            self.trace_drawing(file, selection.index_of(KIND_WITH_SHAPES));
         } else if is_one_of(&MESHES) {
-            self.burn(file, subject.index_of(KIND_WITH_BURNERS));
+            self.add_mesh_burner(file, selection.index_of(KIND_WITH_BURNERS));
         } else if is_one_of(&PICTURES) {
             let place = Place::root().key("plate").key("image");
             self.edit("plate", &[Operation::Set { place, value: self.named(file) }]);
@@ -57,15 +57,15 @@ impl Session {
         }
     }
 
-    fn draw_from(&mut self, file: &Path, index: usize) {
-        let drawing = Drawing::read(self.document.values(), index, self.assets());
+    fn trace_drawing(&mut self, file: &Path, index: usize) {
+        let drawing = AuroraDrawing::read(self.document.values(), index, self.assets());
         let traced = drawing.map(|drawing| drawing.trace(self.named(file)));
-        if let Err(reason) = traced.and_then(|traced| self.reshape("drawing", &traced, index)) {
+        if let Err(reason) = traced.and_then(|traced| self.edit_shapes("drawing", &traced, index)) {
             self.set_notice(Some(reason.to_string()));
         }
     }
 
-    fn burn(&mut self, file: &Path, index: usize) {
+    fn add_mesh_burner(&mut self, file: &Path, index: usize) {
         let flame = Place::root().key(KIND_WITH_BURNERS).index(index);
         if flame.find(self.document.values()).is_none() {
             self.set_notice(Some("a mesh burns in a particle flame, which this scene lacks: add one first".into()));

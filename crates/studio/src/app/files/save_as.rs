@@ -45,8 +45,8 @@ pub(super) fn follow(session: &Session, to: &Path) -> Result<Arc<str>, MovingErr
         if Path::new(&name).is_absolute() {
             continue;
         }
-        let bundled = if session.path.is_none() { session.bundled(&name) } else { None };
-        let new = match bundled {
+        let bundled_file = if session.path.is_none() { session.bundled_file(&name) } else { None };
+        let new = match bundled_file {
             Some(bytes) => laid_beside(&name, bytes, &after)?,
             None => from_elsewhere(&name, &before, &after),
         };

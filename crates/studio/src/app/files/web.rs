@@ -10,18 +10,17 @@ use bansho::{
 use super::{
     Files,
     browser_io::{self, Inbox, Parts},
-    questions::Leaving,
-    tell_end,
+    questions::PendingAction,
+    report_end,
 };
 use crate::{
-    app::panels::scene::Subject,
-    player::{Event, Player, Wish, WorkerPlayer, render_job::Ended},
-    session::{Session, settings_store::Store},
+    player::{Event, FrameRequest, Player, WorkerPlayer, render_job::JobFailure},
+    session::{Session, selection::Selection, settings_store::SettingsStore},
 };
 use eframe::egui::{Context, Ui};
 
 /// What the page knows of files.
-pub(super) struct Shelf {
+pub(super) struct PlatformFiles {
     /// Files that came by way of the browser.
     inbox: Inbox,
     /// What shall name the next file that comes.
@@ -33,7 +32,7 @@ pub(super) struct Shelf {
 struct Rendering {
     player: WorkerPlayer,
     /// For the picture that is made now.
-    wish: Wish,
+    request: FrameRequest,
     /// What the scene is called.
     stem: String,
     done: usize,
@@ -42,8 +41,8 @@ struct Rendering {
     shot: Option<Zip<Parts>>,
 }
 
-impl Shelf {
-    pub(super) fn new(_store: &Store) -> Self {
+impl PlatformFiles {
+    pub(super) fn new(_store: &SettingsStore) -> Self {
         Self { inbox: Inbox::default(), relink: None, rendering: None }
     }
 }
@@ -51,18 +50,18 @@ impl Shelf {
 impl Files {
     /// Asks which file to open.
     pub(in crate::app) fn ask_to_open(&mut self, ctx: &Context, session: &mut Session) {
-        self.shelf.relink = None;
+        self.platform.relink = None;
         self.ask_for_file(ctx, session);
     }
 
     /// Asks which file `place` shall name.
     pub(in crate::app) fn ask_to_relink(&mut self, ctx: &Context, session: &mut Session, place: Place) {
-        self.shelf.relink = Some(place);
+        self.platform.relink = Some(place);
         self.ask_for_file(ctx, session);
     }
 
     fn ask_for_file(&self, ctx: &Context, session: &mut Session) {
-        if browser_io::ask_for_file(&self.shelf.inbox, ctx).is_err() {
+        if browser_io::ask_for_file(&self.platform.inbox, ctx).is_err() {
             session.set_notice(Some("the browser cannot ask for files here".into()));
         }
     }
@@ -72,13 +71,13 @@ impl Files {
         self.save_and(session, None);
     }
 
-    /// Saves, and goes to `leaving` once that is done.
-    pub(super) fn save_and(&mut self, session: &mut Session, leaving: Option<Leaving>) {
+    /// Saves, and goes to `action` once that is done.
+    pub(super) fn save_and(&mut self, session: &mut Session, action: Option<PendingAction>) {
         let text = session.document.text().clone();
         match browser_io::download(&format!("{}.toml", stem(session)), &Parts::of(text.as_bytes())) {
             Ok(()) => {
                 session.document.mark_saved(text);
-                leaving.into_iter().for_each(|leaving| self.leave(session, leaving));
+                action.into_iter().for_each(|action| self.proceed(session, action));
             }
             Err(_) => session.set_notice(Some("the browser cannot save files here".into())),
         }
@@ -121,37 +120,38 @@ impl Files {
             session.set_notice(Some("the browser gives no worker to render in".into()));
             return;
         };
-        session.given().iter().for_each(|(name, bytes)| player.give(name, bytes));
-        let wish = session.finished(first);
-        player.wish(wish.clone());
-        self.shelf.rendering = Some(Rendering { player, wish, stem: stem(session).to_owned(), done: 0, total, shot });
+        session.added_files().iter().for_each(|(name, bytes)| player.add_file(name, bytes));
+        let request = session.finished(first);
+        player.request(request.clone());
+        self.platform.rendering =
+            Some(Rendering { player, request, stem: stem(session).to_owned(), done: 0, total, shot });
     }
 
     /// Frames that are rendered, and all; `None` where nothing is.
     pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
-        self.shelf.rendering.as_ref().map(|rendering| [rendering.done, rendering.total])
+        self.platform.rendering.as_ref().map(|rendering| [rendering.done, rendering.total])
     }
 
     /// Stops what is rendered.
     pub(in crate::app) fn stop_rendering(&mut self) {
-        self.shelf.rendering = None;
+        self.platform.rendering = None;
     }
 
     /// Takes in finished pictures, and tells how rendering ended.
-    fn tend_rendering(&mut self, session: &mut Session) {
-        if let Some(ended) = self.shelf.rendering.as_mut().and_then(Rendering::tend) {
-            self.shelf.rendering = None;
-            tell_end(session, ended);
+    fn poll_rendering(&mut self, session: &mut Session) {
+        if let Some(ended) = self.platform.rendering.as_mut().and_then(Rendering::poll) {
+            self.platform.rendering = None;
+            report_end(session, ended);
         }
     }
 
     /// Takes in what the browser gave: a scene is opened, anything else laid into the one that is open.
-    pub(super) fn tend_shelf(&mut self, ui: &Ui, session: &mut Session, subject: &Subject) {
-        self.tend_rendering(session);
+    pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
+        self.poll_rendering(session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
-        dropped.into_iter().for_each(|file| browser_io::take_dropped(file, &self.shelf.inbox, ui.ctx()));
-        let given = self.shelf.inbox.take();
-        for (name, bytes) in given {
+        dropped.into_iter().for_each(|file| browser_io::take_dropped(file, &self.platform.inbox, ui.ctx()));
+        let added_files = self.platform.inbox.take();
+        for (name, bytes) in added_files {
             if name.ends_with(".toml") {
                 match String::from_utf8(bytes) {
                     Ok(text) => self.open_text(session, &name, text, None),
@@ -159,10 +159,10 @@ impl Files {
                 }
                 continue;
             }
-            session.give(&name, bytes);
-            match self.shelf.relink.take() {
+            session.add_file(&name, bytes);
+            match self.platform.relink.take() {
                 Some(place) => session.relink(&place, Path::new(&name)),
-                None => session.lay_over(Path::new(&name), subject),
+                None => session.drop_file(Path::new(&name), selection),
             }
         }
     }
@@ -176,15 +176,15 @@ fn stem(session: &Session) -> &str {
 
 impl Rendering {
     /// Takes in what was finished and asks for what comes next; how it ended, once it has.
-    fn tend(&mut self) -> Option<Result<String, Ended>> {
+    fn poll(&mut self) -> Option<Result<String, JobFailure>> {
         self.player.poll().into_iter().find_map(|event| match event {
-            Event::Still { number, png } => self.take(number, &png).map_err(Ended::Failed).transpose(),
-            Event::Judged { outcome: Err(error), .. } => {
-                Some(Err(Ended::Failed(format!("the scene has faults: {error}"))))
+            Event::FullQualityFrame { number, png } => self.take(number, &png).map_err(JobFailure::Failed).transpose(),
+            Event::Checked { outcome: Err(error), .. } => {
+                Some(Err(JobFailure::Failed(format!("the scene has faults: {error}"))))
             }
-            Event::Failed { reason, .. } => Some(Err(Ended::Failed(reason))),
-            Event::Panicked { message, .. } => Some(Err(Ended::Panicked(message))),
-            Event::Judged { .. } | Event::Drawn(_) | Event::Stage(..) => None,
+            Event::Failed { reason, .. } => Some(Err(JobFailure::Failed(reason))),
+            Event::Panicked { message, .. } => Some(Err(JobFailure::Panicked(message))),
+            Event::Checked { .. } | Event::Drawn(_) | Event::Stage(..) => None,
         })
     }
 
@@ -195,8 +195,8 @@ impl Rendering {
         let Some(shot) = &mut self.shot else { return save(&name, &Parts::of(png)).map(Some) };
         shot.add(&name, png).map_err(|error| error.to_string())?;
         if self.done < self.total {
-            self.wish.number = Some(number + 1);
-            self.player.wish(self.wish.clone());
+            self.request.number = Some(number + 1);
+            self.player.request(self.request.clone());
             return Ok(None);
         }
         let pictures = self.shot.take().map(Zip::finish).transpose().map_err(|error| error.to_string())?;

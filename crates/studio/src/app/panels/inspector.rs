@@ -5,55 +5,55 @@ use bansho::{
     render::scene::{Place, operation::Operation},
 };
 
-use super::scene::Subject;
 use crate::{
     app::{
-        viewport::handles::stands_for_one,
+        viewport::handles::implies_one_item,
         widgets::{
             icon::{self, Icon},
-            keyframes,
-            value::{Widget, somewhere_in},
+            value::{ValueEditor, initial_value},
         },
     },
-    session::Session,
+    document::keyframes,
+    session::{Session, selection::Selection},
 };
+
 use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, TextEdit, Ui, vec2};
 
 /// The panel, and what is looked for in it.
 #[derive(Default)]
 pub(crate) struct Inspector {
-    wanted: String,
+    filter: String,
 }
 
 impl Inspector {
-    /// Shows the parameters of `subject`: all, or those whose names or descriptions hold what is looked for.
-    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
-        let Some(descriptor) = subject.descriptor() else { return };
-        let place = subject.place();
-        ui.heading(subject.title(&session.document));
+    /// Shows the parameters of `selection`: all, or those whose names or descriptions hold what is looked for.
+    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+        let Some(descriptor) = selection.descriptor() else { return };
+        let place = selection.place();
+        ui.heading(selection.title(&session.document));
         ui.weak(&descriptor.doc);
         ui.horizontal(|ui| {
             let label = ui.label("Find").id;
-            let field = TextEdit::singleline(&mut self.wanted).hint_text("a parameter").desired_width(f32::INFINITY);
+            let field = TextEdit::singleline(&mut self.filter).hint_text("a parameter").desired_width(f32::INFINITY);
             ui.add(field).labelled_by(label);
         });
         ui.separator();
-        if subject.index.is_some() && subject.place().find(session.document.values()).is_none() {
+        if selection.index.is_some() && selection.place().find(session.document.values()).is_none() {
             ui.label("It is not in the scene any more.");
             return;
         }
-        let wanted = Sought::new(&self.wanted);
-        if !wanted.is_in(descriptor) {
+        let filter = SearchFilter::new(&self.filter);
+        if !filter.is_in(descriptor) {
             ui.weak("Nothing here is called so.");
         }
-        table(ui, session, &place, descriptor, &wanted);
+        table(ui, session, &place, descriptor, &filter);
     }
 }
 
 /// What is looked for; empty for everything.
-struct Sought(String);
+struct SearchFilter(String);
 
-impl Sought {
+impl SearchFilter {
     fn new(text: &str) -> Self {
         Self(text.trim().to_lowercase())
     }
@@ -78,23 +78,23 @@ impl Sought {
     }
 }
 
-fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, wanted: &Sought) {
+fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, filter: &SearchFilter) {
     // Where a section itself is looked for, all of it is.
-    let all = Sought(String::new());
-    let wanted = if wanted.is_in(descriptor) { wanted } else { &all };
-    for parameter in descriptor.parameters.iter().filter(|parameter| wanted.is(parameter)) {
+    let all = SearchFilter(String::new());
+    let filter = if filter.is_in(descriptor) { filter } else { &all };
+    for parameter in descriptor.parameters.iter().filter(|parameter| filter.is(parameter)) {
         let own = place.key(parameter.key);
         match &parameter.kind {
-            Kind::Table(inner) => section(ui, session, &own, parameter.key, inner(), wanted),
-            Kind::List { item, .. } => list(ui, session, &own, parameter, item, wanted),
+            Kind::Table(inner) => section(ui, session, &own, parameter.key, inner(), filter),
+            Kind::List { item, .. } => list(ui, session, &own, parameter, item, filter),
             _ => row(ui, session, &own, parameter),
         }
     }
 }
 
 /// A part that opens by itself while something in it is looked for.
-fn header(title: &str, place: &Place, wanted: &Sought) -> CollapsingHeader {
-    CollapsingHeader::new(words(title)).id_salt(place).open((!wanted.is_everything()).then_some(true))
+fn header(title: &str, place: &Place, filter: &SearchFilter) -> CollapsingHeader {
+    CollapsingHeader::new(words(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
 }
 
 fn section(
@@ -103,36 +103,36 @@ fn section(
     place: &Place,
     title: &str,
     descriptor: &TableDescriptor,
-    wanted: &Sought,
+    filter: &SearchFilter,
 ) {
-    let shown = header(title, place, wanted).show(ui, |ui| {
-        table(ui, session, place, descriptor, wanted);
+    let shown = header(title, place, filter).show(ui, |ui| {
+        table(ui, session, place, descriptor, filter);
     });
     shown.header_response.on_hover_text(&descriptor.doc);
 }
 
 /// The items of a list; tables among them are sections.
-fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, wanted: &Sought) {
-    let shown = header(parameter.key, place, wanted).show(ui, |ui| {
+fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, filter: &SearchFilter) {
+    let shown = header(parameter.key, place, filter).show(ui, |ui| {
         let stated = place.find(session.document.values()).map(|node| node.value.clone());
         let is_stated = stated.is_some();
         let items = match stated.or_else(|| parameter.default.clone()) {
             Some(Value::List(items)) => items,
             _ => Vec::new(),
         };
-        // A part of the usual list can only be changed in a list that is stated.
-        let usual = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
-        let before = if is_stated || items.is_empty() { Vec::new() } else { vec![usual] };
-        if let (true, Kind::Table(inner)) = (items.is_empty() && stands_for_one(place), item) {
-            // Changing anything of the usual one states it.
-            let usual = place.index(0);
-            section(ui, session, &usual, &format!("{usual}, as usual"), inner(), wanted);
+        // An item of the default list can only be changed once the file states the list.
+        let state_list = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
+        let before = if is_stated || items.is_empty() { Vec::new() } else { vec![state_list] };
+        if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(place), item) {
+            // A change to the implied item states it.
+            let implied = place.index(0);
+            section(ui, session, &implied, &format!("{implied}, as usual"), inner(), filter);
         }
         for (index, node) in items.iter().enumerate() {
-            list_item(ui, session, &place.index(index), item, &node.value, wanted, &before);
+            list_item(ui, session, &place.index(index), item, &node.value, filter, &before);
         }
         if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
-            let append = Operation::Append { place: place.clone(), value: somewhere_in(item) };
+            let append = Operation::Append { place: place.clone(), value: initial_value(item) };
             session.edit("add", &[before.as_slice(), &[append]].concat());
         }
     });
@@ -146,7 +146,7 @@ fn list_item(
     place: &Place,
     kind: &Kind,
     value: &Value,
-    wanted: &Sought,
+    filter: &SearchFilter,
     before: &[Operation],
 ) {
     ui.horizontal(|ui| {
@@ -154,10 +154,10 @@ fn list_item(
             session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
         }
         match kind {
-            Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner(), wanted),
+            Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner(), filter),
             kind => {
                 let label = ui.label(place.to_string()).id;
-                if let Some(value) = (Widget { kind, unit: "", label, usual: None }).show(ui, value) {
+                if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).show(ui, value) {
                     session.edit(
                         &place.to_string(),
                         &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
@@ -172,8 +172,8 @@ fn list_item(
 fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let time = session.transport.time_s();
-    let unstated = session.unstated(place).or_else(|| parameter.default.clone());
-    let present = stated.as_ref().or(unstated.as_ref()).and_then(|value| keyframes::at(value, time));
+    let implied_value = session.implied_value(place).or_else(|| parameter.default.clone());
+    let present = stated.as_ref().or(implied_value.as_ref()).and_then(|value| keyframes::at(value, time));
     let curve = matches!(parameter.kind, Kind::Curve { .. });
     let name = RichText::new(words(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
@@ -183,7 +183,7 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
             if ui.button("Set").labelled_by(label).clicked() {
                 session.edit(
                     parameter.key,
-                    &[Operation::Set { place: place.clone(), value: somewhere_in(&parameter.kind) }],
+                    &[Operation::Set { place: place.clone(), value: initial_value(&parameter.kind) }],
                 );
             }
             return;
@@ -192,8 +192,8 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
             reset(ui, session, place, parameter, stated.is_some());
             ui.end_row();
         }
-        let usual = parameter.default.as_ref();
-        let widget = Widget { kind: &parameter.kind, unit: parameter.unit, label, usual };
+        let default = parameter.default.as_ref();
+        let widget = ValueEditor { kind: &parameter.kind, unit: parameter.unit, label, default };
         if let Some(value) = widget.show(ui, &present) {
             session.set(parameter.key, place, value);
         }

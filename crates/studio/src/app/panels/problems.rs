@@ -10,7 +10,7 @@ use eframe::egui::{self, RichText, Ui};
 
 /// What is wanted of a fault.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Wanted {
+pub(crate) enum ProblemAction {
     /// To see it in the text.
     Sight(Span),
     /// Another file in stead of one that cannot be had.
@@ -18,9 +18,9 @@ pub(crate) enum Wanted {
 }
 
 /// Shows the faults, if there are any; what a hand wants of one.
-pub(crate) fn show(ui: &mut Ui, session: &Session) -> Option<Wanted> {
+pub(crate) fn show(ui: &mut Ui, session: &Session) -> Option<ProblemAction> {
     let error = session.document.error()?.clone();
-    let mut wanted = None;
+    let mut action = None;
     egui::Panel::bottom("problems").resizable(true).show(ui, |ui| {
         let count = error.problems.len() + error.omitted;
         let faults = if count == 1 { "1 fault".to_owned() } else { format!("{count} faults") };
@@ -32,18 +32,18 @@ pub(crate) fn show(ui: &mut Ui, session: &Session) -> Option<Wanted> {
                 let colour = ui.visuals().error_fg_color;
                 ui.horizontal_wrapped(|ui| {
                     if ui.link(RichText::new(text).color(colour)).clicked() {
-                        wanted = problem.span.clone().map(Wanted::Sight);
+                        action = problem.span.clone().map(ProblemAction::Sight);
                     }
                     let missing = matches!(problem.kind, ProblemKind::Asset(_));
                     if missing && ui.small_button("Relink").on_hover_text("Choose another file in its stead").clicked()
                     {
-                        wanted = Some(Wanted::File(place(&problem.path)));
+                        action = Some(ProblemAction::File(place(&problem.path)));
                     }
                 });
             }
         });
     });
-    wanted
+    action
 }
 
 /// The place that a problem's path names.

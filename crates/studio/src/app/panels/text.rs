@@ -45,12 +45,12 @@ impl TextPanel {
                 let now = ui.input(|input| input.time);
                 let line = changed_line(session.document.text(), &text);
                 if self.typed.replace((now, line)).is_none_or(|(then, there)| now - then > REST_S || line != there) {
-                    session.document.seal();
+                    session.document.end_step();
                 }
                 session.document.replace("typing", &text);
             }
             if output.response.lost_focus() {
-                session.document.seal();
+                session.document.end_step();
             }
         });
     }

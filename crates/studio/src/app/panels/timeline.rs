@@ -3,10 +3,8 @@
 use eframe::egui::{self, Color32, CornerRadius, PointerButton, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use crate::{
-    app::widgets::{
-        icon::{self, Icon},
-        keyframes,
-    },
+    app::widgets::icon::{self, Icon},
+    document::keyframes,
     session::Session,
 };
 
@@ -69,9 +67,9 @@ fn bar(ui: &mut Ui, session: &mut Session) {
     let (first, last) = (*frames.start(), (*frames.end()).max(frames.start() + 1));
     let x_of = |number: f64| rect.left() + ((number - first as f64) / (last - first) as f64) as f32 * rect.width();
     if let Some(at) = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on()) {
-        let share = f64::from(((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0));
+        let fraction = f64::from(((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0));
         session.transport.set_playing(false);
-        session.transport.go_to(first + (share * (last - first) as f64).round() as i64);
+        session.transport.go_to(first + (fraction * (last - first) as f64).round() as i64);
     }
     let visuals = ui.visuals();
     painter.rect_filled(rect, CornerRadius::same(2), visuals.extreme_bg_color);

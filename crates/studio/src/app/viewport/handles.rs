@@ -8,11 +8,11 @@ use bansho::{
     render::scene::{Place, Segment},
 };
 
-use crate::{app::widgets::keyframes, session::Session};
+use crate::{document::keyframes, session::Session};
 
 /// One of them.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Thing {
+pub(super) struct Handle {
     /// The value that says where it stands.
     pub(super) place: Place,
     /// What its value counts from, m.
@@ -25,29 +25,29 @@ pub(super) struct Thing {
 
 /// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own. A list that is not stated
 /// stands for one part.
-const STANDING: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
+const POSITIONED_KINDS: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
 
 /// Whether the list at `place` stands for one usual part where it is not stated.
-pub(crate) fn stands_for_one(place: &Place) -> bool {
+pub(crate) fn implies_one_item(place: &Place) -> bool {
     let [Segment::Key(kind), Segment::Index(_), Segment::Key(parts)] = place.segments() else { return false };
-    STANDING.contains(&(kind, parts))
+    POSITIONED_KINDS.contains(&(kind, parts))
 }
 
 /// All that hands can move at the present time: what stands somewhere, or while keyframes are recorded what can be keyed.
-pub(super) fn things(session: &Session) -> Vec<Thing> {
-    let mut things = standing(session);
+pub(super) fn handles(session: &Session) -> Vec<Handle> {
+    let mut handles = positioned_handles(session);
     if session.recording {
-        things.retain(|thing| keyframes::animatable(&thing.place));
+        handles.retain(|handle| keyframes::animatable(&handle.place));
     }
-    things
+    handles
 }
 
-fn standing(session: &Session) -> Vec<Thing> {
+fn positioned_handles(session: &Session) -> Vec<Handle> {
     let Some(plan) = session.plan() else { return Vec::new() };
     let time = session.transport.time_s();
     let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.stands());
-    let mut things: Vec<Thing> = lights
-        .map(|(index, light)| Thing {
+    let mut handles: Vec<Handle> = lights
+        .map(|(index, light)| Handle {
             place: Place::root().key("light").index(index).key("position"),
             origin: DVec3::ZERO,
             point: DVec3::from(light.position.at(time)),
@@ -56,10 +56,10 @@ fn standing(session: &Session) -> Vec<Thing> {
         .collect();
     let root = session.document.values();
     for listed in session.document.phenomena() {
-        let Some((_, parts)) = STANDING.iter().find(|(kind, _)| *kind == listed.kind) else { continue };
+        let Some((_, parts)) = POSITIONED_KINDS.iter().find(|(kind, _)| *kind == listed.kind) else { continue };
         let origin = position(root, &listed.place(), time);
         let own = listed.place().key("position");
-        things.push(Thing { place: own, origin: DVec3::ZERO, point: origin, name: listed.name.clone() });
+        handles.push(Handle { place: own, origin: DVec3::ZERO, point: origin, name: listed.name.clone() });
         let list = listed.place().key(parts);
         let count = match list.find(root).map(|node| &node.value) {
             Some(Value::List(items)) => items.len(),
@@ -67,14 +67,14 @@ fn standing(session: &Session) -> Vec<Thing> {
         };
         // One that is not stated stands where the phenomenon does, and moves by itself only over time.
         let unstated = usize::from(session.recording && count == 0);
-        things.extend((0..count + unstated).map(|index| Thing {
+        handles.extend((0..count + unstated).map(|index| Handle {
             place: list.index(index).key("position"),
             origin,
             point: origin + position(root, &list.index(index), time),
             name: format!("{} {parts} {}", listed.name, index + 1),
         }));
     }
-    things
+    handles
 }
 
 /// The `position` of the table at `place`; the origin where it states none.

@@ -14,24 +14,23 @@ use bansho::{
 };
 
 use crate::{
-    app::panels::scene::Subject,
     editors::flame_sheet::{curves_ui, stages_ui::image},
-    session::Session,
+    session::{Session, selection::Selection},
 };
 use eframe::egui::{
     self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2,
     pos2, vec2,
 };
-use handles::{Thing, things};
-use pointer::{Stand, rounded};
-use wind_drag::Blowing;
+use handles::{Handle, handles};
+use pointer::{CameraPose, rounded};
+use wind_drag::WindDrag;
 
 /// Around the picture: so dark that it does not blind, and not black, so that the picture's border is seen.
 const SURROUND: Color32 = Color32::from_gray(18);
 
 /// What a drag with the first button does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Tool {
+pub(super) enum ViewportTool {
     /// Turns the camera about its target.
     #[default]
     Camera,
@@ -46,8 +45,8 @@ pub(super) enum Tool {
 pub(super) struct Viewport {
     texture: Option<(TextureHandle, u64)>,
     pixels: [usize; 2],
-    pub(super) tool: Tool,
-    blowing: Option<Blowing>,
+    pub(super) tool: ViewportTool,
+    wind_drag: Option<WindDrag>,
     held: Option<Place>,
     /// Whether curves lie on top of the picture.
     curves: bool,
@@ -60,10 +59,10 @@ impl Viewport {
     }
 
     /// Shows the picture and takes in what hands do to it.
-    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
+    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         let behind = ui.painter().add(Shape::Noop);
         let panel = ui.clip_rect();
-        self.tools(ui, session, subject);
+        self.tools(ui, session, selection);
         let (response, painter) = ui.allocate_painter(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
         let scale = ui.ctx().pixels_per_point();
@@ -83,24 +82,26 @@ impl Viewport {
             let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
             painter.image(texture.id(), frame, whole, Color32::WHITE);
         }
-        self.hands(ui, session, &response, frame);
-        self.paint_things(session, &painter, frame);
-        if self.curves && curves_ui::has_any(subject) {
-            curves_ui::show(ui, session, subject, response.rect);
+        self.handle_pointer(ui, session, &response, frame);
+        self.paint_handles(session, &painter, frame);
+        if self.curves && curves_ui::has_any(selection) {
+            curves_ui::show(ui, session, selection, response.rect);
         }
     }
 
-    fn tools(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
+    fn tools(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         ui.horizontal_wrapped(|ui| {
-            ui.selectable_value(&mut self.tool, Tool::Camera, "Camera")
+            ui.selectable_value(&mut self.tool, ViewportTool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
-            ui.selectable_value(&mut self.tool, Tool::Wind, "Blow").on_hover_text("Drag to blow: the drag is the wind");
-            ui.selectable_value(&mut self.tool, Tool::Place, "Place").on_hover_text("Drag lamps, flames and burners");
+            ui.selectable_value(&mut self.tool, ViewportTool::Wind, "Blow")
+                .on_hover_text("Drag to blow: the drag is the wind");
+            ui.selectable_value(&mut self.tool, ViewportTool::Place, "Place")
+                .on_hover_text("Drag lamps, flames and burners");
             ui.toggle_value(&mut session.recording, "Record")
                 .on_hover_text("What is dragged leaves keyframes; time passes while you blow or drag things");
             ui.toggle_value(&mut session.draft, "Draft")
                 .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
-            if curves_ui::has_any(subject) {
+            if curves_ui::has_any(selection) {
                 ui.toggle_value(&mut self.curves, "Curves")
                     .on_hover_text("The curves of what is chosen, on the picture");
             }
@@ -125,74 +126,77 @@ impl Viewport {
         Some(picture.scene_size)
     }
 
-    fn hands(&mut self, ui: &Ui, session: &mut Session, response: &Response, frame: Rect) {
+    fn handle_pointer(&mut self, ui: &Ui, session: &mut Session, response: &Response, frame: Rect) {
         let Some(plan) = session.plan().cloned() else { return };
         let time = session.transport.time_s();
         let camera = plan.scene().camera.at(time, plan.size());
-        let stand = Stand::of(&plan, session.document.values(), time);
+        let pose = CameraPose::of(&plan, session.document.values(), time);
         let heights = |drag: Vec2| DVec2::new(f64::from(drag.x), f64::from(drag.y)) / f64::from(frame.height());
         let drag = heights(response.drag_delta());
         let shift = ui.input(|input| input.modifiers.shift);
         let pans = response.dragged_by(PointerButton::Middle)
-            || (shift && self.tool == Tool::Camera && response.dragged_by(PointerButton::Primary));
+            || (shift && self.tool == ViewportTool::Camera && response.dragged_by(PointerButton::Primary));
         if pans {
-            move_camera(session, stand.panned(drag, &camera));
-        } else if response.dragged_by(PointerButton::Primary) && self.tool == Tool::Camera && drag != DVec2::ZERO {
-            move_camera(session, stand.turned(drag, &camera));
+            move_camera(session, pose.panned(drag, &camera));
+        } else if response.dragged_by(PointerButton::Primary)
+            && self.tool == ViewportTool::Camera
+            && drag != DVec2::ZERO
+        {
+            move_camera(session, pose.turned(drag, &camera));
         }
-        self.dolly(ui, session, response, stand);
+        self.dolly(ui, session, response, pose);
         self.blow(session, response, &camera, heights(response.total_drag_delta().unwrap_or_default()));
-        self.drag_thing(ui, session, response, &camera, frame);
+        self.drag_handle(ui, session, response, &camera, frame);
     }
 
-    fn dolly(&self, ui: &Ui, session: &mut Session, response: &Response, stand: Stand) {
+    fn dolly(&self, ui: &Ui, session: &mut Session, response: &Response, pose: CameraPose) {
         /// Points of scrolling that are a step.
         const STEP: f32 = 50.0;
         let scrolled = ui.input(|input| input.smooth_scroll_delta().y);
         if response.hovered() && scrolled != 0.0 {
-            move_camera(session, stand.dollied(f64::from(scrolled / STEP)));
+            move_camera(session, pose.dollied(f64::from(scrolled / STEP)));
         }
     }
 
     fn blow(&mut self, session: &mut Session, response: &Response, camera: &Camera, drag: DVec2) {
-        if self.tool != Tool::Wind {
+        if self.tool != ViewportTool::Wind {
             return;
         }
         if response.drag_started_by(PointerButton::Primary) {
-            self.blowing = Some(Blowing::begin(session));
+            self.wind_drag = Some(WindDrag::begin(session));
         }
-        match &self.blowing {
-            Some(blowing) if response.dragged_by(PointerButton::Primary) => {
-                blowing.blow(session, pointer::wind(drag, camera));
+        match &self.wind_drag {
+            Some(wind_drag) if response.dragged_by(PointerButton::Primary) => {
+                wind_drag.update(session, pointer::wind(drag, camera));
             }
             _ => {}
         }
         if response.drag_stopped_by(PointerButton::Primary)
-            && let Some(blowing) = self.blowing.take()
+            && let Some(wind_drag) = self.wind_drag.take()
         {
-            blowing.end(session);
+            wind_drag.end(session);
         }
     }
 
     /// Takes the hand off the wind, as before the scene is saved: wind that is not recorded passes.
-    pub(super) fn let_go(&mut self, session: &mut Session) {
-        if let Some(blowing) = self.blowing.take() {
-            blowing.end(session);
+    pub(super) fn end_wind_drag(&mut self, session: &mut Session) {
+        if let Some(wind_drag) = self.wind_drag.take() {
+            wind_drag.end(session);
         }
     }
 
-    fn drag_thing(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
+    fn drag_handle(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
         /// Things nearer to the pointer than this are meant, points of the screen.
         const REACH: f32 = 14.0;
-        if self.tool != Tool::Place {
+        if self.tool != ViewportTool::Place {
             return;
         }
-        let things = things(session);
-        let on_screen = |thing: &Thing| Some(to_screen(camera.project(thing.point)?.pixel, camera, frame));
+        let handles = handles(session);
+        let on_screen = |handle: &Handle| Some(to_screen(camera.project(handle.point)?.pixel, camera, frame));
         if response.drag_started_by(PointerButton::Primary) {
             let from = ui.input(|input| input.pointer.press_origin());
-            let near = |thing: &&Thing| Some((on_screen(thing)?.distance(from?), thing.place.clone()));
-            let nearest = things.iter().filter_map(|thing| near(&thing)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let near = |handle: &&Handle| Some((on_screen(handle)?.distance(from?), handle.place.clone()));
+            let nearest = handles.iter().filter_map(|handle| near(&handle)).min_by(|a, b| a.0.total_cmp(&b.0));
             self.held = nearest.filter(|(distance, _)| *distance < REACH).map(|(_, place)| place);
             if session.recording && self.held.is_some() {
                 session.transport.play_to_the_end();
@@ -203,32 +207,32 @@ impl Viewport {
         }
         // Beyond the end of the shot nothing is recorded.
         let ended = session.recording && !session.transport.is_playing();
-        let held = things.iter().find(|thing| Some(&thing.place) == self.held.as_ref()).filter(|_| !ended);
-        if let (Some(thing), Some(at)) = (held, response.interact_pointer_pos())
-            && let Some(moved) = pointer::dragged(thing.point, to_picture(at, camera, frame), camera)
+        let held = handles.iter().find(|handle| Some(&handle.place) == self.held.as_ref()).filter(|_| !ended);
+        if let (Some(handle), Some(at)) = (held, response.interact_pointer_pos())
+            && let Some(moved) = pointer::dragged(handle.point, to_picture(at, camera, frame), camera)
         {
-            session.set("place", &thing.place, Value::numbers(rounded(moved - thing.origin)));
+            session.set("place", &handle.place, Value::numbers(rounded(moved - handle.origin)));
         }
     }
 
-    fn paint_things(&self, session: &Session, painter: &egui::Painter, frame: Rect) {
-        let Some(plan) = session.plan().filter(|_| self.tool == Tool::Place) else { return };
+    fn paint_handles(&self, session: &Session, painter: &egui::Painter, frame: Rect) {
+        let Some(plan) = session.plan().filter(|_| self.tool == ViewportTool::Place) else { return };
         let camera = plan.scene().camera.at(session.transport.time_s(), plan.size());
-        for thing in things(session) {
-            let Some(seen) = camera.project(thing.point) else { continue };
+        for handle in handles(session) {
+            let Some(seen) = camera.project(handle.point) else { continue };
             let at = to_screen(seen.pixel, &camera, frame);
-            let width = if Some(&thing.place) == self.held.as_ref() { 3.0 } else { 1.5 };
+            let width = if Some(&handle.place) == self.held.as_ref() { 3.0 } else { 1.5 };
             painter.circle_stroke(at, 8.0, Stroke::new(width, Color32::from_rgb(255, 210, 90)));
             let font = egui::FontId::proportional(12.0);
-            painter.text(at + vec2(11.0, 0.0), egui::Align2::LEFT_CENTER, thing.name, font, Color32::from_gray(220));
+            painter.text(at + vec2(11.0, 0.0), egui::Align2::LEFT_CENTER, handle.name, font, Color32::from_gray(220));
         }
     }
 }
 
-fn move_camera(session: &mut Session, stand: Stand) {
+fn move_camera(session: &mut Session, pose: CameraPose) {
     let camera = Place::root().key("camera");
     let value = |key: &str, to: DVec3| (camera.key(key), Value::numbers(rounded(to)));
-    session.set_all("camera", [value("position", stand.position), value("target", stand.target)]);
+    session.set_all("camera", [value("position", pose.position), value("target", pose.target)]);
 }
 
 /// The exposure of the scene, which a hand sets in place of the automatic one.
@@ -281,13 +285,13 @@ fn around(whole: Rect, hole: Rect, fill: Color32) -> Shape {
 }
 
 fn to_screen(pixel: DVec2, camera: &Camera, frame: Rect) -> Pos2 {
-    let share = |at: f64, side: f64| (at / side) as f32;
-    frame.min + vec2(share(pixel.x, camera.size[0]), share(pixel.y, camera.size[1])) * frame.size()
+    let fraction = |at: f64, side: f64| (at / side) as f32;
+    frame.min + vec2(fraction(pixel.x, camera.size[0]), fraction(pixel.y, camera.size[1])) * frame.size()
 }
 
 fn to_picture(at: Pos2, camera: &Camera, frame: Rect) -> DVec2 {
-    let share = (at - frame.min) / frame.size();
-    DVec2::new(f64::from(share.x) * camera.size[0], f64::from(share.y) * camera.size[1])
+    let fraction = (at - frame.min) / frame.size();
+    DVec2::new(f64::from(fraction.x) * camera.size[0], f64::from(fraction.y) * camera.size[1])
 }
 
 #[cfg(test)]

@@ -10,11 +10,11 @@ use bansho::{
     render::scene::Place,
 };
 
-use crate::app::widgets::keyframes::vector;
+use crate::document::keyframes::vector;
 
 /// Where a camera stands and what it looks at, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stand {
+pub(super) struct CameraPose {
     pub(super) position: DVec3,
     pub(super) target: DVec3,
 }
@@ -28,7 +28,7 @@ const LOWEST: f64 = 0.05;
 /// Nearest that the line of sight comes to straight up or down, radians.
 const POLE: f64 = 0.02;
 
-impl Stand {
+impl CameraPose {
     /// Where the camera stands at `time`: as the scene `root` states it, for hands are faster than plans, else as `plan` has it.
     pub(super) fn of(plan: &Plan, root: &Table, time: f64) -> Self {
         let camera = &plan.scene().camera;
@@ -123,19 +123,19 @@ mod tests {
 
     use super::*;
 
-    const STAND: Stand = Stand { position: DVec3::new(0.0, 1.0, 4.0), target: DVec3::new(0.0, 1.0, 0.0) };
+    const POSE: CameraPose = CameraPose { position: DVec3::new(0.0, 1.0, 4.0), target: DVec3::new(0.0, 1.0, 0.0) };
 
-    fn camera_at(stand: Stand) -> Camera {
+    fn camera_at(pose: CameraPose) -> Camera {
         let parameters = CameraParameters {
-            position: stand.position.to_array().into(),
-            target: stand.target.to_array().into(),
+            position: pose.position.to_array().into(),
+            target: pose.target.to_array().into(),
             ..CameraParameters::default()
         };
         parameters.at(0.0, [160, 90])
     }
 
     fn camera() -> Camera {
-        camera_at(STAND)
+        camera_at(POSE)
     }
 
     fn near(a: DVec3, b: DVec3) -> bool {
@@ -144,32 +144,32 @@ mod tests {
 
     #[test]
     fn half_a_height_to_the_left_turns_a_quarter() {
-        let stand = STAND.orbited(DVec2::new(-0.5, 0.0));
-        assert!(near(stand.position, DVec3::new(4.0, 1.0, 0.0)) && stand.target == STAND.target);
-        let high = STAND.orbited(DVec2::new(0.0, 3.0));
+        let pose = POSE.orbited(DVec2::new(-0.5, 0.0));
+        assert!(near(pose.position, DVec3::new(4.0, 1.0, 0.0)) && pose.target == POSE.target);
+        let high = POSE.orbited(DVec2::new(0.0, 3.0));
         assert!(high.position.y < 5.0 && high.position.y > 4.99, "never over the pole");
         assert!(((high.position - high.target).length() - 4.0).abs() < 1e-9);
     }
 
     #[test]
     fn far_targets_are_looked_around_for_and_follow_the_hand() {
-        let stand = Stand { position: DVec3::new(0.0, 1.7, 0.0), target: DVec3::new(0.0, 60.0, -60.0) };
-        let camera = camera_at(stand);
-        let before = camera.project(stand.target).unwrap().pixel;
+        let pose = CameraPose { position: DVec3::new(0.0, 1.7, 0.0), target: DVec3::new(0.0, 60.0, -60.0) };
+        let camera = camera_at(pose);
+        let before = camera.project(pose.target).unwrap().pixel;
         let drag = DVec2::new(0.0, 0.2);
-        for moved in [stand.turned(drag, &camera), stand.panned(drag, &camera)] {
-            assert_eq!(moved.position, stand.position, "it stays where it stands");
-            let after = camera_at(moved).project(stand.target).unwrap().pixel;
+        for moved in [pose.turned(drag, &camera), pose.panned(drag, &camera)] {
+            assert_eq!(moved.position, pose.position, "it stays where it stands");
+            let after = camera_at(moved).project(pose.target).unwrap().pixel;
             let followed = (after - before) / 90.0;
             assert!(followed.x.abs() < 1e-9 && (followed.y - 0.2).abs() < 0.03, "{followed}");
         }
-        let right = stand.turned(DVec2::new(0.1, 0.0), &camera);
-        assert!(camera_at(right).project(stand.target).unwrap().pixel.x > before.x + 5.0);
+        let right = pose.turned(DVec2::new(0.1, 0.0), &camera);
+        assert!(camera_at(right).project(pose.target).unwrap().pixel.x > before.x + 5.0);
     }
 
     #[test]
     fn hands_bring_no_camera_under_the_ground() {
-        let low = Stand { position: DVec3::new(0.0, 0.5, 4.0), ..STAND };
+        let low = CameraPose { position: DVec3::new(0.0, 0.5, 4.0), ..POSE };
         let camera = camera_at(low);
         let up = DVec2::new(0.0, -0.4);
         for moved in
@@ -177,23 +177,23 @@ mod tests {
         {
             assert!(moved.position.y >= LOWEST, "{moved:?}");
         }
-        let beneath = Stand { position: DVec3::new(0.0, -2.0, 4.0), ..STAND };
+        let beneath = CameraPose { position: DVec3::new(0.0, -2.0, 4.0), ..POSE };
         assert_eq!(beneath.turned(DVec2::ZERO, &camera).position.y, -2.0, "who is there already stays");
     }
 
     #[test]
     fn what_is_panned_stays_under_the_hand() {
         let camera = camera();
-        let before = camera.project(STAND.target).unwrap().pixel;
-        let stand = STAND.panned(DVec2::new(0.25, -0.1), &camera);
-        let after = camera_at(stand).project(STAND.target).unwrap().pixel;
+        let before = camera.project(POSE.target).unwrap().pixel;
+        let pose = POSE.panned(DVec2::new(0.25, -0.1), &camera);
+        let after = camera_at(pose).project(POSE.target).unwrap().pixel;
         assert!((after - before - DVec2::new(0.25, -0.1) * 90.0).length() < 1e-6, "{before} {after}");
     }
 
     #[test]
     fn steps_nearer_and_back_come_to_the_same_place() {
-        assert!(near(STAND.dollied(3.0).dollied(-3.0).position, STAND.position));
-        assert!(near(STAND.dollied(1.0).position, DVec3::new(0.0, 1.0, 3.6)));
+        assert!(near(POSE.dollied(3.0).dollied(-3.0).position, POSE.position));
+        assert!(near(POSE.dollied(1.0).position, DVec3::new(0.0, 1.0, 3.6)));
     }
 
     #[test]

@@ -6,15 +6,15 @@ use bansho::{
 };
 
 use super::pointer::rounded;
-use crate::{app::widgets::keyframes, session::Session};
+use crate::{document::keyframes, session::Session};
 
 /// The wind before a drag began.
 #[derive(Clone, Debug)]
-pub(super) struct Blowing {
-    calm: [f64; 3],
-    recorded: bool,
+pub(super) struct WindDrag {
+    base_velocity: [f64; 3],
+    recording: bool,
     /// When it began, s.
-    began: f64,
+    start_s: f64,
 }
 
 /// The name of the step in the history.
@@ -24,27 +24,27 @@ fn place() -> Place {
     Place::root().key("wind").key("velocity")
 }
 
-impl Blowing {
+impl WindDrag {
     /// Begins a drag. Where keyframes are recorded, time passes while it lasts.
     pub(super) fn begin(session: &mut Session) -> Self {
-        let calm =
+        let base_velocity =
             keyframes::vector(session.document.values(), &place(), session.transport.time_s()).unwrap_or_default();
-        let calm = calm.to_array();
-        let blowing = Self { calm, recorded: session.recording, began: session.transport.time_s() };
-        session.document.seal();
-        if blowing.recorded {
+        let base_velocity = base_velocity.to_array();
+        let wind_drag = Self { base_velocity, recording: session.recording, start_s: session.transport.time_s() };
+        session.document.end_step();
+        if wind_drag.recording {
             session.transport.play_to_the_end();
-            blowing.key(session, calm);
+            wind_drag.key(session, base_velocity);
         }
-        blowing
+        wind_drag
     }
 
     /// The hand says `wind`, m/s, on top of what blows anyway.
-    pub(super) fn blow(&self, session: &mut Session, wind: DVec3) {
-        let velocity = rounded(DVec3::from(self.calm) + wind);
-        if self.recorded {
+    pub(super) fn update(&self, session: &mut Session, wind: DVec3) {
+        let velocity = rounded(DVec3::from(self.base_velocity) + wind);
+        if self.recording {
             // The key of the calm before the drag stays, and so does what was recorded when the shot ends.
-            if session.transport.time_s() != self.began && session.transport.is_playing() {
+            if session.transport.time_s() != self.start_s && session.transport.is_playing() {
                 self.key(session, velocity);
             }
         } else {
@@ -54,14 +54,14 @@ impl Blowing {
 
     /// The hand lets go: recorded wind calms down again, unrecorded wind never was.
     pub(super) fn end(self, session: &mut Session) {
-        if self.recorded {
+        if self.recording {
             if session.transport.is_playing() {
-                self.key(session, self.calm);
+                self.key(session, self.base_velocity);
             }
             session.transport.set_playing(false);
-            session.document.seal();
+            session.document.end_step();
         } else {
-            session.document.abandon(LABEL);
+            session.document.discard_step(LABEL);
         }
     }
 

@@ -35,16 +35,16 @@ struct Chart {
 
 impl Chart {
     fn to_screen(&self, [x, y]: [f64; 2]) -> Pos2 {
-        let share = |value: f64, [low, high]: [f64; 2]| ((value - low) / (high - low)) as f32;
+        let fraction = |value: f64, [low, high]: [f64; 2]| ((value - low) / (high - low)) as f32;
         pos2(
-            self.rect.left() + share(x, self.x) * self.rect.width(),
-            self.rect.bottom() - share(y, self.y) * self.rect.height(),
+            self.rect.left() + fraction(x, self.x) * self.rect.width(),
+            self.rect.bottom() - fraction(y, self.y) * self.rect.height(),
         )
     }
 
     fn to_curve(&self, at: Pos2) -> [f64; 2] {
-        let value = |share: f32, [low, high]: [f64; 2]| {
-            let exact = low + f64::from(share.clamp(0.0, 1.0)) * (high - low);
+        let value = |fraction: f32, [low, high]: [f64; 2]| {
+            let exact = low + f64::from(fraction.clamp(0.0, 1.0)) * (high - low);
             ((exact * 1000.0).round() / 1000.0).clamp(low, high)
         };
         let rect = self.rect;

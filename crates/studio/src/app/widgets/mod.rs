@@ -2,5 +2,4 @@
 
 pub(crate) mod curve_editor;
 pub(crate) mod icon;
-pub(crate) mod keyframes;
 pub(crate) mod value;

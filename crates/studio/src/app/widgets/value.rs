@@ -6,7 +6,7 @@ use eframe::egui::{self, Color32, DragValue, Id, Ui};
 use super::curve_editor::{self, Allowed};
 
 /// What a value is edited with.
-pub(crate) struct Widget<'a> {
+pub(crate) struct ValueEditor<'a> {
     /// What it may be.
     pub(crate) kind: &'a Kind,
     /// Its unit.
@@ -14,24 +14,24 @@ pub(crate) struct Widget<'a> {
     /// The label that names it, for screen readers.
     pub(crate) label: Id,
     /// What it usually is: sliders are finest around it.
-    pub(crate) usual: Option<&'a Value>,
+    pub(crate) default: Option<&'a Value>,
 }
 
 /// Beside a slider: a number without its unit, and the buttons after it, points of the screen.
-const BESIDE: f32 = 114.0;
+const NUMBER_WIDTH: f32 = 114.0;
 
 /// Sliders are so wide at least, points of the screen.
-const NARROWEST: f32 = 40.0;
+const MIN_SLIDER_WIDTH: f32 = 40.0;
 
-impl Widget<'_> {
+impl ValueEditor<'_> {
     /// Shows `value`; what it becomes where a hand changed it.
     pub(crate) fn show(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
         match self.kind {
             Kind::Bool => self.checkbox(ui, value),
             Kind::Integer { min, max } => self.integer(ui, value, [*min, *max]),
             Kind::Number { min, max } => {
-                let usual = self.usual.and_then(Value::as_number);
-                let number = self.number(ui, value.as_number()?, [*min, *max], usual)?;
+                let default = self.default.and_then(Value::as_number);
+                let number = self.number(ui, value.as_number()?, [*min, *max], default)?;
                 Some(Value::Number(number))
             }
             Kind::Vector { min, max, .. } => self.vector(ui, value, [*min, *max]),
@@ -40,7 +40,7 @@ impl Widget<'_> {
             Kind::Curve { x, y, rising } => {
                 curve_editor::show(ui, self.label, value, Allowed { x: *x, y: *y, rising: *rising })
             }
-            Kind::Animated(inner) | Kind::Optional(inner) => Widget { kind: inner, ..*self }.show(ui, value),
+            Kind::Animated(inner) | Kind::Optional(inner) => ValueEditor { kind: inner, ..*self }.show(ui, value),
             Kind::Auto(inner) => self.auto(ui, value, inner),
             Kind::List { .. } | Kind::Table(_) => {
                 ui.weak("in the text");
@@ -58,15 +58,15 @@ impl Widget<'_> {
     fn integer(&self, ui: &mut Ui, value: &Value, [min, max]: [i64; 2]) -> Option<Value> {
         let mut number = value.as_number()? as i64;
         let bounds = [min as f64, max as f64];
-        let usual = self.usual.and_then(Value::as_number);
-        let slid = self.slider(ui, number as f64, bounds, usual).map(|slid| slid.round() as i64);
+        let default = self.default.and_then(Value::as_number);
+        let slid = self.slider(ui, number as f64, bounds, default).map(|slid| slid.round() as i64);
         let drag = DragValue::new(&mut number).range(min..=max).clamp_existing_to_range(false).suffix(self.suffix());
         let dragged = ui.add(drag).labelled_by(self.label).changed().then_some(number);
         slid.or(dragged).map(Value::Integer)
     }
 
-    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
-        let slid = self.slider(ui, number, bounds, usual).map(decimal);
+    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
+        let slid = self.slider(ui, number, bounds, default).map(decimal);
         let dragged = self.drag(ui, number, bounds);
         slid.or(dragged)
     }
@@ -81,17 +81,17 @@ impl Widget<'_> {
     }
 
     /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
-    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], usual: Option<f64>) -> Option<f64> {
-        let scale = Scale::over(bounds, usual)?;
+    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
+        let scale = SliderScale::for_bounds(bounds, default)?;
         let unit =
             ui.painter().layout_no_wrap(self.suffix(), egui::TextStyle::Button.resolve(ui.style()), Color32::WHITE);
-        let beside = BESIDE + unit.size().x;
-        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - beside).max(NARROWEST);
+        let beside = NUMBER_WIDTH + unit.size().x;
+        ui.spacing_mut().slider_width = (ui.available_size_before_wrap().x - beside).max(MIN_SLIDER_WIDTH);
         let slider = egui::Slider::new(&mut number, bounds[0]..=bounds[1]).show_value(false);
         let slider = slider.clamping(egui::SliderClamping::Edits);
         let slider = match scale {
-            Scale::Even => slider,
-            Scale::Decades { least } => slider.logarithmic(true).smallest_positive(least),
+            SliderScale::Linear => slider,
+            SliderScale::Logarithmic { least } => slider.logarithmic(true).smallest_positive(least),
         };
         ui.add(slider).labelled_by(self.label).changed().then_some(number)
     }
@@ -107,18 +107,18 @@ impl Widget<'_> {
     /// Numbers beside one another; where they have bounds, each below the other with a slider.
     fn vector(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
         let Value::List(items) = value else { return None };
-        let usual = |index: usize| match self.usual {
+        let default = |index: usize| match self.default {
             Some(Value::List(items)) => items.get(index)?.value.as_number(),
             _ => None,
         };
         let whole = items.iter().all(|item| matches!(item.value, Value::Integer(_)));
         let mut edited = items.clone();
         let mut changed = false;
-        let slides = Scale::over(bounds, usual(0)).is_some();
+        let slides = SliderScale::for_bounds(bounds, default(0)).is_some();
         let part = Self { unit: if slides { self.unit } else { "" }, ..*self };
         let mut show = |ui: &mut Ui, index: usize, item: &mut Node| {
             let Some(number) = item.value.as_number() else { return };
-            if let Some(number) = part.number(ui, number, bounds, usual(index)) {
+            if let Some(number) = part.number(ui, number, bounds, default(index)) {
                 changed = true;
                 item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
             }
@@ -167,9 +167,9 @@ impl Widget<'_> {
         let mut edited = None;
         ui.horizontal(|ui| {
             if ui.checkbox(&mut auto, "auto").changed() {
-                edited = Some(if auto { Value::Text("auto".into()) } else { somewhere_in(inner) });
+                edited = Some(if auto { Value::Text("auto".into()) } else { initial_value(inner) });
             } else if !auto {
-                edited = Widget { kind: inner, ..*self }.show(ui, value);
+                edited = ValueEditor { kind: inner, ..*self }.show(ui, value);
             }
         });
         edited
@@ -177,7 +177,7 @@ impl Widget<'_> {
 }
 
 /// A value that `kind` allows, to begin with where nothing better is known.
-pub(crate) fn somewhere_in(kind: &Kind) -> Value {
+pub(crate) fn initial_value(kind: &Kind) -> Value {
     match kind {
         Kind::Bool => Value::Bool(false),
         Kind::Integer { min, max } => Value::Integer(1.clamp(*min, *max)),
@@ -189,7 +189,7 @@ pub(crate) fn somewhere_in(kind: &Kind) -> Value {
             let point = |x: f64| Node::from(Value::numbers([x, y[1]]));
             Value::List(vec![point(x[0]), point(x[1])])
         }
-        Kind::Animated(inner) | Kind::Optional(inner) | Kind::Auto(inner) => somewhere_in(inner),
+        Kind::Animated(inner) | Kind::Optional(inner) | Kind::Auto(inner) => initial_value(inner),
         Kind::List { .. } => Value::List(Vec::new()),
         Kind::Table(_) => Value::Table(bansho::base::parameters::Table::default()),
     }
@@ -197,31 +197,31 @@ pub(crate) fn somewhere_in(kind: &Kind) -> Value {
 
 /// How a slider divides what is allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Scale {
-    Even,
+enum SliderScale {
+    Linear,
     /// By decades, down to `least`.
-    Decades {
+    Logarithmic {
         least: f64,
     },
 }
 
-impl Scale {
-    /// For `[min, max]` around what is `usual`; `None` without bounds that a hand could mean.
-    fn over([min, max]: [f64; 2], usual: Option<f64>) -> Option<Self> {
+impl SliderScale {
+    /// For `[min, max]` around what is `default`; `None` without bounds that a hand could mean.
+    fn for_bounds([min, max]: [f64; 2], default: Option<f64>) -> Option<Self> {
         /// Limits so far apart only say that a value is a number.
-        const FARTHEST: f64 = 2e6;
+        const MAX_SPAN: f64 = 2e6;
         /// Ratios from which on the same step is too coarse below and too fine above.
-        const WIDE: f64 = 50.0;
-        if !(min < max && max - min < FARTHEST) {
+        const LOGARITHMIC_RATIO: f64 = 50.0;
+        if !(min < max && max - min < MAX_SPAN) {
             return None;
         }
-        let usual = usual.filter(|usual| *usual > 0.0);
-        let wide = match usual {
-            Some(usual) => max / usual >= WIDE,
-            None => min > 0.0 && max / min >= WIDE,
+        let default = default.filter(|default| *default > 0.0);
+        let wide = match default {
+            Some(default) => max / default >= LOGARITHMIC_RATIO,
+            None => min > 0.0 && max / min >= LOGARITHMIC_RATIO,
         };
-        let least = if min > 0.0 { min } else { usual.map_or(1e-6 * max, |usual| 1e-3 * usual) };
-        Some(if wide { Self::Decades { least } } else { Self::Even })
+        let least = if min > 0.0 { min } else { default.map_or(1e-6 * max, |default| 1e-3 * default) };
+        Some(if wide { Self::Logarithmic { least } } else { Self::Linear })
     }
 }
 
@@ -243,11 +243,11 @@ mod tests {
 
     #[test]
     fn sliders_go_by_decades_where_the_range_does() {
-        assert_eq!(Scale::over([0.0, 1.0], Some(0.5)), Some(Scale::Even));
-        assert_eq!(Scale::over([-40.0, 40.0], None), Some(Scale::Even));
-        assert_eq!(Scale::over([0.0, 1000.0], Some(2.0)), Some(Scale::Decades { least: 0.002 }));
-        assert_eq!(Scale::over([0.01, 100.0], None), Some(Scale::Decades { least: 0.01 }));
-        assert_eq!(Scale::over([f64::MIN, f64::MAX], Some(1.0)), None);
-        assert_eq!(Scale::over([1.0, 1.0], None), None);
+        assert_eq!(SliderScale::for_bounds([0.0, 1.0], Some(0.5)), Some(SliderScale::Linear));
+        assert_eq!(SliderScale::for_bounds([-40.0, 40.0], None), Some(SliderScale::Linear));
+        assert_eq!(SliderScale::for_bounds([0.0, 1000.0], Some(2.0)), Some(SliderScale::Logarithmic { least: 0.002 }));
+        assert_eq!(SliderScale::for_bounds([0.01, 100.0], None), Some(SliderScale::Logarithmic { least: 0.01 }));
+        assert_eq!(SliderScale::for_bounds([f64::MIN, f64::MAX], Some(1.0)), None);
+        assert_eq!(SliderScale::for_bounds([1.0, 1.0], None), None);
     }
 }

@@ -22,7 +22,7 @@ pub struct Autosave {
 
 /// Unsaved work of a studio that did not end well.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Recovered {
+pub struct RecoveredWork {
     /// The file it belongs to; empty for work that was never saved.
     pub origin: String,
     /// The text.
@@ -103,7 +103,7 @@ pub fn kept(origin: &str, text: &str) -> String {
 }
 
 /// The work in `folder` that no running studio holds.
-pub fn recoverable(folder: &Path) -> Vec<Recovered> {
+pub fn recoverable(folder: &Path) -> Vec<RecoveredWork> {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     files.retain(|path| path.extension().is_some_and(|extension| extension == "toml") && !is_held(path));
@@ -117,12 +117,12 @@ fn is_held(kept: &Path) -> bool {
     lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
-fn read(file: PathBuf) -> Option<Recovered> {
-    let recovered = Recovered::of(&fs::read_to_string(&file).ok()?)?;
-    Some(Recovered { kept_in: file, ..recovered })
+fn read(file: PathBuf) -> Option<RecoveredWork> {
+    let recovered = RecoveredWork::of(&fs::read_to_string(&file).ok()?)?;
+    Some(RecoveredWork { kept_in: file, ..recovered })
 }
 
-impl Recovered {
+impl RecoveredWork {
     /// Work as it was [`kept`], in no file.
     pub fn of(kept: &str) -> Option<Self> {
         let (heading, text) = kept.split_once('\n')?;

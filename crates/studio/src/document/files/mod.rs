@@ -46,9 +46,9 @@ pub fn open(path: &Path) -> Result<Document, OpenError> {
 pub fn save(document: &mut Document, path: &Path, text: Arc<str>) -> Result<(), MediaError> {
     atomic::write_bytes(path, text.as_bytes())?;
     if text != *document.text() {
-        document.seal();
+        document.end_step();
         document.replace("paths", &text);
-        document.seal();
+        document.end_step();
     }
     document.mark_saved(text);
     document.rename(path.display().to_string());
@@ -103,7 +103,7 @@ pub fn write_beside(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Result<Pat
 
 /// What another program made of a file since it was opened or saved here.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Outside {
+pub enum ExternalChange {
     /// Nothing.
     Same,
     /// Another text.
@@ -115,12 +115,12 @@ pub enum Outside {
 }
 
 /// What another program made of the file of `document` in `path`.
-pub fn outside(document: &Document, path: &Path) -> Outside {
+pub fn external_change(document: &Document, path: &Path) -> ExternalChange {
     match fs::read_to_string(path) {
-        Ok(there) if *there != *document.saved => Outside::Changed(there.into()),
-        Ok(_) => Outside::Same,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Outside::Gone,
-        Err(error) => Outside::Unreadable(error.to_string()),
+        Ok(there) if *there != *document.saved => ExternalChange::Changed(there.into()),
+        Ok(_) => ExternalChange::Same,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => ExternalChange::Gone,
+        Err(error) => ExternalChange::Unreadable(error.to_string()),
     }
 }
 

@@ -12,11 +12,11 @@ use std::{
 };
 
 /// Between two looks.
-const LOOK: Duration = Duration::from_millis(700);
+const POLL_INTERVAL: Duration = Duration::from_millis(700);
 
 /// Looks at one file until it is dropped.
 #[derive(Debug)]
-pub struct Watch {
+pub struct FileWatcher {
     path: PathBuf,
     shared: Arc<Shared>,
 }
@@ -28,12 +28,12 @@ struct Shared {
 }
 
 /// What tells one writing from another.
-fn mark(path: &Path) -> Option<(SystemTime, u64)> {
+fn modification_stamp(path: &Path) -> Option<(SystemTime, u64)> {
     let about = fs::metadata(path).ok()?;
     Some((about.modified().ok()?, about.len()))
 }
 
-impl Watch {
+impl FileWatcher {
     /// Looks at `path` from now on; `wake` is called from another thread when it was touched.
     ///
     /// # Errors
@@ -42,10 +42,10 @@ impl Watch {
         let shared = Arc::new(Shared::default());
         let (watched, own) = (path.to_path_buf(), shared.clone());
         let look = move || {
-            let mut last = mark(&watched);
+            let mut last = modification_stamp(&watched);
             while !own.closing.load(Ordering::Relaxed) {
-                thread::sleep(LOOK);
-                let now = mark(&watched);
+                thread::sleep(POLL_INTERVAL);
+                let now = modification_stamp(&watched);
                 if now != last {
                     last = now;
                     own.touched.store(true, Ordering::Relaxed);
@@ -68,7 +68,7 @@ impl Watch {
     }
 }
 
-impl Drop for Watch {
+impl Drop for FileWatcher {
     fn drop(&mut self) {
         self.shared.closing.store(true, Ordering::Relaxed);
     }
@@ -86,7 +86,7 @@ mod tests {
         let path = folder.path().join("scene.toml");
         fs::write(&path, "bansho = 1\n").unwrap();
         let (sender, woken) = mpsc::channel();
-        let watch = Watch::start(&path, move || sender.send(()).unwrap_or_default()).unwrap();
+        let watch = FileWatcher::start(&path, move || sender.send(()).unwrap_or_default()).unwrap();
         assert!(!watch.touched());
         // The thread may have taken its first look before or after this.
         thread::sleep(Duration::from_millis(200));

@@ -14,11 +14,11 @@ use bansho::{aurora::shapes::Form, render::scene::operation::Operation};
 
 use self::{
     plane::{Plane, Side},
-    tool::Tool,
+    tool::DrawTool,
 };
 use crate::{document::Revision, session::Session};
-use document::{Drawing, Refusal};
-use pointer::Gesture;
+use document::{AuroraDrawing, ShapeEditError};
+use pointer::DragState;
 
 use eframe::egui::{self, Color32, Id, Pos2, Sense, Ui, vec2};
 
@@ -27,16 +27,16 @@ use eframe::egui::{self, Color32, Id, Pos2, Sense, Ui, vec2};
 pub(crate) struct AuroraEditor {
     /// Which aurora of the scene.
     index: usize,
-    tool: Tool,
+    tool: DrawTool,
     /// The shape that is drawn.
     target: usize,
     /// Its sheet that is drawn next; a new one where there is none.
     next: Option<usize>,
-    gesture: Gesture,
+    drag: DragState,
     /// Where a shape is held on the line of time.
-    grip: Option<shape_timeline::Grip>,
-    refusal: Option<(String, Pos2)>,
-    read: Option<(Revision, Result<Arc<Drawing>, String>)>,
+    shape_drag: Option<shape_timeline::ShapeDrag>,
+    shape_error: Option<(String, Pos2)>,
+    read: Option<(Revision, Result<Arc<AuroraDrawing>, String>)>,
 }
 
 impl AuroraEditor {
@@ -59,28 +59,28 @@ impl AuroraEditor {
                 }
             }
         }
-        self.tell_refusal(ui);
+        self.shape_error_ui(ui);
     }
 
     /// The shapes as the scene states them now.
-    fn drawing(&mut self, session: &Session) -> Result<Arc<Drawing>, String> {
+    fn drawing(&mut self, session: &Session) -> Result<Arc<AuroraDrawing>, String> {
         let revision = session.document.revision();
         if let Some((_, read)) = self.read.as_ref().filter(|(of, _)| *of == revision) {
             return read.clone();
         }
-        let read = Drawing::read(session.document.values(), self.index, session.assets());
-        let read = read.map(Arc::new).map_err(|refusal| refusal.to_string());
+        let read = AuroraDrawing::read(session.document.values(), self.index, session.assets());
+        let read = read.map(Arc::new).map_err(|shape_error| shape_error.to_string());
         self.read = Some((revision, read.clone()));
         read
     }
 
-    fn tools(&mut self, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+    fn tools(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
         ui.horizontal_wrapped(|ui| {
-            for tool in Tool::ALL {
+            for tool in DrawTool::ALL {
                 let (name, help) = tool.words();
                 if ui.selectable_label(self.tool == tool, name).on_hover_text(help).clicked() {
                     self.tool = tool;
-                    (self.gesture, self.refusal) = (Gesture::None, None);
+                    (self.drag, self.shape_error) = (DragState::None, None);
                 }
             }
             ui.separator();
@@ -88,8 +88,9 @@ impl AuroraEditor {
                 for choice in Form::CHOICES {
                     let form = Form::from_name(choice.name);
                     if let Some(form) = form.filter(|_| ui.button(choice.name).on_hover_text(choice.doc).clicked()) {
-                        let put = drawing.put_form(self.target, self.slot(drawing), form);
-                        self.change(session, "template", &put, ui.cursor().min).then(|| self.advance(drawing));
+                        let put = drawing.put_form(self.target, self.target_sheet(drawing), form);
+                        self.change(session, "template", &put, ui.cursor().min)
+                            .then(|| self.select_next_sheet(drawing));
                         ui.close();
                     }
                 }
@@ -97,26 +98,26 @@ impl AuroraEditor {
             .response
             .on_hover_text("A named form in stead of the yellow sheet");
             ui.separator();
-            self.say_next(ui, drawing);
+            self.next_stroke_ui(ui, drawing);
         });
     }
 
     /// What the next stroke becomes.
-    fn say_next(&mut self, ui: &mut Ui, drawing: &Drawing) {
+    fn next_stroke_ui(&mut self, ui: &mut Ui, drawing: &AuroraDrawing) {
         let count = if drawing.is_stated() { drawing.lines(self.target).len() } else { 0 };
-        let text = match self.slot(drawing) {
+        let text = match self.target_sheet(drawing) {
             Some(sheet) => format!("next stroke: sheet {} of {count}", sheet + 1),
             None => "next stroke: a new sheet".to_owned(),
         };
         if ui.link(text).on_hover_text("Click for another; or click a sheet of the drawing").clicked() && count > 0 {
-            let next = self.slot(drawing).map_or(0, |sheet| sheet + 1);
+            let next = self.target_sheet(drawing).map_or(0, |sheet| sheet + 1);
             let new = self.target == 0 && next >= count;
             self.next = (!new).then_some(next % count);
         }
     }
 
     /// The sheet that a stroke is drawn for: the first shape takes new ones, the others have as many as come to them.
-    fn slot(&self, drawing: &Drawing) -> Option<usize> {
+    fn target_sheet(&self, drawing: &AuroraDrawing) -> Option<usize> {
         let count = drawing.lines(self.target).len();
         match self.next {
             _ if !drawing.is_stated() => None,
@@ -127,12 +128,12 @@ impl AuroraEditor {
     }
 
     /// After a sheet was drawn, the one after it is next.
-    fn advance(&mut self, drawing: &Drawing) {
+    fn select_next_sheet(&mut self, drawing: &AuroraDrawing) {
         let count = drawing.lines(self.target).len().max(1);
-        self.next = self.slot(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
+        self.next = self.target_sheet(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
     }
 
-    fn planes(&mut self, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+    fn planes(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
         let gap = ui.spacing().item_spacing.x;
         let side = ui.available_height().min((ui.available_width() - gap) / 2.0).max(80.0);
         ui.horizontal(|ui| {
@@ -143,7 +144,7 @@ impl AuroraEditor {
             });
             let planes = [0, 1].map(|area: usize| Plane::new(areas[area].1.rect, drawing.extent_km()));
             for (which, response, painter) in areas {
-                self.hands(ui, session, drawing, &planes, which, &response);
+                self.handle_pointer(ui, session, drawing, &planes, which, &response);
                 self.paint(&painter, drawing, &planes[which as usize], which, &response);
             }
         });
@@ -151,26 +152,26 @@ impl AuroraEditor {
 
     /// Carries out a change of the shapes, or says at `at` why it cannot be; whether it was.
     fn change(&mut self, session: &mut Session, label: &str, operations: &[Operation], at: Pos2) -> bool {
-        match session.reshape(label, operations, self.index) {
+        match session.edit_shapes(label, operations, self.index) {
             Ok(drawing) => {
-                self.refusal = None;
+                self.shape_error = None;
                 self.read = Some((session.document.revision(), Ok(Arc::new(drawing))));
                 true
             }
-            Err(refusal) => {
-                self.refuse(&refusal, at);
+            Err(shape_error) => {
+                self.set_shape_error(&shape_error, at);
                 false
             }
         }
     }
 
-    fn refuse(&mut self, refusal: &Refusal, at: Pos2) {
-        self.refusal = Some((refusal.to_string(), at));
+    fn set_shape_error(&mut self, shape_error: &ShapeEditError, at: Pos2) {
+        self.shape_error = Some((shape_error.to_string(), at));
     }
 
     /// The reason of a refusal, at the pointer, until something else is done.
-    fn tell_refusal(&self, ui: &Ui) {
-        let Some((reason, at)) = &self.refusal else { return };
+    fn shape_error_ui(&self, ui: &Ui) {
+        let Some((reason, at)) = &self.shape_error else { return };
         egui::Area::new(Id::unique("refusal")).order(egui::Order::Tooltip).fixed_pos(*at + vec2(14.0, 10.0)).show(
             ui.ctx(),
             |ui| {

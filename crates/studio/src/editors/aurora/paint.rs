@@ -4,12 +4,13 @@ use bansho::base::math::DVec2;
 
 use super::{
     AuroraEditor,
-    document::{Drawing, Factor, OnSheet},
+    document::{AuroraDrawing, Factor, SheetPosition},
     plane::{Plane, Side},
-    pointer::Gesture,
-    tool::Tool,
+    pointer::DragState,
+    tool::DrawTool,
 };
-use crate::editors::aurora::document::lines;
+use crate::editors::aurora::document::polyline;
+
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Response, Shape, Stroke, StrokeKind, pos2};
 
 const GROUND: Color32 = Color32::from_rgb(12, 15, 20);
@@ -24,7 +25,14 @@ const MARK: Color32 = Color32::from_rgb(255, 120, 90);
 const WAYS_APART: usize = 6;
 
 impl AuroraEditor {
-    pub(super) fn paint(&self, painter: &Painter, drawing: &Drawing, plane: &Plane, side: Side, response: &Response) {
+    pub(super) fn paint(
+        &self,
+        painter: &Painter,
+        drawing: &AuroraDrawing,
+        plane: &Plane,
+        side: Side,
+        response: &Response,
+    ) {
         ground(painter, plane);
         match side {
             Side::Source => self.paint_source(painter, drawing, plane),
@@ -35,14 +43,14 @@ impl AuroraEditor {
         }
     }
 
-    fn paint_source(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
+    fn paint_source(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
         let Some(source) = self.target.checked_sub(1) else {
             let text = "the first shape comes from nothing:\ndraw it on the right";
             painter.text(plane.rect.center(), Align2::CENTER_CENTER, text, FontId::proportional(13.0), WORDS);
             return;
         };
         title(painter, plane, &format!("shape {}", source + 1));
-        let origins = self.slot(drawing).map(|sheet| drawing.origins(self.target, sheet)).unwrap_or_default();
+        let origins = self.target_sheet(drawing).map(|sheet| drawing.origins(self.target, sheet)).unwrap_or_default();
         for (number, sheet) in drawing.lines(source).iter().enumerate() {
             painter.line(plane.line(sheet), Stroke::new(2.0, SHEET));
             numbered(painter, plane, sheet, number, SHEET);
@@ -50,13 +58,13 @@ impl AuroraEditor {
         for strand in origins {
             painter.line(plane.line(&strand), Stroke::new(2.5, NEXT));
         }
-        if self.tool == Tool::Merge {
+        if self.tool == DrawTool::Merge {
             self.paint_ends(painter, drawing, plane, source);
         }
     }
 
     /// From the farthest layer to the nearest.
-    fn paint_target(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
+    fn paint_target(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
         title(painter, plane, &format!("shape {}", self.target + 1));
         self.paint_ways(painter, drawing, plane);
         self.paint_sheets(painter, drawing, plane);
@@ -64,12 +72,12 @@ impl AuroraEditor {
     }
 
     /// The shape before, and the ways from there.
-    fn paint_ways(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
+    fn paint_ways(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
         if let Some(source) = self.target.checked_sub(1) {
             for sheet in drawing.lines(source) {
                 painter.line(plane.line(&sheet), Stroke::new(3.0, FAINT));
             }
-            for way in drawing.ways(source).iter().flatten().step_by(WAYS_APART) {
+            for way in drawing.point_paths(source).iter().flatten().step_by(WAYS_APART) {
                 painter.line_segment(way.map(|end| plane.to_screen(end)), Stroke::new(1.0, WAY));
             }
         }
@@ -80,9 +88,10 @@ impl AuroraEditor {
         }
     }
 
-    fn paint_sheets(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
-        let next = self.slot(drawing);
-        let shows_points = drawing.is_stated() && matches!(self.tool, Tool::Move | Tool::Smooth | Tool::Erase);
+    fn paint_sheets(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
+        let next = self.target_sheet(drawing);
+        let shows_points =
+            drawing.is_stated() && matches!(self.tool, DrawTool::Move | DrawTool::Smooth | DrawTool::Erase);
         for (number, sheet) in drawing.lines(self.target).iter().enumerate() {
             let colour = match next {
                 _ if !drawing.is_stated() => FAINT,
@@ -100,12 +109,12 @@ impl AuroraEditor {
     }
 
     /// What a hand is doing.
-    fn paint_gesture(&self, painter: &Painter, drawing: &Drawing, plane: &Plane) {
-        match &self.gesture {
-            Gesture::Stroke(stroke) => {
+    fn paint_gesture(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
+        match &self.drag {
+            DragState::Stroke(stroke) => {
                 painter.line(plane.line(stroke), Stroke::new(2.5, NEXT));
             }
-            Gesture::Linking { from, at, .. } => {
+            DragState::Linking { from, at, .. } => {
                 let start = self.target.checked_sub(1).and_then(|source| place_of(&drawing.lines(source), *from));
                 if let Some(start) = start {
                     painter.line_segment([plane.to_screen(start), *at], Stroke::new(2.0, MARK));
@@ -119,14 +128,14 @@ impl AuroraEditor {
     fn paint_sheet(
         &self,
         painter: &Painter,
-        drawing: &Drawing,
+        drawing: &AuroraDrawing,
         plane: &Plane,
         number: usize,
         sheet: &[DVec2],
         colour: Color32,
     ) {
         let factor = match self.tool {
-            Tool::Energy => Factor::Energy,
+            DrawTool::Energy => Factor::Energy,
             _ => Factor::Flux,
         };
         let factors = drawing.factors(self.target, number, factor);
@@ -136,11 +145,11 @@ impl AuroraEditor {
         }
     }
 
-    fn paint_ends(&self, painter: &Painter, drawing: &Drawing, plane: &Plane, source: usize) {
+    fn paint_ends(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane, source: usize) {
         for (number, sheet) in drawing.lines(source).iter().enumerate() {
             for (last, end) in [(false, sheet.first()), (true, sheet.last())] {
                 let Some(&end) = end else { continue };
-                let chosen = matches!(self.gesture, Gesture::FirstEnd(first) if first == (number, last));
+                let chosen = matches!(self.drag, DragState::FirstEnd(first) if first == (number, last));
                 let colour = if chosen { NEXT } else { SHEET };
                 painter.circle(plane.to_screen(end), 6.0, GROUND, Stroke::new(2.0, colour));
             }
@@ -148,16 +157,16 @@ impl AuroraEditor {
     }
 
     /// What a click would do.
-    fn paint_pointer(&self, painter: &Painter, drawing: &Drawing, plane: &Plane, side: Side, at: Pos2) {
+    fn paint_pointer(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane, side: Side, at: Pos2) {
         match (self.tool, side) {
-            (Tool::Smooth | Tool::Erase | Tool::Brightness | Tool::Energy, Side::Target) => {
-                painter.circle_stroke(at, self.tool.reach(), Stroke::new(1.0, WORDS));
+            (DrawTool::Smooth | DrawTool::Erase | DrawTool::Brightness | DrawTool::Energy, Side::Target) => {
+                painter.circle_stroke(at, self.tool.hit_radius(), Stroke::new(1.0, WORDS));
             }
-            (Tool::Split, _) => {
+            (DrawTool::Split, _) => {
                 let Some(source) = self.target.checked_sub(1) else { return };
                 let all = drawing.lines(source);
-                let nearest = lines::nearest_among(&all, plane.to_plane(at)).map(|(_, on)| on);
-                if let Some(on) = nearest.filter(|on| on.distance < plane.km(self.tool.reach())) {
+                let nearest = polyline::nearest_among(&all, plane.to_plane(at)).map(|(_, on)| on);
+                if let Some(on) = nearest.filter(|on| on.distance < plane.km(self.tool.hit_radius())) {
                     let centre = plane.to_screen(on.point);
                     painter.circle_stroke(centre, 7.0, Stroke::new(2.0, MARK));
                     painter.vline(centre.x, centre.y - 12.0..=centre.y + 12.0, Stroke::new(1.0, MARK));
@@ -169,8 +178,8 @@ impl AuroraEditor {
 }
 
 /// Where a place on a sheet lies.
-fn place_of(all: &[Vec<DVec2>], (sheet, share): OnSheet) -> Option<DVec2> {
-    lines::at(all.get(sheet)?, share)
+fn place_of(all: &[Vec<DVec2>], (sheet, fraction): SheetPosition) -> Option<DVec2> {
+    polyline::at(all.get(sheet)?, fraction)
 }
 
 fn ground(painter: &Painter, plane: &Plane) {

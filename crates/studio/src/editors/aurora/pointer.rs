@@ -4,16 +4,17 @@ use bansho::base::math::DVec2;
 
 use super::{
     AuroraEditor,
-    document::{Drawing, End, Factor, OnSheet},
+    document::{AuroraDrawing, Factor, SheetEnd, SheetPosition},
     plane::{Plane, Side},
-    tool::Tool,
+    tool::DrawTool,
 };
-use crate::{editors::aurora::document::lines, session::Session};
+use crate::{editors::aurora::document::polyline, session::Session};
+
 use eframe::egui::{Event, PointerButton, Pos2, Response, Ui};
 
 /// What is under way.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) enum Gesture {
+pub(super) enum DragState {
     #[default]
     None,
     /// A stroke as far as it is drawn, km.
@@ -21,14 +22,14 @@ pub(super) enum Gesture {
     /// A point that is held: sheet and point.
     Holding(usize, usize),
     /// The first of two ends that shall merge.
-    FirstEnd(End),
+    FirstEnd(SheetEnd),
     /// From a place on the source, to be let go over a sheet of the target: the sheet is linked, or the point alone.
-    Linking { from: OnSheet, point_alone: bool, at: Pos2 },
+    Linking { from: SheetPosition, point_alone: bool, at: Pos2 },
 }
 
-impl Tool {
+impl DrawTool {
     /// How near the pointer must come, or how wide it brushes, points of the screen.
-    pub(super) fn reach(self) -> f32 {
+    pub(super) fn hit_radius(self) -> f32 {
         match self {
             Self::Smooth => 36.0,
             Self::Erase => 12.0,
@@ -40,98 +41,98 @@ impl Tool {
 
 impl AuroraEditor {
     /// Takes in what hands do on one of the planes.
-    pub(super) fn hands(
+    pub(super) fn handle_pointer(
         &mut self,
         ui: &Ui,
         session: &mut Session,
-        drawing: &Drawing,
+        drawing: &AuroraDrawing,
         planes: &[Plane; 2],
         side: Side,
         response: &Response,
     ) {
         let Some(at) = response.interact_pointer_pos() else { return };
         if response.is_pointer_button_down_on() && ui.input(|input| input.pointer.any_pressed()) {
-            self.refusal = None;
+            self.shape_error = None;
         }
         let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(at);
-        let hand = Hand { plane: &planes[side as usize], at, response, from };
-        let way = way(ui);
+        let pointer = PointerInput { plane: &planes[side as usize], at, response, from };
+        let pointer_path = pointer_path(ui);
         let lower = ui.input(|input| input.modifiers.shift);
         match (self.tool, side) {
-            (Tool::Draw, Side::Target) => self.draw(session, drawing, &hand, &way),
-            (Tool::Move, Side::Target) => self.move_point(session, drawing, &hand),
-            (Tool::Smooth | Tool::Erase, Side::Target) => self.mend(session, drawing, &hand),
-            (Tool::Brightness, Side::Target) => self.brush(session, drawing, &hand, Factor::Flux, lower),
-            (Tool::Energy, Side::Target) => self.brush(session, drawing, &hand, Factor::Energy, lower),
-            (Tool::Split, _) if response.clicked() => self.split(session, drawing, &hand),
-            (Tool::Merge, _) if response.clicked() => self.merge(session, drawing, &hand),
-            (Tool::Link, _) => self.link(session, drawing, &hand, side, planes),
+            (DrawTool::Draw, Side::Target) => self.draw(session, drawing, &pointer, &pointer_path),
+            (DrawTool::Move, Side::Target) => self.move_point(session, drawing, &pointer),
+            (DrawTool::Smooth | DrawTool::Erase, Side::Target) => self.smooth_or_erase(session, drawing, &pointer),
+            (DrawTool::Brightness, Side::Target) => self.brush(session, drawing, &pointer, Factor::Flux, lower),
+            (DrawTool::Energy, Side::Target) => self.brush(session, drawing, &pointer, Factor::Energy, lower),
+            (DrawTool::Split, _) if response.clicked() => self.split(session, drawing, &pointer),
+            (DrawTool::Merge, _) if response.clicked() => self.merge(session, drawing, &pointer),
+            (DrawTool::Link, _) => self.link(session, drawing, &pointer, side, planes),
             _ => {}
         }
     }
 
-    fn draw(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand, way: &[Pos2]) {
+    fn draw(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput, pointer_path: &[Pos2]) {
         /// Points of the screen that a hand moves at least between two points of a stroke.
         const STEP: f32 = 2.0;
-        if hand.response.clicked() {
-            self.next = hand.sheet_of(&drawing.lines(self.target)).or(self.next).filter(|_| drawing.is_stated());
+        if pointer.response.clicked() {
+            self.next = pointer.sheet_of(&drawing.lines(self.target)).or(self.next).filter(|_| drawing.is_stated());
         }
-        if hand.response.drag_started_by(PointerButton::Primary) {
-            self.gesture = Gesture::Stroke(vec![hand.plane.to_plane(hand.from)]);
+        if pointer.response.drag_started_by(PointerButton::Primary) {
+            self.drag = DragState::Stroke(vec![pointer.plane.to_plane(pointer.from)]);
         }
-        let Gesture::Stroke(stroke) = &mut self.gesture else { return };
-        for point in way.iter().map(|&at| hand.plane.to_plane(at)) {
-            if stroke.last().is_none_or(|last| last.distance(point) >= hand.plane.km(STEP)) {
+        let DragState::Stroke(stroke) = &mut self.drag else { return };
+        for point in pointer_path.iter().map(|&at| pointer.plane.to_plane(at)) {
+            if stroke.last().is_none_or(|last| last.distance(point) >= pointer.plane.km(STEP)) {
                 stroke.push(point);
             }
         }
-        if !hand.response.drag_stopped() {
+        if !pointer.response.drag_stopped() {
             return;
         }
-        let Gesture::Stroke(stroke) = std::mem::take(&mut self.gesture) else { return };
-        let drawn = drawing.draw(self.target, self.slot(drawing), &stroke);
-        if self.change(session, "stroke", &drawn, hand.at) {
-            session.document.seal();
-            self.advance(drawing);
+        let DragState::Stroke(stroke) = std::mem::take(&mut self.drag) else { return };
+        let drawn = drawing.draw(self.target, self.target_sheet(drawing), &stroke);
+        if self.change(session, "stroke", &drawn, pointer.at) {
+            session.document.end_step();
+            self.select_next_sheet(drawing);
         }
     }
 
-    fn move_point(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand) {
-        if hand.response.drag_started_by(PointerButton::Primary) {
-            let from = hand.plane.to_plane(hand.from);
+    fn move_point(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
+        if pointer.response.drag_started_by(PointerButton::Primary) {
+            let from = pointer.plane.to_plane(pointer.from);
             let sheets = 0..drawing.lines(self.target).len();
             let all = sheets.flat_map(|sheet| {
                 let points = drawing.points(self.target, sheet);
                 points.into_iter().enumerate().map(move |(point, at)| (at.distance(from), sheet, point))
             });
-            let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|near| near.0 < hand.reach(self.tool));
-            self.gesture = nearest.map_or(Gesture::None, |(_, sheet, point)| Gesture::Holding(sheet, point));
+            let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|near| near.0 < pointer.hit_radius(self.tool));
+            self.drag = nearest.map_or(DragState::None, |(_, sheet, point)| DragState::Holding(sheet, point));
         }
-        let Gesture::Holding(sheet, point) = self.gesture else { return };
+        let DragState::Holding(sheet, point) = self.drag else { return };
         let mut points = drawing.points(self.target, sheet);
         if let Some(held) = points.get_mut(point) {
-            *held = hand.point();
+            *held = pointer.point();
         }
         let moved = drawing.set_points(self.target, sheet, &points);
         if !moved.is_empty() {
-            self.change(session, "move point", &moved, hand.at);
+            self.change(session, "move point", &moved, pointer.at);
         }
-        if hand.response.drag_stopped() {
-            self.gesture = Gesture::None;
+        if pointer.response.drag_stopped() {
+            self.drag = DragState::None;
         }
     }
 
     /// Smooths or erases what is under the brush.
-    fn mend(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand) {
-        if !hand.response.dragged_by(PointerButton::Primary) && !hand.response.clicked() {
+    fn smooth_or_erase(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
+        if !pointer.response.dragged_by(PointerButton::Primary) && !pointer.response.clicked() {
             return;
         }
-        let (around, radius) = (hand.point(), hand.reach(self.tool));
-        let under = |line: &[DVec2]| lines::nearest(line, around).is_some_and(|on| on.distance < radius);
+        let (around, radius) = (pointer.point(), pointer.hit_radius(self.tool));
+        let under = |line: &[DVec2]| polyline::nearest(line, around).is_some_and(|on| on.distance < radius);
         let Some(sheet) = drawing.lines(self.target).iter().position(|line| under(line)) else { return };
         let mut points = drawing.points(self.target, sheet);
-        let change = if self.tool == Tool::Smooth {
-            drawing.set_points(self.target, sheet, &lines::smoothed(&points, around, radius))
+        let change = if self.tool == DrawTool::Smooth {
+            drawing.set_points(self.target, sheet, &polyline::smoothed(&points, around, radius))
         } else {
             points.retain(|point| point.distance(around) >= radius);
             if points.len() < 2 {
@@ -140,138 +141,152 @@ impl AuroraEditor {
                 drawing.set_points(self.target, sheet, &points)
             }
         };
-        let label = if self.tool == Tool::Smooth { "smooth" } else { "erase" };
+        let label = if self.tool == DrawTool::Smooth { "smooth" } else { "erase" };
         if !change.is_empty() {
-            self.change(session, label, &change, hand.at);
+            self.change(session, label, &change, pointer.at);
         }
     }
 
     /// More of `factor` under the brush, or less.
-    fn brush(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand, factor: Factor, lower: bool) {
+    fn brush(
+        &mut self,
+        session: &mut Session,
+        drawing: &AuroraDrawing,
+        pointer: &PointerInput,
+        factor: Factor,
+        lower: bool,
+    ) {
         /// What a point of the screen that the brush moves adds.
         const STRENGTH: f64 = 0.008;
-        if !hand.response.dragged_by(PointerButton::Primary) {
+        if !pointer.response.dragged_by(PointerButton::Primary) {
             return;
         }
         let all = drawing.lines(self.target);
-        let Some(sheet) = hand.near(&all, self.tool) else { return };
-        let Some(on) = lines::nearest(&all[sheet], hand.point()) else { return };
-        let moved = f64::from(hand.response.drag_delta().length());
+        let Some(sheet) = pointer.near(&all, self.tool) else { return };
+        let Some(on) = polyline::nearest(&all[sheet], pointer.point()) else { return };
+        let moved = f64::from(pointer.response.drag_delta().length());
         let by = if lower { -STRENGTH * moved } else { STRENGTH * moved };
-        let painted = drawing.paint(self.target, sheet, factor, lines::share_of(&all[sheet], on), by);
+        let painted = drawing.paint(self.target, sheet, factor, polyline::share_of(&all[sheet], on), by);
         if !painted.is_empty() {
-            self.change(session, "paint", &painted, hand.at);
+            self.change(session, "paint", &painted, pointer.at);
         }
     }
 
-    fn split(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand) {
-        let Some(all) = self.source(drawing, hand) else { return };
-        let Some(sheet) = hand.near(&all, self.tool) else { return };
-        let Some(on) = lines::nearest(&all[sheet], hand.point()) else { return };
-        let split = drawing.split(self.target, sheet, lines::share_of(&all[sheet], on));
-        if self.change(session, "split", &split, hand.at) {
-            (self.next, self.tool) = (Some(0), Tool::Draw);
+    fn split(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
+        let Some(all) = self.source(drawing, pointer) else { return };
+        let Some(sheet) = pointer.near(&all, self.tool) else { return };
+        let Some(on) = polyline::nearest(&all[sheet], pointer.point()) else { return };
+        let split = drawing.split(self.target, sheet, polyline::share_of(&all[sheet], on));
+        if self.change(session, "split", &split, pointer.at) {
+            (self.next, self.tool) = (Some(0), DrawTool::Draw);
         }
     }
 
-    fn merge(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand) {
-        let Some(all) = self.source(drawing, hand) else { return };
+    fn merge(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
+        let Some(all) = self.source(drawing, pointer) else { return };
         let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
             [(line.first(), false), (line.last(), true)].map(|(point, last)| (point.copied(), (sheet, last)))
         });
-        let near = |(point, end): (Option<DVec2>, End)| Some((point?.distance(hand.point()), end));
+        let near = |(point, end): (Option<DVec2>, SheetEnd)| Some((point?.distance(pointer.point()), end));
         let nearest = ends.filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, end)) = nearest.filter(|near| near.0 < hand.reach(self.tool)) else {
-            if hand.near(&all, self.tool).is_some() {
-                self.refusal = Some(("only ends merge: sheets never branch".into(), hand.at));
+        let Some((_, end)) = nearest.filter(|near| near.0 < pointer.hit_radius(self.tool)) else {
+            if pointer.near(&all, self.tool).is_some() {
+                self.shape_error = Some(("only ends merge: sheets never branch".into(), pointer.at));
             }
             return;
         };
-        let Gesture::FirstEnd(first) = self.gesture else {
-            self.gesture = Gesture::FirstEnd(end);
+        let DragState::FirstEnd(first) = self.drag else {
+            self.drag = DragState::FirstEnd(end);
             return;
         };
-        self.gesture = Gesture::None;
+        self.drag = DragState::None;
         let merge = drawing.merge(self.target, [first, end]);
-        if self.change(session, "merge", &merge, hand.at) {
-            (self.next, self.tool) = (Some(0), Tool::Draw);
+        if self.change(session, "merge", &merge, pointer.at) {
+            (self.next, self.tool) = (Some(0), DrawTool::Draw);
         }
     }
 
     /// On the left a sheet is taken, on the right one of the points that arrive there; a click there lets a linked one go.
-    fn link(&mut self, session: &mut Session, drawing: &Drawing, hand: &Hand, side: Side, planes: &[Plane; 2]) {
-        if hand.response.drag_started_by(PointerButton::Primary) {
-            let Some(all) = self.source(drawing, hand) else { return };
-            let pressed = Hand { at: hand.from, ..*hand };
+    fn link(
+        &mut self,
+        session: &mut Session,
+        drawing: &AuroraDrawing,
+        pointer: &PointerInput,
+        side: Side,
+        planes: &[Plane; 2],
+    ) {
+        if pointer.response.drag_started_by(PointerButton::Primary) {
+            let Some(all) = self.source(drawing, pointer) else { return };
+            let pressed = PointerInput { at: pointer.from, ..*pointer };
             let from = match side {
                 Side::Source => Some(pressed.point()),
                 Side::Target => pressed.arrival(drawing, self.target - 1),
             };
-            let from = from.and_then(|from| on_sheet(&all, from, hand.reach(self.tool)));
-            let linking = |from| Gesture::Linking { from, point_alone: side == Side::Target, at: hand.at };
-            self.gesture = from.map_or(Gesture::None, linking);
+            let from = from.and_then(|from| on_sheet(&all, from, pointer.hit_radius(self.tool)));
+            let linking = |from| DragState::Linking { from, point_alone: side == Side::Target, at: pointer.at };
+            self.drag = from.map_or(DragState::None, linking);
         }
-        if hand.response.clicked() && side == Side::Target {
-            let freed = drawing.unlink(self.target, hand.point(), hand.reach(self.tool));
+        if pointer.response.clicked() && side == Side::Target {
+            let freed = drawing.unlink(self.target, pointer.point(), pointer.hit_radius(self.tool));
             if !freed.is_empty() {
-                self.change(session, "unlink", &freed, hand.at);
+                self.change(session, "unlink", &freed, pointer.at);
             }
         }
-        let Gesture::Linking { from, point_alone, at } = &mut self.gesture else { return };
-        *at = hand.at;
+        let DragState::Linking { from, point_alone, at } = &mut self.drag else { return };
+        *at = pointer.at;
         let (from, point_alone) = (*from, *point_alone);
-        if hand.response.drag_stopped() {
-            self.gesture = Gesture::None;
-            let over = planes.iter().find(|plane| plane.rect.contains(hand.at)).unwrap_or(hand.plane);
-            let let_go = Hand { plane: over, ..*hand };
-            let Some(to) = on_sheet(&drawing.lines(self.target), let_go.point(), let_go.reach(self.tool)) else {
+        if pointer.response.drag_stopped() {
+            self.drag = DragState::None;
+            let over = planes.iter().find(|plane| plane.rect.contains(pointer.at)).unwrap_or(pointer.plane);
+            let let_go = PointerInput { plane: over, ..*pointer };
+            let Some(to) = on_sheet(&drawing.lines(self.target), let_go.point(), let_go.hit_radius(self.tool)) else {
                 return;
             };
             let change = if point_alone {
-                drawing.correspond_at(self.target, from, to)
+                drawing.link_point(self.target, from, to)
             } else {
-                drawing.correspond(self.target, from, to.0)
+                drawing.link_sheet(self.target, from, to.0)
             };
-            self.change(session, "link", &change, hand.at);
+            self.change(session, "link", &change, pointer.at);
         }
     }
 
     /// The sheets of the shape before; the first has none.
-    fn source(&mut self, drawing: &Drawing, hand: &Hand) -> Option<Vec<Vec<DVec2>>> {
+    fn source(&mut self, drawing: &AuroraDrawing, pointer: &PointerInput) -> Option<Vec<Vec<DVec2>>> {
         if self.target == 0 {
             let reason = "the first shape comes from nothing; add a shape, which the change then leads to";
-            self.refusal = Some((reason.into(), hand.at));
+            self.shape_error = Some((reason.into(), pointer.at));
             return None;
         }
         Some(drawing.lines(self.target - 1))
     }
 }
 
-/// The place on one of `all` that is nearest to `point`, within `reach`, km.
-fn on_sheet(all: &[Vec<DVec2>], point: DVec2, reach: f64) -> Option<OnSheet> {
-    let (sheet, on) = lines::nearest_among(all, point).filter(|(_, on)| on.distance < reach)?;
-    Some((sheet, lines::share_of(&all[sheet], on)))
+/// The place on one of `all` that is nearest to `point`, within `hit_radius`, km.
+fn on_sheet(all: &[Vec<DVec2>], point: DVec2, hit_radius: f64) -> Option<SheetPosition> {
+    let (sheet, on) = polyline::nearest_among(all, point).filter(|(_, on)| on.distance < hit_radius)?;
+    Some((sheet, polyline::share_of(&all[sheet], on)))
 }
 
 /// Where the pointer went with its button down since the last picture: a hand may be faster than the window.
-fn way(ui: &Ui) -> Vec<Pos2> {
-    let mut way = Vec::new();
+fn pointer_path(ui: &Ui) -> Vec<Pos2> {
+    let mut pointer_path = Vec::new();
     ui.input(|input| {
         for event in &input.events {
             match event {
-                Event::PointerButton { pressed: true, .. } => way.clear(),
+                Event::PointerButton { pressed: true, .. } => pointer_path.clear(),
                 Event::PointerButton { pressed: false, .. } => break,
-                Event::PointerMoved(at) => way.push(*at),
+                Event::PointerMoved(at) => pointer_path.push(*at),
                 _ => {}
             }
         }
     });
-    way
+    pointer_path
 }
 
 /// The pointer on a plane.
 #[derive(Clone, Copy)]
-struct Hand<'a> {
+struct PointerInput<'a> {
     plane: &'a Plane,
     response: &'a Response,
     /// Where it is.
@@ -280,30 +295,32 @@ struct Hand<'a> {
     from: Pos2,
 }
 
-impl Hand<'_> {
+impl PointerInput<'_> {
     fn point(&self) -> DVec2 {
         self.plane.to_plane(self.at)
     }
 
     /// The reach of `tool`, km.
-    fn reach(&self, tool: Tool) -> f64 {
-        self.plane.km(tool.reach())
+    fn hit_radius(&self, tool: DrawTool) -> f64 {
+        self.plane.km(tool.hit_radius())
     }
 
     /// The sheet nearest to the pointer, within the reach of `tool`.
-    fn near(&self, all: &[Vec<DVec2>], tool: Tool) -> Option<usize> {
-        on_sheet(all, self.point(), self.reach(tool)).map(|(sheet, _)| sheet)
+    fn near(&self, all: &[Vec<DVec2>], tool: DrawTool) -> Option<usize> {
+        on_sheet(all, self.point(), self.hit_radius(tool)).map(|(sheet, _)| sheet)
     }
 
     /// Where the control point leaves shape `before` that arrives nearest to the pointer.
-    fn arrival(&self, drawing: &Drawing, before: usize) -> Option<DVec2> {
-        let ways = drawing.ways(before);
-        let off = |way: &&[DVec2; 2]| way[1].distance(self.point());
-        let nearest = ways.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b)));
-        nearest.filter(|way| off(way) < self.reach(Tool::Link)).map(|way| way[0])
+    fn arrival(&self, drawing: &AuroraDrawing, before: usize) -> Option<DVec2> {
+        let point_paths = drawing.point_paths(before);
+        let off = |pointer_path: &&[DVec2; 2]| pointer_path[1].distance(self.point());
+        let nearest = point_paths.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest
+            .filter(|pointer_path| off(pointer_path) < self.hit_radius(DrawTool::Link))
+            .map(|pointer_path| pointer_path[0])
     }
 
     fn sheet_of(&self, all: &[Vec<DVec2>]) -> Option<usize> {
-        self.near(all, Tool::Draw)
+        self.near(all, DrawTool::Draw)
     }
 }

@@ -5,19 +5,19 @@ use bansho::{
     render::scene::{Place, operation::Operation},
 };
 
-use super::{AuroraEditor, document::Drawing, pointer::Gesture};
+use super::{AuroraEditor, document::AuroraDrawing, pointer::DragState};
 use crate::session::Session;
 use eframe::egui::{self, Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 /// A shape that is dragged on the line: the line keeps its end meanwhile, and the shape its distance from the pointer.
 #[derive(Clone, Copy)]
-pub(super) struct Grip {
+pub(super) struct ShapeDrag {
     end_s: f64,
     offset: f32,
 }
 
 /// Shows the line and its buttons.
-pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
     /// A narrower line has a row of its own.
     const BESIDE: f32 = 220.0;
     let beside = ui.horizontal(|ui| {
@@ -34,7 +34,7 @@ pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session
 }
 
 /// What is done with the shape that is shown on the right.
-fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
     if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
         add(editor, ui, session, drawing);
         return;
@@ -58,7 +58,7 @@ fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawin
     }
 }
 
-fn add(editor: &mut AuroraEditor, ui: &Ui, session: &mut Session, drawing: &Drawing) {
+fn add(editor: &mut AuroraEditor, ui: &Ui, session: &mut Session, drawing: &AuroraDrawing) {
     let operations = drawing.add_shape();
     if !editor.change(session, "add shape", &operations, ui.cursor().min) {
         return;
@@ -81,22 +81,22 @@ fn lengthen_shot(session: &mut Session, until_s: f64) {
 }
 
 /// Draws shape `shape` from now on, and shows the moment when it is reached.
-pub(super) fn choose(editor: &mut AuroraEditor, session: &mut Session, drawing: &Drawing, shape: usize) {
+pub(super) fn choose(editor: &mut AuroraEditor, session: &mut Session, drawing: &AuroraDrawing, shape: usize) {
     (editor.target, editor.next) = (shape, None);
-    (editor.gesture, editor.refusal) = (Gesture::None, None);
+    (editor.drag, editor.shape_error) = (DragState::None, None);
     let arrival = drawing.arrivals().get(shape).copied().unwrap_or_default();
     session.transport.set_playing(false);
     session.go_to_time(arrival);
 }
 
-fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &Drawing) {
+fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
     const HANDLE: f32 = 22.0;
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width().max(120.0), 22.0), Sense::hover());
     let rect = response.rect.shrink2(vec2(0.5 * HANDLE + 2.0, 2.0));
     let visuals = ui.visuals().clone();
     painter.hline(rect.x_range(), rect.center().y, Stroke::new(2.0, visuals.widgets.inactive.bg_fill));
     let arrivals = drawing.arrivals();
-    let end = editor.grip.map_or_else(|| line_end_s(session, arrivals), |grip| grip.end_s);
+    let end = editor.shape_drag.map_or_else(|| line_end_s(session, arrivals), |shape_drag| shape_drag.end_s);
     let x_of = |time: f64| rect.left() + (time / end).min(1.0) as f32 * rect.width();
     painter.vline(
         x_of(session.transport.time_s()),
@@ -119,14 +119,16 @@ fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: 
         }
         if response.drag_started() {
             let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(handle.center());
-            editor.grip = Some(Grip { end_s: end, offset: from.x - handle.center().x });
+            editor.shape_drag = Some(ShapeDrag { end_s: end, offset: from.x - handle.center().x });
         }
-        if let (Some(grip), Some(at), true) = (editor.grip, response.interact_pointer_pos(), response.dragged()) {
-            let wanted = f64::from((at.x - grip.offset - rect.left()) / rect.width()) * end;
+        if let (Some(shape_drag), Some(at), true) =
+            (editor.shape_drag, response.interact_pointer_pos(), response.dragged())
+        {
+            let wanted = f64::from((at.x - shape_drag.offset - rect.left()) / rect.width()) * end;
             move_in_time(editor, session, drawing, (shape, wanted - arrival), handle.center());
         }
         if response.drag_stopped() {
-            editor.grip = None;
+            editor.shape_drag = None;
         }
     }
 }
@@ -142,7 +144,7 @@ fn line_end_s(session: &Session, arrivals: &[f64]) -> f64 {
 fn move_in_time(
     editor: &mut AuroraEditor,
     session: &mut Session,
-    drawing: &Drawing,
+    drawing: &AuroraDrawing,
     (shape, later): (usize, f64),
     at: Pos2,
 ) {

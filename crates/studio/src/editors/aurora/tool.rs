@@ -2,7 +2,7 @@
 
 /// What a drag or a click does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Tool {
+pub(super) enum DrawTool {
     #[default]
     Draw,
     Move,
@@ -15,7 +15,7 @@ pub(super) enum Tool {
     Energy,
 }
 
-impl Tool {
+impl DrawTool {
     /// All, in the order of the tool bar.
     pub(super) const ALL: [Self; 9] = [
         Self::Draw,

@@ -7,10 +7,10 @@ use bansho::{
 
 use crate::{
     app::{
-        panels::{inspector::words, scene::Subject},
+        panels::inspector::words,
         widgets::curve_editor::{self, Allowed},
     },
-    session::Session,
+    session::{Session, selection::Selection},
 };
 use eframe::egui::{self, Color32, Frame, Rect, Ui, vec2};
 
@@ -25,8 +25,8 @@ const VEIL: Color32 = Color32::from_black_alpha(70);
 /// Of the picture's height they take so much at most; the rest is scrolled to.
 const MOST: f32 = 0.5;
 
-/// Whether `subject` has any curves.
-pub(crate) fn has_any(subject: &Subject) -> bool {
+/// Whether `selection` has any curves.
+pub(crate) fn has_any(selection: &Selection) -> bool {
     fn any(table: &TableDescriptor) -> bool {
         table.parameters.iter().any(|parameter| match &parameter.kind {
             Kind::Curve { .. } => true,
@@ -34,14 +34,14 @@ pub(crate) fn has_any(subject: &Subject) -> bool {
             _ => false,
         })
     }
-    subject.descriptor().is_some_and(any)
+    selection.descriptor().is_some_and(any)
 }
 
 /// Shows them along the lower edge of the picture in `viewport`, row over row.
-pub(crate) fn show(ui: &mut Ui, session: &mut Session, subject: &Subject, viewport: Rect) {
-    let Some(descriptor) = subject.descriptor() else { return };
+pub(crate) fn show(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
+    let Some(descriptor) = selection.descriptor() else { return };
     let mut curves = Vec::new();
-    gather(&subject.place(), descriptor, &mut curves);
+    gather(&selection.place(), descriptor, &mut curves);
     let across = (((viewport.width() - GAP) / (WIDTH + GAP)) as usize).clamp(1, curves.len().max(1));
     let down = curves.len().div_ceil(across);
     let height = (down as f32 * (HEIGHT + GAP) + GAP).min(MOST * viewport.height());
@@ -110,8 +110,8 @@ mod tests {
 
     #[test]
     fn the_flame_sheet_shows_the_nine_curves_of_its_paper() {
-        let sheet = Subject { key: "flame_sheet", index: Some(0) };
-        assert!(has_any(&sheet) && !has_any(&Subject { key: "camera", index: None }));
+        let sheet = Selection { key: "flame_sheet", index: Some(0) };
+        assert!(has_any(&sheet) && !has_any(&Selection { key: "camera", index: None }));
         let mut curves = Vec::new();
         gather(&sheet.place(), sheet.descriptor().unwrap(), &mut curves);
         let titles: Vec<String> = curves.iter().map(|(_, parameter)| title(parameter)).collect();

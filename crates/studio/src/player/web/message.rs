@@ -6,32 +6,37 @@ use bansho::Assets;
 
 use super::reply::Reply;
 use crate::{
-    document::{Found, Revision},
-    player::{Picture, Wish},
+    document::{ReportedProblem, Revision},
+    player::{FrameRequest, Picture},
 };
 use js_sys::{Array, Uint8Array};
 use wasm_bindgen::{JsCast, JsValue};
 
 /// What the page says.
-pub(super) enum Order {
+pub(super) enum PageMessage {
     /// A file that no folder holds.
     File(String, Vec<u8>),
     /// A wish, with its number.
-    Wish(u64, Wish),
+    FrameRequest(u64, FrameRequest),
 }
 
-impl Order {
+impl PageMessage {
     pub(super) fn file(name: &str, bytes: &[u8]) -> Array {
         array(["file".into(), name.into(), Uint8Array::from(bytes).into()])
     }
 
-    pub(super) fn wish(number: u64, wish: &Wish) -> Array {
-        let frame = wish.number.map_or(JsValue::NULL, |frame| (frame as f64).into());
-        let [width, height] = wish.within.map(|side| JsValue::from(side as f64));
-        let flags = [wish.exact, wish.draft, wish.still].map(JsValue::from);
-        let head =
-            [JsValue::from("wish"), count(number), count(wish.revision.0), (&*wish.name).into(), (&*wish.text).into()];
-        let stages = wish.stages.map_or(JsValue::NULL, |sheet| (sheet as f64).into());
+    pub(super) fn request(number: u64, request: &FrameRequest) -> Array {
+        let frame = request.number.map_or(JsValue::NULL, |frame| (frame as f64).into());
+        let [width, height] = request.within.map(|side| JsValue::from(side as f64));
+        let flags = [request.exact, request.draft, request.full_quality].map(JsValue::from);
+        let head = [
+            JsValue::from("wish"),
+            count(number),
+            count(request.revision.0),
+            (&*request.name).into(),
+            (&*request.text).into(),
+        ];
+        let stages = request.stages.map_or(JsValue::NULL, |sheet| (sheet as f64).into());
         head.into_iter().chain([frame, width, height]).chain(flags).chain([stages]).collect()
     }
 
@@ -42,7 +47,7 @@ impl Order {
             "file" => Self::File(fields.text()?, fields.bytes()?),
             "wish" => {
                 let number = fields.count()?;
-                let wish = Wish {
+                let request = FrameRequest {
                     revision: Revision(fields.count()?),
                     name: fields.text()?,
                     text: fields.text()?.into(),
@@ -51,10 +56,10 @@ impl Order {
                     within: fields.size()?,
                     exact: fields.flag()?,
                     draft: fields.flag()?,
-                    still: fields.flag()?,
+                    full_quality: fields.flag()?,
                     stages: fields.next()?.as_f64().map(|sheet| sheet as usize),
                 };
-                Self::Wish(number, wish)
+                Self::FrameRequest(number, request)
             }
             _ => return None,
         })
@@ -65,14 +70,14 @@ impl Reply {
     pub(super) fn write(self) -> Array {
         match self {
             Self::Ready => array(["ready".into()]),
-            Self::Judged { number, found: Ok(ev100) } => array(["judged".into(), count(number), ev100.into()]),
-            Self::Judged { number, found: Err(faults) } => {
+            Self::Checked { number, found: Ok(ev100) } => array(["judged".into(), count(number), ev100.into()]),
+            Self::Checked { number, found: Err(faults) } => {
                 let faults: Array = faults.iter().map(fault).collect();
                 array(["judged".into(), count(number), faults.into()])
             }
             Self::Drawn { picture } => drawn("drawn", &picture).collect(),
             Self::Stage { stage, picture } => drawn("stage", &picture).chain([JsValue::from(stage as f64)]).collect(),
-            Self::Still { frame, png } => {
+            Self::FullQualityFrame { frame, png } => {
                 array(["still".into(), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
             }
             Self::Failed { number, reason } => array(["failed".into(), count(number), reason.into()]),
@@ -90,14 +95,14 @@ impl Reply {
                 let said = fields.next()?;
                 let faults =
                     || said.dyn_ref::<Array>().into_iter().flat_map(Array::iter).filter_map(read_fault).collect();
-                Self::Judged { number, found: said.as_f64().map(|ev100| ev100 as f32).ok_or_else(faults) }
+                Self::Checked { number, found: said.as_f64().map(|ev100| ev100 as f32).ok_or_else(faults) }
             }
             "drawn" => Self::Drawn { picture: fields.picture()? },
             "stage" => {
                 let picture = fields.picture()?;
                 Self::Stage { stage: fields.number()? as usize, picture }
             }
-            "still" => Self::Still { frame: fields.number()? as i64, png: fields.bytes()? },
+            "still" => Self::FullQualityFrame { frame: fields.number()? as i64, png: fields.bytes()? },
             "failed" => Self::Failed { number: fields.count()?, reason: fields.text()? },
             "panicked" => Self::Panicked { number: fields.count()?, message: fields.text()? },
             "done" => Self::Done { number: fields.count()? },
@@ -111,18 +116,18 @@ fn array<const N: usize>(fields: [JsValue; N]) -> Array {
 }
 
 /// A fault as a message holds it: without a place, both of its ends are null.
-fn fault(found: &Found) -> Array {
+fn fault(found: &ReportedProblem) -> Array {
     let end = |at: Option<usize>| at.map_or(JsValue::NULL, |at| (at as f64).into());
     let [start, stop] = [found.span.as_ref().map(|span| span.start), found.span.as_ref().map(|span| span.end)].map(end);
     let asset = found.asset.as_deref().map_or(JsValue::NULL, JsValue::from);
     array([start, stop, (&*found.path).into(), (&*found.reason).into(), asset])
 }
 
-fn read_fault(message: JsValue) -> Option<Found> {
+fn read_fault(message: JsValue) -> Option<ReportedProblem> {
     let mut fields = Fields::of(&message)?;
     let [start, stop] = [fields.next()?, fields.next()?].map(|end| end.as_f64().map(|at| at as usize));
     let span = start.zip(stop).map(|(start, stop)| start..stop);
-    Some(Found { span, path: fields.text()?, reason: fields.text()?, asset: fields.next()?.as_string() })
+    Some(ReportedProblem { span, path: fields.text()?, reason: fields.text()?, asset: fields.next()?.as_string() })
 }
 
 /// Counts stay far below 2^53.

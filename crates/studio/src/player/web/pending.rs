@@ -2,17 +2,17 @@
 
 use std::collections::VecDeque;
 
-use super::reply::{Heard, Reply};
+use super::reply::{Reply, WorkerMessage};
 use crate::{
     document::recheck,
-    player::{Event, Wish},
+    player::{Event, FrameRequest},
 };
 
 /// Wishes that something may still come of.
 #[derive(Default)]
 pub(super) struct Pending {
     /// With their numbers, the oldest first.
-    wishes: VecDeque<(u64, Wish)>,
+    requests: VecDeque<(u64, FrameRequest)>,
     /// How many were made.
     made: u64,
     /// The last one that nothing more comes of.
@@ -23,25 +23,25 @@ pub(super) struct Pending {
 
 /// What follows from what was heard.
 #[derive(Default)]
-pub(super) struct News {
+pub(super) struct WorkerUpdate {
     pub(super) events: Vec<Event>,
     /// Whether the worker listens from now on.
-    pub(super) listens: bool,
+    pub(super) ready: bool,
     /// Whether it is gone; another must take its place, and be told the newest wish.
-    pub(super) gone: bool,
+    pub(super) terminated: bool,
 }
 
 impl Pending {
     /// Notes a wish; whether the worker lives that it is for.
-    pub(super) fn note(&mut self, wish: Wish) -> bool {
+    pub(super) fn note(&mut self, request: FrameRequest) -> bool {
         self.made += 1;
-        self.wishes.push_back((self.made, wish));
+        self.requests.push_back((self.made, request));
         !std::mem::take(&mut self.lost)
     }
 
     /// The newest wish, with its number, unless nothing more comes of it.
-    pub(super) fn newest(&self) -> Option<(u64, &Wish)> {
-        self.wishes.back().map(|(number, wish)| (*number, wish))
+    pub(super) fn newest(&self) -> Option<(u64, &FrameRequest)> {
+        self.requests.back().map(|(number, request)| (*number, request))
     }
 
     pub(super) fn is_busy(&self) -> bool {
@@ -54,41 +54,43 @@ impl Pending {
     }
 
     /// Takes in what a worker said since the last time. Whatever comes after its end is no more than an echo of that.
-    pub(super) fn take_in(&mut self, heard: Vec<Heard>) -> News {
-        let mut news = News::default();
+    pub(super) fn handle_messages(&mut self, heard: Vec<WorkerMessage>) -> WorkerUpdate {
+        let mut update = WorkerUpdate::default();
         for heard in heard {
             match heard {
-                Heard::Said(Reply::Ready) => news.listens = true,
-                Heard::Said(Reply::Panicked { number, message }) => {
-                    news.events.extend(self.mourn(self.wish_of(number).is_some().then_some(number), message));
-                    news.gone = true;
+                WorkerMessage::Reply(Reply::Ready) => update.ready = true,
+                WorkerMessage::Reply(Reply::Panicked { number, message }) => {
+                    update
+                        .events
+                        .extend(self.worker_failed(self.request_of(number).is_some().then_some(number), message));
+                    update.terminated = true;
                 }
-                Heard::Ended => {
+                WorkerMessage::Terminated => {
                     let message = "it ended without a word, as where memory runs out".to_owned();
-                    news.events.extend(self.mourn(None, message));
-                    news.gone = true;
+                    update.events.extend(self.worker_failed(None, message));
+                    update.terminated = true;
                 }
-                Heard::Said(reply) => news.events.extend(self.event(reply)),
+                WorkerMessage::Reply(reply) => update.events.extend(self.event(reply)),
             }
-            if news.gone {
-                news.gone = !self.lost;
+            if update.terminated {
+                update.terminated = !self.lost;
                 break;
             }
         }
-        news
+        update
     }
 
     fn event(&mut self, reply: Reply) -> Option<Event> {
         Some(match reply {
-            Reply::Judged { number, found } => {
-                let wish = self.wish_of(number)?;
-                let outcome = recheck(&wish.name, &wish.text, &wish.assets, found);
-                Event::Judged { revision: wish.revision, outcome }
+            Reply::Checked { number, found } => {
+                let request = self.request_of(number)?;
+                let outcome = recheck(&request.name, &request.text, &request.assets, found);
+                Event::Checked { revision: request.revision, outcome }
             }
             Reply::Drawn { picture } => Event::Drawn(picture),
             Reply::Stage { stage, picture } => Event::Stage(stage, picture),
-            Reply::Still { frame, png } => Event::Still { number: frame, png },
-            Reply::Failed { number, reason } => Event::Failed { revision: self.wish_of(number)?.revision, reason },
+            Reply::FullQualityFrame { frame, png } => Event::FullQualityFrame { number: frame, png },
+            Reply::Failed { number, reason } => Event::Failed { revision: self.request_of(number)?.revision, reason },
             Reply::Done { number } => {
                 self.finish(number);
                 return None;
@@ -98,41 +100,41 @@ impl Pending {
     }
 
     /// The worker is gone, over wish `number` as far as it said, else over the oldest. Of newer ones the newest may still be had.
-    fn mourn(&mut self, number: Option<u64>, message: String) -> Option<Event> {
-        let Some(number) = number.or_else(|| self.wishes.front().map(|(number, _)| *number)) else {
+    fn worker_failed(&mut self, number: Option<u64>, message: String) -> Option<Event> {
+        let Some(number) = number.or_else(|| self.requests.front().map(|(number, _)| *number)) else {
             self.lost = true;
             return None;
         };
-        let wish = self.wish_of(number)?;
-        let event = Event::Panicked { revision: wish.revision, number: wish.number, message };
+        let request = self.request_of(number)?;
+        let event = Event::Panicked { revision: request.revision, number: request.number, message };
         self.finish(number);
-        self.wishes.drain(..self.wishes.len().saturating_sub(1));
+        self.requests.drain(..self.requests.len().saturating_sub(1));
         Some(event)
     }
 
-    fn wish_of(&self, number: u64) -> Option<&Wish> {
-        self.wishes.iter().find(|(own, _)| *own == number).map(|(_, wish)| wish)
+    fn request_of(&self, number: u64) -> Option<&FrameRequest> {
+        self.requests.iter().find(|(own, _)| *own == number).map(|(_, request)| request)
     }
 
     fn finish(&mut self, number: u64) {
         self.done = number;
-        self.wishes.retain(|(own, _)| *own > number);
+        self.requests.retain(|(own, _)| *own > number);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::player::{Picture, tests::wish};
+    use crate::player::{Picture, tests::request};
 
     const SCENE: &str = "bansho = 1\n[[flame_sheet]]\n";
 
-    fn panicked(number: u64) -> Heard {
-        Heard::Said(Reply::Panicked { number, message: "broken on purpose".into() })
+    fn panicked(number: u64) -> WorkerMessage {
+        WorkerMessage::Reply(Reply::Panicked { number, message: "broken on purpose".into() })
     }
 
-    fn said(reply: Reply) -> Vec<Heard> {
-        vec![Heard::Said(reply)]
+    fn said(reply: Reply) -> Vec<WorkerMessage> {
+        vec![WorkerMessage::Reply(reply)]
     }
 
     /// The frames that panicked.
@@ -147,38 +149,38 @@ mod tests {
     #[test]
     fn a_worker_that_panics_ends_once() {
         let mut pending = Pending::default();
-        assert!(pending.note(wish(SCENE, 3)));
+        assert!(pending.note(request(SCENE, 3)));
         // A trap follows the last words, in the same moment.
-        let news = pending.take_in(vec![panicked(1), Heard::Ended]);
-        assert_eq!((broken(&news.events), news.gone, pending.is_busy()), (vec![Some(3)], true, false));
-        assert!(pending.note(wish(SCENE, 4)), "another worker is there");
-        let news = pending.take_in(said(Reply::Done { number: 2 }));
-        assert_eq!((news.events.len(), news.gone, pending.is_busy()), (0, false, false));
+        let update = pending.handle_messages(vec![panicked(1), WorkerMessage::Terminated]);
+        assert_eq!((broken(&update.events), update.terminated, pending.is_busy()), (vec![Some(3)], true, false));
+        assert!(pending.note(request(SCENE, 4)), "another worker is there");
+        let update = pending.handle_messages(said(Reply::Done { number: 2 }));
+        assert_eq!((update.events.len(), update.terminated, pending.is_busy()), (0, false, false));
     }
 
     #[test]
     fn what_was_wished_for_since_is_still_to_be_had() {
         let mut pending = Pending::default();
         for number in 3..6 {
-            pending.note(wish(SCENE, number));
+            pending.note(request(SCENE, number));
         }
-        let news = pending.take_in(vec![panicked(1), Heard::Ended]);
-        assert_eq!(broken(&news.events), [Some(3)]);
-        let newest = pending.newest().map(|(number, wish)| (number, wish.number));
+        let update = pending.handle_messages(vec![panicked(1), WorkerMessage::Terminated]);
+        assert_eq!(broken(&update.events), [Some(3)]);
+        let newest = pending.newest().map(|(number, request)| (number, request.number));
         assert_eq!((newest, pending.is_busy()), (Some((3, Some(5))), true));
         // Nobody says over which one it ended; each is blamed once at most.
-        let news = pending.take_in(vec![Heard::Ended]);
-        assert_eq!((broken(&news.events), pending.is_busy()), (vec![Some(5)], false));
+        let update = pending.handle_messages(vec![WorkerMessage::Terminated]);
+        assert_eq!((broken(&update.events), pending.is_busy()), (vec![Some(5)], false));
     }
 
     #[test]
     fn a_worker_that_ends_idle_is_replaced_when_it_is_needed() {
         let mut pending = Pending::default();
-        let news = pending.take_in(vec![Heard::Ended]);
-        assert!(news.events.is_empty() && !news.gone, "else one that cannot start would be started for ever");
-        assert!(!pending.note(wish(SCENE, 0)));
+        let update = pending.handle_messages(vec![WorkerMessage::Terminated]);
+        assert!(update.events.is_empty() && !update.terminated, "else one that cannot start would be started for ever");
+        assert!(!pending.note(request(SCENE, 0)));
         assert_eq!(pending.newest().map(|(number, _)| number), Some(1));
-        assert!(pending.note(wish(SCENE, 1)), "the other one");
+        assert!(pending.note(request(SCENE, 1)), "the other one");
         pending.give_up();
         assert!(!pending.is_busy() && pending.newest().is_none());
     }
@@ -186,9 +188,9 @@ mod tests {
     #[test]
     fn what_a_worker_says_of_a_wish_is_passed_on() {
         let mut pending = Pending::default();
-        pending.note(wish(SCENE, 7));
+        pending.note(request(SCENE, 7));
         let picture = Picture {
-            revision: pending.wishes[0].1.revision,
+            revision: pending.requests[0].1.revision,
             number: 7,
             size: [1; 2],
             scene_size: [1; 2],
@@ -200,18 +202,20 @@ mod tests {
         };
         let heard = [
             Reply::Ready,
-            Reply::Judged { number: 1, found: Ok(9.5) },
+            Reply::Checked { number: 1, found: Ok(9.5) },
             Reply::Drawn { picture: picture.clone() },
             Reply::Stage { stage: 2, picture },
-            Reply::Still { frame: 7, png: vec![1] },
+            Reply::FullQualityFrame { frame: 7, png: vec![1] },
             Reply::Failed { number: 1, reason: "no room".into() },
             Reply::Failed { number: 9, reason: "of no wish".into() },
         ];
-        let news = pending.take_in(heard.into_iter().map(Heard::Said).collect());
-        assert!(news.listens && !news.gone && pending.is_busy());
-        let [judged, drawn, stage, still, failed] = &news.events[..] else { panic!("{} events", news.events.len()) };
-        assert!(matches!(judged, Event::Judged { outcome: Ok(plan), .. } if plan.exposure_ev100 == 9.5));
+        let update = pending.handle_messages(heard.into_iter().map(WorkerMessage::Reply).collect());
+        assert!(update.ready && !update.terminated && pending.is_busy());
+        let [checked, drawn, stage, full_quality, failed] = &update.events[..] else {
+            panic!("{} events", update.events.len())
+        };
+        assert!(matches!(checked, Event::Checked { outcome: Ok(plan), .. } if plan.exposure_ev100 == 9.5));
         assert!(matches!((drawn, stage), (Event::Drawn(Picture { number: 7, .. }), Event::Stage(2, _))));
-        assert!(matches!((still, failed), (Event::Still { number: 7, .. }, Event::Failed { .. })));
+        assert!(matches!((full_quality, failed), (Event::FullQualityFrame { number: 7, .. }, Event::Failed { .. })));
     }
 }

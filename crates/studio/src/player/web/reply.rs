@@ -1,19 +1,19 @@
 //! What a page hears from its worker.
 
-use crate::{document::Found, player::Picture};
+use crate::{document::ReportedProblem, player::Picture};
 
 /// What a worker says.
 pub(super) enum Reply {
     /// It listens.
     Ready,
     /// The scene of wish `number` was checked: its exposure, or its faults.
-    Judged { number: u64, found: Result<f32, Vec<Found>> },
+    Checked { number: u64, found: Result<f32, Vec<ReportedProblem>> },
     /// A picture.
     Drawn { picture: Picture },
     /// A small picture of a stage.
     Stage { stage: usize, picture: Picture },
     /// A finished picture: its frame, and the file.
-    Still { frame: i64, png: Vec<u8> },
+    FullQualityFrame { frame: i64, png: Vec<u8> },
     /// Why wish `number` has no picture.
     Failed { number: u64, reason: String },
     /// What a phenomenon said when it panicked over wish `number`. The worker is gone.
@@ -23,8 +23,8 @@ pub(super) enum Reply {
 }
 
 /// What comes from a worker.
-pub(super) enum Heard {
-    Said(Reply),
+pub(super) enum WorkerMessage {
+    Reply(Reply),
     /// It ended: without a word, as where memory runs out, or after it told of a panic.
-    Ended,
+    Terminated,
 }

@@ -6,13 +6,13 @@ use std::{cell::RefCell, rc::Rc, sync::Arc};
 use bansho::{Assets, Plan, SceneError};
 
 use super::{
-    message::Order,
-    pending::{News, Pending},
-    reply::{Heard, Reply},
+    message::PageMessage,
+    pending::{Pending, WorkerUpdate},
+    reply::{Reply, WorkerMessage},
 };
 use crate::{
-    document::Found,
-    player::{Event, Player, SlicePlayer, Wish},
+    document::ReportedProblem,
+    player::{Event, FrameRequest, Player, PolledPlayer},
     scenes::examples::Bundle,
 };
 use js_sys::Array;
@@ -24,7 +24,7 @@ const SCRIPT: &str = "worker.js";
 
 /// The page's side.
 pub struct WorkerPlayer {
-    link: Link,
+    worker: WorkerHandle,
     wake: Rc<dyn Fn()>,
     /// What a worker must know that takes the place of one that panicked.
     files: Vec<(String, Vec<u8>)>,
@@ -32,16 +32,16 @@ pub struct WorkerPlayer {
 }
 
 /// A worker, and what it said.
-struct Link {
+struct WorkerHandle {
     worker: Worker,
-    inbox: Rc<RefCell<Vec<Heard>>>,
+    inbox: Rc<RefCell<Vec<WorkerMessage>>>,
     /// What waits until it listens.
     outbox: Option<Vec<Array>>,
     _listen: Closure<dyn FnMut(MessageEvent)>,
     _mourn: Closure<dyn FnMut()>,
 }
 
-impl Link {
+impl WorkerHandle {
     fn start(wake: Rc<dyn Fn()>) -> Result<Self, JsValue> {
         let options = WorkerOptions::new();
         options.set_type(WorkerType::Module);
@@ -49,19 +49,19 @@ impl Link {
         let inbox = Rc::new(RefCell::new(Vec::new()));
         let (heard, woken) = (inbox.clone(), wake.clone());
         let listen = Closure::new(move |event: MessageEvent| {
-            heard.borrow_mut().extend(Reply::read(&event.data()).map(Heard::Said));
+            heard.borrow_mut().extend(Reply::read(&event.data()).map(WorkerMessage::Reply));
             woken();
         });
         worker.set_onmessage(Some(listen.as_ref().unchecked_ref()));
         let heard = inbox.clone();
-        let mourn = Closure::new(move || {
-            heard.borrow_mut().push(Heard::Ended);
+        let worker_failed = Closure::new(move || {
+            heard.borrow_mut().push(WorkerMessage::Terminated);
             wake();
         });
-        worker.set_onerror(Some(mourn.as_ref().unchecked_ref()));
+        worker.set_onerror(Some(worker_failed.as_ref().unchecked_ref()));
         // The program, compiled already.
         worker.post_message(&wasm_bindgen::module())?;
-        Ok(Self { worker, inbox, outbox: Some(Vec::new()), _listen: listen, _mourn: mourn })
+        Ok(Self { worker, inbox, outbox: Some(Vec::new()), _listen: listen, _mourn: worker_failed })
     }
 
     fn say(&mut self, message: Array) {
@@ -79,7 +79,7 @@ impl Link {
     }
 }
 
-impl Drop for Link {
+impl Drop for WorkerHandle {
     fn drop(&mut self) {
         // Nobody is there any more for what is still on its way.
         self.worker.set_onmessage(None);
@@ -95,30 +95,30 @@ impl WorkerPlayer {
     /// The browser gives no workers.
     pub fn start(wake: impl Fn() + 'static) -> Result<Self, JsValue> {
         let wake: Rc<dyn Fn()> = Rc::new(wake);
-        let link = Link::start(wake.clone())?;
-        Ok(Self { link, wake, files: Vec::new(), pending: Pending::default() })
+        let worker = WorkerHandle::start(wake.clone())?;
+        Ok(Self { worker, wake, files: Vec::new(), pending: Pending::default() })
     }
 
     /// Another worker in place of one that is gone, and the newest wish for it. Where none can be had, nothing more is drawn, as the panic
     /// told.
     fn restart(&mut self) {
-        let Ok(link) = Link::start(self.wake.clone()) else { return self.pending.give_up() };
+        let Ok(worker) = WorkerHandle::start(self.wake.clone()) else { return self.pending.give_up() };
         // What the old one may still say goes with it.
-        self.link = link;
-        self.files.iter().for_each(|(name, bytes)| self.link.say(Order::file(name, bytes)));
+        self.worker = worker;
+        self.files.iter().for_each(|(name, bytes)| self.worker.say(PageMessage::file(name, bytes)));
         self.tell_newest();
     }
 
     fn tell_newest(&mut self) {
-        if let Some((number, wish)) = self.pending.newest() {
-            self.link.say(Order::wish(number, wish));
+        if let Some((number, request)) = self.pending.newest() {
+            self.worker.say(PageMessage::request(number, request));
         }
     }
 }
 
 impl Player for WorkerPlayer {
-    fn wish(&mut self, wish: Wish) {
-        if self.pending.note(wish) {
+    fn request(&mut self, request: FrameRequest) {
+        if self.pending.note(request) {
             self.tell_newest();
         } else {
             self.restart();
@@ -126,11 +126,11 @@ impl Player for WorkerPlayer {
     }
 
     fn poll(&mut self) -> Vec<Event> {
-        let News { events, listens, gone } = self.pending.take_in(self.link.inbox.take());
-        if listens {
-            self.link.flush();
+        let WorkerUpdate { events, ready, terminated } = self.pending.handle_messages(self.worker.inbox.take());
+        if ready {
+            self.worker.flush();
         }
-        if gone {
+        if terminated {
             self.restart();
         }
         events
@@ -140,20 +140,20 @@ impl Player for WorkerPlayer {
         self.pending.is_busy()
     }
 
-    fn waits_for_poll(&self) -> bool {
+    fn needs_polling(&self) -> bool {
         false
     }
 
-    fn give(&mut self, name: &str, bytes: &[u8]) {
-        self.link.say(Order::file(name, bytes));
+    fn add_file(&mut self, name: &str, bytes: &[u8]) {
+        self.worker.say(PageMessage::file(name, bytes));
         self.files.push((name.to_owned(), bytes.to_vec()));
     }
 }
 
 /// The worker's side.
-struct Workshop {
+struct WorkerMain {
     scope: DedicatedWorkerGlobalScope,
-    player: SlicePlayer,
+    player: PolledPlayer,
     bundle: Bundle,
     assets: Arc<dyn Assets>,
     /// Of the wish that is being fulfilled.
@@ -163,19 +163,19 @@ struct Workshop {
 }
 
 /// Fulfils the wishes of the page that this program is the worker of.
-pub fn serve() {
+pub fn run_worker() {
     let scope: DedicatedWorkerGlobalScope = js_sys::global().unchecked_into();
-    let shop = Rc::new(RefCell::new(Workshop {
+    let worker = Rc::new(RefCell::new(WorkerMain {
         scope: scope.clone(),
-        player: SlicePlayer::default(),
+        player: PolledPlayer::default(),
         bundle: Bundle::default(),
         assets: Arc::new(Bundle::default()),
         number: 0,
         working: false,
     }));
     let listen = Closure::<dyn FnMut(MessageEvent)>::new(move |event: MessageEvent| {
-        shop.borrow_mut().hear(&event.data());
-        go_on(&shop);
+        worker.borrow_mut().hear(&event.data());
+        go_on(&worker);
     });
     scope.set_onmessage(Some(listen.as_ref().unchecked_ref()));
     // It listens for as long as the worker lives.
@@ -189,13 +189,13 @@ fn say(scope: &DedicatedWorkerGlobalScope, reply: Reply) {
 }
 
 /// Works until nothing is wished for, with a look at new messages between any two slices.
-fn go_on(shop: &Rc<RefCell<Workshop>>) {
-    let mut own = shop.borrow_mut();
+fn go_on(worker: &Rc<RefCell<WorkerMain>>) {
+    let mut own = worker.borrow_mut();
     if own.working || !own.player.is_busy() {
         return;
     }
     own.working = true;
-    let next = shop.clone();
+    let next = worker.clone();
     let work = Closure::once_into_js(move || {
         next.borrow_mut().work();
         go_on(&next);
@@ -203,17 +203,17 @@ fn go_on(shop: &Rc<RefCell<Workshop>>) {
     let _ = own.scope.set_timeout_with_callback(work.unchecked_ref());
 }
 
-impl Workshop {
+impl WorkerMain {
     fn hear(&mut self, message: &JsValue) {
-        match Order::read(message, &self.assets) {
-            Some(Order::File(name, bytes)) => {
-                self.bundle.give(name, bytes);
+        match PageMessage::read(message, &self.assets) {
+            Some(PageMessage::File(name, bytes)) => {
+                self.bundle.add_file(name, bytes);
                 self.assets = Arc::new(self.bundle.clone());
             }
-            Some(Order::Wish(number, wish)) => {
+            Some(PageMessage::FrameRequest(number, request)) => {
                 self.number = number;
                 self.tell_panics_of(number);
-                self.player.wish(wish);
+                self.player.request(request);
             }
             None => {}
         }
@@ -242,17 +242,17 @@ impl Workshop {
 
 fn reply(number: u64, event: Event) -> Reply {
     match event {
-        Event::Judged { outcome, .. } => Reply::Judged { number, found: found(outcome) },
+        Event::Checked { outcome, .. } => Reply::Checked { number, found: found(outcome) },
         Event::Drawn(picture) => Reply::Drawn { picture },
         Event::Stage(stage, picture) => Reply::Stage { stage, picture },
-        Event::Still { number: frame, png } => Reply::Still { frame, png },
+        Event::FullQualityFrame { number: frame, png } => Reply::FullQualityFrame { frame, png },
         Event::Failed { reason, .. } => Reply::Failed { number, reason },
         Event::Panicked { message, .. } => Reply::Panicked { number, message },
     }
 }
 
 /// What the page cannot find out by itself without making every phenomenon.
-fn found(outcome: Result<Arc<Plan>, SceneError>) -> Result<f32, Vec<Found>> {
-    let faults = |error: SceneError| error.problems.iter().map(Found::from).collect();
+fn found(outcome: Result<Arc<Plan>, SceneError>) -> Result<f32, Vec<ReportedProblem>> {
+    let faults = |error: SceneError| error.problems.iter().map(ReportedProblem::from).collect();
     outcome.map(|plan| plan.exposure_ev100).map_err(faults)
 }

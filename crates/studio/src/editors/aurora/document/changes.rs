@@ -10,22 +10,23 @@ use bansho::{
 };
 
 use super::{
-    Drawing, Factor, OnSheet, lines,
+    AuroraDrawing, Factor, SheetPosition,
     links::rounded,
-    renumber::Fate,
+    polyline,
+    renumber::SheetRemap,
     sheets::{curve_chain, curve_part, stated, with_form, with_points},
 };
 
 /// An end of a sheet: which sheet, and whether its last point rather than its first.
-pub type End = (usize, bool);
+pub type SheetEnd = (usize, bool);
 
 /// The sheets of a shape after a change, and what became of places on those before.
-type Changed = (Vec<SheetParameters>, Fate);
+type RemappedSheets = (Vec<SheetParameters>, SheetRemap);
 
 /// Half of the gap between the two parts of a sheet that was split, as a share of the square's side.
 const HALF_GAP: f64 = 0.012;
 
-impl Drawing {
+impl AuroraDrawing {
     /// A stroke in stead of sheet `sheet` of shape `shape`, or as a new one.
     pub fn draw(&self, shape: usize, sheet: Option<usize>, stroke: &[DVec2]) -> Vec<Operation> {
         let points = self.written(stroke);
@@ -85,7 +86,8 @@ impl Drawing {
             (0..=POINTS).map(|step| step as f64 / POINTS as f64).map(|at| [at, curve.eval(at)]).collect();
         let [low, high] = factor.bounds();
         let value = |value: f64| rounded(value.clamp(low, high));
-        let points = lines::brushed(&even, at, by, REACH).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
+        let points =
+            polyline::brushed(&even, at, by, REACH).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
         if let Ok(painted) = Curve::new(points, curve.interpolation()) {
             *curve = painted;
         }
@@ -106,17 +108,17 @@ impl Drawing {
             _ => link.clone(),
         };
         let line = self.lines(shape - 1).into_iter().nth(sheet).unwrap_or_default();
-        let from = lines::at(&line, at);
-        let changed = self.carried(shape, from.as_slice(), |shape, targets| {
+        let from = polyline::at(&line, at);
+        let changed = self.propagated(shape, from.as_slice(), |shape, targets| {
             let (sheets, cut) = self.cut_at(shape, *targets.first()?)?;
-            Some((sheets, Fate::Cut(cut)))
+            Some((sheets, SheetRemap::Cut(cut)))
         });
         operations.extend(self.write_all(shape, &changed, part, |_| Vec::new()));
         operations
     }
 
     /// Merges two ends of the shape before `shape`; what they become from there on is joined too.
-    pub fn merge(&self, shape: usize, ends: [End; 2]) -> Vec<Operation> {
+    pub fn merge(&self, shape: usize, ends: [SheetEnd; 2]) -> Vec<Operation> {
         let mut change = Table::default();
         let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
         change.push("sheets", list(ends.map(|(sheet, _)| sheet as i64 + 1)));
@@ -124,12 +126,12 @@ impl Drawing {
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
-        let at = |(sheet, last): End| {
+        let at = |(sheet, last): SheetEnd| {
             let line = before.get(sheet)?;
             if last { line.last().copied() } else { line.first().copied() }
         };
         if let [Some(first), Some(second)] = ends.map(at) {
-            let joined = self.carried(shape, &[first, second], |shape, targets| match targets {
+            let joined = self.propagated(shape, &[first, second], |shape, targets| match targets {
                 &[first, second] => self.joined_at(shape, [first, second]),
                 _ => None,
             });
@@ -140,17 +142,17 @@ impl Drawing {
 
     /// What `change` makes of shape `shape` and of all that come of it, where points of the shape before arrive, for as long as it
     /// makes something of them.
-    fn carried(
+    fn propagated(
         &self,
         shape: usize,
         from: &[DVec2],
-        change: impl Fn(usize, &[DVec2]) -> Option<Changed>,
-    ) -> Vec<Changed> {
+        change: impl Fn(usize, &[DVec2]) -> Option<RemappedSheets>,
+    ) -> Vec<RemappedSheets> {
         let mut points = from.to_vec();
         let mut changed = Vec::new();
         let shapes = if self.shows_changes() { shape..self.arrivals().len() } else { 0..0 };
         for shape in shapes {
-            let arrived: Option<Vec<DVec2>> = points.iter().map(|&point| self.arrival_of(shape, point)).collect();
+            let arrived: Option<Vec<DVec2>> = points.iter().map(|&point| self.destination_of(shape, point)).collect();
             let Some(new) = arrived.and_then(|arrived| {
                 points = arrived;
                 change(shape, &points)
@@ -167,14 +169,14 @@ impl Drawing {
     pub(super) fn write_all(
         &self,
         first: usize,
-        changed: &[Changed],
+        changed: &[RemappedSheets],
         links: impl Fn(&LinkParameters) -> LinkParameters,
         needless: impl Fn(usize) -> Vec<usize>,
     ) -> Vec<Operation> {
         let written = changed.iter().enumerate().flat_map(|(index, (sheets, _))| self.write(first + index, sheets));
         let mut operations: Vec<Operation> = written.collect();
-        let fates: Vec<Fate> = changed.iter().map(|(_, fate)| fate.clone()).collect();
-        operations.extend(self.renumbered(first, &fates, links, needless));
+        let remaps: Vec<SheetRemap> = changed.iter().map(|(_, remap)| remap.clone()).collect();
+        operations.extend(self.renumbered(first, &remaps, links, needless));
         operations
     }
 
@@ -240,41 +242,41 @@ impl Drawing {
     }
 
     /// Where in shape `shape` a point of the one before arrives.
-    fn arrival_of(&self, shape: usize, from: DVec2) -> Option<DVec2> {
-        let strands = self.ways(shape - 1);
-        let on = |ways: &Vec<[DVec2; 2]>| {
-            let [leaving, arriving] = [0, 1].map(|end| ways.iter().map(|way| way[end]).collect::<Vec<_>>());
-            let on = lines::nearest(&leaving, from)?;
-            Some((on.distance, arriving.get(on.segment)?.lerp(*arriving.get(on.segment + 1)?, on.share)))
+    fn destination_of(&self, shape: usize, from: DVec2) -> Option<DVec2> {
+        let strands = self.point_paths(shape - 1);
+        let on = |point_paths: &Vec<[DVec2; 2]>| {
+            let [leaving, arriving] = [0, 1].map(|end| point_paths.iter().map(|way| way[end]).collect::<Vec<_>>());
+            let on = polyline::nearest(&leaving, from)?;
+            Some((on.distance, arriving.get(on.segment)?.lerp(*arriving.get(on.segment + 1)?, on.fraction)))
         };
         strands.iter().filter_map(on).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
     /// The sheets of shape `shape`, the one at `target` cut there, and where that is; `None` where there is nothing to cut.
-    fn cut_at(&self, shape: usize, target: DVec2) -> Option<(Vec<SheetParameters>, OnSheet)> {
+    fn cut_at(&self, shape: usize, target: DVec2) -> Option<(Vec<SheetParameters>, SheetPosition)> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
-        let (sheet, on) = lines::nearest_among(&all, target)?;
+        let (sheet, on) = polyline::nearest_among(&all, target)?;
         let line = &all[sheet];
-        let share = lines::share_of(line, on);
+        let fraction = polyline::share_of(line, on);
         // A short part keeps most of itself.
-        if share * (1.0 - share) < f64::EPSILON {
+        if fraction * (1.0 - fraction) < f64::EPSILON {
             // Where the sheet is cut already the scene has the words for it.
             return None;
         }
-        let gap = HALF_GAP * self.extent_km() / lines::length(line).max(f64::MIN_POSITIVE);
-        let ranges = [[0.0, share - gap.min(0.25 * share)], [share + gap.min(0.25 * (1.0 - share)), 1.0]];
+        let gap = HALF_GAP * self.extent_km() / polyline::length(line).max(f64::MIN_POSITIVE);
+        let ranges = [[0.0, fraction - gap.min(0.25 * fraction)], [fraction + gap.min(0.25 * (1.0 - fraction)), 1.0]];
         let parts = ranges.map(|range| SheetParameters {
             flux: curve_part(&sheets[sheet].flux, range),
             energy: curve_part(&sheets[sheet].energy, range),
-            ..with_points(&sheets[sheet], self.written(&lines::part(line, range)))
+            ..with_points(&sheets[sheet], self.written(&polyline::part(line, range)))
         });
         sheets.splice(sheet..=sheet, parts);
-        Some((sheets, (sheet, share)))
+        Some((sheets, (sheet, fraction)))
     }
 
     /// The sheets of shape `shape`, those that end at `targets` joined there, and what becomes of places on them; `None` where they are one.
-    fn joined_at(&self, shape: usize, targets: [DVec2; 2]) -> Option<Changed> {
+    fn joined_at(&self, shape: usize, targets: [DVec2; 2]) -> Option<RemappedSheets> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
         let ends = targets.map(|target| nearest_end(&all, target));
@@ -286,7 +288,7 @@ impl Drawing {
         let turned = [!first.1, second.1];
         let mut parts = [self.points(shape, first.0), self.points(shape, second.0)];
         parts.iter_mut().zip(turned).filter(|(_, turned)| *turned).for_each(|(part, _)| part.reverse());
-        let [one, other] = [lines::length(&parts[0]), lines::length(&parts[1])];
+        let [one, other] = [polyline::length(&parts[0]), polyline::length(&parts[1])];
         let curves = |curve: fn(&SheetParameters) -> &Curve| {
             let of = |sheet: usize, turned: bool| (curve(&sheets[sheet]), turned);
             curve_chain([of(first.0, turned[0]), of(second.0, turned[1])], one / (one + other))
@@ -296,8 +298,8 @@ impl Drawing {
         let joined = SheetParameters { flux, energy, ..with_points(&sheets[first.0], points) };
         sheets[first.0.min(second.0)] = joined;
         sheets.remove(first.0.max(second.0));
-        let fate = Fate::Joined([(first.0, turned[0]), (second.0, turned[1])], one / (one + other));
-        Some((sheets, fate))
+        let remap = SheetRemap::Joined([(first.0, turned[0]), (second.0, turned[1])], one / (one + other));
+        Some((sheets, remap))
     }
 
     /// The operations that make the sheets of shape `shape` to be `sheets`, and leave everything else as it stands.
@@ -341,7 +343,7 @@ fn exchanged(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) ->
     Some(operations)
 }
 
-fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<End> {
+fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<SheetEnd> {
     let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
         let end = |last: bool, point: Option<&DVec2>| point.map(|point| (point.distance(target), (sheet, last)));
         [end(false, line.first()), end(true, line.last())]

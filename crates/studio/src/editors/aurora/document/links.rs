@@ -9,17 +9,17 @@ use bansho::{
     render::scene::operation::Operation,
 };
 
-use super::{Drawing, lines};
+use super::{AuroraDrawing, polyline};
 
 /// A place on a sheet: which, and the share of its length.
-pub type OnSheet = (usize, f64);
+pub type SheetPosition = (usize, f64);
 
 /// Links that leave nearer to each other than this are the same, as a share of a sheet's length.
 const SAME: f64 = 0.02;
 
-impl Drawing {
+impl AuroraDrawing {
     /// Makes what lies at `from` on the shape before `shape` become sheet `to`. No other transition changes.
-    pub fn correspond(&self, shape: usize, from: OnSheet, to: usize) -> Vec<Operation> {
+    pub fn link_sheet(&self, shape: usize, from: SheetPosition, to: usize) -> Vec<Operation> {
         if !self.shows_changes() {
             // There the order of the list says what becomes what.
             return self.exchange_sheets(shape, from.0, to);
@@ -31,7 +31,7 @@ impl Drawing {
     }
 
     /// Makes the point at `from` on the shape before `shape` arrive at `to`.
-    pub fn correspond_at(&self, shape: usize, from: OnSheet, to: OnSheet) -> Vec<Operation> {
+    pub fn link_point(&self, shape: usize, from: SheetPosition, to: SheetPosition) -> Vec<Operation> {
         let link = LinkParameters { at: Some(rounded(from.1)), arrives: Some(rounded(to.1)), ..between(from.0, to.0) };
         let same_place = |own: &LinkParameters| own.at.zip(link.at).is_some_and(|(a, b)| (a - b).abs() < SAME);
         let stays = |own: &&LinkParameters| (own.from == link.from) == (own.to == link.to) && !same_place(own);
@@ -52,8 +52,9 @@ impl Drawing {
     pub fn linked(&self, shape: usize) -> Vec<(usize, [DVec2; 2])> {
         let Some(before) = shape.checked_sub(1) else { return Vec::new() };
         let [leaving, arriving] = [before, shape].map(|shape| self.lines(shape));
-        let at =
-            |all: &[Vec<DVec2>], sheet: i64, share: f64| lines::at(all.get(usize::try_from(sheet - 1).ok()?)?, share);
+        let at = |all: &[Vec<DVec2>], sheet: i64, fraction: f64| {
+            polyline::at(all.get(usize::try_from(sheet - 1).ok()?)?, fraction)
+        };
         let ends = |(number, link): (usize, &LinkParameters)| {
             Some((number, [at(&leaving, link.from, link.at?)?, at(&arriving, link.to, link.arrives?)?]))
         };
@@ -74,8 +75,8 @@ fn between(from: usize, to: usize) -> LinkParameters {
     LinkParameters { from: from as i64 + 1, to: to as i64 + 1, ..LinkParameters::default() }
 }
 
-pub(super) fn rounded(share: f64) -> f64 {
-    (share * 1000.0).round() / 1000.0
+pub(super) fn rounded(fraction: f64) -> f64 {
+    (fraction * 1000.0).round() / 1000.0
 }
 
 /// Both sheets are always stated: a link is read as a pair.
@@ -83,8 +84,8 @@ fn table(link: &LinkParameters) -> Table {
     let mut table = Table::default();
     table.push("from", Value::Integer(link.from));
     table.push("to", Value::Integer(link.to));
-    for (key, share) in [("at", link.at), ("arrives", link.arrives)] {
-        share.into_iter().for_each(|share| table.push(key, Value::Number(share)));
+    for (key, fraction) in [("at", link.at), ("arrives", link.arrives)] {
+        fraction.into_iter().for_each(|fraction| table.push(key, Value::Number(fraction)));
     }
     table
 }

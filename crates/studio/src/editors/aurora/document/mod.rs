@@ -2,8 +2,8 @@
 //! Whether a change is possible is for the scene itself to say; a refusal has its words.
 
 mod changes;
-pub mod lines;
 mod links;
+pub mod polyline;
 mod removal;
 mod renumber;
 mod sheets;
@@ -32,13 +32,13 @@ use bansho::{
 
 use crate::document::Document;
 
-pub use changes::End;
-pub use links::OnSheet;
+pub use changes::SheetEnd;
+pub use links::SheetPosition;
 pub use sheets::Factor;
 
 /// The drawn shapes of one aurora of a scene.
 #[derive(Clone, Debug)]
-pub struct Drawing {
+pub struct AuroraDrawing {
     place: Place,
     parameters: AuroraParameters,
     sequence: Sequence,
@@ -46,7 +46,7 @@ pub struct Drawing {
 
 /// Why shapes cannot be shown, or a change of them is refused.
 #[derive(Debug, thiserror::Error)]
-pub enum Refusal {
+pub enum ShapeEditError {
     /// There is no such aurora.
     #[error("the aurora is not in the scene any more")]
     Missing,
@@ -67,23 +67,26 @@ fn shape_number(fault: &ShapeFault) -> usize {
     number.unwrap_or_default() + 1
 }
 
-impl Drawing {
+impl AuroraDrawing {
     /// The shapes of aurora `index` of the scene `root`.
     ///
     /// # Errors
     /// There is no such aurora, or its parameters or shapes are faulty.
-    pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, Refusal> {
+    pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, ShapeEditError> {
         let place = Place::root().key("aurora").index(index);
-        let Some(Value::Table(table)) = place.find(root).map(|node| &node.value) else { return Err(Refusal::Missing) };
+        let Some(Value::Table(table)) = place.find(root).map(|node| &node.value) else {
+            return Err(ShapeEditError::Missing);
+        };
         let mut reader = Reader::new();
         let parameters = AuroraParameters::read_table(table, &mut reader, &[]);
         // Keys that every phenomenon has are not the aurora's own.
         let own = |kind: &ProblemKind| !matches!(kind, ProblemKind::UnknownKey { .. });
         if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| own(&problem.kind)) {
-            return Err(Refusal::Faulty(problem.to_string()));
+            return Err(ShapeEditError::Faulty(problem.to_string()));
         }
         let AuroraParameters { shapes, motion, extent_km, .. } = &parameters;
-        let sequence = Sequence::new(shapes, motion, *extent_km, assets.as_ref(), None).map_err(Refusal::Shape)?;
+        let sequence =
+            Sequence::new(shapes, motion, *extent_km, assets.as_ref(), None).map_err(ShapeEditError::Shape)?;
         Ok(Self { place, parameters, sequence })
     }
 
@@ -122,16 +125,16 @@ impl Drawing {
     /// What sheet `sheet` of shape `shape` comes from: the parts of the shape before that go there.
     pub fn origins(&self, shape: usize, sheet: usize) -> Vec<Vec<DVec2>> {
         let all = self.lines(shape);
-        let arrives = |ways: &&Vec<[DVec2; 2]>| {
-            let Some([_, middle]) = ways.get(ways.len() / 2) else { return false };
-            lines::nearest_among(&all, *middle).is_some_and(|(own, _)| own == sheet)
+        let arrives = |point_paths: &&Vec<[DVec2; 2]>| {
+            let Some([_, middle]) = point_paths.get(point_paths.len() / 2) else { return false };
+            polyline::nearest_among(&all, *middle).is_some_and(|(own, _)| own == sheet)
         };
-        let strands = shape.checked_sub(1).map(|before| self.ways(before)).unwrap_or_default();
-        strands.iter().filter(arrives).map(|ways| ways.iter().map(|way| way[0]).collect()).collect()
+        let strands = shape.checked_sub(1).map(|before| self.point_paths(before)).unwrap_or_default();
+        strands.iter().filter(arrives).map(|point_paths| point_paths.iter().map(|way| way[0]).collect()).collect()
     }
 
     /// Where the points of shape `shape` go on the way to the next, km, strand by strand.
-    pub fn ways(&self, shape: usize) -> Vec<Vec<[DVec2; 2]>> {
+    pub fn point_paths(&self, shape: usize) -> Vec<Vec<[DVec2; 2]>> {
         self.sequence.ways(shape)
     }
 }
@@ -141,17 +144,17 @@ impl Document {
     ///
     /// # Errors
     /// It cannot, for the reason given; nothing is changed then.
-    pub fn reshape(
+    pub fn edit_shapes(
         &mut self,
         label: &str,
         operations: &[Operation],
         index: usize,
         assets: &Arc<dyn Assets>,
-    ) -> Result<Drawing, Refusal> {
+    ) -> Result<AuroraDrawing, ShapeEditError> {
         let text = operation::apply(self.text(), operations)?;
-        let root = values(&text).map_err(|problem| Refusal::Faulty(problem.to_string()))?;
-        let drawing = Drawing::read(&root, index, assets)?;
-        self.go_on(label, text, root);
+        let root = values(&text).map_err(|problem| ShapeEditError::Faulty(problem.to_string()))?;
+        let drawing = AuroraDrawing::read(&root, index, assets)?;
+        self.apply_text(label, text, root);
         Ok(drawing)
     }
 }

@@ -4,35 +4,35 @@ use std::collections::BTreeSet;
 
 use bansho::{aurora::shapes::LinkParameters, render::scene::operation::Operation};
 
-use super::{Drawing, lines, renumber::Fate};
+use super::{AuroraDrawing, polyline, renumber::SheetRemap};
 
 /// Strands on the way from a shape to the next: the sheet that each is part of before, and after.
 type Strands = Vec<(usize, usize)>;
 
-impl Drawing {
+impl AuroraDrawing {
     /// Without sheet `sheet` of shape `shape`, without sheets that only become what is gone, and without those that only come of it.
     /// A sheet that split off goes by itself, and so does one that would have grown together with another.
     pub fn remove_sheet(&self, shape: usize, sheet: usize) -> Vec<Operation> {
         let mut gone: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); self.arrivals().len()];
         gone[shape].insert(sheet);
-        let ways: Vec<Strands> = (1..gone.len()).map(|shape| self.strands(shape - 1)).collect();
+        let point_paths: Vec<Strands> = (1..gone.len()).map(|shape| self.strands(shape - 1)).collect();
         for before in (0..shape).rev() {
-            let turned: Strands = ways[before].iter().map(|&(from, to)| (to, from)).collect();
+            let turned: Strands = point_paths[before].iter().map(|&(from, to)| (to, from)).collect();
             gone[before] = only_of(&turned, &gone[before + 1]);
         }
-        for before in shape..ways.len() {
-            gone[before + 1] = only_of(&ways[before], &gone[before]);
+        for before in shape..point_paths.len() {
+            gone[before + 1] = only_of(&point_paths[before], &gone[before]);
         }
         let first = gone.iter().position(|sheets| !sheets.is_empty()).unwrap_or(shape);
         let changed: Vec<_> = (first..gone.len())
             .take_while(|&shape| !gone[shape].is_empty())
             .map(|shape| {
                 let kept = self.sheets(shape).into_iter().enumerate().filter(|(sheet, _)| !gone[shape].contains(sheet));
-                (kept.map(|(_, sheet)| sheet).collect(), Fate::Gone(gone[shape].clone()))
+                (kept.map(|(_, sheet)| sheet).collect(), SheetRemap::Gone(gone[shape].clone()))
             })
             .collect();
         let needless = |shape: usize| match shape.checked_sub(1) {
-            Some(before) => self.needless_splits(shape, &ways[before], [&gone[before], &gone[shape]]),
+            Some(before) => self.needless_splits(shape, &point_paths[before], [&gone[before], &gone[shape]]),
             None => Vec::new(),
         };
         self.write_all(first, &changed, LinkParameters::clone, needless)
@@ -41,10 +41,10 @@ impl Drawing {
     /// The strands from shape `before` to the next, in the order of its sheets and along each.
     fn strands(&self, before: usize) -> Strands {
         let [leaving, arriving] = [before, before + 1].map(|shape| self.lines(shape));
-        let ways = self.ways(before);
-        let ends = ways.iter().filter_map(|strand| {
+        let point_paths = self.point_paths(before);
+        let ends = point_paths.iter().filter_map(|strand| {
             let [from, to] = *strand.get(strand.len() / 2)?;
-            Some((lines::nearest_among(&leaving, from)?.0, lines::nearest_among(&arriving, to)?.0))
+            Some((polyline::nearest_among(&leaving, from)?.0, polyline::nearest_among(&arriving, to)?.0))
         });
         ends.collect()
     }

@@ -9,36 +9,36 @@ use bansho::{
     render::scene::operation::Operation,
 };
 
-use super::{Drawing, OnSheet, links::rounded};
+use super::{AuroraDrawing, SheetPosition, links::rounded};
 
 /// What becomes of places on the sheets of a shape.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Fate {
+pub(super) enum SheetRemap {
     /// These sheets are gone.
     Gone(BTreeSet<usize>),
     /// This sheet is cut at a share of its length; its second part comes after it.
-    Cut(OnSheet),
+    Cut(SheetPosition),
     /// Two sheets are one, at the place of the first in the list: each with whether it was turned round, and the share of the
     /// length that the first to be run through has.
     Joined([(usize, bool); 2], f64),
 }
 
-impl Fate {
+impl SheetRemap {
     /// Where a place is now, if it is still there.
-    pub(super) fn of(&self, (sheet, share): OnSheet) -> Option<OnSheet> {
+    pub(super) fn of(&self, (sheet, fraction): SheetPosition) -> Option<SheetPosition> {
         Some(match *self {
             Self::Gone(ref gone) if gone.contains(&sheet) => return None,
-            Self::Gone(ref gone) => (sheet - gone.range(..sheet).count(), share),
-            Self::Cut((cut, at)) if sheet == cut && share <= at => (cut, share / at.max(f64::MIN_POSITIVE)),
-            Self::Cut((cut, at)) if sheet == cut => (cut + 1, (share - at) / (1.0 - at)),
-            Self::Cut((cut, _)) => (sheet + usize::from(sheet > cut), share),
+            Self::Gone(ref gone) => (sheet - gone.range(..sheet).count(), fraction),
+            Self::Cut((cut, at)) if sheet == cut && fraction <= at => (cut, fraction / at.max(f64::MIN_POSITIVE)),
+            Self::Cut((cut, at)) if sheet == cut => (cut + 1, (fraction - at) / (1.0 - at)),
+            Self::Cut((cut, _)) => (sheet + usize::from(sheet > cut), fraction),
             Self::Joined(parts, seam) => {
                 let sheets = parts.map(|(own, _)| own);
                 let (stays, goes) = (sheets[0].min(sheets[1]), sheets[0].max(sheets[1]));
                 match parts.iter().position(|(own, _)| *own == sheet) {
-                    None => (sheet - usize::from(sheet > goes), share),
+                    None => (sheet - usize::from(sheet > goes), fraction),
                     Some(part) => {
-                        let along = if parts[part].1 { 1.0 - share } else { share };
+                        let along = if parts[part].1 { 1.0 - fraction } else { fraction };
                         (stays, if part == 0 { along * seam } else { seam + along * (1.0 - seam) })
                     }
                 }
@@ -47,10 +47,10 @@ impl Fate {
     }
 
     /// The same for a sheet counted from 1, and a place on it where one is told.
-    fn counted(&self, sheet: i64, share: Option<f64>) -> Option<(i64, Option<f64>)> {
+    fn counted(&self, sheet: i64, fraction: Option<f64>) -> Option<(i64, Option<f64>)> {
         // Without a place the beginning is meant.
-        let (sheet, at) = self.of((usize::try_from(sheet - 1).ok()?, share.unwrap_or(0.0)))?;
-        Some((sheet as i64 + 1, share.map(|_| rounded(at))))
+        let (sheet, at) = self.of((usize::try_from(sheet - 1).ok()?, fraction.unwrap_or(0.0)))?;
+        Some((sheet as i64 + 1, fraction.map(|_| rounded(at))))
     }
 
     fn of_arrival(&self, link: &LinkParameters) -> Option<LinkParameters> {
@@ -82,44 +82,44 @@ impl Fate {
     }
 }
 
-impl Drawing {
-    /// Lets everything follow that counts sheets of the shapes from `first` on, of which `fates` tells what became of them; `begun`
+impl AuroraDrawing {
+    /// Lets everything follow that counts sheets of the shapes from `first` on, of which `remaps` tells what became of them; `begun`
     /// changes the links from the shape before, which stays, and splits to a shape that are `needless` go.
     pub(super) fn renumbered(
         &self,
         first: usize,
-        fates: &[Fate],
+        remaps: &[SheetRemap],
         begun: impl Fn(&LinkParameters) -> LinkParameters,
         needless: impl Fn(usize) -> Vec<usize>,
     ) -> Vec<Operation> {
         let mut operations = Vec::new();
-        for shape in first..=first + fates.len() {
-            let arrives = fates.get(shape - first);
-            let leaves = shape.checked_sub(first + 1).and_then(|before| fates.get(before));
+        for shape in first..=first + remaps.len() {
+            let arrives = remaps.get(shape - first);
+            let leaves = shape.checked_sub(first + 1).and_then(|before| remaps.get(before));
             operations.extend(self.relinked(shape, |link| {
-                let link = leaves.map_or_else(|| Some(begun(link)), |fate| fate.of_departure(link))?;
-                arrives.map_or(Some(link.clone()), |fate| fate.of_arrival(&link))
+                let link = leaves.map_or_else(|| Some(begun(link)), |remap| remap.of_departure(link))?;
+                arrives.map_or(Some(link.clone()), |remap| remap.of_arrival(&link))
             }));
             let needless = if arrives.is_some() { needless(shape) } else { Vec::new() };
             operations.extend(self.resplit(shape, leaves, &needless));
-            operations.extend(leaves.and_then(|fate| self.remerged(shape, fate)));
+            operations.extend(leaves.and_then(|remap| self.remerged(shape, remap)));
         }
         operations
     }
 
     /// The splits to shape `shape` after a fate of the one before, without those that are `needless`, by number.
-    fn resplit(&self, shape: usize, fate: Option<&Fate>, needless: &[usize]) -> Option<Operation> {
+    fn resplit(&self, shape: usize, remap: Option<&SheetRemap>, needless: &[usize]) -> Option<Operation> {
         let old = &self.parameters.shapes.get(shape)?.split;
         let kept = old.iter().enumerate().filter(|(number, _)| !needless.contains(number)).map(|(_, split)| split);
         let new: Vec<SplitParameters> =
-            kept.filter_map(|split| fate.map_or(Some(split.clone()), |fate| fate.of_split(split))).collect();
+            kept.filter_map(|split| remap.map_or(Some(split.clone()), |remap| remap.of_split(split))).collect();
         (new != *old).then(|| self.set_list(shape, "split", new.iter().map(split_table).collect()))
     }
 
-    /// The merges to shape `shape` after `fate` of the one before.
-    fn remerged(&self, shape: usize, fate: &Fate) -> Option<Operation> {
+    /// The merges to shape `shape` after `remap` of the one before.
+    fn remerged(&self, shape: usize, remap: &SheetRemap) -> Option<Operation> {
         let old = &self.parameters.shapes.get(shape)?.merge;
-        let new: Vec<MergeParameters> = old.iter().filter_map(|merge| fate.of_merge(merge)).collect();
+        let new: Vec<MergeParameters> = old.iter().filter_map(|merge| remap.of_merge(merge)).collect();
         (new != *old).then(|| self.set_list(shape, "merge", new.iter().map(merge_table).collect()))
     }
 
@@ -168,16 +168,16 @@ mod tests {
     #[test]
     fn places_follow_their_sheets() {
         assert_eq!(
-            [0, 1, 2].map(|sheet| Fate::Gone([1].into()).of((sheet, 0.5))),
+            [0, 1, 2].map(|sheet| SheetRemap::Gone([1].into()).of((sheet, 0.5))),
             [Some((0, 0.5)), None, Some((1, 0.5))]
         );
-        let cut = Fate::Cut((1, 0.25));
+        let cut = SheetRemap::Cut((1, 0.25));
         assert_eq!(
             [(0, 0.9), (1, 0.125), (1, 0.625), (2, 0.1)].map(|place| cut.of(place)),
             [Some((0, 0.9)), Some((1, 0.5)), Some((2, 0.5)), Some((3, 0.1)),]
         );
         // Sheet 3 runs back to its beginning, where sheet 1 goes on.
-        let joined = Fate::Joined([(3, true), (1, false)], 0.5);
+        let joined = SheetRemap::Joined([(3, true), (1, false)], 0.5);
         assert_eq!(
             [(3, 1.0), (3, 0.0), (1, 0.5), (2, 0.3), (4, 0.3)].map(|place| joined.of(place)),
             [Some((1, 0.0)), Some((1, 0.5)), Some((1, 0.75)), Some((2, 0.3)), Some((3, 0.3)),]
@@ -187,10 +187,10 @@ mod tests {
     #[test]
     fn merges_of_what_are_ends_no_longer_go() {
         let merge = MergeParameters { sheets: [1, 3], at: Auto::Set([1.0, 0.0]) };
-        let after = |fate: Fate| fate.of_merge(&merge);
-        assert_eq!(after(Fate::Gone([1].into())), Some(MergeParameters { sheets: [1, 2], ..merge.clone() }));
-        assert_eq!(after(Fate::Gone([2].into())), None);
-        assert_eq!(after(Fate::Cut((0, 0.5))), Some(MergeParameters { sheets: [2, 4], ..merge.clone() }));
-        assert_eq!(after(Fate::Joined([(0, false), (1, false)], 0.5)), None, "the seam is no end");
+        let after = |remap: SheetRemap| remap.of_merge(&merge);
+        assert_eq!(after(SheetRemap::Gone([1].into())), Some(MergeParameters { sheets: [1, 2], ..merge.clone() }));
+        assert_eq!(after(SheetRemap::Gone([2].into())), None);
+        assert_eq!(after(SheetRemap::Cut((0, 0.5))), Some(MergeParameters { sheets: [2, 4], ..merge.clone() }));
+        assert_eq!(after(SheetRemap::Joined([(0, false), (1, false)], 0.5)), None, "the seam is no end");
     }
 }

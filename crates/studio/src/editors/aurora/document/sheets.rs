@@ -8,7 +8,7 @@ use bansho::{
     },
 };
 
-use super::{Drawing, lines, links::rounded};
+use super::{AuroraDrawing, links::rounded, polyline};
 
 /// What can be painted along a sheet, each a factor of the aurora's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,13 +37,13 @@ impl Factor {
     }
 }
 
-impl Drawing {
+impl AuroraDrawing {
     /// A line is kept within this share of the square's side.
     const TOLERANCE: f64 = 0.002;
 
     /// A line with few points, as a person would write them down.
     pub(super) fn written(&self, line: &[DVec2]) -> Vec<[f64; 2]> {
-        let points = lines::simplified(line, Self::TOLERANCE * self.extent_km());
+        let points = polyline::simplified(line, Self::TOLERANCE * self.extent_km());
         points.into_iter().map(|point| self.rounded(point)).collect()
     }
 
@@ -61,7 +61,7 @@ impl Drawing {
             Some(points) => points.into_iter().map(DVec2::from).collect(),
             None => {
                 let line = self.lines(shape).into_iter().nth(sheet).unwrap_or_default();
-                lines::simplified(&line, Self::TOLERANCE * self.extent_km())
+                polyline::simplified(&line, Self::TOLERANCE * self.extent_km())
             }
         }
     }
@@ -88,7 +88,7 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
     /// A factor is kept within this.
     const TOLERANCE: f64 = 0.01;
     let usual = SheetParameters::default().flux;
-    let total = lines::length(line).max(f64::MIN_POSITIVE);
+    let total = polyline::length(line).max(f64::MIN_POSITIVE);
     let mut way = 0.0;
     let mut points = Vec::new();
     for (index, value) in values.iter().enumerate().take(line.len()) {
@@ -106,7 +106,7 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
     }
     // Between few points a curve may swing away from the lines that would do.
     let with = |tolerance: f64| {
-        let kept = lines::simplified(&points, tolerance).into_iter().map(|point| point.to_array().map(rounded));
+        let kept = polyline::simplified(&points, tolerance).into_iter().map(|point| point.to_array().map(rounded));
         Curve::new(kept.collect(), usual.interpolation()).ok()
     };
     let is_near = |curve: &Curve| points.iter().all(|point| (curve.eval(point.x) - point.y).abs() < 2.0 * TOLERANCE);
@@ -159,15 +159,15 @@ pub(super) fn curve_part(curve: &Curve, [from, to]: [f64; 2]) -> Curve {
     Curve::new(points, curve.interpolation()).unwrap_or_else(|_| curve.clone())
 }
 
-/// Two curves end to end, the first up to the share `share`; each may run against its own direction.
-pub(super) fn curve_chain(parts: [(&Curve, bool); 2], share: f64) -> Curve {
+/// Two curves end to end, the first up to the share `fraction`; each may run against its own direction.
+pub(super) fn curve_chain(parts: [(&Curve, bool); 2], fraction: f64) -> Curve {
     /// What the two meet over, as a share of the whole.
     const SEAM: f64 = 1e-3;
     let [first, second] = parts;
     if first.0 == second.0 && first.0.points().len() < 2 {
         return first.0.clone();
     }
-    let ranges = [[0.0, share - SEAM], [share + SEAM, 1.0]];
+    let ranges = [[0.0, fraction - SEAM], [fraction + SEAM, 1.0]];
     let mut points = Vec::new();
     for ((curve, reversed), [from, to]) in parts.into_iter().zip(ranges) {
         let mut own = curve_part(&sampled(curve), [0.0, 1.0]).points().to_vec();

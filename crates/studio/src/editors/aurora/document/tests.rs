@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use bansho::{Assets, MemoryAssets, aurora::shapes::Form, base::math::DVec2};
 
-use super::{Drawing, Factor, Refusal};
+use super::{AuroraDrawing, Factor, ShapeEditError};
 use crate::document::Document;
 
 const ARC: &str = "\
@@ -17,14 +17,14 @@ fn assets() -> Arc<dyn Assets> {
     Arc::new(MemoryAssets::default())
 }
 
-fn open(text: &str) -> (Document, Drawing) {
+fn open(text: &str) -> (Document, AuroraDrawing) {
     let document = Document::new("aurora", text);
-    let drawing = Drawing::read(document.values(), 0, &assets()).unwrap();
+    let drawing = AuroraDrawing::read(document.values(), 0, &assets()).unwrap();
     (document, drawing)
 }
 
-fn change(document: &mut Document, operations: &[bansho::render::scene::operation::Operation]) -> Drawing {
-    document.reshape("change", operations, 0, &assets()).unwrap()
+fn change(document: &mut Document, operations: &[bansho::render::scene::operation::Operation]) -> AuroraDrawing {
+    document.edit_shapes("change", operations, 0, &assets()).unwrap()
 }
 
 fn stroke(points: &[[f64; 2]]) -> Vec<DVec2> {
@@ -53,10 +53,10 @@ fn strokes_are_drawn_as_new_sheets_and_in_stead_of_old_ones() {
 fn impossible_strokes_are_refused_in_the_scene_s_words() {
     let (mut document, drawing) = open(ARC);
     let across = drawing.draw(0, None, &stroke(&[[0.0, -100.0], [0.0, 100.0]]));
-    let refusal = document.reshape("draw", &across, 0, &assets()).unwrap_err();
-    assert!(refusal.to_string().starts_with("shape 1: sheet 2 meets sheet 1"), "{refusal}");
+    let shape_error = document.edit_shapes("draw", &across, 0, &assets()).unwrap_err();
+    assert!(shape_error.to_string().starts_with("shape 1: sheet 2 meets sheet 1"), "{shape_error}");
     assert_eq!(**document.text(), *ARC);
-    assert!(matches!(Drawing::read(document.values(), 1, &assets()), Err(Refusal::Missing)));
+    assert!(matches!(AuroraDrawing::read(document.values(), 1, &assets()), Err(ShapeEditError::Missing)));
 }
 
 #[test]
@@ -67,14 +67,14 @@ fn a_split_cuts_what_the_sheet_became() {
     let drawing = change(&mut document, &drawing.draw(1, Some(0), &bent));
     let drawing = change(&mut document, &drawing.split(1, 0, 0.5));
     assert_eq!([drawing.lines(0).len(), drawing.lines(1).len()], [1, 2]);
-    assert_eq!(drawing.ways(0).len(), 2);
+    assert_eq!(drawing.point_paths(0).len(), 2);
     let ends = [drawing.points(1, 0), drawing.points(1, 1)];
     assert!(ends[0].last().unwrap().x < -5.0 && ends[1].first().unwrap().x > 5.0, "{ends:?}");
     assert!((ends[0].last().unwrap().y - 60.0).abs() < 2.0, "{ends:?}");
     assert!(document.text().contains("# the arc") && document.text().contains("# wide"), "{}", document.text());
     let twice = drawing.split(1, 0, 0.5);
-    let refusal = document.reshape("split", &twice, 0, &assets()).unwrap_err();
-    assert!(refusal.to_string().contains("split already"), "{refusal}");
+    let shape_error = document.edit_shapes("split", &twice, 0, &assets()).unwrap_err();
+    assert!(shape_error.to_string().contains("split already"), "{shape_error}");
     assert!(is_good(&mut document));
 }
 
@@ -88,8 +88,9 @@ fn two_ends_grow_together_and_a_ring_is_refused() {
     assert_eq!(drawing.lines(1).len(), 1);
     let points = drawing.points(1, 0);
     assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(-200.0, 0.0), DVec2::new(-200.0, 60.0)));
-    let refusal = document.reshape("merge", &drawing.merge(1, [(0, false), (1, true)]), 0, &assets()).unwrap_err();
-    assert!(refusal.to_string().contains("ring"), "{refusal}");
+    let shape_error =
+        document.edit_shapes("merge", &drawing.merge(1, [(0, false), (1, true)]), 0, &assets()).unwrap_err();
+    assert!(shape_error.to_string().contains("ring"), "{shape_error}");
     assert!(is_good(&mut document));
 }
 
@@ -143,20 +144,22 @@ fn sheets_and_points_are_told_what_they_become() {
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-200.0, 60.0], [200.0, 60.0]])));
     let drawing = change(&mut document, &drawing.add_shape());
     let drawing = change(&mut document, &drawing.add_shape());
-    let exchanged = change(&mut document, &drawing.correspond(1, (0, 0.3), 1));
+    let exchanged = change(&mut document, &drawing.link_sheet(1, (0, 0.3), 1));
     assert!(document.text().contains("link = [{ from = 1, to = 2 }]"), "{}", document.text());
-    let crosses =
-        |drawing: &Drawing, shape: usize| drawing.ways(shape)[0].iter().all(|[from, to]| (to.y - from.y).abs() > 59.0);
+    let crosses = |drawing: &AuroraDrawing, shape: usize| {
+        drawing.point_paths(shape)[0].iter().all(|[from, to]| (to.y - from.y).abs() > 59.0)
+    };
     assert!(crosses(&exchanged, 0) && !crosses(&exchanged, 1), "only that transition goes otherwise");
-    let back = change(&mut document, &exchanged.correspond(1, (0, 0.3), 0));
+    let back = change(&mut document, &exchanged.link_sheet(1, (0, 0.3), 0));
     assert!(!crosses(&back, 0));
 
-    let moved = change(&mut document, &back.correspond_at(1, (0, 0.25), (0, 0.5)));
+    let moved = change(&mut document, &back.link_point(1, (0, 0.25), (0, 0.5)));
     let [from, to] = moved.linked(1)[0].1;
     assert!((from.x + 100.0).abs() < 1e-6 && to.x.abs() < 1e-6, "{from} {to}");
-    let arrives = |drawing: &Drawing, from: f64| {
-        let ways = drawing.ways(0).concat();
-        ways.iter()
+    let arrives = |drawing: &AuroraDrawing, from: f64| {
+        let point_paths = drawing.point_paths(0).concat();
+        point_paths
+            .iter()
             .filter(|way| way[0].y.abs() < 1.0)
             .map(|way| ((way[0].x - from).abs(), way[1].x))
             .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -164,7 +167,7 @@ fn sheets_and_points_are_told_what_they_become() {
             .1
     };
     assert!(arrives(&moved, -100.0).abs() < 5.0, "{}", arrives(&moved, -100.0));
-    let again = change(&mut document, &moved.correspond_at(1, (0, 0.26), (0, 0.4)));
+    let again = change(&mut document, &moved.link_point(1, (0, 0.26), (0, 0.4)));
     assert_eq!(again.linked(1).len(), 1, "the same point is linked anew: {}", document.text());
     let freed = change(&mut document, &again.unlink(1, DVec2::new(-40.0, 0.0), 5.0));
     assert!(freed.linked(1).is_empty() && (arrives(&freed, -100.0) + 100.0).abs() < 5.0);

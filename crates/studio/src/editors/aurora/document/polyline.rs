@@ -4,11 +4,11 @@ use bansho::base::math::{DVec2, lerp};
 
 /// A place on a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OnLine {
+pub struct LinePoint {
     /// The segment, from the point of that number to the next.
     pub segment: usize,
     /// The share of the segment.
-    pub share: f64,
+    pub fraction: f64,
     /// Where it is, km.
     pub point: DVec2,
     /// How far that is from what was asked for, km.
@@ -16,26 +16,26 @@ pub struct OnLine {
 }
 
 /// The place on `line` that is nearest to `to`; `None` where the line has no segment.
-pub fn nearest(line: &[DVec2], to: DVec2) -> Option<OnLine> {
+pub fn nearest(line: &[DVec2], to: DVec2) -> Option<LinePoint> {
     let on = |(segment, ends): (usize, &[DVec2])| {
         let (from, way) = (ends[0], ends[1] - ends[0]);
         let squared = way.length_squared();
-        let share = if squared > 0.0 { ((to - from).dot(way) / squared).clamp(0.0, 1.0) } else { 0.0 };
-        let point = from + share * way;
-        OnLine { segment, share, point, distance: point.distance(to) }
+        let fraction = if squared > 0.0 { ((to - from).dot(way) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        let point = from + fraction * way;
+        LinePoint { segment, fraction, point, distance: point.distance(to) }
     };
     line.windows(2).enumerate().map(on).min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
 /// Which of some lines comes nearest to a point, and where on it that is.
-pub fn nearest_among(all: &[Vec<DVec2>], to: DVec2) -> Option<(usize, OnLine)> {
+pub fn nearest_among(all: &[Vec<DVec2>], to: DVec2) -> Option<(usize, LinePoint)> {
     let on = |(number, line): (usize, &Vec<DVec2>)| Some((number, nearest(line, to)?));
     all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))
 }
 
 /// The point of `line` at a share of its length.
-pub fn at(line: &[DVec2], share: f64) -> Option<DVec2> {
-    part(line, [share, 1.0]).first().copied()
+pub fn at(line: &[DVec2], fraction: f64) -> Option<DVec2> {
+    part(line, [fraction, 1.0]).first().copied()
 }
 
 /// Length of `line`, km.
@@ -44,11 +44,11 @@ pub fn length(line: &[DVec2]) -> f64 {
 }
 
 /// The share of the whole length up to `at`.
-pub fn share_of(line: &[DVec2], at: OnLine) -> f64 {
+pub fn share_of(line: &[DVec2], at: LinePoint) -> f64 {
     let before = length(line.get(..=at.segment).unwrap_or(line));
     let here = line.get(at.segment..at.segment + 2).map_or(0.0, length);
     let total = length(line);
-    if total > 0.0 { (before + at.share * here) / total } else { 0.5 }
+    if total > 0.0 { (before + at.fraction * here) / total } else { 0.5 }
 }
 
 /// The part of `line` between two shares of its length.
@@ -58,8 +58,8 @@ pub fn part(line: &[DVec2], [from, to]: [f64; 2]) -> Vec<DVec2> {
     let mut points = Vec::new();
     for ends in line.windows(2) {
         let step = ends[0].distance(ends[1]);
-        let at = |share: f64| ends[0].lerp(ends[1], (share * total - way) / step);
-        let [starts, stops] = [from, to].map(|share| (way..way + step).contains(&(share * total)));
+        let at = |fraction: f64| ends[0].lerp(ends[1], (fraction * total - way) / step);
+        let [starts, stops] = [from, to].map(|fraction| (way..way + step).contains(&(fraction * total)));
         if starts {
             points.push(at(from));
         }
@@ -103,8 +103,8 @@ pub fn smoothed(points: &[DVec2], around: DVec2, radius: f64) -> Vec<DVec2> {
 
 /// Factors along a sheet, as (share, factor), brushed by `by` at the share `at`, less and less up to `reach` to both sides.
 pub fn brushed(factors: &[[f64; 2]], at: f64, by: f64, reach: f64) -> Vec<[f64; 2]> {
-    let weight = |share: f64| (1.0 - (share - at).abs() / reach).max(0.0);
-    factors.iter().map(|&[share, factor]| [share, lerp(factor, factor + by, weight(share))]).collect()
+    let weight = |fraction: f64| (1.0 - (fraction - at).abs() / reach).max(0.0);
+    factors.iter().map(|&[fraction, factor]| [fraction, lerp(factor, factor + by, weight(fraction))]).collect()
 }
 
 #[cfg(test)]
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!((on.segment, on.point, on.distance), (0, DVec2::new(1.0, 0.0), 2.0));
         assert_eq!(share_of(&corner, on), 0.25);
         let end = nearest(&corner, DVec2::new(4.0, 1.0)).unwrap();
-        assert_eq!((end.segment, end.share, share_of(&corner, end)), (1, 1.0, 1.0));
+        assert_eq!((end.segment, end.fraction, share_of(&corner, end)), (1, 1.0, 1.0));
         assert_eq!(nearest(&corner[..1], DVec2::ZERO), None);
     }
 
