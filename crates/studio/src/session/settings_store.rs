@@ -3,9 +3,6 @@
 
 use std::path::PathBuf;
 
-#[cfg(target_arch = "wasm32")]
-use crate::app::files::browser_io;
-
 /// Where they are kept.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SettingsStore {
@@ -22,7 +19,7 @@ impl SettingsStore {
 
     /// At the browser: a page has no home.
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn new(_home: Option<PathBuf>) -> Self {
+    pub(crate) fn new(_home: Option<PathBuf>) -> Self {
         Self {}
     }
 
@@ -46,20 +43,20 @@ impl SettingsStore {
 
     /// The text `name`, if it is kept.
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn read(&self, name: &str) -> Option<String> {
-        browser_io::storage()?.get_item(&key(name)).ok()?
+    pub(crate) fn read(&self, name: &str) -> Option<String> {
+        storage()?.get_item(&key(name)).ok()?
     }
 
     /// Keeps `text` as `name`; whether it could.
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn write(&self, name: &str, text: &str) -> bool {
-        browser_io::storage().is_some_and(|storage| storage.set_item(&key(name), text).is_ok())
+    pub(crate) fn write(&self, name: &str, text: &str) -> bool {
+        storage().is_some_and(|storage| storage.set_item(&key(name), text).is_ok())
     }
 
     /// The names of all texts that are kept as `beginning`, or as that and more words; the first kept first.
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn names(&self, beginning: &str) -> Vec<String> {
-        let Some(storage) = browser_io::storage() else { return Vec::new() };
+    pub(crate) fn names(&self, beginning: &str) -> Vec<String> {
+        let Some(storage) = storage() else { return Vec::new() };
         let count = storage.length().unwrap_or_default();
         let keys = (0..count).filter_map(|index| storage.key(index).ok()?);
         let names = keys.filter_map(|own| Some(own.strip_prefix(&key(""))?.to_owned()));
@@ -71,9 +68,9 @@ impl SettingsStore {
 
     /// Keeps nothing as `name` any more.
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn forget(&self, name: &str) {
+    pub(crate) fn remove(&self, name: &str) {
         // What cannot be removed is offered again, which does no harm.
-        let _ = browser_io::storage().map(|storage| storage.remove_item(&key(name)));
+        let _ = storage().map(|storage| storage.remove_item(&key(name)));
     }
 }
 
@@ -81,4 +78,10 @@ impl SettingsStore {
 #[cfg(target_arch = "wasm32")]
 fn key(name: &str) -> String {
     format!("bansho-studio {name}")
+}
+
+/// The local storage of this page's origin, where the browser grants it.
+#[cfg(target_arch = "wasm32")]
+fn storage() -> Option<web_sys::Storage> {
+    web_sys::window()?.local_storage().ok()?
 }

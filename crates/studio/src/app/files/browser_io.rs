@@ -9,7 +9,7 @@ use std::{
 use eframe::egui::{Context, DroppedFileHandle};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Storage, Url};
+use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
 
 /// Files that came in, by name.
 pub(super) type Inbox = Rc<RefCell<Vec<(String, Vec<u8>)>>>;
@@ -81,11 +81,6 @@ pub(super) fn download(name: &str, parts: &Parts) -> Result<(), JsValue> {
     link.set_download(name);
     link.click();
     Url::revoke_object_url(&url)
-}
-
-/// What the browser keeps for this page's server, where it does.
-pub(crate) fn storage() -> Option<Storage> {
-    web_sys::window()?.local_storage().ok()?
 }
 
 async fn bytes_of(file: &File) -> Result<Vec<u8>, JsValue> {

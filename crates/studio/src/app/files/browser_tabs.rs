@@ -46,7 +46,7 @@ impl BrowserTabs {
         match work {
             Some(work) => self.store.write(&self.own, work),
             None => {
-                self.store.forget(&self.own);
+                self.store.remove(&self.own);
                 true
             }
         }

@@ -151,5 +151,5 @@ fn forget(recovered: &RecoveredWork) {
 
 #[cfg(target_arch = "wasm32")]
 fn forget(recovered: &RecoveredWork) {
-    SettingsStore::default().forget(&recovered.kept_in.to_string_lossy());
+    SettingsStore::default().remove(&recovered.kept_in.to_string_lossy());
 }

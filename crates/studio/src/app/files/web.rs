@@ -121,7 +121,7 @@ impl Files {
             return;
         };
         session.added_files().iter().for_each(|(name, bytes)| player.add_file(name, bytes));
-        let request = session.finished(first);
+        let request = session.full_quality_request(first);
         player.request(request.clone());
         self.platform.rendering =
             Some(Rendering { player, request, stem: stem(session).to_owned(), done: 0, total, shot });
