@@ -1,8 +1,14 @@
-//! A window that needs no GPU: egui's triangles painted by the processor's own cores, and only where something changed.
+//! A software rasterizer for [egui], and a window that shows it, for machines without a GPU.
 //!
-//! [`window`] runs a [`App`] in a window of the system; [`Painter`] turns what egui wants painted
-//! into pixels; `Screen` brings those that changed to the window. No library does this for this version of egui, and
-//! painters that pretend to be a GPU paint the whole window for every frame.
+//! [`window::run`] runs an [`App`] in a native window (`winit`). Per frame:
+//! 1. egui tessellates the user interface into clipped triangle meshes.
+//! 2. `primitives` converts each mesh to rectangles, where two triangles form one, and triangles.
+//! 3. `tiles` bins the primitives into tiles of 64 x 32 pixels. Each tile keeps a hash of the primitives that touch it:
+//!    a tile with an unchanged hash and unchanged texels is not repainted.
+//! 4. `raster` paints the changed tiles on a thread pool; `triangle` has the edge functions, `blend` egui's blending in gamma space.
+//! 5. `surface` copies the changed rectangles to the window (`softbuffer`), with the damage that the system needs to know.
+//!
+//! A software Vulkan driver such as lavapipe would repaint the whole window for every frame.
 
 mod app;
 mod blend;
@@ -19,30 +25,30 @@ pub mod window;
 use egui::{ClippedPrimitive, TexturesDelta, epaint::Primitive};
 
 pub use app::App;
-use primitives::{Piece, Target};
+use primitives::{DrawPrimitive, Viewport};
 use textures::Textures;
-pub use tiles::Area;
-use tiles::Canvas;
+pub use tiles::PixelRect;
+use tiles::TileGrid;
 
-/// Paints what egui wants seen, and keeps it: where the next frame is the same, nothing is painted.
+/// Rasterizes egui's meshes into a retained framebuffer: only what changed since the previous frame is painted.
 pub struct Painter {
     textures: Textures,
-    canvas: Canvas,
-    pieces: Vec<Piece>,
+    tile_grid: TileGrid,
+    primitives: Vec<DrawPrimitive>,
     /// A pool of its own: the application's pool may be busy with long jobs.
     pool: Option<rayon::ThreadPool>,
 }
 
 impl Default for Painter {
     fn default() -> Self {
-        // Where the system gives no threads, the window's own paints.
+        // Without a thread pool, the calling thread paints.
         let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("paint {index}")).build().ok();
-        Self { textures: Textures::default(), canvas: Canvas::default(), pieces: Vec::new(), pool }
+        Self { textures: Textures::default(), tile_grid: TileGrid::default(), primitives: Vec::new(), pool }
     }
 }
 
 impl Painter {
-    /// Takes in textures that are new or changed.
+    /// Uploads new and changed textures. Call before [`paint`](Self::paint).
     pub fn set_textures(&mut self, delta: &mut TexturesDelta) {
         for (id, images) in delta.set.drain() {
             for image in &images {
@@ -51,35 +57,36 @@ impl Painter {
         }
     }
 
-    /// Gives up textures that nothing shows any more; after a frame is painted.
+    /// Frees textures that egui no longer uses. Call after [`paint`](Self::paint).
     pub fn free_textures(&mut self, delta: &mut TexturesDelta) {
         for id in delta.free.drain() {
             self.textures.free(id);
         }
     }
 
-    /// Paints `primitives` in a window of `size` pixels, of which a point of the screen has `pixels_per_point`. What changed, pixels.
-    pub fn paint(&mut self, primitives: &[ClippedPrimitive], pixels_per_point: f32, size: [u32; 2]) -> Vec<Area> {
-        let target = Target { pixels_per_point, size: size.map(|side| side.min(i32::MAX as u32) as i32) };
-        self.pieces.clear();
+    /// Paints `primitives` into a framebuffer of `size` pixels with `pixels_per_point` pixels per egui point. Returns the rectangles that
+    /// changed.
+    pub fn paint(&mut self, primitives: &[ClippedPrimitive], pixels_per_point: f32, size: [u32; 2]) -> Vec<PixelRect> {
+        let target = Viewport { pixels_per_point, size: size.map(|side| side.min(i32::MAX as u32) as i32) };
+        self.primitives.clear();
         for ClippedPrimitive { clip_rect, primitive } in primitives {
             if let Primitive::Mesh(mesh) = primitive {
-                target.add(mesh, *clip_rect, &self.textures, &mut self.pieces);
+                target.add(mesh, *clip_rect, &self.textures, &mut self.primitives);
             }
         }
-        let Self { textures, canvas, pieces, pool } = self;
-        let changed = canvas.paint(target.size, pieces, textures, pool.as_ref());
-        textures.settle();
+        let Self { textures, tile_grid, primitives, pool } = self;
+        let changed = tile_grid.paint(target.size, primitives, textures, pool.as_ref());
+        textures.clear_changes();
         changed
     }
 
-    /// Forgets what was painted: the next frame paints everything.
+    /// Discards the framebuffer: the next frame paints everything.
     pub fn forget(&mut self) {
-        self.canvas = Canvas::default();
+        self.tile_grid = TileGrid::default();
     }
 
-    /// Copies the pixels of `area` into `into`, whose rows have `stride` pixels: 0 in the highest byte, then red, green, blue.
-    pub fn copy(&self, area: Area, into: &mut [u32], stride: usize) {
-        self.canvas.copy(area, into, stride);
+    /// Copies the pixels of `area` into `into`, whose rows have `stride` pixels, as 0x00RRGGBB.
+    pub fn copy(&self, area: PixelRect, into: &mut [u32], stride: usize) {
+        self.tile_grid.copy(area, into, stride);
     }
 }

@@ -1,4 +1,4 @@
-//! egui's meshes taken apart into what can be painted: rectangles wherever two triangles make one, and triangles.
+//! Converts egui's meshes to draw primitives: rectangles wherever two triangles form one, and triangles.
 
 use egui::{
     Color32, Mesh, Pos2, Rect,
@@ -6,54 +6,55 @@ use egui::{
 };
 
 use super::{
-    blend::{Rgba, times},
+    blend::{Rgba, multiply},
     textures::{Texture, Textures},
-    tiles::Area,
+    tiles::PixelRect,
     triangle::{Corner, SUBPIXELS, Triangle},
 };
 
-/// Where pictures lie pixel by pixel, up to this share of a texel, nothing is mixed: half a step of 255 at most.
-const EXACT: f64 = 1.0 / 512.0;
+/// Images whose texels align with pixels within this fraction of a texel are copied without filtering: the error is half of 1/255 at most.
+const TEXEL_TOLERANCE: f64 = 1.0 / 512.0;
 
-/// What is painted at once.
+/// A rectangle or a triangle, clipped.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
-    /// Where it may be seen: its bounds within its clip, never empty.
-    pub(super) area: Area,
+pub(super) struct DrawPrimitive {
+    /// Its bounds within its clip rectangle, never empty.
+    pub(super) area: PixelRect,
     pub(super) shape: Shape,
-    /// Of everything that it looks like, but for the texels.
+    /// Hash of its geometry, colors and texture id; texels are tracked by [`Textures`].
     pub(super) hash: u64,
 }
 
-/// How a piece fills its area; textures by their slots.
+/// How a primitive fills its area; textures by slot.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape {
-    /// With one colour.
+    /// One color.
     Fill(Rgba),
-    /// With texels, one a pixel; the texel of pixel (0, 0).
+    /// One texel per pixel; `origin` is the texel of pixel (0, 0).
     Texels { texture: usize, origin: [i64; 2], tint: Rgba },
-    /// With a picture of another size: the place in it, texels, of the middle of pixel (0, 0), and how much farther each pixel is.
+    /// A scaled image: `from` is the texture coordinate of the center of pixel (0, 0), `step` the increment per pixel, texels.
     Picture { texture: usize, from: [f64; 2], step: [f64; 2], tint: Rgba },
-    /// What of it lies within a triangle.
+    /// The pixels inside a triangle.
     Triangle { texture: usize, triangle: Triangle },
 }
 
-/// What is painted on.
+/// The framebuffer that is painted on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Target {
+pub(super) struct Viewport {
     pub(super) pixels_per_point: f32,
     /// Pixels.
     pub(super) size: [i32; 2],
 }
 
-impl Target {
-    /// Adds what `mesh` shows within `clip`.
-    pub(super) fn add(&self, mesh: &Mesh, clip: Rect, textures: &Textures, pieces: &mut Vec<Piece>) {
+impl Viewport {
+    /// Appends the primitives of `mesh` within `clip`.
+    pub(super) fn add(&self, mesh: &Mesh, clip: Rect, textures: &Textures, primitives: &mut Vec<DrawPrimitive>) {
         let clip = self.clip(clip);
         let Some(slot) = textures.slot(mesh.texture_id).filter(|_| !clip.is_empty()) else { return };
         let Some(texture) = textures.get(slot) else { return };
-        // Nearly all that is no letter shows this texel, which is white.
-        let add = Adding { clip, id: mesh.texture_id, slot, texture, first_texel: texture.rounded_at([0.0; 2]) };
+        // Untextured shapes use this texel of the font atlas, which is white.
+        let add =
+            MeshContext { clip, id: mesh.texture_id, slot, texture, first_texel: texture.sample_rounded([0.0; 2]) };
         let mut indices = mesh.indices.as_slice();
         while let [a, b, c, rest @ ..] = indices {
             indices = rest;
@@ -64,19 +65,19 @@ impl Target {
                 && let Some([low, high]) = rectangle(&first, &second)
             {
                 indices = beyond;
-                pieces.extend(add.rectangle(&low, &high));
+                primitives.extend(add.rectangle(&low, &high));
                 continue;
             }
-            pieces.extend(add.triangle(first));
+            primitives.extend(add.triangle(first));
         }
     }
 
-    /// Rounded to pixels, as egui's own painters round it.
-    fn clip(&self, clip: Rect) -> Area {
+    /// The clip rectangle rounded to pixels, as egui's wgpu and glow painters round it.
+    fn clip(&self, clip: Rect) -> PixelRect {
         // Casts saturate.
         let pixel = |at: f32, side: i32| ((at * self.pixels_per_point).round() as i32).clamp(0, side);
         let [width, height] = self.size;
-        Area {
+        PixelRect {
             left: pixel(clip.min.x, width),
             top: pixel(clip.min.y, height),
             right: pixel(clip.max.x, width),
@@ -84,7 +85,7 @@ impl Target {
         }
     }
 
-    /// Corners that are somewhere, of a triangle of the mesh.
+    /// The corners of a triangle of the mesh; `None` where a position is NaN or an index is out of range.
     fn corners(&self, mesh: &Mesh, indices: [u32; 3], texture: &Texture) -> Option<[Corner; 3]> {
         let size = texture.size().map(|side| side as f32);
         let mut corners = [Corner::default(); 3];
@@ -100,17 +101,17 @@ impl Target {
     }
 }
 
-/// Whether a triangle may be half of a rectangle: two of its sides go along the axes.
+/// Whether a triangle may be half of a rectangle: two of its sides are parallel to the axes.
 fn is_half([a, b, c]: &[Corner; 3]) -> bool {
     let level = |axis: usize| a.at[axis] == b.at[axis] || b.at[axis] == c.at[axis] || c.at[axis] == a.at[axis];
     level(0) && level(1)
 }
 
-/// The first and the last corner of the rectangle that two triangles make which have one colour, and of which each axis goes along one
-/// of the texture.
+/// The minimum and maximum corner of the rectangle that two triangles form, where all corners have one color and each texture coordinate
+/// depends on one axis only.
 fn rectangle(first: &[Corner; 3], second: &[Corner; 3]) -> Option<[Corner; 2]> {
     let all = [first, second];
-    let colour = first[0].colour;
+    let color = first[0].color;
     let (mut low, mut high) = (first[0], first[0]);
     for corner in all.into_iter().flatten() {
         for axis in 0..2 {
@@ -122,63 +123,63 @@ fn rectangle(first: &[Corner; 3], second: &[Corner; 3]) -> Option<[Corner; 2]> {
             }
         }
     }
-    // Which of the four corners each triangle has, as bits; the one that each lacks must be the other one's own.
+    // Bit masks of the rectangle corners that each triangle has: each must lack exactly one, opposite to the one that the other lacks.
     let mut seen = [0_u8; 2];
     for (triangle, seen) in all.into_iter().zip(&mut seen) {
         for corner in triangle {
-            let mut place = 0;
+            let mut corner_bits = 0;
             for axis in 0..2 {
                 let end = if corner.at[axis] == high.at[axis] { high } else { low };
-                if corner.at[axis] != end.at[axis] || corner.texel[axis] != end.texel[axis] || corner.colour != colour {
+                if corner.at[axis] != end.at[axis] || corner.texel[axis] != end.texel[axis] || corner.color != color {
                     return None;
                 }
-                place |= u8::from(corner.at[axis] == high.at[axis]) << axis;
+                corner_bits |= u8::from(corner.at[axis] == high.at[axis]) << axis;
             }
-            *seen |= 1 << place;
+            *seen |= 1 << corner_bits;
         }
     }
     let [lacks, other_lacks] = seen.map(|seen| !seen & 15);
-    let opposite = |place: u8| 1 << (3 - place.trailing_zeros());
+    let opposite = |mask: u8| 1 << (3 - mask.trailing_zeros());
     let fit = lacks.count_ones() == 1 && other_lacks.count_ones() == 1 && opposite(lacks) == other_lacks;
     fit.then_some([low, high])
 }
 
-/// Pieces of one mesh.
-struct Adding<'a> {
-    clip: Area,
+/// What the primitives of one mesh share.
+struct MeshContext<'a> {
+    clip: PixelRect,
     id: TextureId,
     slot: usize,
     texture: &'a Texture,
-    /// The colour at (0, 0).
+    /// The color at (0, 0).
     first_texel: Rgba,
 }
 
-impl Adding<'_> {
-    /// `None` where nothing of it is seen.
-    fn rectangle(&self, low: &Corner, high: &Corner) -> Option<Piece> {
-        let area = Area::between(low.at, high.at).within(self.clip);
+impl MeshContext<'_> {
+    /// `None` where nothing of it is visible.
+    fn rectangle(&self, low: &Corner, high: &Corner) -> Option<DrawPrimitive> {
+        let area = PixelRect::covering(low.at, high.at).within(self.clip);
         if area.is_empty() {
             return None;
         }
-        let tint = low.colour;
+        let tint = low.color;
         let shape = if low.texel == high.texel {
-            let colour = times(self.texel(low), tint);
-            if colour == [0; 4] {
+            let color = multiply(self.texel(low), tint);
+            if color == [0; 4] {
                 return None;
             }
-            Shape::Fill(colour)
+            Shape::Fill(color)
         } else {
             self.picture(low, high, tint)
         };
         let hash = match shape {
-            Shape::Fill(colour) => hashed(0, [u64::from(u32::from_le_bytes(colour))]),
-            _ => hash_of(self.id, [low, high]),
+            Shape::Fill(color) => mix_hash(0, [u64::from(u32::from_le_bytes(color))]),
+            _ => hash_vertices(self.id, [low, high]),
         };
-        Some(Piece { area, shape, hash: hashed(hash, area.words()) })
+        Some(DrawPrimitive { area, shape, hash: mix_hash(hash, area.words()) })
     }
 
     fn texel(&self, corner: &Corner) -> Rgba {
-        if corner.texel == [0.0; 2] { self.first_texel } else { self.texture.rounded_at(corner.texel) }
+        if corner.texel == [0.0; 2] { self.first_texel } else { self.texture.sample_rounded(corner.texel) }
     }
 
     fn picture(&self, low: &Corner, high: &Corner, tint: Rgba) -> Shape {
@@ -190,7 +191,8 @@ impl Adding<'_> {
             step[axis] = (last - first) / (end - start);
             from[axis] = first + (0.5 - start) * step[axis];
             let nearest = (first - start).round();
-            exact &= (first - start - nearest).abs() <= EXACT && (last - end - nearest).abs() <= EXACT;
+            exact &=
+                (first - start - nearest).abs() <= TEXEL_TOLERANCE && (last - end - nearest).abs() <= TEXEL_TOLERANCE;
             origin[axis] = nearest as i64;
         }
         if exact {
@@ -200,17 +202,21 @@ impl Adding<'_> {
         }
     }
 
-    /// `None` where nothing of it is seen.
-    fn triangle(&self, corners: [Corner; 3]) -> Option<Piece> {
+    /// `None` where nothing of it is visible.
+    fn triangle(&self, corners: [Corner; 3]) -> Option<DrawPrimitive> {
         let triangle = Triangle::new(corners, |corner| self.texel(corner))?;
         let area = triangle.bounds().within(self.clip);
-        let hash = hashed(hash_of(self.id, &corners), area.words());
-        (!area.is_empty()).then_some(Piece { area, shape: Shape::Triangle { texture: self.slot, triangle }, hash })
+        let hash = mix_hash(hash_vertices(self.id, &corners), area.words());
+        (!area.is_empty()).then_some(DrawPrimitive {
+            area,
+            shape: Shape::Triangle { texture: self.slot, triangle },
+            hash,
+        })
     }
 }
 
-/// Goes on with a hash.
-pub(super) fn hashed(hash: u64, words: impl IntoIterator<Item = u64>) -> u64 {
+/// Mixes `words` into `hash` (multiply and fold, as wyhash does).
+pub(super) fn mix_hash(hash: u64, words: impl IntoIterator<Item = u64>) -> u64 {
     let mut hash = hash;
     for word in words {
         let product =
@@ -220,15 +226,15 @@ pub(super) fn hashed(hash: u64, words: impl IntoIterator<Item = u64>) -> u64 {
     hash
 }
 
-fn hash_of<'a>(id: TextureId, corners: impl IntoIterator<Item = &'a Corner>) -> u64 {
+fn hash_vertices<'a>(id: TextureId, corners: impl IntoIterator<Item = &'a Corner>) -> u64 {
     let mut hash = match id {
-        TextureId::Managed(number) => hashed(1, [number]),
-        TextureId::User(number) => hashed(2, [number]),
+        TextureId::Managed(number) => mix_hash(1, [number]),
+        TextureId::User(number) => mix_hash(2, [number]),
     };
     for corner in corners {
         let pair = |[a, b]: [u32; 2]| u64::from(a) << 32 | u64::from(b);
-        let colour = u64::from(u32::from_le_bytes(corner.colour));
-        hash = hashed(hash, [pair(corner.at.map(|at| at as u32)), pair(corner.texel.map(f32::to_bits)), colour]);
+        let color = u64::from(u32::from_le_bytes(corner.color));
+        hash = mix_hash(hash, [pair(corner.at.map(|at| at as u32)), pair(corner.texel.map(f32::to_bits)), color]);
     }
     hash
 }

@@ -1,4 +1,4 @@
-//! Textures as egui sends them, and which of their parts changed when.
+//! Textures as egui uploads them, with a dirty flag per block of texels.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -9,29 +9,29 @@ use egui::{
 
 use super::blend::Rgba;
 
-/// Changes are told apart by blocks of so many texels.
+/// Size of a block with its own dirty flag, texels.
 const BLOCK: [usize; 2] = [64, 32];
 
-/// All that is shown.
+/// All textures by id.
 #[derive(Default)]
 pub(super) struct Textures {
-    /// Where each one is.
+    /// The slot of each texture in `textures`.
     slots: HashMap<TextureId, usize>,
     textures: Vec<Option<Texture>>,
 }
 
-/// One of them.
+/// A texture.
 pub(super) struct Texture {
     image: Arc<ColorImage>,
     options: TextureOptions,
-    /// Which blocks changed since the last frame, and whether any did.
+    /// The blocks that changed since the last frame.
     changed: Vec<bool>,
     any_changed: bool,
     opaque: bool,
 }
 
 impl Textures {
-    /// Where texture `id` is, until it is given up.
+    /// The slot of texture `id`; valid until the texture is freed.
     pub(super) fn slot(&self, id: TextureId) -> Option<usize> {
         self.slots.get(&id).copied()
     }
@@ -40,7 +40,7 @@ impl Textures {
         self.textures.get(slot)?.as_ref()
     }
 
-    /// Takes in a whole texture, or a part of one that is there.
+    /// Uploads a whole texture, or a region of an existing one.
     pub(super) fn set(&mut self, id: TextureId, delta: &ImageDelta) {
         let ImageData::Color(image) = &delta.image;
         if image.pixels.len() != image.size[0] * image.size[1] || image.pixels.is_empty() {
@@ -53,8 +53,8 @@ impl Textures {
                 self.textures.len() - 1
             })
         });
-        let place = &mut self.textures[slot];
-        match (delta.pos, place) {
+        let entry = &mut self.textures[slot];
+        match (delta.pos, entry) {
             (Some(at), Some(texture)) => texture.set_part(at, image, delta.options),
             (Some(_), None) => {
                 self.slots.remove(&id);
@@ -62,11 +62,11 @@ impl Textures {
             (None, Some(texture)) if (texture.image.size, texture.options) == (image.size, delta.options) => {
                 texture.replace(image);
             }
-            (None, place) => {
+            (None, entry) => {
                 let blocks = blocks(image.size);
                 let changed = vec![true; blocks[0] * blocks[1]];
                 let (image, opaque) = (image.clone(), is_opaque(image));
-                *place = Some(Texture { image, options: delta.options, changed, any_changed: true, opaque });
+                *entry = Some(Texture { image, options: delta.options, changed, any_changed: true, opaque });
             }
         }
     }
@@ -77,8 +77,8 @@ impl Textures {
         }
     }
 
-    /// A frame is painted: nothing changed since.
-    pub(super) fn settle(&mut self) {
+    /// Clears the dirty flags, after a frame is painted.
+    pub(super) fn clear_changes(&mut self) {
         for texture in self.textures.iter_mut().flatten().filter(|texture| texture.any_changed) {
             texture.changed.fill(false);
             texture.any_changed = false;
@@ -99,23 +99,23 @@ fn is_opaque(image: &ColorImage) -> bool {
 }
 
 impl Texture {
-    /// Texels across and down, at least one.
+    /// Width and height, texels; at least one.
     pub(super) fn size(&self) -> [usize; 2] {
         self.image.size
     }
 
-    /// Whether nothing shines through.
+    /// Whether every texel is opaque.
     pub(super) fn is_opaque(&self) -> bool {
         self.opaque
     }
 
-    /// The texels of row `row`, which must be one of the texture.
+    /// The texels of row `row`, which must exist.
     pub(super) fn row(&self, row: usize) -> &[Color32] {
         let width = self.image.size[0];
         &self.image.pixels[row * width..][..width]
     }
 
-    /// Whether anything changed, since the last frame, of texels `from` to `to` and so many `around` them.
+    /// Whether texels from `from` to `to`, with a margin of `around` texels, changed since the last frame.
     pub(super) fn has_changed(&self, [from, to]: [[f32; 2]; 2], around: f32) -> bool {
         if !self.any_changed {
             return false;
@@ -124,7 +124,7 @@ impl Texture {
         let mut ranges = [[0, 0]; 2];
         for axis in 0..2 {
             let last = self.image.size[axis] as f32 - 1.0;
-            // Texels that are repeated may come from anywhere.
+            // A repeating texture may show any of its texels.
             let [low, high] = if self.options.wrap_mode == TextureWrapMode::ClampToEdge {
                 [from[axis].min(to[axis]) - around, from[axis].max(to[axis]) + around].map(|at| at.clamp(0.0, last))
             } else {
@@ -136,7 +136,7 @@ impl Texture {
         rows.into_iter().any(|row| self.changed[row * across..][columns.clone()].contains(&true))
     }
 
-    /// Puts `image`, of the same size, in the place of what is there.
+    /// Replaces the texels by `image`, which has the same size.
     fn replace(&mut self, image: &Arc<ColorImage>) {
         let before = std::mem::replace(&mut self.image, image.clone());
         let [width, height] = image.size;
@@ -153,7 +153,7 @@ impl Texture {
         self.opaque = is_opaque(image);
     }
 
-    /// Lays `image` over what is there, as far as it lies within.
+    /// Copies `image` into the texture at `at`, clipped to the texture.
     fn set_part(&mut self, at: [usize; 2], image: &ColorImage, options: TextureOptions) {
         let size = self.image.size;
         if at[0] >= size[0] || at[1] >= size[1] {
@@ -178,8 +178,8 @@ impl Texture {
         self.opaque &= is_opaque(image);
     }
 
-    /// The texel that stands for number `at` of `axis`, wherever that lies.
-    pub(super) fn wrapped(&self, at: i32, axis: usize) -> usize {
+    /// The texel index for coordinate `at` of `axis` by the wrap mode.
+    pub(super) fn wrap(&self, at: i32, axis: usize) -> usize {
         let side = self.image.size[axis].min(i32::MAX as usize / 2) as i32;
         (match self.options.wrap_mode {
             TextureWrapMode::ClampToEdge => at.clamp(0, side - 1),
@@ -191,52 +191,52 @@ impl Texture {
         }) as usize
     }
 
-    /// The two texels whose mixture stands at `at` of `axis`, texels, and the share of the second.
-    pub(super) fn taps(&self, at: f32, axis: usize) -> Taps {
+    /// The two texels that linear filtering reads at `at` of `axis`, and the weight of the second.
+    pub(super) fn taps(&self, at: f32, axis: usize) -> FilterTaps {
         if self.options.magnification == TextureFilter::Nearest {
-            let texel = self.wrapped(at.floor() as i32, axis);
-            return Taps { texels: [texel; 2], fraction: 0.0 };
+            let texel = self.wrap(at.floor() as i32, axis);
+            return FilterTaps { texels: [texel; 2], weight: 0.0 };
         }
         let floor = (at - 0.5).floor();
         // Saturates, so that nothing overflows.
         let first = (floor as i32).min(i32::MAX - 1);
-        let fraction = if floor.is_finite() { at - 0.5 - floor } else { 0.0 };
-        Taps { texels: [self.wrapped(first, axis), self.wrapped(first + 1, axis)], fraction }
+        let weight = if floor.is_finite() { at - 0.5 - floor } else { 0.0 };
+        FilterTaps { texels: [self.wrap(first, axis), self.wrap(first + 1, axis)], weight }
     }
 
-    /// The mixture of four texels, 0 to 255.
-    pub(super) fn mixed(&self, across: Taps, down: Taps) -> [f32; 4] {
+    /// The bilinearly filtered color of four texels, 0 to 255.
+    pub(super) fn bilinear(&self, across: FilterTaps, down: FilterTaps) -> [f32; 4] {
         let mut sides = [[0.0; 4]; 2];
         for (side, row) in sides.iter_mut().zip(down.texels) {
             let row = self.row(row);
             let [left, right] = across.texels.map(|texel| row[texel].to_array());
-            *side = mix(left.map(f32::from), right.map(f32::from), across.fraction);
+            *side = lerp(left.map(f32::from), right.map(f32::from), across.weight);
         }
-        mix(sides[0], sides[1], down.fraction)
+        lerp(sides[0], sides[1], down.weight)
     }
 
-    /// The colour at `at`, texels.
+    /// The filtered color at `at`, texels.
     pub(super) fn at(&self, at: [f32; 2]) -> [f32; 4] {
-        self.mixed(self.taps(at[0], 0), self.taps(at[1], 1))
+        self.bilinear(self.taps(at[0], 0), self.taps(at[1], 1))
     }
 
     /// The same, rounded.
-    pub(super) fn rounded_at(&self, at: [f32; 2]) -> Rgba {
+    pub(super) fn sample_rounded(&self, at: [f32; 2]) -> Rgba {
         self.at(at).map(|channel| (channel + 0.5) as u8)
     }
 }
 
-/// Two texels and how they are mixed.
+/// Two texels along an axis and the weight of the second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Taps {
+pub(super) struct FilterTaps {
     pub(super) texels: [usize; 2],
-    pub(super) fraction: f32,
+    pub(super) weight: f32,
 }
 
-fn mix(from: [f32; 4], to: [f32; 4], fraction: f32) -> [f32; 4] {
+fn lerp(from: [f32; 4], to: [f32; 4], weight: f32) -> [f32; 4] {
     let mut mixture = from;
     for c in 0..4 {
-        mixture[c] += (to[c] - from[c]) * fraction;
+        mixture[c] += (to[c] - from[c]) * weight;
     }
     mixture
 }

@@ -1,4 +1,4 @@
-//! A window of the system and its events; nothing happens in it unless something is asked for.
+//! A native window and its event loop. It repaints only when egui or the system requests it.
 
 use std::{
     sync::Arc,
@@ -16,150 +16,153 @@ use winit::{
     window::{Window, WindowId},
 };
 
-use super::{Painter, app::App, surface::Screen};
+use super::{Painter, app::App, surface::WindowSurface};
 
-/// Nothing is painted more often than this, whatever moves.
-const LEAST: Duration = Duration::from_millis(8);
+/// Shortest time between two frames.
+const MIN_FRAME_INTERVAL: Duration = Duration::from_millis(8);
 
-/// Pixels that a picture may have a side.
+/// Largest texture side that egui is told, texels.
 const LARGEST_TEXTURE: usize = 8192;
 
-/// Makes what the window shows, once there is something that wakes it.
+/// Builds the application once the egui context can request repaints.
 pub type Build = Box<dyn FnOnce(&egui::Context) -> Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>>;
 
 /// Why there is no window.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
-    /// The system has no screen for it.
+    /// There is no display server.
     #[error("no window: {0}")]
     Events(#[from] EventLoopError),
-    /// The system does not open it.
+    /// The system does not open a window.
     #[error("no window: {0}")]
     Open(#[from] OsError),
-    /// It takes no pixels.
+    /// The system offers no pixel buffer.
     #[error("a window that shows nothing: {0}")]
-    Screen(#[from] softbuffer::SoftBufferError),
-    /// What it would show cannot be made.
+    WindowSurface(#[from] softbuffer::SoftBufferError),
+    /// The application cannot be built.
     #[error(transparent)]
     App(#[from] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// Shows what `build` makes in a window until that closes.
+/// Runs the application that `build` makes in a window, until it closes.
 ///
 /// # Errors
-/// There is no window, or nothing to show.
+/// No window can be opened, or the application cannot be built.
 pub fn run(viewport: egui::ViewportBuilder, build: Build) -> Result<(), WindowError> {
-    let events = EventLoop::<Wake>::with_user_event().build()?;
+    let events = EventLoop::<RepaintRequest>::with_user_event().build()?;
     let ctx = egui::Context::default();
     ctx.set_embed_viewports(false);
     ctx.options_mut(|options| options.max_passes = std::num::NonZeroUsize::MIN.saturating_add(1));
-    wake_by(&ctx, events.create_proxy());
-    let mut runner = Runner { ctx, viewport, build: Some(build), shown: None, due: None, failed: None };
+    request_repaints_with(&ctx, events.create_proxy());
+    let mut runner = Runner { ctx, viewport, build: Some(build), open: None, next_repaint: None, failed: None };
     events.run_app(&mut runner)?;
     runner.failed.map_or(Ok(()), Err)
 }
 
-/// A frame is wanted at a time, as somebody asked who had seen so many.
+/// A repaint at a time, requested after `seen` passes of egui.
 #[derive(Debug)]
-struct Wake {
+struct RepaintRequest {
     at: Instant,
     seen: u64,
 }
 
-fn wake_by(ctx: &egui::Context, proxy: EventLoopProxy<Wake>) {
+fn request_repaints_with(ctx: &egui::Context, proxy: EventLoopProxy<RepaintRequest>) {
     let proxy = std::sync::Mutex::new(proxy);
     ctx.set_request_repaint_callback(move |info| {
         if info.viewport_id == ViewportId::ROOT
             && let Ok(proxy) = proxy.lock()
         {
             let at = Instant::now().checked_add(info.delay);
-            // Nobody listens any more when the window is closed; what is asked for in centuries is not.
-            let _ = at.map(|at| proxy.send_event(Wake { at, seen: info.current_cumulative_pass_nr }));
+            // The event loop may have ended; a time beyond the range of `Instant` never comes.
+            let _ = at.map(|at| proxy.send_event(RepaintRequest { at, seen: info.current_cumulative_pass_nr }));
         }
     });
 }
 
-/// The window, before and while it is there.
+/// The state of the event loop.
 struct Runner {
     ctx: egui::Context,
     viewport: egui::ViewportBuilder,
     build: Option<Build>,
-    shown: Option<Shown>,
-    /// When the next frame is wanted.
-    due: Option<Instant>,
+    open: Option<OpenWindow>,
+    /// When the next frame is due.
+    next_repaint: Option<Instant>,
     failed: Option<WindowError>,
 }
 
-/// The window while it is there.
-struct Shown {
+/// The window while it is open.
+struct OpenWindow {
     app: Box<dyn App>,
     window: Arc<Window>,
     state: State,
     info: ViewportInfo,
     painter: Painter,
-    screen: Screen,
-    /// Cut, copy and paste that were asked for.
+    window_surface: WindowSurface,
+    /// Requests to cut, copy and paste.
     actions: Vec<ActionRequested>,
-    /// When the last frame began.
+    /// Start of the last frame.
     last: Instant,
-    /// Nothing was painted yet.
+    /// Whether nothing was painted yet.
     first: bool,
-    /// The system says when frames are wanted, and keeps what was shown.
-    paced: bool,
+    /// Whether the system paces frames and keeps the content of the window, as Wayland does.
+    vsync: bool,
 }
 
 impl Runner {
     fn open(&mut self, events: &ActiveEventLoop) -> Result<(), WindowError> {
         let Some(build) = self.build.take() else { return Ok(()) };
-        // Nobody sees it before something is painted.
+        // Hidden until the first frame is painted.
         let mut viewport = self.viewport.clone().with_visible(false);
         viewport.inner_size = viewport.inner_size.map(|size| size.min(largest_monitor(events)));
         let window = Arc::new(egui_winit::create_window(&self.ctx, events, &viewport)?);
-        let screen = Screen::new(events.owned_display_handle(), window.clone())?;
+        let window_surface = WindowSurface::new(events.owned_display_handle(), window.clone())?;
         let scale = Some(window.scale_factor() as f32);
         let state =
             State::new(self.ctx.clone(), ViewportId::ROOT, events, scale, events.system_theme(), Some(LARGEST_TEXTURE));
         let mut info = ViewportInfo::default();
         egui_winit::update_viewport_info(&mut info, &self.ctx, &window, true);
         let app = build(&self.ctx)?;
-        let paced = events.display_handle().is_ok_and(|handle| matches!(handle.as_raw(), RawDisplayHandle::Wayland(_)));
-        let last = Instant::now().checked_sub(LEAST).unwrap_or_else(Instant::now);
+        let vsync = events.display_handle().is_ok_and(|handle| matches!(handle.as_raw(), RawDisplayHandle::Wayland(_)));
+        let last = Instant::now().checked_sub(MIN_FRAME_INTERVAL).unwrap_or_else(Instant::now);
         let (painter, actions) = (Painter::default(), Vec::new());
-        self.shown = Some(Shown { app, window, state, info, painter, screen, actions, last, first: true, paced });
-        self.due = Some(Instant::now());
+        self.open =
+            Some(OpenWindow { app, window, state, info, painter, window_surface, actions, last, first: true, vsync });
+        self.next_repaint = Some(Instant::now());
         Ok(())
     }
 
-    fn want(&mut self, at: Instant) {
-        self.due = Some(self.due.map_or(at, |due| due.min(at)));
+    fn schedule(&mut self, at: Instant) {
+        self.next_repaint = Some(self.next_repaint.map_or(at, |next_repaint| next_repaint.min(at)));
     }
 
-    /// Paints a frame if one is wanted by now, and sleeps until the next.
-    fn follow(&mut self, events: &ActiveEventLoop) {
-        let Some(shown) = &mut self.shown else { return };
-        let soonest = shown.last + LEAST;
-        if self.due.is_some_and(|due| due.max(soonest) <= Instant::now()) {
-            self.due = None;
-            if shown.paced && !shown.first {
-                shown.window.request_redraw();
+    /// Paints a frame if one is due, and sets the time to sleep until the next.
+    fn paint_if_due(&mut self, events: &ActiveEventLoop) {
+        let Some(open) = &mut self.open else { return };
+        let soonest = open.last + MIN_FRAME_INTERVAL;
+        if self.next_repaint.is_some_and(|next_repaint| next_repaint.max(soonest) <= Instant::now()) {
+            self.next_repaint = None;
+            if open.vsync && !open.first {
+                open.window.request_redraw();
             } else {
                 self.frame(events, false);
             }
         }
-        let soonest = self.shown.as_ref().map(|shown| shown.last + LEAST);
-        events.set_control_flow(match self.due {
-            Some(due) => ControlFlow::WaitUntil(soonest.map_or(due, |soonest| due.max(soonest))),
+        let soonest = self.open.as_ref().map(|open| open.last + MIN_FRAME_INTERVAL);
+        events.set_control_flow(match self.next_repaint {
+            Some(next_repaint) => {
+                ControlFlow::WaitUntil(soonest.map_or(next_repaint, |soonest| next_repaint.max(soonest)))
+            }
             None => ControlFlow::Wait,
         });
     }
 
-    /// One frame; with `whole`, nothing of the last one is on the screen any more.
+    /// Paints a frame; with `whole`, the system has lost the content of the window.
     fn frame(&mut self, events: &ActiveEventLoop, whole: bool) {
-        let Some(shown) = &mut self.shown else { return };
-        match shown.frame(&self.ctx, events, whole) {
-            Ok(Next::Close) => self.close(events),
-            Ok(Next::Again) => self.want(Instant::now()),
-            Ok(Next::Rest) => {}
+        let Some(open) = &mut self.open else { return };
+        match open.frame(&self.ctx, events, whole) {
+            Ok(AfterFrame::Close) => self.close(events),
+            Ok(AfterFrame::Repaint) => self.schedule(Instant::now()),
+            Ok(AfterFrame::Sleep) => {}
             Err(error) => {
                 self.failed = Some(error);
                 self.close(events);
@@ -168,30 +171,30 @@ impl Runner {
     }
 
     fn close(&mut self, events: &ActiveEventLoop) {
-        if let Some(mut shown) = self.shown.take() {
+        if let Some(mut open) = self.open.take() {
             self.ctx.on_exit();
-            shown.app.on_exit();
+            open.app.on_exit();
         }
         events.exit();
     }
 }
 
-/// What follows a frame.
-enum Next {
-    Rest,
-    Again,
+/// What to do after a frame.
+enum AfterFrame {
+    Sleep,
+    Repaint,
     Close,
 }
 
-impl Shown {
-    fn frame(&mut self, ctx: &egui::Context, events: &ActiveEventLoop, whole: bool) -> Result<Next, WindowError> {
+impl OpenWindow {
+    fn frame(&mut self, ctx: &egui::Context, events: &ActiveEventLoop, whole: bool) -> Result<AfterFrame, WindowError> {
         self.last = Instant::now();
         egui_winit::update_viewport_info(&mut self.info, ctx, &self.window, false);
         let mut input = self.state.take_egui_input(&self.window);
         input.viewports.insert(ViewportId::ROOT, self.info.clone());
         let closing = input.viewport().close_requested();
-        let Self { app, screen, .. } = self;
-        let mut output = ctx.run_ui(input, |ui| app.ui(ui, &mut || screen.settle()));
+        let Self { app, window_surface, .. } = self;
+        let mut output = ctx.run_ui(input, |ui| app.ui(ui, &mut || window_surface.wait_until_presented()));
         self.info.events.clear();
         self.state.handle_platform_output_with_event_loop(&self.window, events, output.platform_output);
         let primitives = ctx.tessellate(std::mem::take(&mut output.shapes), output.pixels_per_point);
@@ -201,9 +204,9 @@ impl Shown {
         self.painter.free_textures(&mut output.textures_delta);
         self.window.pre_present_notify();
         if whole {
-            self.screen.forget();
+            self.window_surface.forget();
         }
-        self.screen.show(&self.painter, &changed, size)?;
+        self.window_surface.present(&self.painter, &changed, size)?;
         if std::mem::take(&mut self.first) {
             self.window.set_visible(true);
         }
@@ -212,16 +215,16 @@ impl Shown {
             commands.extend(viewport.commands);
         }
         if closing && !commands.contains(&ViewportCommand::CancelClose) {
-            return Ok(Next::Close);
+            return Ok(AfterFrame::Close);
         }
         egui_winit::process_viewport_commands(ctx, &mut self.info, commands, &self.window, &mut self.actions);
-        self.act();
+        self.run_actions();
         let again = !self.info.events.is_empty() || !self.state.egui_input().events.is_empty();
-        Ok(if again { Next::Again } else { Next::Rest })
+        Ok(if again { AfterFrame::Repaint } else { AfterFrame::Sleep })
     }
 
-    /// What was asked for becomes input of the next frame.
-    fn act(&mut self) {
+    /// Turns cut, copy and paste requests into input events of the next frame.
+    fn run_actions(&mut self) {
         for action in self.actions.drain(..) {
             let event = match action {
                 ActionRequested::Cut => egui::Event::Cut,
@@ -230,7 +233,7 @@ impl Shown {
                     Some(text) if !text.is_empty() => egui::Event::Paste(text.replace("\r\n", "\n")),
                     _ => continue,
                 },
-                // Nobody asks for pictures of the window.
+                // Screenshots are not supported.
                 ActionRequested::Screenshot(_) | ActionRequested::PaintWhileHidden => continue,
             };
             self.state.egui_input_mut().events.push(event);
@@ -238,7 +241,7 @@ impl Shown {
     }
 }
 
-/// Points of the screen that the largest has; a window that is larger does not open everywhere.
+/// Size of the largest monitor, points. Some systems do not open larger windows.
 fn largest_monitor(events: &ActiveEventLoop) -> egui::Vec2 {
     let mut largest = egui::Vec2::ZERO;
     for monitor in events.available_monitors() {
@@ -248,7 +251,7 @@ fn largest_monitor(events: &ActiveEventLoop) -> egui::Vec2 {
     if largest == egui::Vec2::ZERO { egui::Vec2::INFINITY } else { largest }
 }
 
-impl ApplicationHandler<Wake> for Runner {
+impl ApplicationHandler<RepaintRequest> for Runner {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if let Err(error) = self.open(events) {
             self.failed = Some(error);
@@ -257,48 +260,48 @@ impl ApplicationHandler<Wake> for Runner {
     }
 
     fn new_events(&mut self, events: &ActiveEventLoop, _cause: StartCause) {
-        self.follow(events);
+        self.paint_if_due(events);
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
-        self.follow(events);
+        self.paint_if_due(events);
     }
 
-    fn user_event(&mut self, _events: &ActiveEventLoop, Wake { at, seen }: Wake) {
-        // One that was asked for before the last frames has been painted by now.
-        let shown = self.ctx.cumulative_pass_nr_for(ViewportId::ROOT);
-        if shown == seen || shown == seen + 1 {
-            self.want(at);
+    fn user_event(&mut self, _events: &ActiveEventLoop, RepaintRequest { at, seen }: RepaintRequest) {
+        // Requests made before the last frames are satisfied by them.
+        let passes = self.ctx.cumulative_pass_nr_for(ViewportId::ROOT);
+        if passes == seen || passes == seen + 1 {
+            self.schedule(at);
         }
     }
 
     fn device_event(&mut self, _events: &ActiveEventLoop, _device: DeviceId, event: DeviceEvent) {
-        if let (DeviceEvent::MouseMotion { delta }, Some(shown)) = (event, &mut self.shown)
-            && shown.state.on_mouse_motion(delta)
+        if let (DeviceEvent::MouseMotion { delta }, Some(open)) = (event, &mut self.open)
+            && open.state.on_mouse_motion(delta)
         {
-            self.want(Instant::now());
+            self.schedule(Instant::now());
         }
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _window: WindowId, event: WindowEvent) {
-        let Some(shown) = &mut self.shown else { return };
+        let Some(open) = &mut self.open else { return };
         match &event {
             WindowEvent::RedrawRequested => {
-                // Where frames are not asked of the system, it has lost what was there.
-                let whole = !shown.paced;
+                // Where the system does not pace frames, a redraw request means that the content was lost.
+                let whole = !open.vsync;
                 self.frame(events, whole);
                 return;
             }
             WindowEvent::CloseRequested => {
-                shown.info.events.push(ViewportEvent::Close);
-                self.want(Instant::now());
+                open.info.events.push(ViewportEvent::Close);
+                self.schedule(Instant::now());
                 return;
             }
-            WindowEvent::Occluded(occluded) => shown.info.occluded = Some(*occluded),
+            WindowEvent::Occluded(occluded) => open.info.occluded = Some(*occluded),
             _ => {}
         }
-        if shown.state.on_window_event(&shown.window, &event).repaint {
-            self.want(Instant::now());
+        if open.state.on_window_event(&open.window, &event).repaint {
+            self.schedule(Instant::now());
         }
     }
 

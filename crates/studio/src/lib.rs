@@ -1,5 +1,4 @@
-//! The studio: everything a scene file says, seen and changed live. What is done here is a scene file that
-//! `bansho render` renders identically.
+//! The studio: an editor of scene files with a live preview. The file that it saves is rendered identically by `bansho render`.
 //!
 //! Layers, each of which uses only those above it in this list:
 //! - [`document`]: the scene as text, with its undo history and its problems.

@@ -1,4 +1,4 @@
-//! The studio in a page: on the canvas `studio`, with the example that the address names after its `#`.
+//! The program in a web page: on the canvas `studio`, with the example scene named in the URL's fragment.
 
 use std::{cell::Cell, path::Path, rc::Rc, sync::Arc};
 
@@ -13,7 +13,7 @@ use eframe::egui::{self, Context};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use web_sys::{Event, HtmlCanvasElement, KeyboardEvent, Window};
 
-/// What is shown where the address names nothing.
+/// The example without a fragment.
 const FIRST: &str = "campfire";
 
 pub(super) async fn main() {

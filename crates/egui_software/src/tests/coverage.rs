@@ -141,11 +141,11 @@ fn only_what_changed_is_painted_again() {
     let spot = |x: f32| rectangle(Rect::from_min_size(pos2(x, 40.0), vec2(5.0, 5.0)), Color32::RED);
     let mut painter = painter();
     let (_, all) = painted(&mut painter, [ground(), spot(10.0)]);
-    assert_eq!(all, [Area { left: 0, top: 0, right: 150, bottom: 70 }]);
+    assert_eq!(all, [PixelRect { left: 0, top: 0, right: 150, bottom: 70 }]);
     let (_, again) = painted(&mut painter, [ground(), spot(10.0)]);
     assert!(again.is_empty(), "nothing changed");
     let (moved, where_moved) = painted(&mut painter, [ground(), spot(130.0)]);
-    let tile = |left, right| Area { left, top: 32, right, bottom: 64 };
+    let tile = |left, right| PixelRect { left, top: 32, right, bottom: 64 };
     assert_eq!(where_moved, [tile(0, 64), tile(128, 150)]);
     assert_eq!([pixel(&moved, 12, 42), pixel(&moved, 132, 42)], [0x0028_2828, 0x00ff_0000]);
     let (_, below) = painted(&mut painter, [spot(130.0), ground()]);

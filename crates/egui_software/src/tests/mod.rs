@@ -11,7 +11,7 @@ use egui::{
     pos2,
 };
 
-use super::{Area, Painter};
+use super::{Painter, PixelRect};
 
 /// The window of these tests, pixels: tiles at the right and at the bottom are not whole.
 const SIZE: [u32; 2] = [150, 70];
@@ -58,7 +58,7 @@ fn within(clip_rect: Rect, mesh: Mesh) -> ClippedPrimitive {
 }
 
 /// All pixels after `meshes` were painted over what is there, and where that was.
-fn painted(painter: &mut Painter, meshes: impl IntoIterator<Item = Mesh>) -> (Vec<u32>, Vec<Area>) {
+fn painted(painter: &mut Painter, meshes: impl IntoIterator<Item = Mesh>) -> (Vec<u32>, Vec<PixelRect>) {
     let primitives: Vec<ClippedPrimitive> = meshes.into_iter().map(|mesh| within(EVERYWHERE, mesh)).collect();
     let changed = painter.paint(&primitives, 1.0, SIZE);
     (pixels(painter), changed)
@@ -67,7 +67,7 @@ fn painted(painter: &mut Painter, meshes: impl IntoIterator<Item = Mesh>) -> (Ve
 fn pixels(painter: &Painter) -> Vec<u32> {
     let [width, height] = SIZE;
     let mut pixels = vec![0xdead_beef; (width * height) as usize];
-    let whole = Area { left: 0, top: 0, right: width as i32, bottom: height as i32 };
+    let whole = PixelRect { left: 0, top: 0, right: width as i32, bottom: height as i32 };
     painter.copy(whole, &mut pixels, width as usize);
     pixels
 }
@@ -80,7 +80,7 @@ fn pixel(pixels: &[u32], x: u32, y: u32) -> u32 {
 fn random(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed;
     move || {
-        state = super::primitives::hashed(state, [1]);
+        state = super::primitives::mix_hash(state, [1]);
         (state >> 40) as f32 / (1 << 24) as f32
     }
 }

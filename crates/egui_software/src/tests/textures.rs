@@ -23,8 +23,8 @@ fn shown(rect: Rect, uv: Rect, tint: Color32) -> Mesh {
 
 const WHOLE: Rect = Rect { min: pos2(0.0, 0.0), max: pos2(1.0, 1.0) };
 
-fn packed(colour: Color32) -> u32 {
-    let [red, green, blue, _] = colour.to_array();
+fn pack_xrgb(color: Color32) -> u32 {
+    let [red, green, blue, _] = color.to_array();
     u32::from_be_bytes([0, red, green, blue])
 }
 
@@ -40,7 +40,7 @@ fn a_picture_of_its_own_size_is_shown_as_it_is() {
             for x in 0..SIZE[0] {
                 let (column, row) = (x as i32 - left, y as i32 - top);
                 let inside = (0..90).contains(&column) && (0..50).contains(&row);
-                let expected = if inside { packed(picture.pixels[(row * 90 + column) as usize]) } else { 0 };
+                let expected = if inside { pack_xrgb(picture.pixels[(row * 90 + column) as usize]) } else { 0 };
                 assert_eq!(pixel(&pixels, x, y), expected, "({x}, {y}) of one at ({left}, {top})");
             }
         }
@@ -113,14 +113,14 @@ fn only_tiles_of_changed_texels_are_painted_again() {
     other.pixels[150 * 40 + 20] = Color32::RED;
     set(&mut painter, PICTURE, None, other.clone());
     let (pixels, changed) = painted(&mut painter, mesh());
-    assert_eq!(changed, [Area { left: 0, top: 32, right: 64, bottom: 64 }]);
+    assert_eq!(changed, [PixelRect { left: 0, top: 32, right: 64, bottom: 64 }]);
     assert_eq!(pixel(&pixels, 20, 40), 0x00ff_0000);
     // A part, which reaches over the edge of what is there.
     set(&mut painter, PICTURE, Some([140, 66]), ColorImage::filled([30, 30], Color32::GREEN));
     let (pixels, changed) = painted(&mut painter, mesh());
-    assert_eq!(changed, [Area { left: 128, top: 64, right: 150, bottom: 70 }]);
+    assert_eq!(changed, [PixelRect { left: 128, top: 64, right: 150, bottom: 70 }]);
     for (x, y) in [(139, 66), (140, 65)] {
-        assert_eq!(pixel(&pixels, x, y), packed(picture.pixels[(y * 150 + x) as usize]));
+        assert_eq!(pixel(&pixels, x, y), pack_xrgb(picture.pixels[(y * 150 + x) as usize]));
     }
     assert_eq!([pixel(&pixels, 140, 66), pixel(&pixels, 149, 69)], [0x0000_ff00; 2]);
     // Parts of nothing, or beyond everything, change nothing.

@@ -1,4 +1,4 @@
-//! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
+//! The window: panels around a viewport, over one [`Session`].
 
 mod files;
 mod layout;
@@ -18,20 +18,20 @@ use eframe::egui;
 pub use self::shortcuts::function_keys;
 use self::{files::Files, layout::Layout, viewport::Viewport};
 pub use super::session::{AssetsForFolder, Session};
-pub use crate::editors::flame_sheet::stages_ui::image as screen_image;
+pub use crate::editors::flame_sheet::stages_ui::color_image;
 use crate::{
     editors::{aurora::AuroraEditor, flame_sheet::stages_ui::StagesView},
     session::{selection::Selection, settings_store::SettingsStore},
 };
 use panels::{inspector::Inspector, problems::ProblemAction, text::TextPanel};
 
-/// The kind of phenomenon whose shapes are drawn.
+/// The kind of phenomenon with an editor of shapes.
 const KIND_WITH_SHAPES: &str = "aurora";
 
-/// The kind of phenomenon that burns on burners.
+/// The kind of phenomenon with burners.
 const KIND_WITH_BURNERS: &str = "flame_particles";
 
-/// The kind of phenomenon that comes to be in stages.
+/// The kind of phenomenon with pictures of its stages.
 const KIND_WITH_STAGES: &str = "flame_sheet";
 
 /// The whole window.
@@ -62,12 +62,12 @@ pub fn window_size(home: Option<&std::path::Path>) -> [f32; 2] {
 struct VisiblePanels {
     text: bool,
     shortcuts: bool,
-    /// Nothing but the picture and its tools.
+    /// Only the picture and its tools.
     picture_only: bool,
 }
 
 impl Studio {
-    /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
+    /// A window on `session`. `home` is the folder for settings, recent files and autosaves; without it, nothing is stored.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
         let selection = Selection::first_of(&session.document);
         let store = SettingsStore::new(home);
@@ -88,57 +88,57 @@ impl Studio {
         }
     }
 
-    /// What it works on.
+    /// The open session.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
     }
 
-    /// Whether something would be lost if the window closed now: work, or pictures under way.
+    /// Whether closing now would lose unsaved work or stop rendering.
     pub fn has_unfinished_work(&self) -> bool {
         self.session.document.is_dirty() || self.files.progress().is_some()
     }
 
-    /// The window closes: what is kept for the next time is written.
+    /// Called when the window closes: stores the settings.
     pub fn on_exit(&mut self) {
         self.files.unsaved.end();
-        self.layout.keep();
+        self.layout.save();
     }
 
-    /// Shows everything and takes in what hands do.
+    /// Builds the user interface of one frame.
     pub fn ui(&mut self, ui: &mut egui::Ui) {
         if ui.ctx().cumulative_pass_nr() == 0 {
             self.layout.apply_theme(ui.ctx());
         }
         let (now, dragging) = time_and_dragging(ui);
-        // Before anything is shown, so that a picture is on the screen as soon as it is there.
+        // Polled first, so that a new picture is shown in this frame.
         self.session.poll_player(now, dragging);
         self.begin_undo_steps(ui.ctx());
         self.handle_shortcuts(ui.ctx());
         self.files.poll(ui, &mut self.session, &self.selection);
-        egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
-        egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
-        egui::Panel::bottom("timeline").show(ui, |ui| panels::timeline::show(ui, &mut self.session));
+        egui::Panel::top("menu").show(ui, |ui| self.menu_ui(ui));
+        egui::Panel::bottom("status").show(ui, |ui| status::status_ui(ui, &mut self.session, &mut self.files));
+        egui::Panel::bottom("timeline").show(ui, |ui| panels::timeline::timeline_ui(ui, &mut self.session));
         self.reset_on_open();
         if self.visible_panels.picture_only {
             self.session.stages = None;
         } else {
-            self.panels(ui);
+            self.panels_ui(ui);
         }
         let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
         egui::CentralPanel::default()
             .frame(bare)
-            .show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.selection));
+            .show(ui, |ui| self.viewport.ui(ui, &mut self.session, &self.selection));
         if self.visible_panels.shortcuts {
-            shortcuts::window(ui.ctx(), &mut self.visible_panels.shortcuts);
+            shortcuts::shortcuts_ui(ui.ctx(), &mut self.visible_panels.shortcuts);
         }
         self.end_undo_steps(ui);
-        self.layout.note_theme(ui.ctx());
-        self.layout.note("text shown", f32::from(u8::from(self.visible_panels.text)));
-        self.layout.note_window(ui.ctx());
+        self.layout.record_theme(ui.ctx());
+        self.layout.set("text shown", f32::from(u8::from(self.visible_panels.text)));
+        self.layout.record_window_size(ui.ctx());
         self.request_frame(ui);
     }
 
-    /// Begins with what a hand would reach for first in a scene that was just opened.
+    /// Resets the selection after a scene was opened, or where the selected table is gone.
     fn reset_on_open(&mut self) {
         let gone =
             self.selection.index.is_some() && self.selection.place().find(self.session.document.values()).is_none();
@@ -149,42 +149,42 @@ impl Studio {
         }
     }
 
-    fn panels(&mut self, ui: &mut egui::Ui) {
-        self.side_panels(ui);
+    fn panels_ui(&mut self, ui: &mut egui::Ui) {
+        self.side_panels_ui(ui);
         if let (KIND_WITH_SHAPES, Some(index)) = (self.selection.key, self.selection.index) {
             let panel = egui::Panel::bottom("aurora").resizable(true);
             let Self { aurora, session, layout, .. } = self;
-            layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
+            layout.panel_ui("aurora", panel, 420.0, ui, |ui| aurora.ui(ui, session, index));
         }
     }
 
-    fn side_panels(&mut self, ui: &mut egui::Ui) {
-        match panels::problems::show(ui, &self.session) {
-            Some(ProblemAction::Sight(span)) => {
+    fn side_panels_ui(&mut self, ui: &mut egui::Ui) {
+        match panels::problems::problems_ui(ui, &self.session) {
+            Some(ProblemAction::ShowInText(span)) => {
                 self.visible_panels.text = true;
                 self.text.jump_to(span);
             }
-            Some(ProblemAction::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
+            Some(ProblemAction::Relink(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
             None => {}
         }
         let Self { session, selection, text, stages, inspector, layout, visible_panels, .. } = self;
-        layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| panels::scene::show(ui, session, selection));
+        layout.panel_ui("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| panels::scene::scene_ui(ui, session, selection));
         });
         if visible_panels.text {
-            layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
+            layout.panel_ui("text", egui::Panel::right("text"), 380.0, ui, |ui| text.ui(ui, session));
         }
-        layout.panel("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+        layout.panel_ui("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
             session.stages = None;
             if let (KIND_WITH_STAGES, Some(index)) = (selection.key, selection.index) {
-                stages.show(ui, session, index);
+                stages.ui(ui, session, index);
             }
-            // A row that is too wide is scrolled to: it must not widen the panel, which would widen the rows.
-            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, selection));
+            // Wide rows scroll: otherwise they would widen the panel, which widens the rows.
+            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.ui(ui, session, selection));
         });
     }
 
-    /// What is done from one press to its letting go, in one field, or by one turn of the wheel is one step of the history.
+    /// Starts an undo step at a press or a change of focus: a drag, the edits in one field, or one turn of the wheel are one step.
     fn begin_undo_steps(&mut self, ctx: &egui::Context) {
         let field = ctx.memory(egui::Memory::focused);
         let (pressed, held) = ctx.input(|input| (input.pointer.any_pressed(), input.pointer.any_down()));
@@ -194,9 +194,9 @@ impl Studio {
         self.field = field;
     }
 
-    /// When everything is let go, what was done is done.
+    /// Ends the undo step once nothing is pressed, typed in or scrolled.
     fn end_undo_steps(&mut self, ui: &egui::Ui) {
-        /// Turns of the wheel that follow one another faster are one, s.
+        /// Scrolling with shorter pauses is one step, s.
         const TURN_S: f32 = 0.5;
         let typing = ui.ctx().egui_wants_keyboard_input();
         let (held, turned) = ui.input(|input| {
@@ -209,9 +209,9 @@ impl Studio {
         if !turned {
             self.session.document.end_step();
         }
-        // Pages end without being asked.
+        // A page is closed without notice.
         if cfg!(target_arch = "wasm32") {
-            self.layout.keep();
+            self.layout.save();
         }
     }
 
@@ -221,11 +221,11 @@ impl Studio {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
         }
         self.session.wait(now, dragging);
-        self.viewport.take_picture(ui, &self.session);
+        self.viewport.upload_picture(ui, &self.session);
     }
 }
 
-/// What time it is, s, and whether something is being dragged.
+/// The time, s, and whether something is being dragged.
 fn time_and_dragging(ui: &egui::Ui) -> (f64, bool) {
     let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
     (now, held && ui.ctx().dragged_id().is_some())

@@ -1,10 +1,10 @@
-//! Keys: one list, from which they are both taken and shown.
+//! Keyboard shortcuts: one list, for handling and for the help window.
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
 
 use super::Studio;
 
-/// What a key does.
+/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Action {
     Undo,
@@ -22,7 +22,7 @@ pub(super) enum Action {
     Shortcuts,
 }
 
-/// A key, what it does, and how that is called.
+/// A key, its action and the action's name.
 pub(super) struct Shortcut {
     pub(super) keys: KeyboardShortcut,
     pub(super) action: Action,
@@ -65,7 +65,7 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
 ];
 
 impl Studio {
-    /// Does what pressed keys say. Keys that write something belong to whatever is being typed in.
+    /// Performs the actions of pressed keys. While a text field has the focus, plain keys belong to it.
     pub(super) fn handle_shortcuts(&mut self, ctx: &Context) {
         let typing = ctx.egui_wants_keyboard_input();
         for shortcut in &SHORTCUTS {
@@ -119,7 +119,7 @@ fn pressed(input: &mut egui::InputState, shortcut: &Shortcut) -> bool {
 }
 
 /// The window that lists them.
-pub(super) fn window(ctx: &Context, open: &mut bool) {
+pub(super) fn shortcuts_ui(ctx: &Context, open: &mut bool) {
     egui::Window::new("Shortcuts").open(open).resizable(false).show(ctx, |ui| {
         egui::Grid::new("shortcuts").num_columns(2).striped(true).show(ui, |ui| {
             for shortcut in &SHORTCUTS {

@@ -1,4 +1,4 @@
-//! One line that says what is shown and what goes on.
+//! The status line.
 
 use eframe::egui::{ProgressBar, Ui};
 
@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Shows the line.
-pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
+pub(super) fn status_ui(ui: &mut Ui, session: &mut Session, files: &mut Files) {
     ui.horizontal(|ui| {
         if session.is_busy() {
             ui.spinner();
@@ -30,7 +30,7 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
             ui.weak(format!("{rate:.0} pictures/s"));
         }
         if let Some([done, total]) = files.progress() {
-            rendering(ui, files, done, total);
+            render_progress_ui(ui, files, done, total);
         }
         if session.has_panicked() && ui.button("Retry").on_hover_text(RETRY).clicked() {
             session.set_notice(None);
@@ -46,8 +46,8 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
     });
 }
 
-/// How far rendering has come, and a way to stop it.
-fn rendering(ui: &mut Ui, files: &mut Files, done: usize, total: usize) {
+/// The progress of rendering, and a button to stop it.
+fn render_progress_ui(ui: &mut Ui, files: &mut Files, done: usize, total: usize) {
     let text = if total == 0 { "rendering…".to_owned() } else { format!("rendering: {done} of {total}") };
     ui.label(text);
     let fraction = done as f32 / total.max(1) as f32;

@@ -1,6 +1,5 @@
-//! How fast the studio follows: pictures a second of each phenomenon while it plays, and how long after a change of the phenomenon
-//! itself its picture is there. All but the window is in it: document, checks, player and the picture as the screen takes it; with
-//! the window it is measured by [`WindowBench`].
+//! Benchmarks of the studio: the frame rate of each phenomenon while playing, and the latency from an edit to its picture. They
+//! include document, checks, player and the conversion to an egui image; [`WindowBench`] includes the window too.
 
 mod window;
 
@@ -13,7 +12,7 @@ use bansho::{
 };
 
 use crate::{
-    app::{Session, screen_image},
+    app::{Session, color_image},
     document::Document,
     editors::aurora::document::ShapeEditError,
     player::{StartError, ThreadPlayer},
@@ -23,16 +22,16 @@ use web_time::Instant;
 
 pub use window::{WindowBench, WindowSpeed};
 
-/// What the preview is measured at, pixels.
+/// Size of the preview, pixels.
 const PICTURE: [usize; 2] = [960, 540];
 
-/// Pictures that are played.
+/// Number of frames played.
 const PLAYED: i64 = 60;
 
-/// Changes that are made, of which the slowest one is left out: the 95th of a hundred.
+/// Number of edits; the second slowest latency is the 95th percentile.
 const CHANGES: usize = 20;
 
-/// A phenomenon as the studio promises to follow it, and what a hand changes of it.
+/// A benchmark scene, and the parameter that is edited.
 struct BenchScene {
     name: &'static str,
     text: &'static str,
@@ -72,7 +71,7 @@ impl BenchScene {
     }
 }
 
-/// How fast one scene goes.
+/// The result of one scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Speed {
     /// The phenomenon.
@@ -142,11 +141,11 @@ fn speed(bench_scene: &BenchScene) -> Result<Speed, BenchError> {
         shown(&mut session, bench_scene.name)?;
         answers.push(began.elapsed().as_secs_f64());
     }
-    Ok(Speed { name: bench_scene.name, frames_per_s, advance_s, draw_s, answer_s: nineteenth(answers) })
+    Ok(Speed { name: bench_scene.name, frames_per_s, advance_s, draw_s, answer_s: percentile_95(answers) })
 }
 
-/// The slowest but one of the changes.
-fn nineteenth(mut answers: Vec<f64>) -> f64 {
+/// The second largest latency.
+fn percentile_95(mut answers: Vec<f64>) -> f64 {
     answers.sort_by(f64::total_cmp);
     answers.into_iter().rev().nth(1).unwrap_or_default()
 }
@@ -177,7 +176,7 @@ fn shown(session: &mut Session, scene: &'static str) -> Result<[f64; 2], BenchEr
             && (picture.revision, picture.number, picture.size) == (revision, number, PICTURE)
         {
             let took = [picture.advance_s, picture.draw_s];
-            std::hint::black_box(screen_image(picture));
+            std::hint::black_box(color_image(picture));
             return Ok(took);
         }
         let faults = session.document.error().map(ToString::to_string);

@@ -1,12 +1,12 @@
-//! The same with the window: pictures that it shows while a scene plays, and how long after a change the window with the picture of it has
-//! been painted. Panels, editors and all are painted too, by whatever the machine paints with.
+//! The benchmarks with the window: frames that it shows while a scene plays, and the latency from an edit to the painted window, by the
+//! renderer of this machine.
 
 use std::{sync::mpsc, time::Duration};
 
 use eframe::egui;
 use web_time::Instant;
 
-use super::{BENCH_SCENES, BenchError, BenchScene, CHANGES, change, nineteenth};
+use super::{BENCH_SCENES, BenchError, BenchScene, CHANGES, change, percentile_95};
 use crate::{
     app::{Session, Studio},
     document::{Document, Revision},
@@ -107,7 +107,7 @@ impl WindowBench {
         if std::mem::take(painting) {
             answers.extend(made.map(|made| made.elapsed().as_secs_f64()));
             if answers.len() == CHANGES {
-                self.speed.answer_s = nineteenth(std::mem::take(answers));
+                self.speed.answer_s = percentile_95(std::mem::take(answers));
                 // Nobody listens any more where the window was closed.
                 let _ = self.results.send(Ok(self.speed.clone()));
                 self.open_next();

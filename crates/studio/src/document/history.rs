@@ -1,8 +1,8 @@
-//! What was done, to be taken back and done again. Scenes are small, so each step keeps both texts.
+//! Undo and redo. Scenes are small, so each step keeps both texts.
 
 use std::sync::Arc;
 
-/// Most steps that are kept.
+/// Most undo steps.
 const MAX_STEPS: usize = 1000;
 
 #[derive(Default)]
@@ -21,7 +21,7 @@ struct Step {
 
 impl History {
     /// Notes a step from `before` to `after`, which goes on with an open one of the same label.
-    pub(super) fn note(&mut self, label: &str, before: &Arc<str>, after: &str) {
+    pub(super) fn record(&mut self, label: &str, before: &Arc<str>, after: &str) {
         if **before == *after {
             return;
         }

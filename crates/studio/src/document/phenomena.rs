@@ -66,7 +66,7 @@ fn free_name(wanted: &str, listed: &[PhenomenonEntry]) -> String {
     numbered.into_iter().find(|name| !taken(name)).unwrap_or_default()
 }
 
-/// The operations behind the buttons of the scene panel.
+/// The operations of the scene panel.
 pub mod operations {
     use super::*;
 

@@ -1,4 +1,4 @@
-//! The studio in a window of the system.
+//! The native program.
 
 use std::{
     io::Write,
@@ -17,7 +17,7 @@ use bansho_studio::{
 };
 
 use self::{
-    arguments::{Arguments, Work},
+    arguments::{Arguments, Mode},
     renderer_choice::RendererChoice,
 };
 use bansho_egui_software::window::Build;
@@ -35,23 +35,23 @@ const USAGE: &str = "usage: bansho-studio [--painter auto|gpu|software] [SCENE]
 const TITLE: &str = "Bansho Studio";
 
 pub(super) fn main() -> ExitCode {
-    let asked = match Arguments::of(std::env::args_os().skip(1)) {
-        Ok(asked) => asked,
+    let arguments = match Arguments::parse(std::env::args_os().skip(1)) {
+        Ok(arguments) => arguments,
         Err(message) => return fail(&message),
     };
-    let painter = asked.painter;
-    match asked.work {
-        Work::Help => say(USAGE),
-        Work::Bench(wanted) => bench(&wanted),
-        Work::BenchWindow(wanted) => bench_window(painter, wanted),
-        Work::Scene(scene) => match run(painter, scene) {
+    let painter = arguments.painter;
+    match arguments.mode {
+        Mode::Help => say(USAGE),
+        Mode::Bench(wanted) => bench(&wanted),
+        Mode::BenchWindow(wanted) => bench_window(painter, wanted),
+        Mode::Scene(scene) => match run(painter, scene) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => fail(&format!("error: {error}")),
         },
     }
 }
 
-/// How fast the studio follows hands here, of the phenomena whose name contains `wanted`.
+/// Measures the studio on the phenomena whose name contains `wanted`.
 fn bench(wanted: &str) -> ExitCode {
     for speed in bench::measure(wanted) {
         let bench::Speed { name, frames_per_s, advance_s, draw_s, answer_s } = match speed {
@@ -93,13 +93,13 @@ fn bench_window(painter: RendererChoice, wanted: String) -> ExitCode {
 }
 
 fn say(message: &str) -> ExitCode {
-    // Nobody is left to be told that this failed.
+    // A failure to print cannot be reported.
     let _ = writeln!(std::io::stdout(), "{message}");
     ExitCode::SUCCESS
 }
 
 fn fail(message: &str) -> ExitCode {
-    // Nobody is left to be told that this failed.
+    // A failure to print cannot be reported.
     let _ = writeln!(std::io::stderr(), "{message}");
     ExitCode::FAILURE
 }
@@ -124,7 +124,7 @@ fn viewport(size: [f32; 2]) -> egui::ViewportBuilder {
     egui::ViewportBuilder::default().with_title(TITLE).with_inner_size(size)
 }
 
-/// `document`, which lies in `scene`, with a player that wakes the window.
+/// A session on `document` from the file `scene`, with a player that requests repaints.
 fn session(ctx: &egui::Context, document: Document, scene: Option<PathBuf>) -> Result<Session, StartError> {
     let ctx = ctx.clone();
     let player = ThreadPlayer::start(move || ctx.request_repaint())?;
@@ -135,7 +135,7 @@ fn assets(folder: &Path) -> Arc<dyn Assets> {
     Arc::new(FileAssets::new(folder))
 }
 
-/// Where the user's programs keep their own files.
+/// The folder for settings in the user's data directory.
 fn home() -> Option<PathBuf> {
     let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let base = variable("XDG_DATA_HOME")

@@ -1,5 +1,5 @@
-//! What paints the window: a GPU where there is one, and else the processor, which is a good deal faster at it than drivers that only
-//! pretend to be one.
+//! What paints the window: eframe with a GPU where there is one, else the software rasterizer, which is much faster than a software
+//! Vulkan driver.
 
 use bansho_egui_software::{
     App,
@@ -10,7 +10,7 @@ use eframe::{
     wgpu::PollType,
 };
 
-/// Who paints.
+/// The renderer of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum RendererChoice {
     /// A GPU if there is one.
@@ -24,7 +24,7 @@ impl RendererChoice {
     pub(super) const NAMES: &str = "auto, gpu, software";
 
     /// # Errors
-    /// Nobody is called `name`; what is to be told.
+    /// There is no renderer `name`; the message.
     pub(super) fn named(name: &str) -> Result<Self, String> {
         match name {
             "auto" => Ok(Self::Auto),
@@ -40,7 +40,7 @@ impl RendererChoice {
     /// There is no window, or nothing to show.
     pub(super) fn show(self, viewport: ViewportBuilder, build: Build) -> Result<(), Box<dyn std::error::Error>> {
         match self {
-            // Only eframe's window tells readers of the screen what it shows.
+            // Only eframe's window supports screen readers.
             Self::Auto if cfg!(feature = "accessibility") || has_gpu() => by_gpu(viewport, build),
             Self::Gpu => by_gpu(viewport, build),
             Self::Auto | Self::Software => Ok(window::run(viewport, build).map_err(with_hint)?),
@@ -48,7 +48,7 @@ impl RendererChoice {
     }
 }
 
-/// Whether some driver speaks for more than this processor.
+/// Whether any adapter is not a CPU.
 fn has_gpu() -> bool {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
@@ -56,7 +56,7 @@ fn has_gpu() -> bool {
 }
 
 fn by_gpu(viewport: ViewportBuilder, build: Build) -> Result<(), Box<dyn std::error::Error>> {
-    // What is seen is the picture itself, without noise.
+    // Dithering would add noise to the picture.
     let options = eframe::NativeOptions { viewport, dithering: false, ..eframe::NativeOptions::default() };
     let build = |creation: &eframe::CreationContext| {
         let program = build(&creation.egui_ctx)?;

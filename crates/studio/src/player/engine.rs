@@ -1,4 +1,4 @@
-//! One wish fulfilled: the text checked where it is new, the shot brought to the frame, the frame drawn and shown.
+//! Serves one request: checks the text if it is new, advances the shot to the frame, draws it and converts it to display pixels.
 
 use std::{path::Path, sync::Arc};
 
@@ -17,7 +17,7 @@ use super::{Event, FrameRequest, Picture, snapshot_cache::SnapshotCache};
 use crate::document::{Checker, Revision, stages};
 use web_time::Instant;
 
-/// Why a wish is not fulfilled.
+/// Why a request has no picture.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum RequestError {
     /// No picture can be drawn, or it was stopped.
@@ -35,29 +35,29 @@ impl RequestError {
     }
 }
 
-/// What is kept from one wish to the next.
+/// What is kept from one request to the next.
 #[derive(Default)]
 pub(super) struct Engine {
-    /// What was judged last.
+    /// The revision that was checked last.
     checked: Option<Checked>,
     checker: Checker,
     /// The last good plan, at the scene's own size, and whether it is a draft.
     plan: Option<(Arc<Plan>, bool)>,
     shot: Option<OpenShot>,
-    /// Of finished pictures; each goes on from the one before.
+    /// The shot of full-quality frames; each continues from the frame before.
     full_quality: Option<(Arc<Plan>, Box<dyn Shot>)>,
     snapshots: SnapshotCache,
     stages: StageShots,
 }
 
-/// A state of a document, with its assets, and whether it was judged as a draft if it could be one.
+/// A checked revision with its assets, and whether a draft was asked for.
 struct Checked {
     revision: Revision,
     assets: Arc<dyn Assets>,
     draft: bool,
 }
 
-/// A shot, with the plan and the size that it was last planned for.
+/// An open shot, with the plan and the size that it was last planned for.
 struct OpenShot {
     shot: Box<dyn Shot>,
     of: Arc<Plan>,
@@ -65,7 +65,7 @@ struct OpenShot {
 }
 
 impl Engine {
-    /// Fulfils `request` and tells `emit` what came of it. Stops when `observer` says so; another call then goes on.
+    /// Serves `request` and reports to `emit`. Stops when `observer` cancels; another call then continues.
     ///
     /// # Errors
     /// No picture can be drawn or made a file, or the observer asked to stop.
@@ -109,7 +109,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Forgets the shot, as after a panic in it.
+    /// Discards the shots after a panic in one.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn reset_after_panic(&mut self) {
         *self = Self { checked: self.checked.take(), plan: self.plan.take(), ..Self::default() };
@@ -217,14 +217,14 @@ fn open<'a>(
     Ok(slot.insert(opened))
 }
 
-/// The largest size of `size`'s proportions that fits `within`; `size` itself where that does.
+/// The largest size with the aspect ratio of `size` that fits `within`; never larger than `size`.
 fn fit_within(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
     let ratio = |axis: usize| within[axis] as f64 / size[axis] as f64;
     let scale = ratio(0).min(ratio(1)).min(1.0);
     size.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 
-/// The frame over black: premultiplied light over black is the light itself.
+/// The frame composited over black as display pixels: premultiplied color over black is the color itself.
 fn to_display_pixels(frame: &mut Frame) -> Vec<[u8; 4]> {
     let opaque = std::mem::replace(&mut frame.opaque, true);
     let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
@@ -235,7 +235,7 @@ fn to_display_pixels(frame: &mut Frame) -> Vec<[u8; 4]> {
     }
 }
 
-/// The frame as `bansho render` writes it unless it is told otherwise.
+/// The frame as a PNG with the default options of `bansho render`.
 fn encode_png(frame: &Frame) -> Result<Vec<u8>, MediaError> {
     let to_display_pixels = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let fingerprint = fingerprint::of_png(frame.header.fingerprint, BitDepth::Eight, AlphaConvention::Encoded);

@@ -1,4 +1,4 @@
-//! Wishes fulfilled in slices of the caller's own thread.
+//! A player without threads: it works in time slices whenever it is polled.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use web_time::Instant;
 
 use super::{Event, FrameRequest, Player, engine::Engine, interruption::Interruption};
 
-/// Longest stretch of simulation between two looks at what else is wanted; drawing comes on top, and
+/// Longest simulation time between two polls; drawing comes on top, and
 /// [`PreviewScale`](super::PreviewScale) keeps that as short.
 const TIME_SLICE: Duration = Duration::from_millis(40);
 

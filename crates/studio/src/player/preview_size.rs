@@ -1,56 +1,56 @@
-//! How large a picture may be to keep up: whole where the machine is fast, smaller where it is not and that helps.
+//! Adaptive preview resolution: full size where the machine is fast enough, smaller where it is not and a smaller size helps.
 
-/// Shares of the window's size that a preview may have, the largest first.
+/// Scales of the window's sides that a preview may have, the largest first.
 const SCALES: [f64; 7] = [1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
 
-/// Where no size keeps up, a larger picture is worth so many times the time of the smallest.
+/// Where no size meets the target, a larger picture may take this many times the time of the smallest.
 const WORTHWHILE_FACTOR: f64 = 1.5;
 
-/// A larger picture must fit with room to spare, so that sizes do not flicker.
+/// A larger scale is chosen only if it takes at most this fraction of the target, so that sizes do not oscillate (hysteresis).
 const HEADROOM: f64 = 0.7;
 
-/// Chooses how large previews are, by how long they take.
+/// Chooses the scale of previews by a cost model.
 ///
-/// Drawing takes `fixed + each n` for n pixels: streaks and particles are prepared whatever the size. Pictures of two sizes tell
-/// the two apart; at one size only their sum is known, and both grow and shrink with it.
+/// Drawing n pixels takes `fixed + each n` seconds: preparing streaks and particles does not depend on the size. Pictures of two sizes
+/// determine both terms; at one size only their sum is known, and both are scaled by it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PreviewScale {
     step: usize,
-    /// What is known of drawing, once a picture came.
+    /// The fitted cost model, once a picture was timed.
     known: Option<CostModel>,
 }
 
-/// What drawing a picture costs.
+/// Cost of drawing a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CostModel {
     /// s.
     fixed: f64,
     /// s a pixel.
     each: f64,
-    /// The last picture: pixels, and how long drawing it took, s.
+    /// The last picture: pixels, and time to draw, s.
     last: [f64; 2],
 }
 
-/// How long a picture took.
+/// Timing of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTiming {
     /// Pixels.
     pub pixels: usize,
     /// Drawing, s.
     pub draw_s: f64,
-    /// The simulation, for which no size matters, s.
+    /// The simulation, which does not depend on the size, s.
     pub advance_s: f64,
 }
 
 impl CostModel {
-    /// What is known after a picture of `pixels` that took `draw_s`.
+    /// The model updated by a picture of `pixels` that took `draw_s`.
     fn after(known: Option<Self>, pixels: f64, draw_s: f64) -> Self {
         let last = [pixels, draw_s];
         let Some(Self { fixed, each, last: [before, before_s] }) = known else {
             return Self { fixed: 0.0, each: draw_s / pixels, last };
         };
         if before == pixels {
-            // A busier machine, or more to draw.
+            // The machine is busier, or there is more to draw.
             let grown = draw_s / (fixed + each * pixels).max(f64::MIN_POSITIVE);
             return Self { fixed: fixed * grown, each: each * grown, last };
         }
@@ -64,12 +64,12 @@ impl CostModel {
 }
 
 impl PreviewScale {
-    /// The share of the window's sides that the next preview should have.
+    /// The scale of the next preview.
     pub fn scale(&self) -> f64 {
         SCALES[self.step]
     }
 
-    /// Learns how long a preview of the present share took where `target_s` is wanted, s.
+    /// Records the timing of a preview at the current scale; `target_s` is the wanted time, s.
     pub fn record(&mut self, timing: FrameTiming, target_s: f64) {
         let pixels = timing.pixels.max(1) as f64;
         let cost = CostModel::after(self.known, pixels, timing.draw_s);

@@ -1,4 +1,4 @@
-//! The finished still and the finished shot: the very job that `bansho render` does, on a thread of its own.
+//! Renders a frame or the shot to files, as `bansho render` does, on a thread of its own.
 
 use std::{
     path::{Path, PathBuf},
@@ -15,18 +15,18 @@ use bansho::{
     media::plates::InputLimits,
 };
 
-/// A job under way.
+/// A running job.
 pub struct RenderJob {
     progress: Arc<Progress>,
     worker: Option<JoinHandle<Result<PathBuf, String>>>,
 }
 
-/// Why a job ended without all its pictures.
+/// Why a job ended early.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum JobFailure {
-    /// It could not go on, or was stopped.
+    /// It failed or was stopped.
     Failed(String),
-    /// A phenomenon panicked, and said this.
+    /// A phenomenon panicked with this message.
     Panicked(String),
 }
 
@@ -100,7 +100,7 @@ impl RenderJob {
         Ok(Self { progress, worker: Some(worker) })
     }
 
-    /// Frames that are done, and all.
+    /// Number of frames done, and in total.
     pub fn progress(&self) -> [usize; 2] {
         [&self.progress.done, &self.progress.total].map(|count| count.load(Ordering::Relaxed))
     }

@@ -1,38 +1,38 @@
-//! States of stepped phenomena along the way, so that going back in time does not begin at its beginning.
+//! Snapshots of the simulation at earlier frames, so that scrubbing backwards does not restart at the first frame.
 
 use std::{collections::BTreeMap, sync::Arc};
 
 use bansho::{Plan, Shot, render::fingerprint};
 
-/// Bytes of states that are kept.
+/// Most bytes of snapshots.
 const MAX_BYTES: usize = 256 << 20;
-/// Frames between two states.
+/// Frames between two snapshots.
 const FRAMES_APART: i64 = 10;
 
-/// States of one plan, by frame.
+/// Snapshots of one plan, by frame.
 #[derive(Default)]
 pub(super) struct SnapshotCache {
     of: Option<(Arc<Plan>, [u8; 32])>,
     by_frame: BTreeMap<i64, Vec<u8>>,
     bytes: usize,
-    /// The frame that the shot stands at.
+    /// The current frame of the shot.
     last: Option<i64>,
 }
 
 impl SnapshotCache {
-    /// Brings `shot` nearer to frame `number` where that lies behind it and a state does not.
+    /// Restores the last snapshot up to frame `number` where the shot is beyond that frame.
     pub(super) fn seek(&mut self, plan: &Arc<Plan>, shot: &mut dyn Shot, number: i64) {
         self.set_plan(plan);
         if self.last.is_none_or(|last| last <= number) {
             return;
         }
         if let Some((_, state)) = self.by_frame.range(..=number).next_back() {
-            // A state that is refused leaves the shot as it was, which then begins anew.
+            // Where restoring fails, the shot is unchanged and restarts.
             let _ = shot.restore(state);
         }
     }
 
-    /// Keeps the state at frame `number` where it is worth it: only states that the plan leads to are.
+    /// Stores a snapshot at frame `number`, if it is exact and none is near.
     pub(super) fn store(&mut self, plan: &Arc<Plan>, shot: &dyn Shot, number: i64) {
         self.set_plan(plan);
         self.last = Some(number);
@@ -45,7 +45,7 @@ impl SnapshotCache {
         self.by_frame.insert(number, state);
     }
 
-    /// States of another plan are of no use.
+    /// Drops the snapshots where the plan has another state fingerprint.
     fn set_plan(&mut self, plan: &Arc<Plan>) {
         if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, plan)) {
             return;

@@ -1,4 +1,4 @@
-//! Wishes fulfilled by a thread with a rayon pool of its own.
+//! A player on a thread of its own, with a rayon pool.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -13,35 +13,35 @@ use std::{
 
 use super::{Event, FrameRequest, Player, engine::Engine, interruption::Interruption, panic_text};
 
-/// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
+/// Renders on a thread of its own, in a rayon pool with one thread per core.
 pub struct ThreadPlayer {
     slot: Arc<RequestSlot>,
-    /// What comes of wishes; nothing, once, where a wish was dealt with.
+    /// Events; `None` marks the end of a request.
     events: mpsc::Receiver<Option<Event>>,
-    /// What came while it was waited for.
+    /// Events received by [`wait`](Player::wait).
     waited: Vec<Event>,
     worker: Option<JoinHandle<()>>,
 }
 
-/// Where wishes are left.
+/// The slot with the newest request.
 #[derive(Default)]
 struct RequestSlot {
     request: Mutex<Option<FrameRequest>>,
     request_added: Condvar,
-    /// Counts wishes, so that work on an old one knows it.
+    /// Number of requests so far; work on an older one can be cancelled.
     newest: AtomicU64,
-    /// Counts wishes that were dealt with.
+    /// Number of the last finished request.
     done: AtomicU64,
     closing: AtomicBool,
 }
 
 impl RequestSlot {
     fn request(&self) -> MutexGuard<'_, Option<FrameRequest>> {
-        // A wish is only ever replaced whole.
+        // The request is replaced as a whole, so that a poisoned lock holds a valid one.
         self.request.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a wish; `None` when the player closes.
+    /// Waits for a request; `None` when the player closes.
     fn take(&self) -> Option<(FrameRequest, u64)> {
         let mut slot = self.request();
         loop {
@@ -55,7 +55,7 @@ impl RequestSlot {
         }
     }
 
-    /// Whether nobody wants wish `number` any more: the player closes, or what is under way `may_stop` for a newer wish.
+    /// Whether request `number` is obsolete: the player closes, or the work `may_stop` for a newer request.
     fn is_obsolete(&self, number: u64, may_stop: bool) -> bool {
         self.closing.load(Ordering::Relaxed) || (may_stop && self.newest.load(Ordering::Relaxed) != number)
     }
@@ -100,9 +100,8 @@ pub enum StartError {
     Thread(#[from] std::io::Error),
 }
 
-/// Fulfils wishes until the player closes. Work that nobody wants any more is stopped: a simulation at once, for it goes
-/// on where it stands; a drawing only where the one before it was not stopped too, so that hands that never rest still
-/// see pictures.
+/// Serves requests until the player closes. Obsolete work is cancelled: a simulation at once, since it resumes where it stopped;
+/// a drawing only if the drawing before it was not cancelled too, so that continuous dragging still shows pictures.
 fn work(slot: &RequestSlot, tell: &mut dyn FnMut(Option<Event>)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
@@ -122,7 +121,7 @@ fn work(slot: &RequestSlot, tell: &mut dyn FnMut(Option<Event>)) {
                 tell(Some(Event::Panicked { revision: request.revision, number: request.number, message }));
             }
         }
-        // Who waits for more need not: nothing more comes of it.
+        // Wakes those who wait: no more events come of this request.
         tell(None);
     }
 }
@@ -131,7 +130,7 @@ impl Player for ThreadPlayer {
     fn request(&mut self, request: FrameRequest) {
         let mut slot = self.slot.request();
         *slot = Some(request);
-        // Counted while nobody can take the wish, so that it is taken with its own number.
+        // Counted under the lock, so that the request is taken with its own number.
         self.slot.newest.fetch_add(1, Ordering::Relaxed);
         drop(slot);
         self.slot.request_added.notify_one();

@@ -1,4 +1,4 @@
-//! The example scenes with everything that they name, within the program.
+//! The example scenes and their files, embedded in the program.
 
 use std::{path::Path, sync::Arc};
 
@@ -60,7 +60,7 @@ pub const SCENES: &[(&str, &str)] = files!(
     "torch_in_gusts.toml",
 );
 
-/// What they name.
+/// The files that they name.
 const FILES: &[(&str, &[u8])] = files!(
     &[u8],
     include_bytes,
@@ -74,14 +74,14 @@ const FILES: &[(&str, &[u8])] = files!(
     "plates/hearth_depth.exr",
 );
 
-/// The files of the examples, and others that were given by hand, read when they are asked for.
+/// The embedded files, and files added by the user.
 #[derive(Clone, Debug, Default)]
 pub struct Bundle {
     added_files: Vec<(String, Arc<[u8]>)>,
 }
 
 impl Bundle {
-    /// Keeps the bytes of the file `name`, in stead of any of that name.
+    /// Adds the file `name`, in place of any of that name.
     pub fn add_file(&mut self, name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) {
         let name = name.into();
         self.added_files.retain(|(other, _)| *other != name);
@@ -103,13 +103,13 @@ impl Bundle {
         self.bytes(name).ok_or_else(|| error(name, AssetProblem::Missing))
     }
 
-    /// These files, and all others where `files` finds them.
+    /// These files, with `files` for all that they lack.
     pub fn overlay_on(self, files: Arc<dyn Assets>) -> OverlayAssets {
         OverlayAssets { bundle: self, files }
     }
 }
 
-/// A [`Bundle`], and other assets for what it lacks.
+/// A [`Bundle`] layered over other assets.
 pub struct OverlayAssets {
     bundle: Bundle,
     files: Arc<dyn Assets>,

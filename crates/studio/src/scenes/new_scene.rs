@@ -1,6 +1,6 @@
-//! What a new scene begins with: one phenomenon, and what it needs to be seen.
+//! Templates of new scenes: one phenomenon, and what it needs to be visible.
 
-/// Each kind of beginning: what it is called, and its scene.
+/// Templates by name.
 pub const NEW_SCENES: [(&str, &str); 5] = [
     ("Flame sheet", FLAME_SHEET),
     ("Particle flame", PARTICLE_FLAME),
@@ -9,7 +9,7 @@ pub const NEW_SCENES: [(&str, &str); 5] = [
     ("Nothing", "bansho = 1\n"),
 ];
 
-/// What a studio without a scene begins with.
+/// The template for a studio started without a scene.
 pub const FLAME_SHEET: &str = "\
 bansho = 1
 
@@ -24,7 +24,7 @@ bansho = 1
 name = \"flame\"
 ";
 
-/// Under a lamp at dusk, which is dragged to light other drops.
+/// Rain under a street lamp at dusk.
 const RAIN: &str = "\
 bansho = 1
 
@@ -57,7 +57,7 @@ rate_mm_per_h = 20.0
 distance = 6.0
 ";
 
-/// To the north, where it stands before its shapes are drawn.
+/// The view to the north, where the default shapes are.
 const AURORA: &str = "\
 bansho = 1
 

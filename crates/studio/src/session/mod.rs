@@ -1,4 +1,7 @@
-//! What the window works on: the document, its file, its player and the time. No widgets.
+//! An open document with its file, its player and the playback time. No widgets.
+//!
+//! Per frame of the window: [`Session::poll_player`] takes in the player's events, the panels edit the document, and
+//! [`Session::advance_time`] advances the playback and requests the next picture.
 
 pub(crate) mod selection;
 pub(crate) mod settings_store;
@@ -29,10 +32,10 @@ use status::{FrameRate, PanickedFrames};
 
 use web_time::Instant;
 
-/// Makes the assets of a scene that lies in a folder. A scene without a file finds those of the examples first, and given ones.
+/// Makes the asset source for a scene in a folder. A scene without a file looks in the bundled and the added files first.
 pub type AssetsForFolder = fn(&Path) -> Arc<dyn Assets>;
 
-/// What a hand does not notice that waits for a picture.
+/// Longest wait for a picture within a frame of the window; not noticed while dragging.
 const MAX_WAIT: Duration = Duration::from_millis(40);
 
 /// The table of the camera.
@@ -42,19 +45,19 @@ const CAMERA: &str = "camera";
 pub struct Session {
     /// The scene.
     pub document: Document,
-    /// Its file, once it has one.
+    /// Its file, if it has one.
     pub path: Option<PathBuf>,
-    /// The time.
+    /// The playback.
     pub transport: Transport,
-    /// Whether hands in the viewport leave keyframes.
+    /// Whether dragging in the viewport sets keyframes.
     pub recording: bool,
-    /// Counts documents that were opened here.
+    /// Number of documents opened so far.
     pub opened: u64,
     /// Whether pictures may be simulated with fewer particles than the scene has.
     pub draft: bool,
-    /// The flame sheet whose stages are seen.
+    /// The flame sheet whose stages are shown.
     pub stages: Option<usize>,
-    /// Whether unsaved work must be kept at once.
+    /// Whether to autosave at once.
     pub autosave_now: bool,
     player: Box<dyn Player>,
     assets_for_folder: AssetsForFolder,
@@ -63,18 +66,18 @@ pub struct Session {
     preview_scale: PreviewScale,
     picture: Option<Picture>,
     drawn: u64,
-    /// Pictures of the stages, each with its number.
+    /// Pictures of the stages, each with its serial number.
     stage_pictures: Vec<(Picture, u64)>,
     last_request: Option<LastRequest>,
-    /// What panicked, which is not drawn again.
+    /// Frames that panicked; they are not drawn again.
     panicked_frames: PanickedFrames,
     notice: Option<String>,
     frame_rate: FrameRate,
-    /// A time that is gone to once the scene is checked, s.
+    /// A time to seek to once the scene is checked, s.
     seek: Option<f64>,
 }
 
-/// What was wished for last.
+/// The last request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LastRequest {
     revision: Revision,
@@ -85,7 +88,7 @@ struct LastRequest {
 }
 
 impl Session {
-    /// Opens `document`, which lies in `path`.
+    /// Opens `document` from the file `path`.
     pub fn new(
         document: Document,
         path: Option<PathBuf>,
@@ -129,31 +132,31 @@ impl Session {
         self.opened += 1;
     }
 
-    /// Reads all assets anew, as after one was replaced.
+    /// Reads all assets again, after one was replaced.
     pub fn reload_assets(&mut self) {
         self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_for_folder);
-        // What was broken by a file may be whole with another.
+        // Another file may not cause the panic.
         self.retry();
     }
 
-    /// Draws what panicked once more.
+    /// Draws frames that panicked again.
     pub fn retry(&mut self) {
         (self.last_request, self.panicked_frames) = (None, PanickedFrames::default());
     }
 
-    /// Takes the bytes of a file that no folder holds.
+    /// Adds a file by its bytes, where there is no folder.
     pub fn add_file(&mut self, name: &str, bytes: Vec<u8>) {
         self.player.add_file(name, &bytes);
         self.bundle.add_file(name, bytes);
         self.reload_assets();
     }
 
-    /// The last picture, and which it is.
+    /// The last picture, with its serial number.
     pub fn picture(&self) -> Option<(&Picture, u64)> {
         self.picture.as_ref().map(|picture| (picture, self.drawn))
     }
 
-    /// The last picture of a stage of the flame sheet that is chosen, and which it is.
+    /// The last picture of a stage of the selected flame sheet, with its serial number.
     pub fn stage(&self, stage: usize) -> Option<(&Picture, u64)> {
         self.stage_pictures.get(stage).map(|(picture, drawn)| (picture, *drawn))
     }
@@ -163,32 +166,32 @@ impl Session {
         self.document.plan()
     }
 
-    /// Whether a picture is under way.
+    /// Whether the player is working on a picture.
     pub fn is_busy(&self) -> bool {
         self.player.is_busy()
     }
 
-    /// Pictures a second while time passes.
+    /// Frames per second while playing.
     pub fn frames_per_s(&self) -> Option<f64> {
         self.frame_rate.frames_per_s().filter(|_| self.transport.is_playing())
     }
 
-    /// What the user should know.
+    /// The message in the status line.
     pub fn notice(&self) -> Option<&str> {
         self.notice.as_deref()
     }
 
-    /// Tells the user something, or takes it back.
+    /// Sets or clears the message in the status line.
     pub fn set_notice(&mut self, notice: Option<String>) {
         self.notice = notice;
     }
 
-    /// Whether the present frame panicked.
+    /// Whether the current frame panicked.
     pub fn has_panicked(&self) -> bool {
         self.panicked_frames.contains(self.document.revision(), self.transport.number())
     }
 
-    /// Carries out `operations`; what cannot be done is told.
+    /// Applies `operations`; an error is shown in the status line.
     pub fn edit(&mut self, label: &str, operations: &[Operation]) {
         match self.document.edit(label, operations) {
             Ok(()) => self.notice = None,
@@ -199,10 +202,10 @@ impl Session {
         }
     }
 
-    /// Carries out `operations` on the shapes of aurora `index`; what it has then.
+    /// Applies `operations` to the shapes of aurora `index`. Returns its shapes.
     ///
     /// # Errors
-    /// An aurora cannot take the shapes that would come of them; nothing is changed then.
+    /// The resulting shapes are invalid; nothing is changed then.
     pub fn edit_shapes(
         &mut self,
         label: &str,
@@ -214,7 +217,7 @@ impl Session {
         Ok(drawing)
     }
 
-    /// Goes to the frame at `time`, s; once the scene is checked, also where that makes the shot longer.
+    /// Seeks to the frame at `time`, s, again once the scene is checked, since an edit may make the shot longer.
     pub fn go_to_time(&mut self, time: f64) {
         self.seek = (!self.document.is_checked()).then_some(time);
         self.seek_now(time);
@@ -225,17 +228,17 @@ impl Session {
         self.transport.go_to(first + (time / self.transport.frame_s()).round() as i64);
     }
 
-    /// Where the scene's pictures and drawings come from.
+    /// The source of the scene's plates, meshes and drawings.
     pub fn assets(&self) -> &Arc<dyn Assets> {
         &self.assets
     }
 
-    /// Sets the value at `place`; where it is keyed, as it is at the present time. While keyframes are recorded, all that may be keyed is.
+    /// Sets the value at `place`. Where it is animated, sets a keyframe at the current time; while recording, wherever keyframes are allowed.
     pub fn set(&mut self, label: &str, place: &Place, value: Value) {
         self.set_all(label, [(place.clone(), value)]);
     }
 
-    /// Sets several values in one step.
+    /// Sets several values in one undo step.
     pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (Place, Value)>) {
         let keyed =
             |place: &Place| place.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
@@ -250,22 +253,22 @@ impl Session {
         self.edit_keeping_view(label, operations);
     }
 
-    /// Keys `value` at `place` now.
+    /// Sets a keyframe of `value` at `place` at the current time.
     pub fn key(&mut self, place: &Place, value: Value) {
         let key = self.keyframe(place, value);
         self.edit_keeping_view("key", vec![key]);
     }
 
-    /// What stands at `place` of a good scene whether or not the text states it, where that is not simply the parameter's default: a
-    /// camera that is not told where to look may look up at the sky.
+    /// The value at `place` that the scene derives where the text does not state it and it is not the parameter's default: a camera
+    /// without a target may look up at the sky.
     pub fn implied_value(&self, place: &Place) -> Option<Value> {
         let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
         let camera = &self.plan().filter(|_| root == CAMERA)?.scene().camera;
         camera.to_table().get(key).map(|node| node.value.clone())
     }
 
-    /// Carries out `operations`, and states what they would change unseen: a camera that looks up by itself no longer does once it is
-    /// told where to stand or to look.
+    /// Applies `operations`, and states derived camera values that they would change: the camera's default orientation depends on
+    /// whether its position or target is stated.
     fn edit_keeping_view(&mut self, label: &str, operations: Vec<Operation>) {
         let camera = Place::root().key(CAMERA);
         let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
@@ -285,18 +288,18 @@ impl Session {
         self.edit(label, &all);
     }
 
-    /// The operation that keys `place` now.
+    /// The operation that sets a keyframe at `place` at the current time.
     pub fn keyframe(&self, place: &Place, value: Value) -> Operation {
         Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
     }
 
-    /// What [`poll_player`](Self::poll_player) and then [`advance_time`](Self::advance_time) do.
+    /// [`poll_player`](Self::poll_player), then [`advance_time`](Self::advance_time).
     pub fn update(&mut self, now: f64, viewport: [usize; 2], dragging: bool) -> Option<f64> {
         self.poll_player(now, dragging);
         self.advance_time(now, viewport, dragging)
     }
 
-    /// Takes in what the player did. `dragging` tells that something is being dragged, so that speed matters more than size.
+    /// Handles the player's events. While `dragging`, latency matters more than size.
     pub fn poll_player(&mut self, now: f64, dragging: bool) {
         for event in self.player.poll() {
             self.handle_event(event, now, dragging);
@@ -306,7 +309,7 @@ impl Session {
         }
     }
 
-    /// Lets time pass and says what is to be drawn for a viewport of `viewport` pixels. How long the window may sleep, s.
+    /// Advances the playback and requests a picture for a viewport of `viewport` pixels. Returns how long the window may sleep, s.
     pub fn advance_time(&mut self, now: f64, viewport: [usize; 2], dragging: bool) -> Option<f64> {
         let interactive = dragging || self.transport.is_playing();
         let shown = self.picture.as_ref().is_some_and(|picture| picture.number == self.transport.number());
@@ -318,8 +321,8 @@ impl Session {
         self.transport.sleep_s(now).filter(|_| !self.is_busy())
     }
 
-    /// Waits a moment for a picture that comes at once, as after a change of something quick, so that it is painted together with the
-    /// change and not a whole frame of the window later. While time passes nothing waits: pictures are drawn beside painting then.
+    /// Waits up to [`MAX_WAIT`] for a picture of a scene that is quick to draw, so that the change and its picture appear in the same
+    /// frame of the window. While playing it does not wait: rendering and painting overlap then.
     pub fn wait(&mut self, now: f64, dragging: bool) {
         let began = Instant::now();
         let quick =
@@ -341,7 +344,7 @@ impl Session {
             draft: self.draft,
             stages: self.stages.filter(|_| !interactive || self.is_quick()),
         };
-        // In a hurry a frame is drawn once, whatever size would have been better.
+        // While interactive, a frame is not drawn again for another size.
         let same = |last: LastRequest| {
             last == LastRequest { within: if interactive { last.within } else { last_request.within }, ..last_request }
         };
@@ -352,13 +355,13 @@ impl Session {
         self.send(last_request, false);
     }
 
-    /// Whether there is time for more than the picture itself.
+    /// Whether the scene is quick enough to draw the stages too.
     fn is_quick(&self) -> bool {
         const QUICK_S: f64 = 0.05;
         self.picture.as_ref().is_none_or(|picture| picture.draw_s + picture.advance_s < QUICK_S)
     }
 
-    /// Draws the present frame once more from the scene's beginning, at the viewport's full size.
+    /// Draws the current frame again, simulated from the scene's first frame, at the viewport's full size.
     pub fn redraw_exact(&mut self) {
         if let Some(last_request) = self.last_request {
             self.send(last_request, true);
@@ -370,19 +373,19 @@ impl Session {
         self.player.request(request);
     }
 
-    /// The wish for the finished picture of frame `number`, for a player of its own.
+    /// The request for the full-quality frame `number`, for a player of its own.
     pub fn full_quality_request(&self, number: i64) -> FrameRequest {
         let revision = self.document.revision();
         let last_request = LastRequest { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
         FrameRequest { full_quality: true, ..self.request_for(last_request, true) }
     }
 
-    /// The bytes of a file that the studio brought along, or was given.
+    /// The bytes of a bundled or added file.
     pub fn bundled_file(&self, name: &str) -> Option<&[u8]> {
         self.bundle.bytes(name)
     }
 
-    /// Files that no folder holds, by name.
+    /// Added files, by name.
     pub fn added_files(&self) -> &[(String, Arc<[u8]>)] {
         self.bundle.added_files()
     }
@@ -402,7 +405,7 @@ impl Session {
         }
     }
 
-    /// News of a document that was open before is none.
+    /// Events of a document that was open before are ignored.
     fn handle_event(&mut self, event: Event, now: f64, dragging: bool) {
         if event.revision().is_some_and(|revision| !self.document.includes_revision(revision)) {
             return;
@@ -420,14 +423,14 @@ impl Session {
                 }
             }
             Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
-            // Finished pictures are asked of other players.
+            // Full-quality frames are requested from other players.
             Event::Failed { .. } | Event::FullQualityFrame { .. } => {}
             Event::Panicked { revision, number, message } => {
                 if revision == self.document.revision() {
-                    // One that was checked breaks at some frames only.
+                    // A scene that was checked panics at some frames only.
                     let checked = self.plan().filter(|_| self.document.is_checked());
                     let frame = checked.map(|plan| number.unwrap_or(plan.frames().start));
-                    self.panicked_frames.note(revision, frame);
+                    self.panicked_frames.record(revision, frame);
                 }
                 self.transport.set_playing(false);
                 self.notice = Some(self.panic_message(&message));
@@ -435,7 +438,7 @@ impl Session {
         }
     }
 
-    /// What the user is told where a phenomenon panicked and said `message`; the work is saved at once.
+    /// The notice for a phenomenon that panicked with `message`; the work is saved at once.
     pub(super) fn panic_message(&mut self, message: &str) -> String {
         self.autosave_now = true;
         format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue())
@@ -451,7 +454,7 @@ impl Session {
         }
     }
 
-    /// The browser keeps the work at once, for a page writes no files by itself.
+    /// In a browser, the autosave keeps the work.
     #[cfg(target_arch = "wasm32")]
     fn rescue(&self) -> String {
         if self.document.is_dirty() { "; the browser keeps the scene".into() } else { String::new() }
@@ -464,7 +467,7 @@ impl Session {
             self.transport.set_shot(frames.start..=frames.end - 1, 1.0 / plan.fps().frame_s());
             if let Some(last_request) = self.last_request.as_mut().filter(|last_request| last_request.number.is_none())
             {
-                // The scene's first frame is being drawn, which nobody knew the number of.
+                // The number of the scene's first frame is known only now.
                 last_request.number = Some(frames.start);
                 self.transport.go_to(frames.start);
             }
@@ -475,7 +478,7 @@ impl Session {
     }
 
     fn show(&mut self, picture: Picture, now: f64, dragging: bool) {
-        /// Wanted of a preview while something is dragged, s.
+        /// Target time of a preview while dragging, s.
         const DRAG_TARGET_S: f64 = 0.05;
         if dragging || self.transport.is_playing() {
             let target = if dragging { DRAG_TARGET_S } else { self.transport.frame_s() };
@@ -488,7 +491,7 @@ impl Session {
     }
 }
 
-/// What a scene in `path` finds.
+/// The asset source of a scene in `path`.
 fn assets(bundle: &Bundle, path: Option<&Path>, assets_for_folder: AssetsForFolder) -> Arc<dyn Assets> {
     let files = assets_for_folder(folder(path));
     if path.is_some() { files } else { Arc::new(bundle.clone().overlay_on(files)) }

@@ -8,7 +8,7 @@ use bansho::{
 
 use crate::document::Document;
 
-/// What the inspector shows: a table of the scene.
+/// A selected table of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Selection {
     /// The table's name in scene files.
@@ -24,7 +24,7 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// What a hand would reach for first: the first phenomenon, if there is one.
+    /// The first phenomenon, if there is one.
     pub(crate) fn first_of(document: &Document) -> Self {
         let first = document.phenomena().into_iter().next();
         first.map_or_else(Self::default, |listed| Self { key: listed.kind, index: Some(listed.index) })
@@ -35,13 +35,13 @@ impl Selection {
         self.index.filter(|_| self.key == kind).unwrap_or_default()
     }
 
-    /// Where it stands.
+    /// Its path in the document.
     pub(crate) fn place(&self) -> Place {
         let place = Place::root().key(self.key);
         self.index.map_or(place.clone(), |index| place.index(index))
     }
 
-    /// What a person calls it.
+    /// Its title.
     pub(crate) fn title(&self, document: &Document) -> String {
         let listed =
             document.phenomena().into_iter().find(|listed| Some(listed.index) == self.index && listed.kind == self.key);

@@ -1,9 +1,8 @@
-//! What the studio keeps for itself from one start to the next, as small texts with names: files in a folder of the
-//! user's, or the browser's storage.
+//! Persistent settings as small named texts: files in the user's data folder, or the browser's local storage.
 
 use std::path::PathBuf;
 
-/// Where they are kept.
+/// A key-value store of texts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SettingsStore {
     #[cfg(not(target_arch = "wasm32"))]

@@ -4,18 +4,18 @@ use std::collections::BTreeSet;
 
 use crate::document::Revision;
 
-/// Frames of one state of the document that panicked.
+/// Frames of one revision of the document that panicked.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PanickedFrames {
     revision: Option<Revision>,
     frames: BTreeSet<i64>,
-    /// Whether no frame of it can be drawn, as where a phenomenon cannot even be made.
+    /// Whether all frames panic, as when building a phenomenon panics.
     all_frames: bool,
 }
 
 impl PanickedFrames {
-    /// Notes that `revision` panicked at `frame`, or altogether.
-    pub(crate) fn note(&mut self, revision: Revision, frame: Option<i64>) {
+    /// Records that `revision` panicked at `frame`, or altogether.
+    pub(crate) fn record(&mut self, revision: Revision, frame: Option<i64>) {
         if self.revision != Some(revision) {
             *self = Self { revision: Some(revision), ..Self::default() };
         }
@@ -29,7 +29,7 @@ impl PanickedFrames {
     }
 }
 
-/// Pictures a second, as they come while time passes.
+/// Frame rate of the preview: an exponential moving average of the intervals.
 #[derive(Default)]
 pub(crate) struct FrameRate {
     last: Option<f64>,
@@ -37,9 +37,9 @@ pub(crate) struct FrameRate {
 }
 
 impl FrameRate {
-    /// A picture came at `now`, s.
+    /// Records a frame at `now`, s.
     pub(crate) fn record_frame(&mut self, now: f64) {
-        /// Share of the newest interval in the mean.
+        /// Weight of the newest interval.
         const NEWEST_WEIGHT: f64 = 0.15;
         if let Some(last) = self.last.replace(now) {
             let interval = now - last;
@@ -47,7 +47,7 @@ impl FrameRate {
         }
     }
 
-    /// How many come a second, once two came.
+    /// Frames per second, after two frames.
     pub(crate) fn frames_per_s(&self) -> Option<f64> {
         self.mean_s.map(|mean| 1.0 / mean)
     }

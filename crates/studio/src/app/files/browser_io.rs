@@ -1,4 +1,4 @@
-//! Files by way of the browser: chosen by the user, and handed back as downloads.
+//! Browser file access: the file chooser, dropped files, and downloads.
 
 use std::{
     cell::RefCell,
@@ -11,7 +11,7 @@ use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
 
-/// Files that came in, by name.
+/// Files that arrived, by name.
 pub(super) type Inbox = Rc<RefCell<Vec<(String, Vec<u8>)>>>;
 
 /// Asks the user for a file, which comes into `inbox` later.
@@ -47,18 +47,18 @@ pub(super) fn take_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Context
     });
 }
 
-/// The bytes of a file, kept by the browser: the program's own memory is small.
+/// The bytes of a file in browser memory, since wasm memory is small.
 #[derive(Default)]
-pub(super) struct Parts(js_sys::Array);
+pub(super) struct BlobParts(js_sys::Array);
 
-impl Parts {
+impl BlobParts {
     /// A file that is made already.
     pub(super) fn of(bytes: &[u8]) -> Self {
         Self(js_sys::Array::of1(&js_sys::Uint8Array::from(bytes)))
     }
 }
 
-impl Write for Parts {
+impl Write for BlobParts {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.push(&js_sys::Uint8Array::from(bytes));
         Ok(bytes.len())
@@ -73,7 +73,7 @@ impl Write for Parts {
 ///
 /// # Errors
 /// The page cannot make files.
-pub(super) fn download(name: &str, parts: &Parts) -> Result<(), JsValue> {
+pub(super) fn download(name: &str, parts: &BlobParts) -> Result<(), JsValue> {
     let blob = Blob::new_with_u8_array_sequence(&parts.0)?;
     let url = Url::create_object_url_with_blob(&blob)?;
     let link: HtmlAnchorElement = element("a")?;

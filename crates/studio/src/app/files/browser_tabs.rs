@@ -1,6 +1,6 @@
-//! Pages of one server share what the browser keeps. Each keeps its unsaved work under a name of its own, and holds a lock of that
-//! name for as long as it lives (Web Locks), so that a living page's work is not mistaken for a dead one's. A browser that has no
-//! locks, as for pages that come over plain HTTP, offers the work of living pages too; they keep it again when it changes.
+//! Autosave in browser tabs. Tabs of one origin share the local storage. Each stores its unsaved work under a name of its own and holds
+//! a lock of that name while it is open (Web Locks API), so that the work of open tabs is not offered for recovery. Without locks, as
+//! over plain HTTP, the work of open tabs is offered too; they store it again when it changes.
 
 use std::{cell::RefCell, rc::Rc};
 
@@ -11,14 +11,14 @@ use wasm_bindgen_futures::{JsFuture, spawn_local};
 
 use crate::{document::files::autosave::RecoveredWork, session::settings_store::SettingsStore};
 
-/// The names under which pages keep their work.
+/// The autosaves of all tabs.
 pub(super) struct BrowserTabs {
     store: SettingsStore,
-    /// What all of them begin with.
+    /// The prefix of all names.
     beginning: &'static str,
-    /// This page's.
+    /// The name of this tab.
     own: String,
-    /// Work of pages that are no more; filled once the browser has said which these are.
+    /// Work of closed tabs; filled once the browser has listed the locks.
     found: Rc<RefCell<Vec<RecoveredWork>>>,
     looked: bool,
 }
@@ -32,7 +32,7 @@ impl BrowserTabs {
         Self { store, beginning, own, found: Rc::default(), looked: false }
     }
 
-    /// Work of pages that are no more, once it is known.
+    /// Work of closed tabs, once it is known.
     pub(super) fn found(&mut self, ctx: &Context) -> Vec<RecoveredWork> {
         if !std::mem::replace(&mut self.looked, true) {
             let kept = self.store.names(self.beginning).into_iter().filter(|name| *name != self.own).collect();

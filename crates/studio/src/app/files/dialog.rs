@@ -1,16 +1,16 @@
-//! A file to open or to save to, chosen by walking through folders.
+//! A file dialog.
 
 use std::path::{Path, PathBuf};
 
 use eframe::egui::{self, Ui};
 
-/// A folder and a name in it.
+/// A file dialog: a folder and a name in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FileDialog {
     folder: PathBuf,
     name: String,
-    /// What names of files end in.
-    endings: &'static [&'static str],
+    /// The extensions of listed files.
+    extensions: &'static [&'static str],
     /// What the folder holds: folders first, then files.
     entries: Vec<Entry>,
 }
@@ -23,29 +23,29 @@ enum Entry {
 
 const SCENES: &[&str] = &[".toml"];
 
-/// What scenes name.
-const PICTURES: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".svg", ".glb", ".gltf"];
+/// Files that scenes name.
+const ASSETS: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".svg", ".glb", ".gltf"];
 
 impl FileDialog {
-    /// Begins in the folder of `path`, or where the program was started.
-    pub(super) fn beside(path: Option<&Path>) -> Self {
+    /// Starts in the folder of `path`, or in the working directory.
+    pub(super) fn in_folder_of(path: Option<&Path>) -> Self {
         let folder = path.and_then(Path::parent).unwrap_or(Path::new("."));
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let mut dialog = Self { folder, name: String::new(), endings: SCENES, entries: Vec::new() };
+        let mut dialog = Self { folder, name: String::new(), extensions: SCENES, entries: Vec::new() };
         dialog.read();
         dialog
     }
 
     /// The same with a name to begin with.
     #[must_use]
-    pub(super) fn naming(self, name: String) -> Self {
+    pub(super) fn with_name(self, name: String) -> Self {
         Self { name, ..self }
     }
 
     /// The same for what scenes name.
     #[must_use]
-    pub(super) fn of_pictures(self) -> Self {
-        let mut dialog = Self { endings: PICTURES, ..self };
+    pub(super) fn for_assets(self) -> Self {
+        let mut dialog = Self { extensions: ASSETS, ..self };
         dialog.read();
         dialog
     }
@@ -64,7 +64,7 @@ impl FileDialog {
                 return Some(Entry::Folder(name));
             }
             let ending = name.to_ascii_lowercase();
-            self.endings.iter().any(|own| ending.ends_with(own)).then_some(Entry::File(name))
+            self.extensions.iter().any(|own| ending.ends_with(own)).then_some(Entry::File(name))
         };
         self.entries = found.filter_map(entry).collect();
         self.entries.sort();
@@ -75,8 +75,8 @@ impl FileDialog {
         self.read();
     }
 
-    /// Shows it under `title`; whether a file was chosen for good, by a double-click.
-    pub(super) fn show(&mut self, ui: &mut Ui, title: &str) -> bool {
+    /// Shows the dialog. Returns whether a file was double-clicked.
+    pub(super) fn ui(&mut self, ui: &mut Ui, title: &str) -> bool {
         ui.set_width(460.0);
         ui.heading(title);
         ui.horizontal(|ui| {
@@ -88,13 +88,13 @@ impl FileDialog {
             ui.weak(self.folder.display().to_string());
         });
         let chosen =
-            egui::ScrollArea::vertical().max_height(320.0).auto_shrink([false, true]).show(ui, |ui| self.list(ui));
+            egui::ScrollArea::vertical().max_height(320.0).auto_shrink([false, true]).show(ui, |ui| self.list_ui(ui));
         let label = ui.label("Name").id;
         ui.add(egui::TextEdit::singleline(&mut self.name).desired_width(f32::INFINITY)).labelled_by(label);
         chosen.inner
     }
 
-    fn list(&mut self, ui: &mut Ui) -> bool {
+    fn list_ui(&mut self, ui: &mut Ui) -> bool {
         let (mut chosen, mut entered) = (false, None);
         for entry in &self.entries {
             match entry {
@@ -130,13 +130,13 @@ mod tests {
         for name in ["b.toml", "a.toml", "picture.png", ".hidden.toml"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
-        let mut dialog = FileDialog::beside(Some(&folder.path().join("b.toml")));
+        let mut dialog = FileDialog::in_folder_of(Some(&folder.path().join("b.toml")));
         let listed = [Entry::Folder("zoo".into()), Entry::File("a.toml".into()), Entry::File("b.toml".into())];
         assert_eq!(dialog.entries, listed);
-        let pictures = dialog.clone().of_pictures();
+        let pictures = dialog.clone().for_assets();
         assert_eq!(pictures.entries, [Entry::Folder("zoo".into()), Entry::File("picture.png".into())]);
         dialog.go_to(folder.path().join("zoo"));
         assert!(dialog.entries.is_empty());
-        assert_eq!(dialog.naming("c.toml".into()).path(), folder.path().join("zoo/c.toml"));
+        assert_eq!(dialog.with_name("c.toml".into()).path(), folder.path().join("zoo/c.toml"));
     }
 }

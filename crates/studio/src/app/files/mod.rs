@@ -1,5 +1,5 @@
-//! The window's files: what is opened and saved, what is kept while it is unsaved, what waits to be asked. Where files
-//! lie, on the disk or at the browser, is for its `PlatformFiles` to know.
+//! Opening, saving, rendering to files, autosave, and the dialogs that ask first. `native` has the parts for a file system, `web` those
+//! for a browser: both define `PlatformFiles` and the same methods of [`Files`].
 
 #[cfg(target_arch = "wasm32")]
 pub(crate) mod browser_io;
@@ -29,11 +29,11 @@ use crate::{
 };
 #[cfg(not(target_arch = "wasm32"))]
 use native::PlatformFiles;
-use questions::{Answer, PendingAction, Question, answer};
+use questions::{Answer, PendingAction, Question, answer_ui};
 #[cfg(target_arch = "wasm32")]
 use web::PlatformFiles;
 
-/// Files of the window: what lies where, and what waits to be asked.
+/// The file operations of the window, and the open question.
 pub(super) struct Files {
     question: Option<Question>,
     pub(super) unsaved: UnsavedWork,
@@ -42,12 +42,12 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Files of a window that keeps what it must in `store`.
+    /// File operations with autosaves in `store`.
     pub(super) fn new(store: &SettingsStore) -> Self {
         Self { question: None, unsaved: UnsavedWork::new(store), closing: false, platform: PlatformFiles::new(store) }
     }
 
-    /// Opens a scene that the studio brings along, after asking where that would lose work.
+    /// Opens a bundled scene, after asking where that would lose work.
     pub(super) fn open_bundled(&mut self, session: &mut Session, name: &str, text: &str) {
         self.open_text(session, name, text.to_owned(), None);
     }
@@ -57,7 +57,7 @@ impl Files {
         self.confirm_then(session, PendingAction::Open { name: name.to_owned(), text, path });
     }
 
-    /// Opens work of a studio that did not end well, after asking where that would lose work.
+    /// Opens recovered work, after asking where that would lose work.
     pub(super) fn recover(&mut self, session: &mut Session, recovered: RecoveredWork) {
         self.confirm_then(session, PendingAction::Recover(recovered));
     }
@@ -70,16 +70,16 @@ impl Files {
         }
     }
 
-    /// What must be done now and then, and the question that waits. `selection` is what is chosen.
+    /// Polls autosave, the platform's files and closing, and shows the open question.
     pub(super) fn poll(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         self.unsaved.poll_autosave(ui, session);
         self.poll_platform(ui, session, selection);
-        self.hold_close(ui, session);
-        self.ask(ui, session);
+        self.confirm_close(ui, session);
+        self.question_ui(ui, session);
     }
 
     /// Closing with unsaved work asks first, and so does closing while pictures are rendered.
-    fn hold_close(&mut self, ui: &Ui, session: &mut Session) {
+    fn confirm_close(&mut self, ui: &Ui, session: &mut Session) {
         let wants = ui.input(|input| input.viewport().close_requested());
         if self.closing {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
@@ -89,21 +89,21 @@ impl Files {
         }
     }
 
-    fn ask(&mut self, ui: &mut Ui, session: &mut Session) {
+    fn question_ui(&mut self, ui: &mut Ui, session: &mut Session) {
         let Some(mut question) = self.question.take() else { return };
-        let answer = egui::Modal::new(ui.scope_id().with("question")).show(ui.ctx(), |ui| answer(ui, &mut question));
+        let answer = egui::Modal::new(ui.scope_id().with("question")).show(ui.ctx(), |ui| answer_ui(ui, &mut question));
         match answer.inner {
             None if answer.should_close() => {}
             None => self.question = Some(question),
             Some(Answer::Cancel) => {}
-            Some(yes) => self.answered(session, question, yes),
+            Some(answer) => self.apply_answer(session, question, answer),
         }
         if self.closing {
             ui.ctx().request_repaint();
         }
     }
 
-    fn answered(&mut self, session: &mut Session, question: Question, answer: Answer) {
+    fn apply_answer(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match question {
             Question::Leave(action) => {
                 if answer == Answer::Save {
@@ -117,7 +117,7 @@ impl Files {
                 self.closing = true;
             }
             #[cfg(not(target_arch = "wasm32"))]
-            question => self.answered_about_disk(session, question, answer),
+            question => self.apply_native_answer(session, question, answer),
         }
     }
 
@@ -125,9 +125,9 @@ impl Files {
         match action {
             PendingAction::Open { name, text, path } => session.open(Document::new(name, text), path),
             PendingAction::Recover(recovered) => {
-                let (document, path) = reopened(&recovered);
+                let (document, path) = recovered_document(&recovered);
                 session.open(document, path);
-                self.unsaved.keep_in_stead(recovered, session);
+                self.unsaved.adopt(recovered, session);
             }
             PendingAction::Close if self.progress().is_some() => self.question = Some(Question::StopRendering),
             PendingAction::Close => self.closing = true,
@@ -135,7 +135,7 @@ impl Files {
     }
 }
 
-/// Tells the user how rendering ended: with this, or why not. After a panic the work is kept at once.
+/// Shows how rendering ended. After a panic the work is saved at once.
 fn report_end(session: &mut Session, ended: Result<String, JobFailure>) {
     let told = match ended {
         Ok(told) | Err(JobFailure::Failed(told)) => told,
@@ -144,10 +144,10 @@ fn report_end(session: &mut Session, ended: Result<String, JobFailure>) {
     session.set_notice(Some(told));
 }
 
-/// What was `recovered`, as an edit of what lies in its file now.
-fn reopened(recovered: &RecoveredWork) -> (Document, Option<PathBuf>) {
+/// Recovered work as an undoable edit of the file's current text.
+fn recovered_document(recovered: &RecoveredWork) -> (Document, Option<PathBuf>) {
     let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
-    // A page knows names, but no files.
+    // A page has no file system.
     let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
     let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
     let mut document = Document::new(named.map_or("scene", String::as_str), saved);

@@ -44,12 +44,12 @@ impl PlatformFiles {
 impl Files {
     /// Asks which file to open.
     pub(in crate::app) fn ask_to_open(&mut self, _ctx: &Context, session: &mut Session) {
-        self.question = Some(Question::Open(FileDialog::beside(session.path.as_deref())));
+        self.question = Some(Question::Open(FileDialog::in_folder_of(session.path.as_deref())));
     }
 
     /// Asks which file `place` shall name.
     pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, place: Place) {
-        self.question = Some(Question::Relink(place, FileDialog::beside(session.path.as_deref()).of_pictures()));
+        self.question = Some(Question::Relink(place, FileDialog::in_folder_of(session.path.as_deref()).for_assets()));
     }
 
     /// Saves, or asks where to.
@@ -79,7 +79,8 @@ impl Files {
             None if session.document.name().ends_with(".toml") => session.document.name().to_owned(),
             None => "scene.toml".to_owned(),
         };
-        self.question = Some(Question::SaveAs(FileDialog::beside(session.path.as_deref()).naming(name), action));
+        self.question =
+            Some(Question::SaveAs(FileDialog::in_folder_of(session.path.as_deref()).with_name(name), action));
     }
 
     /// Saves to `path`, whose name shall end as those of scenes do, unless another file would be lost.
@@ -121,7 +122,7 @@ impl Files {
     }
 
     /// What the menu has for files on the disk.
-    pub(in crate::app) fn menu(&mut self, ui: &mut Ui, session: &mut Session) {
+    pub(in crate::app) fn menu_ui(&mut self, ui: &mut Ui, session: &mut Session) {
         if ui.button("Save as…").clicked() {
             self.ask_where_to_save(session, None);
         }
@@ -171,28 +172,28 @@ impl Files {
         }
     }
 
-    /// Frames that are rendered, and all; 0 until they are counted. `None` where nothing is.
+    /// Number of frames rendered, and in total (0 until it is known); `None` where nothing is rendered.
     pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
         self.platform.render_job.as_ref().map(RenderJob::progress)
     }
 
-    /// Asks what is rendered to stop; whole frames stay.
+    /// Stops rendering; finished frames stay.
     pub(in crate::app) fn stop_rendering(&mut self) {
         self.platform.render_job.iter().for_each(RenderJob::stop);
     }
 
     pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         self.poll_external_change(ui, session);
-        self.take_dropped(ui, session, selection);
-        self.finish_job(ui, session);
+        self.handle_dropped_files(ui, session, selection);
+        self.poll_render_job(ui, session);
     }
 
-    /// Takes in what another program wrote into the file.
+    /// Checks whether another program changed the file.
     fn poll_external_change(&mut self, ui: &Ui, session: &mut Session) {
         let Some(path) = session.path.clone() else { return };
         if self.platform.watch.as_ref().is_none_or(|watch| watch.path() != path) {
             let ctx = ui.ctx().clone();
-            // Without a thread to look, the file is not watched.
+            // Without a thread, the file is not watched.
             self.platform.watch = FileWatcher::start(&path, move || ctx.request_repaint()).ok();
         }
         if !self.platform.watch.as_ref().is_some_and(FileWatcher::touched) {
@@ -215,8 +216,8 @@ impl Files {
         }
     }
 
-    /// A scene is opened, all else laid into the one that is open.
-    fn take_dropped(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
+    /// Opens a dropped scene; adds other dropped files to the open scene.
+    fn handle_dropped_files(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         let dropped: Vec<PathBuf> =
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         let scene = dropped.iter().position(|path| files::is_named_as_scene(path));
@@ -231,7 +232,7 @@ impl Files {
         }
     }
 
-    fn finish_job(&mut self, ui: &Ui, session: &mut Session) {
+    fn poll_render_job(&mut self, ui: &Ui, session: &mut Session) {
         let Some(render_job) = &mut self.platform.render_job else { return };
         ui.ctx().request_repaint_after(Duration::from_millis(200));
         if let Some(result) = render_job.finished() {
@@ -240,7 +241,7 @@ impl Files {
         }
     }
 
-    pub(super) fn answered_about_disk(&mut self, session: &mut Session, question: Question, answer: Answer) {
+    pub(super) fn apply_native_answer(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match (question, answer) {
             (Question::Open(dialog), _) => self.open(session, dialog.path()),
             (Question::Relink(place, dialog), _) => session.relink(&place, &dialog.path()),
@@ -249,7 +250,7 @@ impl Files {
             (Question::Replace(_, _, action), _) => self.ask_where_to_save(session, action),
             (Question::ChangedExternally(_), Answer::Do) => {
                 let there = session.path.as_ref().map(|path| files::external_change(&session.document, path));
-                // As it is now: the other program may have gone on writing.
+                // Read again: the other program may have written more since.
                 match there {
                     Some(ExternalChange::Changed(text)) => apply_external_change(session, &text),
                     Some(ExternalChange::Unreadable(reason)) => session.set_notice(Some(reason)),
@@ -266,17 +267,17 @@ impl Files {
     }
 }
 
-/// Writes the scene to `path`; one that `moves` there, with its paths made right.
+/// Writes the scene to `path`; where it `moves` to another folder, with its paths adjusted.
 ///
 /// # Errors
 /// Why it cannot be saved there; it stays as it was.
 fn write(session: &mut Session, path: &Path, moves: bool) -> Result<(), String> {
-    let text = if moves { save_as::follow(session, path) } else { Ok(session.document.text().clone()) };
+    let text = if moves { save_as::with_moved_paths(session, path) } else { Ok(session.document.text().clone()) };
     let text = text.map_err(|error| error.to_string())?;
     files::save(&mut session.document, path, text).map_err(|error| error.to_string())
 }
 
-/// Takes what another program wrote as an edit that can be undone.
+/// Applies the text written by another program as an undoable edit.
 fn apply_external_change(session: &mut Session, text: &str) {
     session.document.replace("edited elsewhere", text);
     session.document.end_step();

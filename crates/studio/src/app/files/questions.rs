@@ -1,4 +1,4 @@
-//! Questions in the middle of the window: what to open, where to save, whether to leave unsaved work.
+//! Modal dialogs: what to open, where to save, whether to discard unsaved work.
 
 use std::path::PathBuf;
 
@@ -34,7 +34,7 @@ pub(super) enum Question {
     ChangedExternally(Option<PendingAction>),
 }
 
-/// Where to, once unsaved work may be left.
+/// What to do once unsaved work is saved or discarded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum PendingAction {
     /// A scene, and where it lies if it lies anywhere.
@@ -43,7 +43,7 @@ pub(super) enum PendingAction {
         text: String,
         path: Option<PathBuf>,
     },
-    /// Work of a studio that did not end well.
+    /// Recovered work.
     Recover(RecoveredWork),
     Close,
 }
@@ -56,9 +56,9 @@ pub(super) enum Answer {
     Cancel,
 }
 
-/// Asks; what was answered, once it was.
-pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
-    let mut chosen = question.body(ui).then_some(Answer::Do);
+/// Shows the dialog. Returns the answer, if there is one.
+pub(super) fn answer_ui(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
+    let mut chosen = question.body_ui(ui).then_some(Answer::Do);
     ui.horizontal(|ui| {
         for (text, answer) in question.choices() {
             if ui.button(*text).clicked() {
@@ -70,17 +70,17 @@ pub(super) fn answer(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
 }
 
 impl Question {
-    /// What is asked; whether it is answered thereby, as by a double-click on a file.
-    fn body(&mut self, ui: &mut Ui) -> bool {
+    /// The content of the dialog. Returns whether it gave an answer, as a double-click on a file does.
+    fn body_ui(&mut self, ui: &mut Ui) -> bool {
         let said = match self {
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Open(dialog) => return dialog.show(ui, "Open which scene?"),
+            Self::Open(dialog) => return dialog.ui(ui, "Open which scene?"),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Relink(_, dialog) => return dialog.show(ui, "Which file in its stead?"),
+            Self::Relink(_, dialog) => return dialog.ui(ui, "Which file in its stead?"),
             #[cfg(not(target_arch = "wasm32"))]
             Self::SaveAs(dialog, _) => {
                 // A double-click chooses a name, to be saved over only after a question.
-                dialog.show(ui, "Save as");
+                dialog.ui(ui, "Save as");
                 return false;
             }
             #[cfg(not(target_arch = "wasm32"))]

@@ -1,4 +1,4 @@
-//! Files that the scene names: linked anew, or laid into it by dropping them on the window.
+//! Files that the scene names: relinked, or added by dropping them on the window.
 
 use std::path::Path;
 
@@ -34,8 +34,8 @@ impl Session {
         Value::Text(relative.to_string_lossy().replace('\\', "/"))
     }
 
-    /// Takes a file that was dropped on the window while `selection` is chosen: a drawing becomes the first shape of the aurora, a mesh
-    /// burns in the flame, a picture is the plate.
+    /// Adds a dropped file to the scene: a drawing becomes the first shape of the selected aurora, a mesh a burner of the selected flame,
+    /// a picture the plate.
     pub(super) fn drop_file(&mut self, file: &Path, selection: &Selection) {
         let ending = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let is_one_of = |endings: &[&str]| endings.contains(&ending.as_str());

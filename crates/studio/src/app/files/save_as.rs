@@ -1,5 +1,5 @@
-//! A scene that is saved elsewhere still finds what it names: paths lead to the same files from there, and what the studio brought
-//! along for an example is laid beside it.
+//! Save As: relative paths in the scene are adjusted so that they name the same files from the new folder, and bundled files of an
+//! example are written beside the scene.
 
 use std::{
     path::{Component, Path, PathBuf},
@@ -20,9 +20,9 @@ use crate::{
     session::{Session, folder},
 };
 
-/// Why a scene cannot go elsewhere.
+/// Why a scene cannot be saved in another folder.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum MovingError {
+pub(super) enum SaveAsError {
     /// A file that must lie beside the scene cannot be written.
     #[error(transparent)]
     Media(#[from] MediaError),
@@ -37,7 +37,7 @@ pub(super) enum MovingError {
 ///
 /// # Errors
 /// A file that must lie beside the scene cannot be written, or a path must be changed in a text that is no TOML.
-pub(super) fn follow(session: &Session, to: &Path) -> Result<Arc<str>, MovingError> {
+pub(super) fn with_moved_paths(session: &Session, to: &Path) -> Result<Arc<str>, SaveAsError> {
     let before = folder(session.path.as_deref()).to_path_buf();
     let after = folder(Some(to)).to_path_buf();
     let mut operations = Vec::new();
@@ -47,8 +47,8 @@ pub(super) fn follow(session: &Session, to: &Path) -> Result<Arc<str>, MovingErr
         }
         let bundled_file = if session.path.is_none() { session.bundled_file(&name) } else { None };
         let new = match bundled_file {
-            Some(bytes) => laid_beside(&name, bytes, &after)?,
-            None => from_elsewhere(&name, &before, &after),
+            Some(bytes) => write_bundled_file(&name, bytes, &after)?,
+            None => path_from_new_folder(&name, &before, &after),
         };
         if new != name {
             operations.push(Operation::Set { place, value: Value::Text(new) });
@@ -59,7 +59,7 @@ pub(super) fn follow(session: &Session, to: &Path) -> Result<Arc<str>, MovingErr
 }
 
 /// Writes `bytes` as `name` into `folder`, or under a free name where another file has that; what it is called there.
-fn laid_beside(name: &str, bytes: &[u8], folder: &Path) -> Result<String, MediaError> {
+fn write_bundled_file(name: &str, bytes: &[u8], folder: &Path) -> Result<String, MediaError> {
     let (stem, ending) = name.split_at(name.rfind('.').unwrap_or(name.len()));
     let file = files::write_beside(|which| folder.join(format!("{stem}{which}{ending}")), bytes)?;
     let own = file.strip_prefix(folder).unwrap_or(&file);
@@ -67,7 +67,7 @@ fn laid_beside(name: &str, bytes: &[u8], folder: &Path) -> Result<String, MediaE
 }
 
 /// What a scene in `after` calls the file that one in `before` calls `name`; the same where there is no such file.
-fn from_elsewhere(name: &str, before: &Path, after: &Path) -> String {
+fn path_from_new_folder(name: &str, before: &Path, after: &Path) -> String {
     let old = before.join(name);
     let whole = |folder: &Path| {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -80,11 +80,11 @@ fn from_elsewhere(name: &str, before: &Path, after: &Path) -> String {
     let Some((file, after)) = found.and_then(|(folder, file)| Some((whole(folder)?.join(file), whole(after)?))) else {
         return name.to_owned();
     };
-    relative(&file, &after).to_string_lossy().replace('\\', "/")
+    relative_path(&file, &after).to_string_lossy().replace('\\', "/")
 }
 
 /// The way from `folder` to `file`, both whole; `file` itself where they share nothing but a root.
-fn relative(file: &Path, folder: &Path) -> PathBuf {
+fn relative_path(file: &Path, folder: &Path) -> PathBuf {
     let shared = file.components().zip(folder.components()).take_while(|(one, other)| one == other);
     let (shared, names) = shared
         .fold((0, 0), |(all, names), (own, _)| (all + 1, names + usize::from(matches!(own, Component::Normal(_)))));
@@ -103,20 +103,20 @@ mod tests {
 
     #[test]
     fn ways_lead_up_and_down_or_are_whole() {
-        let way = |file: &str, folder: &str| relative(Path::new(file), Path::new(folder));
+        let way = |file: &str, folder: &str| relative_path(Path::new(file), Path::new(folder));
         assert_eq!(way("/a/b/c.png", "/a/b"), Path::new("c.png"));
         assert_eq!(way("/a/plates/c.png", "/a/b/d"), Path::new("../../plates/c.png"));
         assert_eq!(way("/a/c.png", "/b"), Path::new("/a/c.png"));
     }
 
     #[test]
-    fn what_is_laid_beside_spoils_no_other_file() {
+    fn what_is_write_bundled_file_spoils_no_other_file() {
         let folder = tempfile::tempdir().unwrap();
-        let lay = |bytes: &[u8]| laid_beside("plates/a.png", bytes, folder.path()).unwrap();
+        let lay = |bytes: &[u8]| write_bundled_file("plates/a.png", bytes, folder.path()).unwrap();
         assert_eq!([lay(b"one"), lay(b"one"), lay(b"two")], ["plates/a.png", "plates/a.png", "plates/a 2.png"]);
         assert_eq!(fs::read(folder.path().join("plates/a.png")).unwrap(), b"one");
         fs::write(folder.path().join("file"), "").unwrap();
-        laid_beside("a.png", b"one", &folder.path().join("file")).unwrap_err();
+        write_bundled_file("a.png", b"one", &folder.path().join("file")).unwrap_err();
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (old, new) = (folder.path().join("old/plates"), folder.path().join("new"));
         fs::create_dir_all(&old).unwrap();
-        let from = |name: &str| from_elsewhere(name, &folder.path().join("old"), &new);
+        let from = |name: &str| path_from_new_folder(name, &folder.path().join("old"), &new);
         assert_eq!(from("plates/c.####.png"), "../old/plates/c.####.png");
         assert_eq!(from("nowhere/c.png"), "nowhere/c.png");
     }

@@ -1,4 +1,4 @@
-//! Unsaved work is kept every few seconds while it changes, and offered at the next start where the studio did not end well.
+//! Autosave: unsaved work is stored every few seconds while it changes, and offered at the next start after a crash.
 
 use std::time::Duration;
 
@@ -16,13 +16,13 @@ use crate::{
     session::{Session, settings_store::SettingsStore},
 };
 
-/// Seconds between two keepings.
-const EVERY_S: f64 = 5.0;
+/// Seconds between two autosaves.
+const INTERVAL_S: f64 = 5.0;
 
-/// Under which it is kept: a folder, or what the names of texts in the browser begin with.
+/// The folder of autosaves, or the prefix of their names in the browser.
 const NAME: &str = "unsaved";
 
-/// Unsaved work, of now and of before.
+/// The autosave of this session, and recovered work of others.
 pub(crate) struct UnsavedWork {
     /// Work of a studio that did not end well.
     pub(crate) recovered: Vec<RecoveredWork>,
@@ -77,7 +77,7 @@ impl UnsavedWork {
             return;
         }
         let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
-        let wait_s = self.last_kept + EVERY_S - now;
+        let wait_s = self.last_kept + INTERVAL_S - now;
         // What is under a hand may pass, as wind does that blows only while it is dragged.
         if !at_once && present.1 && (held || wait_s > 0.0) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(wait_s.max(0.1)));
@@ -119,7 +119,7 @@ impl UnsavedWork {
     }
 
     /// Keeps what was `recovered`, and is open again, as this studio's own work from now on.
-    pub(super) fn keep_in_stead(&mut self, recovered: RecoveredWork, session: &mut Session) {
+    pub(super) fn adopt(&mut self, recovered: RecoveredWork, session: &mut Session) {
         self.recovered.retain(|other| *other != recovered);
         self.reopened.push(recovered);
         session.autosave_now = true;

@@ -1,4 +1,4 @@
-//! Files of a page: they come by way of the browser, and go back to it.
+//! Files in a web page: chosen or dropped by the user, and saved as downloads.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use bansho::{
 
 use super::{
     Files,
-    browser_io::{self, Inbox, Parts},
+    browser_io::{self, BlobParts, Inbox},
     questions::PendingAction,
     report_end,
 };
@@ -19,26 +19,26 @@ use crate::{
 };
 use eframe::egui::{Context, Ui};
 
-/// What the page knows of files.
+/// The state of files in a page.
 pub(super) struct PlatformFiles {
     /// Files that came by way of the browser.
     inbox: Inbox,
-    /// What shall name the next file that comes.
+    /// The parameter that shall name the next file that arrives.
     relink: Option<Place>,
     rendering: Option<Rendering>,
 }
 
-/// Finished pictures under way, in a worker of their own, so that the window's go on meanwhile.
+/// Full-quality rendering, in a worker of its own, so that the preview stays live.
 struct Rendering {
     player: WorkerPlayer,
-    /// For the picture that is made now.
+    /// The current request.
     request: FrameRequest,
-    /// What the scene is called.
+    /// The name of the scene without its extension.
     stem: String,
     done: usize,
     total: usize,
-    /// Where the pictures of a shot are gathered.
-    shot: Option<Zip<Parts>>,
+    /// The archive of a shot's pictures.
+    shot: Option<Zip<BlobParts>>,
 }
 
 impl PlatformFiles {
@@ -74,7 +74,7 @@ impl Files {
     /// Saves, and goes to `action` once that is done.
     pub(super) fn save_and(&mut self, session: &mut Session, action: Option<PendingAction>) {
         let text = session.document.text().clone();
-        match browser_io::download(&format!("{}.toml", stem(session)), &Parts::of(text.as_bytes())) {
+        match browser_io::download(&format!("{}.toml", stem(session)), &BlobParts::of(text.as_bytes())) {
             Ok(()) => {
                 session.document.mark_saved(text);
                 action.into_iter().for_each(|action| self.proceed(session, action));
@@ -84,7 +84,7 @@ impl Files {
     }
 
     /// What the menu has for files of a page.
-    pub(in crate::app) fn menu(&mut self, ui: &mut Ui, session: &mut Session) {
+    pub(in crate::app) fn menu_ui(&mut self, ui: &mut Ui, session: &mut Session) {
         ui.separator();
         if ui.button("Render still").on_hover_text("The finished picture of this frame, as a PNG").clicked() {
             self.render_still(ui.ctx(), session);
@@ -104,11 +104,11 @@ impl Files {
     pub(in crate::app) fn render_shot(&mut self, ctx: &Context, session: &mut Session) {
         let frames = session.transport.frames();
         let total = (frames.end() - frames.start() + 1) as usize;
-        self.render(ctx, session, *frames.start(), total, Some(Zip::new(Parts::default())));
+        self.render(ctx, session, *frames.start(), total, Some(Zip::new(BlobParts::default())));
     }
 
     /// Makes `total` frames from `first` on as `bansho render` does; those of a `shot` are saved together.
-    fn render(&mut self, ctx: &Context, session: &mut Session, first: i64, total: usize, shot: Option<Zip<Parts>>) {
+    fn render(&mut self, ctx: &Context, session: &mut Session, first: i64, total: usize, shot: Option<Zip<BlobParts>>) {
         if self.progress().is_some() {
             session.set_notice(Some(
                 "pictures are being rendered already; wait, or stop that with the cross beside its bar".into(),
@@ -137,7 +137,7 @@ impl Files {
         self.platform.rendering = None;
     }
 
-    /// Takes in finished pictures, and tells how rendering ended.
+    /// Collects rendered frames, and reports how rendering ended.
     fn poll_rendering(&mut self, session: &mut Session) {
         if let Some(ended) = self.platform.rendering.as_mut().and_then(Rendering::poll) {
             self.platform.rendering = None;
@@ -145,7 +145,7 @@ impl Files {
         }
     }
 
-    /// Takes in what the browser gave: a scene is opened, anything else laid into the one that is open.
+    /// Handles files that arrived: a scene is opened, other files are added to the open scene.
     pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         self.poll_rendering(session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
@@ -168,7 +168,7 @@ impl Files {
     }
 }
 
-/// The document's name without its ending.
+/// The document's name without its extension.
 fn stem(session: &Session) -> &str {
     let name = session.document.name();
     name.strip_suffix(".toml").unwrap_or(name)
@@ -192,7 +192,7 @@ impl Rendering {
     fn take(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
         let name = naming::picture(&self.stem, number);
         self.done += 1;
-        let Some(shot) = &mut self.shot else { return save(&name, &Parts::of(png)).map(Some) };
+        let Some(shot) = &mut self.shot else { return save(&name, &BlobParts::of(png)).map(Some) };
         shot.add(&name, png).map_err(|error| error.to_string())?;
         if self.done < self.total {
             self.request.number = Some(number + 1);
@@ -205,7 +205,7 @@ impl Rendering {
 }
 
 /// Hands a file to the browser; what the user is told.
-fn save(name: &str, parts: &Parts) -> Result<String, String> {
+fn save(name: &str, parts: &BlobParts) -> Result<String, String> {
     match browser_io::download(name, parts) {
         Ok(()) => Ok(format!("rendered: {name}")),
         Err(_) => Err("the browser cannot save files here".into()),

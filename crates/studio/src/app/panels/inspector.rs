@@ -1,4 +1,4 @@
-//! Every parameter of what is chosen, made from the descriptors: the one list that parser, book and schema read too.
+//! The inspector: every parameter of the selected table, generated from the descriptors that parser, book and schema read too.
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
@@ -19,7 +19,7 @@ use crate::{
 
 use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, TextEdit, Ui, vec2};
 
-/// The panel, and what is looked for in it.
+/// The panel and its search text.
 #[derive(Default)]
 pub(crate) struct Inspector {
     filter: String,
@@ -27,7 +27,7 @@ pub(crate) struct Inspector {
 
 impl Inspector {
     /// Shows the parameters of `selection`: all, or those whose names or descriptions hold what is looked for.
-    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+    pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         let Some(descriptor) = selection.descriptor() else { return };
         let place = selection.place();
         ui.heading(selection.title(&session.document));
@@ -46,11 +46,11 @@ impl Inspector {
         if !filter.is_in(descriptor) {
             ui.weak("Nothing here is called so.");
         }
-        table(ui, session, &place, descriptor, &filter);
+        table_ui(ui, session, &place, descriptor, &filter);
     }
 }
 
-/// What is looked for; empty for everything.
+/// A search text; empty matches everything.
 struct SearchFilter(String);
 
 impl SearchFilter {
@@ -62,7 +62,7 @@ impl SearchFilter {
         self.0.is_empty()
     }
 
-    /// Whether a parameter, or any within it, is looked for.
+    /// Whether a parameter, or any within it, matches.
     fn is(&self, parameter: &Descriptor) -> bool {
         let said = |text: &str| text.to_lowercase().contains(&self.0);
         let within = match &parameter.kind {
@@ -78,26 +78,26 @@ impl SearchFilter {
     }
 }
 
-fn table(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, filter: &SearchFilter) {
-    // Where a section itself is looked for, all of it is.
+fn table_ui(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, filter: &SearchFilter) {
+    // Where the section itself matches, all of it is shown.
     let all = SearchFilter(String::new());
     let filter = if filter.is_in(descriptor) { filter } else { &all };
     for parameter in descriptor.parameters.iter().filter(|parameter| filter.is(parameter)) {
         let own = place.key(parameter.key);
         match &parameter.kind {
-            Kind::Table(inner) => section(ui, session, &own, parameter.key, inner(), filter),
-            Kind::List { item, .. } => list(ui, session, &own, parameter, item, filter),
-            _ => row(ui, session, &own, parameter),
+            Kind::Table(inner) => section_ui(ui, session, &own, parameter.key, inner(), filter),
+            Kind::List { item, .. } => list_ui(ui, session, &own, parameter, item, filter),
+            _ => row_ui(ui, session, &own, parameter),
         }
     }
 }
 
-/// A part that opens by itself while something in it is looked for.
+/// A collapsing header that is open while searching.
 fn header(title: &str, place: &Place, filter: &SearchFilter) -> CollapsingHeader {
     CollapsingHeader::new(words(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
 }
 
-fn section(
+fn section_ui(
     ui: &mut Ui,
     session: &mut Session,
     place: &Place,
@@ -106,13 +106,20 @@ fn section(
     filter: &SearchFilter,
 ) {
     let shown = header(title, place, filter).show(ui, |ui| {
-        table(ui, session, place, descriptor, filter);
+        table_ui(ui, session, place, descriptor, filter);
     });
     shown.header_response.on_hover_text(&descriptor.doc);
 }
 
 /// The items of a list; tables among them are sections.
-fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, item: &Kind, filter: &SearchFilter) {
+fn list_ui(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    parameter: &Descriptor,
+    item: &Kind,
+    filter: &SearchFilter,
+) {
     let shown = header(parameter.key, place, filter).show(ui, |ui| {
         let stated = place.find(session.document.values()).map(|node| node.value.clone());
         let is_stated = stated.is_some();
@@ -126,10 +133,10 @@ fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descripto
         if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(place), item) {
             // A change to the implied item states it.
             let implied = place.index(0);
-            section(ui, session, &implied, &format!("{implied}, as usual"), inner(), filter);
+            section_ui(ui, session, &implied, &format!("{implied}, as usual"), inner(), filter);
         }
         for (index, node) in items.iter().enumerate() {
-            list_item(ui, session, &place.index(index), item, &node.value, filter, &before);
+            list_item_ui(ui, session, &place.index(index), item, &node.value, filter, &before);
         }
         if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
             let append = Operation::Append { place: place.clone(), value: initial_value(item) };
@@ -139,8 +146,8 @@ fn list(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descripto
     shown.header_response.on_hover_text(&parameter.doc);
 }
 
-/// An item of a list, and what must be done `before` it can be changed.
-fn list_item(
+/// An item of a list; `before` must be applied before it can be changed.
+fn list_item_ui(
     ui: &mut Ui,
     session: &mut Session,
     place: &Place,
@@ -154,10 +161,10 @@ fn list_item(
             session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
         }
         match kind {
-            Kind::Table(inner) => section(ui, session, place, &place.to_string(), inner(), filter),
+            Kind::Table(inner) => section_ui(ui, session, place, &place.to_string(), inner(), filter),
             kind => {
                 let label = ui.label(place.to_string()).id;
-                if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).show(ui, value) {
+                if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).ui(ui, value) {
                     session.edit(
                         &place.to_string(),
                         &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
@@ -168,8 +175,8 @@ fn list_item(
     });
 }
 
-/// One parameter: its name, its value at the present time, its key, and the way back to its default.
-fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
+/// One parameter: its name, its value at the current time, its keyframe button and its reset button.
+fn row_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let time = session.transport.time_s();
     let implied_value = session.implied_value(place).or_else(|| parameter.default.clone());
@@ -178,7 +185,7 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
     let name = RichText::new(words(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
     ui.horizontal_wrapped(|ui| {
-        let label = name_column(ui, name).on_hover_text(help(parameter)).id;
+        let label = name_ui(ui, name).on_hover_text(help(parameter)).id;
         let Some(present) = present else {
             if ui.button("Set").labelled_by(label).clicked() {
                 session.edit(
@@ -189,25 +196,25 @@ fn row(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor
             return;
         };
         if curve {
-            reset(ui, session, place, parameter, stated.is_some());
+            reset_button_ui(ui, session, place, parameter, stated.is_some());
             ui.end_row();
         }
         let default = parameter.default.as_ref();
         let widget = ValueEditor { kind: &parameter.kind, unit: parameter.unit, label, default };
-        if let Some(value) = widget.show(ui, &present) {
+        if let Some(value) = widget.ui(ui, &present) {
             session.set(parameter.key, place, value);
         }
         if parameter.animatable() {
-            key_button(ui, session, place, stated.as_ref(), present);
+            key_button_ui(ui, session, place, stated.as_ref(), present);
         }
         if !curve {
-            reset(ui, session, place, parameter, stated.is_some());
+            reset_button_ui(ui, session, place, parameter, stated.is_some());
         }
     });
 }
 
-/// The name in a column of its own, so that values stand under one another.
-fn name_column(ui: &mut Ui, name: RichText) -> Response {
+/// The name in a column of fixed width, so that values are aligned.
+fn name_ui(ui: &mut Ui, name: RichText) -> Response {
     const WIDTH: f32 = 118.0;
     let size = vec2(WIDTH, ui.spacing().interact_size.y);
     let layout = Layout::left_to_right(Align::Center);
@@ -218,15 +225,15 @@ fn name_column(ui: &mut Ui, name: RichText) -> Response {
     .inner
 }
 
-fn reset(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {
+fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {
     let name = format!("Default of {}", words(parameter.key));
     if stated && icon::button(ui, Icon::Reset, &name).clicked() {
         session.edit("default", &[Operation::Remove { place: place.clone() }]);
     }
 }
 
-/// A diamond: full where a key stands at the present time. It makes one or takes it out.
-fn key_button(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<&Value>, present: Value) {
+/// A diamond that adds or removes the keyframe at the current time; filled where there is one.
+fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<&Value>, present: Value) {
     let time = session.transport.time_s();
     let half = 0.5 * session.transport.frame_s();
     let keys = stated.map(keyframes::keys).unwrap_or_default();

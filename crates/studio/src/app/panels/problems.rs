@@ -1,4 +1,4 @@
-//! What is wrong with the scene, each fault with its line; clicking it leads there.
+//! The problems of the scene, each with its line; a click shows it in the text.
 
 use bansho::{
     base::parameters::{ProblemKind, Span},
@@ -8,17 +8,17 @@ use bansho::{
 use crate::session::Session;
 use eframe::egui::{self, RichText, Ui};
 
-/// What is wanted of a fault.
+/// What to do about a problem.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ProblemAction {
-    /// To see it in the text.
-    Sight(Span),
-    /// Another file in stead of one that cannot be had.
-    File(Place),
+    /// Show it in the text.
+    ShowInText(Span),
+    /// Choose another file for one that is missing.
+    Relink(Place),
 }
 
-/// Shows the faults, if there are any; what a hand wants of one.
-pub(crate) fn show(ui: &mut Ui, session: &Session) -> Option<ProblemAction> {
+/// Shows the problems, if there are any. Returns the action that was clicked.
+pub(crate) fn problems_ui(ui: &mut Ui, session: &Session) -> Option<ProblemAction> {
     let error = session.document.error()?.clone();
     let mut action = None;
     egui::Panel::bottom("problems").resizable(true).show(ui, |ui| {
@@ -29,15 +29,15 @@ pub(crate) fn show(ui: &mut Ui, session: &Session) -> Option<ProblemAction> {
             for problem in &error.problems {
                 let line = problem.span.as_ref().map(|span| error.position(span.start).0);
                 let text = line.map_or_else(|| problem.to_string(), |line| format!("line {line}: {problem}"));
-                let colour = ui.visuals().error_fg_color;
+                let color = ui.visuals().error_fg_color;
                 ui.horizontal_wrapped(|ui| {
-                    if ui.link(RichText::new(text).color(colour)).clicked() {
-                        action = problem.span.clone().map(ProblemAction::Sight);
+                    if ui.link(RichText::new(text).color(color)).clicked() {
+                        action = problem.span.clone().map(ProblemAction::ShowInText);
                     }
                     let missing = matches!(problem.kind, ProblemKind::Asset(_));
                     if missing && ui.small_button("Relink").on_hover_text("Choose another file in its stead").clicked()
                     {
-                        action = Some(ProblemAction::File(place(&problem.path)));
+                        action = Some(ProblemAction::Relink(place(&problem.path)));
                     }
                 });
             }

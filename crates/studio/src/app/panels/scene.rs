@@ -1,4 +1,4 @@
-//! What the scene holds: phenomena to hide, show alone, copy and remove, and everything they share.
+//! The scene panel: phenomena to hide, solo, duplicate and remove, and the shared tables.
 
 use bansho::{
     KINDS,
@@ -14,17 +14,17 @@ use crate::{
 use eframe::egui::{self, Ui};
 
 /// Shows the panel; `selection` is what is chosen.
-pub(crate) fn show(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
+pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     ui.horizontal(|ui| {
         ui.heading("Scene");
-        add_menu(ui, session, selection);
+        add_menu_ui(ui, session, selection);
     });
     for listed in session.document.phenomena() {
-        ui.push_id((listed.kind, listed.index), |ui| phenomenon(ui, session, selection, &listed));
+        ui.push_id((listed.kind, listed.index), |ui| phenomenon_ui(ui, session, selection, &listed));
     }
     ui.separator();
     for shared in SHARED_TABLES.iter().filter(|table| !table.many) {
-        row(ui, selection, Selection { key: shared.key, index: None }, shared.key);
+        row_ui(ui, selection, Selection { key: shared.key, index: None }, shared.key);
     }
     for shared in SHARED_TABLES.iter().filter(|table| table.many) {
         let count = match session.document.values().get(shared.key).map(|node| &node.value) {
@@ -33,7 +33,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session, selection: &mut Selection
         };
         for index in 0..count {
             let own = Selection { key: shared.key, index: Some(index) };
-            let response = row(ui, selection, own.clone(), &format!("{} {}", shared.key, index + 1));
+            let response = row_ui(ui, selection, own.clone(), &format!("{} {}", shared.key, index + 1));
             response.context_menu(|ui| {
                 if ui.button("Remove").clicked() {
                     session.edit("remove", &[Operation::Remove { place: own.place() }]);
@@ -44,7 +44,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session, selection: &mut Selection
     }
 }
 
-fn row(ui: &mut Ui, selection: &mut Selection, own: Selection, text: &str) -> egui::Response {
+fn row_ui(ui: &mut Ui, selection: &mut Selection, own: Selection, text: &str) -> egui::Response {
     let response = ui.selectable_label(*selection == own, text);
     if response.clicked() {
         *selection = own;
@@ -52,7 +52,7 @@ fn row(ui: &mut Ui, selection: &mut Selection, own: Selection, text: &str) -> eg
     response
 }
 
-fn add_menu(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
+fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     ui.menu_button("Add", |ui| {
         for kind in KINDS {
             if ui.button(kind.key).on_hover_text((kind.table)().doc.as_str()).clicked() {
@@ -76,7 +76,7 @@ fn add_menu(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     .on_hover_text("Add a phenomenon, a light or an obstacle");
 }
 
-fn phenomenon(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
+fn phenomenon_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
     let own = Selection { key: listed.kind, index: Some(listed.index) };
     ui.horizontal(|ui| {
         let mut enabled = listed.enabled;
@@ -85,8 +85,8 @@ fn phenomenon(ui: &mut Ui, session: &mut Session, selection: &mut Selection, lis
         if shown.changed() {
             session.edit("hide", &[operations::set_enabled(listed, enabled)]);
         }
-        let response = row(ui, selection, own, &listed.name).on_hover_text(listed.kind);
-        response.context_menu(|ui| context_menu(ui, session, selection, listed));
+        let response = row_ui(ui, selection, own, &listed.name).on_hover_text(listed.kind);
+        response.context_menu(|ui| phenomenon_menu_ui(ui, session, selection, listed));
         let solo = ui.small_button("S").on_hover_text(format!("Draw only {}, or all again", listed.name));
         let solo = solo.accessible_name(format!("Solo {}", listed.name));
         if solo.clicked() {
@@ -96,8 +96,8 @@ fn phenomenon(ui: &mut Ui, session: &mut Session, selection: &mut Selection, lis
     });
 }
 
-fn context_menu(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
-    rename(ui, session, listed);
+fn phenomenon_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
+    rename_ui(ui, session, listed);
     if ui.button("Duplicate").clicked() {
         let copy = operations::duplicate(&session.document, listed);
         session.edit("duplicate", &copy);
@@ -110,8 +110,8 @@ fn context_menu(ui: &mut Ui, session: &mut Session, selection: &mut Selection, l
     }
 }
 
-/// A field for its name. Half a name may be another's, so that only a whole one is taken.
-fn rename(ui: &mut Ui, session: &mut Session, listed: &PhenomenonEntry) {
+/// A field for its name, applied when the field loses the focus: a partial name may equal another's.
+fn rename_ui(ui: &mut Ui, session: &mut Session, listed: &PhenomenonEntry) {
     let kept = ui.scope_id().with("name");
     let mut name = ui.data(|data| data.get_temp::<String>(kept)).unwrap_or_else(|| listed.name.clone());
     ui.horizontal(|ui| {

@@ -1,4 +1,4 @@
-//! The scene file itself, to be typed in.
+//! The text editor of the scene file.
 
 use bansho::base::parameters::Span;
 
@@ -16,17 +16,17 @@ pub(crate) struct TextPanel {
     typed: Option<(f64, usize)>,
 }
 
-/// Typing that rests longer begins another step of the history, s.
-const REST_S: f64 = 1.0;
+/// A longer pause in typing starts a new undo step, s.
+const PAUSE_S: f64 = 1.0;
 
 impl TextPanel {
-    /// Marks these bytes of the text when it is shown next.
+    /// Selects these bytes of the text when it is shown next.
     pub(crate) fn jump_to(&mut self, span: Span) {
         self.jump = Some(span);
     }
 
     /// Shows the text; what is typed is an edit like any other.
-    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session) {
+    pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session) {
         let heading = ui.heading("Text").id;
         let mut text = session.document.text().to_string();
         egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| {
@@ -44,7 +44,7 @@ impl TextPanel {
             if output.response.changed() {
                 let now = ui.input(|input| input.time);
                 let line = changed_line(session.document.text(), &text);
-                if self.typed.replace((now, line)).is_none_or(|(then, there)| now - then > REST_S || line != there) {
+                if self.typed.replace((now, line)).is_none_or(|(then, there)| now - then > PAUSE_S || line != there) {
                     session.document.end_step();
                 }
                 session.document.replace("typing", &text);

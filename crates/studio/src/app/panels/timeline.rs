@@ -1,4 +1,4 @@
-//! Time: play, pause, step, scrub, the range that repeats, and where keys stand.
+//! The timeline: play, pause, step, scrub, the loop range, and keyframe marks.
 
 use eframe::egui::{self, Color32, CornerRadius, PointerButton, Rect, Sense, Stroke, Ui, pos2, vec2};
 
@@ -9,15 +9,15 @@ use crate::{
 };
 
 /// Shows the controls and the bar.
-pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
+pub(crate) fn timeline_ui(ui: &mut Ui, session: &mut Session) {
     ui.horizontal(|ui| {
-        controls(ui, session);
-        range_controls(ui, session);
+        transport_ui(ui, session);
+        range_ui(ui, session);
     });
-    bar(ui, session);
+    bar_ui(ui, session);
 }
 
-fn controls(ui: &mut Ui, session: &mut Session) {
+fn transport_ui(ui: &mut Ui, session: &mut Session) {
     let transport = &mut session.transport;
     let button = |ui: &mut Ui, icon: Icon, name: &str| icon::button(ui, icon, name).clicked();
     if button(ui, Icon::First, "First frame") {
@@ -42,7 +42,7 @@ fn controls(ui: &mut Ui, session: &mut Session) {
     ui.weak(format!("of {} to {}, {:.2} s", frames.start(), frames.end(), transport.time_s()));
 }
 
-fn range_controls(ui: &mut Ui, session: &mut Session) {
+fn range_ui(ui: &mut Ui, session: &mut Session) {
     ui.separator();
     let range = session.transport.range();
     let (mut first, mut last) = (*range.start(), *range.end());
@@ -59,7 +59,7 @@ fn range_controls(ui: &mut Ui, session: &mut Session) {
     }
 }
 
-fn bar(ui: &mut Ui, session: &mut Session) {
+fn bar_ui(ui: &mut Ui, session: &mut Session) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 22.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
     let rect = response.rect.shrink2(vec2(6.0, 3.0));

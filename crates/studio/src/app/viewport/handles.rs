@@ -1,4 +1,4 @@
-//! What stands somewhere in the scene and can be dragged there: lamps, flames and their burners.
+//! Handles in the viewport: positions that can be dragged, of lamps, flames and their burners.
 
 use bansho::{
     base::{
@@ -10,30 +10,30 @@ use bansho::{
 
 use crate::{document::keyframes, session::Session};
 
-/// One of them.
+/// A draggable position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Handle {
-    /// The value that says where it stands.
+    /// The parameter of the position.
     pub(super) place: Place,
-    /// What its value counts from, m.
+    /// The origin of its parameter, m.
     pub(super) origin: DVec3,
-    /// Where it is now, m.
+    /// Its position at the current time, m.
     pub(super) point: DVec3,
-    /// What it is called.
+    /// Its label.
     pub(super) name: String,
 }
 
-/// Kinds of phenomena that stand at a `position`, and the list of their parts that have a place of their own. A list that is not stated
-/// stands for one part.
+/// Kinds of phenomena with a `position`, and their list of items with positions of their own. A list that is not stated implies one
+/// item.
 const POSITIONED_KINDS: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
 
-/// Whether the list at `place` stands for one usual part where it is not stated.
+/// Whether the list at `place` implies one default item where it is not stated.
 pub(crate) fn implies_one_item(place: &Place) -> bool {
     let [Segment::Key(kind), Segment::Index(_), Segment::Key(parts)] = place.segments() else { return false };
     POSITIONED_KINDS.contains(&(kind, parts))
 }
 
-/// All that hands can move at the present time: what stands somewhere, or while keyframes are recorded what can be keyed.
+/// All handles at the current time; while recording, those that can be animated.
 pub(super) fn handles(session: &Session) -> Vec<Handle> {
     let mut handles = positioned_handles(session);
     if session.recording {
@@ -65,7 +65,7 @@ fn positioned_handles(session: &Session) -> Vec<Handle> {
             Some(Value::List(items)) => items.len(),
             _ => 0,
         };
-        // One that is not stated stands where the phenomenon does, and moves by itself only over time.
+        // The implied item is at the position of the phenomenon; only while recording does it get a handle of its own.
         let unstated = usize::from(session.recording && count == 0);
         handles.extend((0..count + unstated).map(|index| Handle {
             place: list.index(index).key("position"),

@@ -1,4 +1,4 @@
-//! The picture, and hands in it: the camera turned, the flame blown, lamps moved.
+//! The viewport: the picture, and dragging in it to move the camera, the wind, lamps and burners.
 
 pub(crate) mod handles;
 pub(crate) mod pointer;
@@ -14,7 +14,7 @@ use bansho::{
 };
 
 use crate::{
-    editors::flame_sheet::{curves_ui, stages_ui::image},
+    editors::flame_sheet::{curves_ui, stages_ui::color_image},
     session::{Session, selection::Selection},
 };
 use eframe::egui::{
@@ -25,22 +25,22 @@ use handles::{Handle, handles};
 use pointer::{CameraPose, rounded};
 use wind_drag::WindDrag;
 
-/// Around the picture: so dark that it does not blind, and not black, so that the picture's border is seen.
+/// The margin around the picture: dark, but not black, so that the border of the picture is visible.
 const SURROUND: Color32 = Color32::from_gray(18);
 
-/// What a drag with the first button does.
+/// What a drag with the primary button does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ViewportTool {
-    /// Turns the camera about its target.
+    /// Orbits the camera around its target.
     #[default]
     Camera,
-    /// Blows: the drag is the wind.
+    /// Sets the wind to the drag vector.
     Wind,
-    /// Moves what stands somewhere.
+    /// Moves lamps, flames and burners.
     Place,
 }
 
-/// The picture on the screen.
+/// The viewport.
 #[derive(Default)]
 pub(super) struct Viewport {
     texture: Option<(TextureHandle, u64)>,
@@ -53,22 +53,22 @@ pub(super) struct Viewport {
 }
 
 impl Viewport {
-    /// Pixels of the screen that a picture may have.
+    /// Size of the viewport, physical pixels.
     pub(super) fn pixels(&self) -> [usize; 2] {
         self.pixels
     }
 
-    /// Shows the picture and takes in what hands do to it.
-    pub(super) fn show(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+    /// Shows the picture and handles dragging in it.
+    pub(super) fn ui(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         let behind = ui.painter().add(Shape::Noop);
         let panel = ui.clip_rect();
-        self.tools(ui, session, selection);
+        self.tools_ui(ui, session, selection);
         let (response, painter) = ui.allocate_painter(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
         let scale = ui.ctx().pixels_per_point();
         self.pixels = [response.rect.width(), response.rect.height()].map(|side| (side * scale).max(1.0) as usize);
         ui.painter().set(behind, around(panel, response.rect, ui.visuals().panel_fill));
-        let Some(size) = self.take_picture(ui, session) else {
+        let Some(size) = self.upload_picture(ui, session) else {
             painter.rect_filled(response.rect, 0.0, SURROUND);
             let text = if session.document.error().is_some() { "nothing to show yet" } else { "drawing…" };
             let font = egui::FontId::proportional(16.0);
@@ -85,11 +85,11 @@ impl Viewport {
         self.handle_pointer(ui, session, &response, frame);
         self.paint_handles(session, &painter, frame);
         if self.curves && curves_ui::has_any(selection) {
-            curves_ui::show(ui, session, selection, response.rect);
+            curves_ui::curves_ui(ui, session, selection, response.rect);
         }
     }
 
-    fn tools(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+    fn tools_ui(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut self.tool, ViewportTool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
@@ -106,15 +106,15 @@ impl Viewport {
                     .on_hover_text("The curves of what is chosen, on the picture");
             }
             ui.separator();
-            exposure(ui, session);
+            exposure_ui(ui, session);
         });
     }
 
-    /// Brings a new picture to the screen; the size of the scene's picture, if there is one at all.
-    pub(super) fn take_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
+    /// Uploads a new picture to the texture. Returns the size of the scene's picture.
+    pub(super) fn upload_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
         let (picture, drawn) = session.picture()?;
         if self.texture.as_ref().is_none_or(|(_, shown)| *shown != drawn) {
-            let image = image(picture);
+            let image = color_image(picture);
             match &mut self.texture {
                 Some((texture, shown)) => {
                     texture.set(image, TextureOptions::LINEAR);
@@ -150,7 +150,7 @@ impl Viewport {
     }
 
     fn dolly(&self, ui: &Ui, session: &mut Session, response: &Response, pose: CameraPose) {
-        /// Points of scrolling that are a step.
+        /// Scroll points per dolly step.
         const STEP: f32 = 50.0;
         let scrolled = ui.input(|input| input.smooth_scroll_delta().y);
         if response.hovered() && scrolled != 0.0 {
@@ -178,7 +178,7 @@ impl Viewport {
         }
     }
 
-    /// Takes the hand off the wind, as before the scene is saved: wind that is not recorded passes.
+    /// Ends a wind drag, as before saving: wind that is not recorded is reset.
     pub(super) fn end_wind_drag(&mut self, session: &mut Session) {
         if let Some(wind_drag) = self.wind_drag.take() {
             wind_drag.end(session);
@@ -186,8 +186,8 @@ impl Viewport {
     }
 
     fn drag_handle(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
-        /// Things nearer to the pointer than this are meant, points of the screen.
-        const REACH: f32 = 14.0;
+        /// Hit radius of a handle, points.
+        const HIT_RADIUS: f32 = 14.0;
         if self.tool != ViewportTool::Place {
             return;
         }
@@ -197,7 +197,7 @@ impl Viewport {
             let from = ui.input(|input| input.pointer.press_origin());
             let near = |handle: &&Handle| Some((on_screen(handle)?.distance(from?), handle.place.clone()));
             let nearest = handles.iter().filter_map(|handle| near(&handle)).min_by(|a, b| a.0.total_cmp(&b.0));
-            self.held = nearest.filter(|(distance, _)| *distance < REACH).map(|(_, place)| place);
+            self.held = nearest.filter(|(distance, _)| *distance < HIT_RADIUS).map(|(_, place)| place);
             if session.recording && self.held.is_some() {
                 session.transport.play_to_the_end();
             }
@@ -205,7 +205,7 @@ impl Viewport {
         if !response.dragged_by(PointerButton::Primary) && self.held.take().is_some() && session.recording {
             session.transport.set_playing(false);
         }
-        // Beyond the end of the shot nothing is recorded.
+        // Recording stops at the end of the shot.
         let ended = session.recording && !session.transport.is_playing();
         let held = handles.iter().find(|handle| Some(&handle.place) == self.held.as_ref()).filter(|_| !ended);
         if let (Some(handle), Some(at)) = (held, response.interact_pointer_pos())
@@ -235,8 +235,8 @@ fn move_camera(session: &mut Session, pose: CameraPose) {
     session.set_all("camera", [value("position", pose.position), value("target", pose.target)]);
 }
 
-/// The exposure of the scene, which a hand sets in place of the automatic one.
-fn exposure(ui: &mut Ui, session: &mut Session) {
+/// The exposure of the scene; a change replaces the automatic one.
+fn exposure_ui(ui: &mut Ui, session: &mut Session) {
     let Some(mut ev100) = session.plan().map(|plan| f64::from(plan.exposure_ev100)) else { return };
     let place = Place::root().key("picture").key("exposure_ev100");
     let label = ui.label("Exposure").on_hover_text("Exposure value at ISO 100; less is brighter").id;

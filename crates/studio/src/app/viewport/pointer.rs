@@ -52,40 +52,40 @@ impl CameraPose {
     }
 
     fn looked_around(self, drag: DVec2, camera: &Camera) -> Self {
-        // The picture's height is its field of view.
+        // A drag over the height of the picture turns by the field of view.
         let field = 2.0 * math::atan2(0.5 * camera.size[1], camera.focal_pixels);
         let turned = turned(self.position - self.target, [field * drag.x, -field * drag.y]);
         Self { target: self.position - turned, ..self }
     }
 
-    /// Moved across the line of sight, so that what lies at the target's distance follows the hand.
+    /// Panned in the image plane, so that points at the target's distance follow the pointer.
     pub(super) fn panned(self, drag: DVec2, camera: &Camera) -> Self {
         let distance = (self.position - self.target).length();
         if distance > FAR {
-            // To follow the hand there, the camera would have to fly.
+            // Panning at that distance would move the camera very far.
             return self.looked_around(drag, camera);
         }
-        let metres = camera.size[1] / camera.focal_pixels * distance;
-        let shift = (camera.orientation.y_axis * drag.y - camera.orientation.x_axis * drag.x) * metres;
+        let meters = camera.size[1] / camera.focal_pixels * distance;
+        let shift = (camera.orientation.y_axis * drag.y - camera.orientation.x_axis * drag.x) * meters;
         Self { position: self.position + shift, target: self.target + shift }.above_ground(self)
     }
 
-    /// Brought nearer to the target by `steps`, or further away by negative ones.
+    /// Dollied toward the target by `steps`; away for negative ones.
     pub(super) fn dollied(self, steps: f64) -> Self {
-        /// Share of the distance that is left after a step.
+        /// Factor of the distance per step.
         const STEP: f64 = 0.9;
         let distance = (self.position - self.target) * math::pow(STEP, steps);
         Self { position: self.target + distance, ..self }.above_ground(self)
     }
 
-    /// The same, but not under the ground where it was not `before`.
+    /// The same, kept above the ground where it was `before`.
     fn above_ground(self, before: Self) -> Self {
         let lowest = LOWEST.min(before.position.y);
         Self { position: DVec3 { y: self.position.y.max(lowest), ..self.position }, ..self }
     }
 }
 
-/// `offset` turned by angles around the vertical and up, radians; never over the pole.
+/// `offset` rotated in azimuth and elevation, radians; the elevation is clamped below the pole.
 fn turned(offset: DVec3, [around, up]: [f64; 2]) -> DVec3 {
     let distance = offset.length();
     if distance <= 0.0 {
@@ -98,7 +98,7 @@ fn turned(offset: DVec3, [around, up]: [f64; 2]) -> DVec3 {
     distance * DVec3::new(sin_a * cos_b, sin_b, cos_a * cos_b)
 }
 
-/// The wind of a drag by `drag` viewport heights, m/s: along the picture, as in the paper where the drag is the wind.
+/// The wind, m/s, of a drag by `drag` viewport heights: in the image plane, as in the paper.
 pub(super) fn wind(drag: DVec2, camera: &Camera) -> DVec3 {
     /// Wind of a drag over the whole height, m/s.
     const STRONGEST: f64 = 8.0;
@@ -106,14 +106,14 @@ pub(super) fn wind(drag: DVec2, camera: &Camera) -> DVec3 {
     along * STRONGEST
 }
 
-/// Where a thing at `point` goes when it is dragged to `pixel`: to the same depth there.
+/// Where a point goes when it is dragged to `pixel`: to the same depth.
 pub(super) fn dragged(point: DVec3, pixel: DVec2, camera: &Camera) -> Option<DVec3> {
     Some(camera.position + camera.direction(pixel)? * camera.depth(point))
 }
 
-/// Numbers as a hand means them, to a millimetre: a file is read by people too.
+/// Rounded to a millimeter, so that files stay readable.
 pub(super) fn rounded(vector: DVec3) -> [f64; 3] {
-    // No number is written as -0.
+    // + 0.0 turns -0 into 0.
     vector.to_array().map(|number| (number * 1000.0).round() / 1000.0 + 0.0)
 }
 

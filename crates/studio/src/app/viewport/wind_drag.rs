@@ -1,4 +1,4 @@
-//! A drag of the hand that blows: while it lasts the wind is what the hand says, and then what it was.
+//! A drag that sets the wind: while it lasts the drag vector is added to the wind, then the wind is what it was before.
 
 use bansho::{
     base::{math::DVec3, parameters::Value},
@@ -8,7 +8,7 @@ use bansho::{
 use super::pointer::rounded;
 use crate::{document::keyframes, session::Session};
 
-/// The wind before a drag began.
+/// A wind drag, with the wind before it began.
 #[derive(Clone, Debug)]
 pub(super) struct WindDrag {
     base_velocity: [f64; 3],
@@ -25,7 +25,7 @@ fn place() -> Place {
 }
 
 impl WindDrag {
-    /// Begins a drag. Where keyframes are recorded, time passes while it lasts.
+    /// Begins a drag. While recording, the playback runs during the drag.
     pub(super) fn begin(session: &mut Session) -> Self {
         let base_velocity =
             keyframes::vector(session.document.values(), &place(), session.transport.time_s()).unwrap_or_default();
@@ -39,11 +39,11 @@ impl WindDrag {
         wind_drag
     }
 
-    /// The hand says `wind`, m/s, on top of what blows anyway.
+    /// Sets the wind to `wind`, m/s, on top of the wind before the drag.
     pub(super) fn update(&self, session: &mut Session, wind: DVec3) {
         let velocity = rounded(DVec3::from(self.base_velocity) + wind);
         if self.recording {
-            // The key of the calm before the drag stays, and so does what was recorded when the shot ends.
+            // The keyframe at the start of the drag stays, and recording stops at the end of the shot.
             if session.transport.time_s() != self.start_s && session.transport.is_playing() {
                 self.key(session, velocity);
             }
@@ -52,7 +52,7 @@ impl WindDrag {
         }
     }
 
-    /// The hand lets go: recorded wind calms down again, unrecorded wind never was.
+    /// Ends the drag: recorded wind returns to the wind before it; unrecorded wind is reset without an undo step.
     pub(super) fn end(self, session: &mut Session) {
         if self.recording {
             if session.transport.is_playing() {

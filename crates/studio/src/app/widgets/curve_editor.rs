@@ -1,4 +1,4 @@
-//! Curves by their points: drag them, double-click to add one, right-click to take one out.
+//! An editor of curves by control points: drag to move, double-click to add, right-click to remove.
 
 use bansho::base::{
     math::curve::{Curve, Interpolation},
@@ -8,19 +8,19 @@ use eframe::egui::{
     self, Color32, CornerRadius, Id, PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, pos2, vec2,
 };
 
-/// Points nearer to the pointer than this are meant, points of the screen.
-const REACH: f32 = 9.0;
-/// Least distance between two points, as a share of the curve's width.
-const APART: f64 = 0.002;
+/// Hit radius of a control point, points of the screen.
+const HIT_RADIUS: f32 = 9.0;
+/// Smallest distance of two control points, as a fraction of the curve's width.
+const MIN_DISTANCE: f64 = 0.002;
 
-/// What a curve may be.
+/// The bounds of a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Allowed {
+pub(crate) struct CurveBounds {
     /// Least and greatest x.
     pub(crate) x: [f64; 2],
     /// Least and greatest y.
     pub(crate) y: [f64; 2],
-    /// Whether it must not fall.
+    /// Whether it must be monotonically increasing.
     pub(crate) rising: bool,
 }
 
@@ -62,18 +62,18 @@ impl Chart {
     fn nearest(&self, points: &[[f64; 2]], at: Pos2) -> Option<usize> {
         let distance = |index: &usize| self.to_screen(points[*index]).distance(at);
         let nearest = (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.filter(|index| distance(index) < REACH)
+        nearest.filter(|index| distance(index) < HIT_RADIUS)
     }
 }
 
 /// Shows the curve `value`, which may be what is `allowed`; what it becomes where a hand changed it.
-pub(crate) fn show(ui: &mut Ui, label: Id, value: &Value, allowed: Allowed) -> Option<Value> {
-    let Allowed { x, y, rising } = allowed;
+pub(crate) fn curve_editor_ui(ui: &mut Ui, label: Id, value: &Value, allowed: CurveBounds) -> Option<Value> {
+    let CurveBounds { x, y, rising } = allowed;
     let (points, interpolation) = read(value)?;
     let curve = Curve::new(points.clone(), interpolation.into()).ok()?;
     let width = ui.available_width().clamp(120.0, 260.0);
     let (_, rect) = ui.allocate_space(vec2(width, 90.0));
-    // Under the label's name, whatever comes to stand between them while a point is held.
+    // The id derives from the label, so that it stays the same if the layout changes during a drag.
     let response = ui.interact(rect, label.with("curve"), Sense::click_and_drag());
     let painter = ui.painter_at(rect);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "curve"));
@@ -85,7 +85,7 @@ pub(crate) fn show(ui: &mut Ui, label: Id, value: &Value, allowed: Allowed) -> O
     Some(write(edited, interpolation))
 }
 
-/// The chart's top, which stays while a hand is down on it: a chart that grew with the point that is dragged up in it would run away.
+/// The chart's top, kept constant while dragging: otherwise the scale would grow with the dragged point.
 fn held_still(ui: &Ui, response: &Response, top: f64) -> f64 {
     let held = response.id.with("top");
     ui.data_mut(|data| {
@@ -123,10 +123,10 @@ fn edit(ui: &Ui, response: &Response, chart: &Chart, mut points: Vec<[f64; 2]>) 
     let held = response.id.with("held");
     if response.double_clicked() {
         let [x, y] = chart.to_curve(at);
-        let place = points.partition_point(|point| point[0] < x);
+        let index = points.partition_point(|point| point[0] < x);
         let [before, after] =
-            [place.checked_sub(1).map(|index| points[index][1]), points.get(place).map(|point| point[1])];
-        points.insert(place, [x, chart.level(y, before, after)]);
+            [index.checked_sub(1).map(|before| points[before][1]), points.get(index).map(|point| point[1])];
+        points.insert(index, [x, chart.level(y, before, after)]);
         return ascending(&points, chart).then_some(points);
     }
     if response.secondary_clicked() {
@@ -143,16 +143,16 @@ fn edit(ui: &Ui, response: &Response, chart: &Chart, mut points: Vec<[f64; 2]>) 
         return None;
     }
     let index = ui.data(|data| data.get_temp::<Option<usize>>(held)).flatten().filter(|&index| index < points.len())?;
-    let moved = between_neighbours(&points, index, chart.to_curve(at), chart);
+    let moved = between_neighbors(&points, index, chart.to_curve(at), chart);
     (points[index] != moved).then(|| {
         points[index] = moved;
         points
     })
 }
 
-/// A point cannot pass its neighbours.
-fn between_neighbours(points: &[[f64; 2]], index: usize, wanted: [f64; 2], chart: &Chart) -> [f64; 2] {
-    let apart = APART * (chart.x[1] - chart.x[0]);
+/// A control point cannot pass its neighbors.
+fn between_neighbors(points: &[[f64; 2]], index: usize, wanted: [f64; 2], chart: &Chart) -> [f64; 2] {
+    let apart = MIN_DISTANCE * (chart.x[1] - chart.x[0]);
     let low = index.checked_sub(1).map_or(chart.x[0], |before| points[before][0] + apart);
     let high = points.get(index + 1).map_or(chart.x[1], |after| after[0] - apart);
     let [before, after] = [index.checked_sub(1), Some(index + 1)].map(|at| points.get(at?).map(|point| point[1]));
@@ -161,7 +161,7 @@ fn between_neighbours(points: &[[f64; 2]], index: usize, wanted: [f64; 2], chart
 }
 
 fn ascending(points: &[[f64; 2]], chart: &Chart) -> bool {
-    let apart = APART * (chart.x[1] - chart.x[0]);
+    let apart = MIN_DISTANCE * (chart.x[1] - chart.x[0]);
     points.windows(2).all(|pair| pair[1][0] - pair[0][0] >= apart)
 }
 

@@ -1,47 +1,47 @@
-//! Widgets for values, one for each kind of parameter. They know nothing of scenes.
+//! Value editors, one for each kind of parameter, independent of scenes.
 
 use bansho::base::parameters::{Choice, Kind, Node, Value};
 use eframe::egui::{self, Color32, DragValue, Id, Ui};
 
-use super::curve_editor::{self, Allowed};
+use super::curve_editor::{self, CurveBounds};
 
-/// What a value is edited with.
+/// An editor of one value.
 pub(crate) struct ValueEditor<'a> {
-    /// What it may be.
+    /// The allowed values.
     pub(crate) kind: &'a Kind,
     /// Its unit.
     pub(crate) unit: &'a str,
     /// The label that names it, for screen readers.
     pub(crate) label: Id,
-    /// What it usually is: sliders are finest around it.
+    /// The default value: sliders are finest around it.
     pub(crate) default: Option<&'a Value>,
 }
 
-/// Beside a slider: a number without its unit, and the buttons after it, points of the screen.
+/// Width of the number field, without its unit, and of the buttons beside a slider, points.
 const NUMBER_WIDTH: f32 = 114.0;
 
-/// Sliders are so wide at least, points of the screen.
+/// Smallest width of a slider, points.
 const MIN_SLIDER_WIDTH: f32 = 40.0;
 
 impl ValueEditor<'_> {
     /// Shows `value`; what it becomes where a hand changed it.
-    pub(crate) fn show(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
+    pub(crate) fn ui(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
         match self.kind {
-            Kind::Bool => self.checkbox(ui, value),
-            Kind::Integer { min, max } => self.integer(ui, value, [*min, *max]),
+            Kind::Bool => self.checkbox_ui(ui, value),
+            Kind::Integer { min, max } => self.integer_ui(ui, value, [*min, *max]),
             Kind::Number { min, max } => {
                 let default = self.default.and_then(Value::as_number);
-                let number = self.number(ui, value.as_number()?, [*min, *max], default)?;
+                let number = self.number_ui(ui, value.as_number()?, [*min, *max], default)?;
                 Some(Value::Number(number))
             }
-            Kind::Vector { min, max, .. } => self.vector(ui, value, [*min, *max]),
-            Kind::Text | Kind::Asset | Kind::Rational { .. } => self.text(ui, value),
-            Kind::Choice(choices) => self.choice(ui, value, choices),
+            Kind::Vector { min, max, .. } => self.vector_ui(ui, value, [*min, *max]),
+            Kind::Text | Kind::Asset | Kind::Rational { .. } => self.text_ui(ui, value),
+            Kind::Choice(choices) => self.choice_ui(ui, value, choices),
             Kind::Curve { x, y, rising } => {
-                curve_editor::show(ui, self.label, value, Allowed { x: *x, y: *y, rising: *rising })
+                curve_editor::curve_editor_ui(ui, self.label, value, CurveBounds { x: *x, y: *y, rising: *rising })
             }
-            Kind::Animated(inner) | Kind::Optional(inner) => ValueEditor { kind: inner, ..*self }.show(ui, value),
-            Kind::Auto(inner) => self.auto(ui, value, inner),
+            Kind::Animated(inner) | Kind::Optional(inner) => ValueEditor { kind: inner, ..*self }.ui(ui, value),
+            Kind::Auto(inner) => self.auto_ui(ui, value, inner),
             Kind::List { .. } | Kind::Table(_) => {
                 ui.weak("in the text");
                 None
@@ -49,39 +49,39 @@ impl ValueEditor<'_> {
         }
     }
 
-    fn checkbox(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
+    fn checkbox_ui(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
         let mut on = *value == Value::Bool(true);
         let changed = ui.checkbox(&mut on, "").labelled_by(self.label).changed();
         changed.then_some(Value::Bool(on))
     }
 
-    fn integer(&self, ui: &mut Ui, value: &Value, [min, max]: [i64; 2]) -> Option<Value> {
+    fn integer_ui(&self, ui: &mut Ui, value: &Value, [min, max]: [i64; 2]) -> Option<Value> {
         let mut number = value.as_number()? as i64;
         let bounds = [min as f64, max as f64];
         let default = self.default.and_then(Value::as_number);
-        let slid = self.slider(ui, number as f64, bounds, default).map(|slid| slid.round() as i64);
+        let slid = self.slider_ui(ui, number as f64, bounds, default).map(|slid| slid.round() as i64);
         let drag = DragValue::new(&mut number).range(min..=max).clamp_existing_to_range(false).suffix(self.suffix());
         let dragged = ui.add(drag).labelled_by(self.label).changed().then_some(number);
         slid.or(dragged).map(Value::Integer)
     }
 
-    fn number(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
-        let slid = self.slider(ui, number, bounds, default).map(decimal);
-        let dragged = self.drag(ui, number, bounds);
+    fn number_ui(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
+        let slid = self.slider_ui(ui, number, bounds, default).map(decimal);
+        let dragged = self.drag_ui(ui, number, bounds);
         slid.or(dragged)
     }
 
-    fn drag(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
+    fn drag_ui(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
         let speed = speed(number);
         let drag = DragValue::new(&mut number).range(min..=max).speed(speed).max_decimals(4);
-        // What a file says beyond its bounds is a fault to be told, not to be mended by being looked at.
+        // A value out of bounds is reported as a problem; showing it must not change it.
         let drag = drag.clamp_existing_to_range(false);
         let changed = ui.add(drag.suffix(self.suffix())).labelled_by(self.label).changed();
         changed.then(|| decimal(number))
     }
 
-    /// Slides over what is allowed, by decades where it spans many; nothing where there are no bounds.
-    fn slider(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
+    /// A slider over the allowed range, logarithmic where that spans orders of magnitude; `None` without bounds.
+    fn slider_ui(&self, ui: &mut Ui, mut number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
         let scale = SliderScale::for_bounds(bounds, default)?;
         let unit =
             ui.painter().layout_no_wrap(self.suffix(), egui::TextStyle::Button.resolve(ui.style()), Color32::WHITE);
@@ -105,7 +105,7 @@ impl ValueEditor<'_> {
     }
 
     /// Numbers beside one another; where they have bounds, each below the other with a slider.
-    fn vector(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
+    fn vector_ui(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
         let Value::List(items) = value else { return None };
         let default = |index: usize| match self.default {
             Some(Value::List(items)) => items.get(index)?.value.as_number(),
@@ -115,10 +115,10 @@ impl ValueEditor<'_> {
         let mut edited = items.clone();
         let mut changed = false;
         let slides = SliderScale::for_bounds(bounds, default(0)).is_some();
-        let part = Self { unit: if slides { self.unit } else { "" }, ..*self };
+        let component = Self { unit: if slides { self.unit } else { "" }, ..*self };
         let mut show = |ui: &mut Ui, index: usize, item: &mut Node| {
             let Some(number) = item.value.as_number() else { return };
-            if let Some(number) = part.number(ui, number, bounds, default(index)) {
+            if let Some(number) = component.number_ui(ui, number, bounds, default(index)) {
                 changed = true;
                 item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
             }
@@ -138,7 +138,7 @@ impl ValueEditor<'_> {
         changed.then_some(Value::List(edited))
     }
 
-    fn text(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
+    fn text_ui(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
         let mut text = match value {
             Value::Text(text) => text.clone(),
             number => number.to_string(),
@@ -148,7 +148,7 @@ impl ValueEditor<'_> {
         changed.then(|| number().map_or_else(|| Value::Text(text.clone()), Value::Number))
     }
 
-    fn choice(&self, ui: &mut Ui, value: &Value, choices: &[Choice]) -> Option<Value> {
+    fn choice_ui(&self, ui: &mut Ui, value: &Value, choices: &[Choice]) -> Option<Value> {
         let Value::Text(name) = value else { return None };
         let mut chosen = None;
         let combo = egui::ComboBox::from_id_salt(self.label).selected_text(name.as_str()).show_ui(ui, |ui| {
@@ -162,21 +162,21 @@ impl ValueEditor<'_> {
         chosen
     }
 
-    fn auto(&self, ui: &mut Ui, value: &Value, inner: &Kind) -> Option<Value> {
+    fn auto_ui(&self, ui: &mut Ui, value: &Value, inner: &Kind) -> Option<Value> {
         let mut auto = *value == Value::Text("auto".into());
         let mut edited = None;
         ui.horizontal(|ui| {
             if ui.checkbox(&mut auto, "auto").changed() {
                 edited = Some(if auto { Value::Text("auto".into()) } else { initial_value(inner) });
             } else if !auto {
-                edited = ValueEditor { kind: inner, ..*self }.show(ui, value);
+                edited = ValueEditor { kind: inner, ..*self }.ui(ui, value);
             }
         });
         edited
     }
 }
 
-/// A value that `kind` allows, to begin with where nothing better is known.
+/// An allowed value of `kind`, where there is no default.
 pub(crate) fn initial_value(kind: &Kind) -> Value {
     match kind {
         Kind::Bool => Value::Bool(false),
@@ -195,11 +195,11 @@ pub(crate) fn initial_value(kind: &Kind) -> Value {
     }
 }
 
-/// How a slider divides what is allowed.
+/// The scale of a slider.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SliderScale {
     Linear,
-    /// By decades, down to `least`.
+    /// Logarithmic down to `least`.
     Logarithmic {
         least: f64,
     },
@@ -208,9 +208,9 @@ enum SliderScale {
 impl SliderScale {
     /// For `[min, max]` around what is `default`; `None` without bounds that a hand could mean.
     fn for_bounds([min, max]: [f64; 2], default: Option<f64>) -> Option<Self> {
-        /// Limits so far apart only say that a value is a number.
+        /// A wider range is no useful slider range.
         const MAX_SPAN: f64 = 2e6;
-        /// Ratios from which on the same step is too coarse below and too fine above.
+        /// Ranges with a larger ratio are logarithmic.
         const LOGARITHMIC_RATIO: f64 = 50.0;
         if !(min < max && max - min < MAX_SPAN) {
             return None;
@@ -225,15 +225,15 @@ impl SliderScale {
     }
 }
 
-/// What a pixel of dragging changes a number by: a hundredth of it, and never nothing.
+/// Change per pixel of dragging: 1 % of the number, at least 0.002.
 fn speed(number: f64) -> f64 {
     (number.abs() * 0.01).max(0.002)
 }
 
-/// The number to the places that a person would write: a file is read by people too.
+/// The number rounded to 4 decimals, so that files stay readable.
 fn decimal(number: f64) -> f64 {
     let rounded = (number * 10_000.0).round() / 10_000.0;
-    // Numbers so small that nothing would be left of them keep all their places.
+    // Numbers that would be rounded to 0 keep all digits.
     if rounded == 0.0 || !rounded.is_finite() { number } else { rounded }
 }
 

@@ -1,6 +1,6 @@
-//! Unsaved work outlives a crash: it is kept in a folder of the user's while it is unsaved, and offered at the next start.
+//! Autosave: unsaved work is stored in the user's data folder, and offered for recovery after a crash.
 //!
-//! Each running studio holds a lock on a file of its own, so that a living one's work is not mistaken for a dead one's.
+//! Each running studio holds a file lock, so that the work of running studios is not offered.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -12,7 +12,7 @@ use bansho::media::{MediaError, atomic};
 
 use crate::document::Document;
 
-/// Where a running studio keeps its unsaved work.
+/// The autosave of a running studio.
 #[derive(Debug)]
 pub struct Autosave {
     kept: PathBuf,
@@ -20,7 +20,7 @@ pub struct Autosave {
     _held: File,
 }
 
-/// Unsaved work of a studio that did not end well.
+/// Unsaved work of a studio that crashed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecoveredWork {
     /// The file it belongs to; empty for work that was never saved.

@@ -1,4 +1,4 @@
-//! Documents in files: opening, saving whole or not at all, and the list of recent ones.
+//! Documents in files: opening, atomic saving, and the list of recent files.
 
 pub mod autosave;
 #[cfg(not(target_arch = "wasm32"))]
@@ -101,7 +101,7 @@ pub fn write_beside(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Result<Pat
     Err(MediaError::Io { path: file, source: io::ErrorKind::AlreadyExists.into() })
 }
 
-/// What another program made of a file since it was opened or saved here.
+/// How another program changed a file since it was opened or saved here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ExternalChange {
     /// Nothing.
@@ -110,7 +110,7 @@ pub enum ExternalChange {
     Changed(Arc<str>),
     /// Something that cannot be read as text, and why.
     Unreadable(String),
-    /// It took the file away.
+    /// It deleted the file.
     Gone,
 }
 

@@ -1,4 +1,4 @@
-//! A file that another program may write: whether it was touched, told by a thread that looks now and then.
+//! Watches a file for changes by other programs: a thread polls its modification time and length.
 
 use std::{
     fs,
@@ -11,10 +11,10 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-/// Between two looks.
+/// Polling interval.
 const POLL_INTERVAL: Duration = Duration::from_millis(700);
 
-/// Looks at one file until it is dropped.
+/// Watches one file until it is dropped.
 #[derive(Debug)]
 pub struct FileWatcher {
     path: PathBuf,
@@ -27,7 +27,7 @@ struct Shared {
     closing: AtomicBool,
 }
 
-/// What tells one writing from another.
+/// Modification time and length.
 fn modification_stamp(path: &Path) -> Option<(SystemTime, u64)> {
     let about = fs::metadata(path).ok()?;
     Some((about.modified().ok()?, about.len()))

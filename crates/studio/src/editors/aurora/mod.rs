@@ -1,5 +1,5 @@
-//! The aurora editor (thesis, fig. 3.1): on the left the shape that is left, on the right the one that is drawn, with
-//! the first faint beneath it and the sheet to be drawn next in yellow.
+//! The aurora editor (thesis, fig. 3.1): two maps, on the left the source shape of a transition, on the right its target shape, which is
+//! drawn, with the source faint beneath it and the sheet that the next stroke replaces in yellow.
 
 pub mod document;
 mod paint;
@@ -28,12 +28,12 @@ pub(crate) struct AuroraEditor {
     /// Which aurora of the scene.
     index: usize,
     tool: DrawTool,
-    /// The shape that is drawn.
+    /// The shape that is edited.
     target: usize,
-    /// Its sheet that is drawn next; a new one where there is none.
+    /// The sheet that the next stroke replaces; `None` for a new sheet.
     next: Option<usize>,
     drag: DragState,
-    /// Where a shape is held on the line of time.
+    /// The shape that is dragged on the timeline.
     shape_drag: Option<shape_timeline::ShapeDrag>,
     shape_error: Option<(String, Pos2)>,
     read: Option<(Revision, Result<Arc<AuroraDrawing>, String>)>,
@@ -41,16 +41,16 @@ pub(crate) struct AuroraEditor {
 
 impl AuroraEditor {
     /// Shows the editor of aurora `index`.
-    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {
+    pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {
         if self.index != index {
             *self = Self { index, tool: self.tool, ..Self::default() };
         }
-        // Each part may change the shapes that the next one shows.
-        for part in [Self::tools, shape_timeline::show, Self::planes] {
+        // Each section may change the shapes that the next one shows.
+        for section in [Self::tools_ui, shape_timeline::shape_timeline_ui, Self::planes_ui] {
             match self.drawing(session) {
                 Ok(drawing) => {
                     self.target = self.target.min(drawing.arrivals().len() - 1);
-                    part(self, ui, session, &drawing);
+                    section(self, ui, session, &drawing);
                 }
                 Err(reason) => {
                     ui.colored_label(ui.visuals().warn_fg_color, reason);
@@ -62,7 +62,7 @@ impl AuroraEditor {
         self.shape_error_ui(ui);
     }
 
-    /// The shapes as the scene states them now.
+    /// The shapes of the current revision.
     fn drawing(&mut self, session: &Session) -> Result<Arc<AuroraDrawing>, String> {
         let revision = session.document.revision();
         if let Some((_, read)) = self.read.as_ref().filter(|(of, _)| *of == revision) {
@@ -74,10 +74,10 @@ impl AuroraEditor {
         read
     }
 
-    fn tools(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
+    fn tools_ui(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
         ui.horizontal_wrapped(|ui| {
             for tool in DrawTool::ALL {
-                let (name, help) = tool.words();
+                let (name, help) = tool.name_and_help();
                 if ui.selectable_label(self.tool == tool, name).on_hover_text(help).clicked() {
                     self.tool = tool;
                     (self.drag, self.shape_error) = (DragState::None, None);
@@ -102,7 +102,7 @@ impl AuroraEditor {
         });
     }
 
-    /// What the next stroke becomes.
+    /// Shows which sheet the next stroke replaces.
     fn next_stroke_ui(&mut self, ui: &mut Ui, drawing: &AuroraDrawing) {
         let count = if drawing.is_stated() { drawing.lines(self.target).len() } else { 0 };
         let text = match self.target_sheet(drawing) {
@@ -116,7 +116,7 @@ impl AuroraEditor {
         }
     }
 
-    /// The sheet that a stroke is drawn for: the first shape takes new ones, the others have as many as come to them.
+    /// The sheet that a stroke replaces. The first shape accepts new sheets; the number of the others follows from the transitions.
     fn target_sheet(&self, drawing: &AuroraDrawing) -> Option<usize> {
         let count = drawing.lines(self.target).len();
         match self.next {
@@ -127,13 +127,13 @@ impl AuroraEditor {
         }
     }
 
-    /// After a sheet was drawn, the one after it is next.
+    /// Selects the sheet after the one that was drawn.
     fn select_next_sheet(&mut self, drawing: &AuroraDrawing) {
         let count = drawing.lines(self.target).len().max(1);
         self.next = self.target_sheet(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
     }
 
-    fn planes(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
+    fn planes_ui(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
         let gap = ui.spacing().item_spacing.x;
         let side = ui.available_height().min((ui.available_width() - gap) / 2.0).max(80.0);
         ui.horizontal(|ui| {
@@ -150,7 +150,7 @@ impl AuroraEditor {
         });
     }
 
-    /// Carries out a change of the shapes, or says at `at` why it cannot be; whether it was.
+    /// Applies an edit of the shapes, or shows the error at `at`. Returns whether it was applied.
     fn change(&mut self, session: &mut Session, label: &str, operations: &[Operation], at: Pos2) -> bool {
         match session.edit_shapes(label, operations, self.index) {
             Ok(drawing) => {
@@ -169,7 +169,7 @@ impl AuroraEditor {
         self.shape_error = Some((shape_error.to_string(), at));
     }
 
-    /// The reason of a refusal, at the pointer, until something else is done.
+    /// Shows the error at the pointer, until the next action.
     fn shape_error_ui(&self, ui: &Ui) {
         let Some((reason, at)) = &self.shape_error else { return };
         egui::Area::new(Id::unique("refusal")).order(egui::Order::Tooltip).fixed_pos(*at + vec2(14.0, 10.0)).show(

@@ -1,4 +1,4 @@
-//! What the planes show.
+//! Painting of the two maps.
 
 use bansho::base::math::DVec2;
 
@@ -17,12 +17,12 @@ const GROUND: Color32 = Color32::from_rgb(12, 15, 20);
 const GRID: Color32 = Color32::from_rgb(30, 36, 44);
 const WORDS: Color32 = Color32::from_rgb(110, 120, 132);
 const FAINT: Color32 = Color32::from_rgb(72, 84, 96);
-const WAY: Color32 = Color32::from_rgba_premultiplied(30, 48, 60, 90);
+const PATH: Color32 = Color32::from_rgba_premultiplied(30, 48, 60, 90);
 const SHEET: Color32 = Color32::from_rgb(120, 225, 170);
 const NEXT: Color32 = Color32::from_rgb(255, 208, 64);
 const MARK: Color32 = Color32::from_rgb(255, 120, 90);
-/// Of the ways of all control points every so many-th is shown.
-const WAYS_APART: usize = 6;
+/// Of the paths of all control points, every sixth is shown.
+const PATH_STRIDE: usize = 6;
 
 impl AuroraEditor {
     pub(super) fn paint(
@@ -33,7 +33,7 @@ impl AuroraEditor {
         side: Side,
         response: &Response,
     ) {
-        ground(painter, plane);
+        paint_grid(painter, plane);
         match side {
             Side::Source => self.paint_source(painter, drawing, plane),
             Side::Target => self.paint_target(painter, drawing, plane),
@@ -66,19 +66,19 @@ impl AuroraEditor {
     /// From the farthest layer to the nearest.
     fn paint_target(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
         title(painter, plane, &format!("shape {}", self.target + 1));
-        self.paint_ways(painter, drawing, plane);
+        self.paint_point_paths(painter, drawing, plane);
         self.paint_sheets(painter, drawing, plane);
         self.paint_gesture(painter, drawing, plane);
     }
 
-    /// The shape before, and the ways from there.
-    fn paint_ways(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
+    /// The source shape, and the paths of its points.
+    fn paint_point_paths(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
         if let Some(source) = self.target.checked_sub(1) {
             for sheet in drawing.lines(source) {
                 painter.line(plane.line(&sheet), Stroke::new(3.0, FAINT));
             }
-            for way in drawing.point_paths(source).iter().flatten().step_by(WAYS_APART) {
-                painter.line_segment(way.map(|end| plane.to_screen(end)), Stroke::new(1.0, WAY));
+            for way in drawing.point_paths(source).iter().flatten().step_by(PATH_STRIDE) {
+                painter.line_segment(way.map(|end| plane.to_screen(end)), Stroke::new(1.0, PATH));
             }
         }
         for (_, way) in drawing.linked(self.target) {
@@ -93,29 +93,29 @@ impl AuroraEditor {
         let shows_points =
             drawing.is_stated() && matches!(self.tool, DrawTool::Move | DrawTool::Smooth | DrawTool::Erase);
         for (number, sheet) in drawing.lines(self.target).iter().enumerate() {
-            let colour = match next {
+            let color = match next {
                 _ if !drawing.is_stated() => FAINT,
                 Some(next) if next == number => NEXT,
                 _ => SHEET,
             };
-            self.paint_sheet(painter, drawing, plane, number, sheet, colour);
-            numbered(painter, plane, sheet, number, colour);
+            self.paint_sheet(painter, drawing, plane, number, sheet, color);
+            numbered(painter, plane, sheet, number, color);
             if shows_points {
                 for point in drawing.points(self.target, number) {
-                    painter.circle(plane.to_screen(point), 3.0, GROUND, Stroke::new(1.2, colour));
+                    painter.circle(plane.to_screen(point), 3.0, GROUND, Stroke::new(1.2, color));
                 }
             }
         }
     }
 
-    /// What a hand is doing.
+    /// The current drag.
     fn paint_gesture(&self, painter: &Painter, drawing: &AuroraDrawing, plane: &Plane) {
         match &self.drag {
             DragState::Stroke(stroke) => {
                 painter.line(plane.line(stroke), Stroke::new(2.5, NEXT));
             }
             DragState::Linking { from, at, .. } => {
-                let start = self.target.checked_sub(1).and_then(|source| place_of(&drawing.lines(source), *from));
+                let start = self.target.checked_sub(1).and_then(|source| point_on(&drawing.lines(source), *from));
                 if let Some(start) = start {
                     painter.line_segment([plane.to_screen(start), *at], Stroke::new(2.0, MARK));
                 }
@@ -124,7 +124,7 @@ impl AuroraEditor {
         }
     }
 
-    /// A sheet, as thick as what is painted along it.
+    /// A sheet; its width shows the painted factor.
     fn paint_sheet(
         &self,
         painter: &Painter,
@@ -132,7 +132,7 @@ impl AuroraEditor {
         plane: &Plane,
         number: usize,
         sheet: &[DVec2],
-        colour: Color32,
+        color: Color32,
     ) {
         let factor = match self.tool {
             DrawTool::Energy => Factor::Energy,
@@ -141,7 +141,7 @@ impl AuroraEditor {
         let factors = drawing.factors(self.target, number, factor);
         for (ends, factor) in sheet.windows(2).zip(factors) {
             let width = (2.2 * factor.clamp(0.15, 4.0)) as f32;
-            painter.line_segment([plane.to_screen(ends[0]), plane.to_screen(ends[1])], Stroke::new(width, colour));
+            painter.line_segment([plane.to_screen(ends[0]), plane.to_screen(ends[1])], Stroke::new(width, color));
         }
     }
 
@@ -149,9 +149,9 @@ impl AuroraEditor {
         for (number, sheet) in drawing.lines(source).iter().enumerate() {
             for (last, end) in [(false, sheet.first()), (true, sheet.last())] {
                 let Some(&end) = end else { continue };
-                let chosen = matches!(self.drag, DragState::FirstEnd(first) if first == (number, last));
-                let colour = if chosen { NEXT } else { SHEET };
-                painter.circle(plane.to_screen(end), 6.0, GROUND, Stroke::new(2.0, colour));
+                let chosen = matches!(self.drag, DragState::MergeFrom(first) if first == (number, last));
+                let color = if chosen { NEXT } else { SHEET };
+                painter.circle(plane.to_screen(end), 6.0, GROUND, Stroke::new(2.0, color));
             }
         }
     }
@@ -167,9 +167,9 @@ impl AuroraEditor {
                 let all = drawing.lines(source);
                 let nearest = polyline::nearest_among(&all, plane.to_plane(at)).map(|(_, on)| on);
                 if let Some(on) = nearest.filter(|on| on.distance < plane.km(self.tool.hit_radius())) {
-                    let centre = plane.to_screen(on.point);
-                    painter.circle_stroke(centre, 7.0, Stroke::new(2.0, MARK));
-                    painter.vline(centre.x, centre.y - 12.0..=centre.y + 12.0, Stroke::new(1.0, MARK));
+                    let center = plane.to_screen(on.point);
+                    painter.circle_stroke(center, 7.0, Stroke::new(2.0, MARK));
+                    painter.vline(center.x, center.y - 12.0..=center.y + 12.0, Stroke::new(1.0, MARK));
                 }
             }
             _ => {}
@@ -177,12 +177,12 @@ impl AuroraEditor {
     }
 }
 
-/// Where a place on a sheet lies.
-fn place_of(all: &[Vec<DVec2>], (sheet, fraction): SheetPosition) -> Option<DVec2> {
+/// The point at a position on a sheet.
+fn point_on(all: &[Vec<DVec2>], (sheet, fraction): SheetPosition) -> Option<DVec2> {
     polyline::at(all.get(sheet)?, fraction)
 }
 
-fn ground(painter: &Painter, plane: &Plane) {
+fn paint_grid(painter: &Painter, plane: &Plane) {
     let rect = plane.rect;
     painter.rect(rect, 3.0, GROUND, Stroke::new(1.0, GRID), StrokeKind::Inside);
     let step = plane.rect.width() / 8.0;
@@ -203,16 +203,16 @@ fn title(painter: &Painter, plane: &Plane, text: &str) {
     painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.0), WORDS);
 }
 
-/// The number of a sheet at its beginning, which is also the way it runs.
-fn numbered(painter: &Painter, plane: &Plane, sheet: &[DVec2], number: usize, colour: Color32) {
+/// The number of a sheet at its first point.
+fn numbered(painter: &Painter, plane: &Plane, sheet: &[DVec2], number: usize, color: Color32) {
     let Some(&start) = sheet.first() else { return };
     let at = plane.to_screen(start);
-    painter.add(Shape::circle_filled(at, 3.0, colour));
+    painter.add(Shape::circle_filled(at, 3.0, color));
     painter.text(
         at + eframe::egui::vec2(-6.0, -3.0),
         Align2::RIGHT_BOTTOM,
         number + 1,
         FontId::proportional(12.0),
-        colour,
+        color,
     );
 }

@@ -1,16 +1,16 @@
-//! The plane at 100 km altitude on the screen: north is up, the point under the zenith in the middle.
+//! A map of the plane at 100 km altitude: north is up, the point below the zenith in the center.
 
 use bansho::base::math::DVec2;
 use eframe::egui::{Pos2, Rect, Vec2, vec2};
 
-/// Which of the two planes.
+/// Which of the two maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {
     Source,
     Target,
 }
 
-/// A square of the plane on the screen.
+/// A square map on the screen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
     pub(super) rect: Rect,
@@ -22,12 +22,12 @@ impl Plane {
         Self { rect, extent_km }
     }
 
-    /// Points of the screen that are a kilometre.
+    /// Points of the screen per kilometer.
     fn scale(&self) -> f64 {
         f64::from(self.rect.width()) / self.extent_km
     }
 
-    /// How many kilometres so many points of the screen are.
+    /// `points` of the screen in kilometers.
     pub(super) fn km(&self, points: f32) -> f64 {
         f64::from(points) / self.scale()
     }

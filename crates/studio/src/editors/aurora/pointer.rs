@@ -1,4 +1,4 @@
-//! What hands do in the planes.
+//! Pointer input on the two maps.
 
 use bansho::base::math::DVec2;
 
@@ -12,23 +12,23 @@ use crate::{editors::aurora::document::polyline, session::Session};
 
 use eframe::egui::{Event, PointerButton, Pos2, Response, Ui};
 
-/// What is under way.
+/// The state of a drag.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) enum DragState {
     #[default]
     None,
-    /// A stroke as far as it is drawn, km.
+    /// The stroke drawn so far, km.
     Stroke(Vec<DVec2>),
-    /// A point that is held: sheet and point.
-    Holding(usize, usize),
-    /// The first of two ends that shall merge.
-    FirstEnd(SheetEnd),
-    /// From a place on the source, to be let go over a sheet of the target: the sheet is linked, or the point alone.
+    /// A dragged control point: sheet and point.
+    MovePoint(usize, usize),
+    /// The first of two ends to merge.
+    MergeFrom(SheetEnd),
+    /// A link from a position on the source to a sheet of the target: the whole sheet is linked, or only the point.
     Linking { from: SheetPosition, point_alone: bool, at: Pos2 },
 }
 
 impl DrawTool {
-    /// How near the pointer must come, or how wide it brushes, points of the screen.
+    /// The hit radius or the radius of the brush, points of the screen.
     pub(super) fn hit_radius(self) -> f32 {
         match self {
             Self::Smooth => 36.0,
@@ -40,7 +40,7 @@ impl DrawTool {
 }
 
 impl AuroraEditor {
-    /// Takes in what hands do on one of the planes.
+    /// Handles the pointer on one of the maps.
     pub(super) fn handle_pointer(
         &mut self,
         ui: &Ui,
@@ -72,7 +72,7 @@ impl AuroraEditor {
     }
 
     fn draw(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput, pointer_path: &[Pos2]) {
-        /// Points of the screen that a hand moves at least between two points of a stroke.
+        /// Smallest distance between two points of a stroke, points of the screen.
         const STEP: f32 = 2.0;
         if pointer.response.clicked() {
             self.next = pointer.sheet_of(&drawing.lines(self.target)).or(self.next).filter(|_| drawing.is_stated());
@@ -106,9 +106,9 @@ impl AuroraEditor {
                 points.into_iter().enumerate().map(move |(point, at)| (at.distance(from), sheet, point))
             });
             let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|near| near.0 < pointer.hit_radius(self.tool));
-            self.drag = nearest.map_or(DragState::None, |(_, sheet, point)| DragState::Holding(sheet, point));
+            self.drag = nearest.map_or(DragState::None, |(_, sheet, point)| DragState::MovePoint(sheet, point));
         }
-        let DragState::Holding(sheet, point) = self.drag else { return };
+        let DragState::MovePoint(sheet, point) = self.drag else { return };
         let mut points = drawing.points(self.target, sheet);
         if let Some(held) = points.get_mut(point) {
             *held = pointer.point();
@@ -122,7 +122,7 @@ impl AuroraEditor {
         }
     }
 
-    /// Smooths or erases what is under the brush.
+    /// Smooths or erases under the brush.
     fn smooth_or_erase(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
         if !pointer.response.dragged_by(PointerButton::Primary) && !pointer.response.clicked() {
             return;
@@ -147,7 +147,7 @@ impl AuroraEditor {
         }
     }
 
-    /// More of `factor` under the brush, or less.
+    /// Raises or lowers `factor` under the brush.
     fn brush(
         &mut self,
         session: &mut Session,
@@ -156,7 +156,7 @@ impl AuroraEditor {
         factor: Factor,
         lower: bool,
     ) {
-        /// What a point of the screen that the brush moves adds.
+        /// Change of the factor per point of the screen that the brush moves.
         const STRENGTH: f64 = 0.008;
         if !pointer.response.dragged_by(PointerButton::Primary) {
             return;
@@ -166,7 +166,7 @@ impl AuroraEditor {
         let Some(on) = polyline::nearest(&all[sheet], pointer.point()) else { return };
         let moved = f64::from(pointer.response.drag_delta().length());
         let by = if lower { -STRENGTH * moved } else { STRENGTH * moved };
-        let painted = drawing.paint(self.target, sheet, factor, polyline::share_of(&all[sheet], on), by);
+        let painted = drawing.paint(self.target, sheet, factor, polyline::fraction_of(&all[sheet], on), by);
         if !painted.is_empty() {
             self.change(session, "paint", &painted, pointer.at);
         }
@@ -176,7 +176,7 @@ impl AuroraEditor {
         let Some(all) = self.source(drawing, pointer) else { return };
         let Some(sheet) = pointer.near(&all, self.tool) else { return };
         let Some(on) = polyline::nearest(&all[sheet], pointer.point()) else { return };
-        let split = drawing.split(self.target, sheet, polyline::share_of(&all[sheet], on));
+        let split = drawing.split(self.target, sheet, polyline::fraction_of(&all[sheet], on));
         if self.change(session, "split", &split, pointer.at) {
             (self.next, self.tool) = (Some(0), DrawTool::Draw);
         }
@@ -195,8 +195,8 @@ impl AuroraEditor {
             }
             return;
         };
-        let DragState::FirstEnd(first) = self.drag else {
-            self.drag = DragState::FirstEnd(end);
+        let DragState::MergeFrom(first) = self.drag else {
+            self.drag = DragState::MergeFrom(end);
             return;
         };
         self.drag = DragState::None;
@@ -206,7 +206,7 @@ impl AuroraEditor {
         }
     }
 
-    /// On the left a sheet is taken, on the right one of the points that arrive there; a click there lets a linked one go.
+    /// Drags a link: from a sheet on the left map, or from a point that arrives on the right map. A click there removes a link.
     fn link(
         &mut self,
         session: &mut Session,
@@ -251,7 +251,7 @@ impl AuroraEditor {
         }
     }
 
-    /// The sheets of the shape before; the first has none.
+    /// The sheets of the source shape; the first shape has none.
     fn source(&mut self, drawing: &AuroraDrawing, pointer: &PointerInput) -> Option<Vec<Vec<DVec2>>> {
         if self.target == 0 {
             let reason = "the first shape comes from nothing; add a shape, which the change then leads to";
@@ -262,13 +262,13 @@ impl AuroraEditor {
     }
 }
 
-/// The place on one of `all` that is nearest to `point`, within `hit_radius`, km.
+/// The position on one of `all` that is nearest to `point`, within `hit_radius`, km.
 fn on_sheet(all: &[Vec<DVec2>], point: DVec2, hit_radius: f64) -> Option<SheetPosition> {
     let (sheet, on) = polyline::nearest_among(all, point).filter(|(_, on)| on.distance < hit_radius)?;
-    Some((sheet, polyline::share_of(&all[sheet], on)))
+    Some((sheet, polyline::fraction_of(&all[sheet], on)))
 }
 
-/// Where the pointer went with its button down since the last picture: a hand may be faster than the window.
+/// The path of the pointer while pressed since the last frame, with all its events.
 fn pointer_path(ui: &Ui) -> Vec<Pos2> {
     let mut pointer_path = Vec::new();
     ui.input(|input| {
@@ -289,9 +289,9 @@ fn pointer_path(ui: &Ui) -> Vec<Pos2> {
 struct PointerInput<'a> {
     plane: &'a Plane,
     response: &'a Response,
-    /// Where it is.
+    /// The current position.
     at: Pos2,
-    /// Where it was pressed.
+    /// The position of the press.
     from: Pos2,
 }
 

@@ -1,4 +1,4 @@
-//! The shapes on a line of time: chosen, added, moved in time, removed.
+//! The timeline of shapes: select, add, move in time, remove.
 
 use bansho::{
     base::parameters::Value,
@@ -9,32 +9,37 @@ use super::{AuroraEditor, document::AuroraDrawing, pointer::DragState};
 use crate::session::Session;
 use eframe::egui::{self, Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 
-/// A shape that is dragged on the line: the line keeps its end meanwhile, and the shape its distance from the pointer.
+/// A dragged shape: the end of the timeline and the offset from the pointer stay constant during the drag.
 #[derive(Clone, Copy)]
 pub(super) struct ShapeDrag {
     end_s: f64,
     offset: f32,
 }
 
-/// Shows the line and its buttons.
-pub(super) fn show(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
-    /// A narrower line has a row of its own.
-    const BESIDE: f32 = 220.0;
+/// Shows the timeline and its buttons.
+pub(super) fn shape_timeline_ui(
+    editor: &mut AuroraEditor,
+    ui: &mut Ui,
+    session: &mut Session,
+    drawing: &AuroraDrawing,
+) {
+    /// A narrower timeline gets a row of its own, points.
+    const MIN_WIDTH_BESIDE: f32 = 220.0;
     let beside = ui.horizontal(|ui| {
-        buttons(editor, ui, session, drawing);
-        let beside = ui.available_width() >= BESIDE;
+        buttons_ui(editor, ui, session, drawing);
+        let beside = ui.available_width() >= MIN_WIDTH_BESIDE;
         if beside {
-            line(editor, ui, session, drawing);
+            timeline_ui(editor, ui, session, drawing);
         }
         beside
     });
     if !beside.inner {
-        line(editor, ui, session, drawing);
+        timeline_ui(editor, ui, session, drawing);
     }
 }
 
-/// What is done with the shape that is shown on the right.
-fn buttons(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
+/// Buttons for the shape on the right map.
+fn buttons_ui(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
     if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
         add(editor, ui, session, drawing);
         return;
@@ -70,7 +75,7 @@ fn add(editor: &mut AuroraEditor, ui: &Ui, session: &mut Session, drawing: &Auro
     editor.next = Some(0);
 }
 
-/// A shot that ends before the last shape is reached would never show it.
+/// Extends the shot to the time when the last shape is reached.
 fn lengthen_shot(session: &mut Session, until_s: f64) {
     let needed = (until_s / session.transport.frame_s()).ceil() as i64 + 1;
     let frames = session.transport.frames();
@@ -80,7 +85,7 @@ fn lengthen_shot(session: &mut Session, until_s: f64) {
     }
 }
 
-/// Draws shape `shape` from now on, and shows the moment when it is reached.
+/// Selects shape `shape`, and seeks to the time when it is reached.
 pub(super) fn choose(editor: &mut AuroraEditor, session: &mut Session, drawing: &AuroraDrawing, shape: usize) {
     (editor.target, editor.next) = (shape, None);
     (editor.drag, editor.shape_error) = (DragState::None, None);
@@ -89,7 +94,7 @@ pub(super) fn choose(editor: &mut AuroraEditor, session: &mut Session, drawing: 
     session.go_to_time(arrival);
 }
 
-fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
+fn timeline_ui(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
     const HANDLE: f32 = 22.0;
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width().max(120.0), 22.0), Sense::hover());
     let rect = response.rect.shrink2(vec2(0.5 * HANDLE + 2.0, 2.0));
@@ -111,8 +116,8 @@ fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: 
         let chosen = shape == editor.target;
         let fill = if chosen { visuals.selection.bg_fill } else { visuals.widgets.inactive.bg_fill };
         painter.rect_filled(handle, CornerRadius::same(3), fill);
-        let colour = if chosen { Color32::WHITE } else { visuals.text_color() };
-        painter.text(handle.center(), Align2::CENTER_CENTER, shape + 1, FontId::proportional(12.0), colour);
+        let color = if chosen { Color32::WHITE } else { visuals.text_color() };
+        painter.text(handle.center(), Align2::CENTER_CENTER, shape + 1, FontId::proportional(12.0), color);
         let response = response.on_hover_text(format!("{name}, reached at {arrival:.2} s; drag to move it in time"));
         if response.clicked() || response.drag_started() {
             choose(editor, session, drawing, shape);
@@ -133,14 +138,14 @@ fn line(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: 
     }
 }
 
-/// Where the line ends, s: it holds the whole shot, and every shape.
+/// The end of the timeline, s: it contains the shot and every shape.
 fn line_end_s(session: &Session, arrivals: &[f64]) -> f64 {
     let frames = session.transport.frames();
     let shot_s = (frames.end() - frames.start()).max(1) as f64 * session.transport.frame_s();
     arrivals.iter().copied().fold(shot_s, f64::max)
 }
 
-/// Lets a shape come `later` by so many seconds. The first one is there from the beginning.
+/// Moves a shape `later` by so many seconds. The first one is at the start of the shot.
 fn move_in_time(
     editor: &mut AuroraEditor,
     session: &mut Session,
@@ -149,7 +154,7 @@ fn move_in_time(
     at: Pos2,
 ) {
     let change = drawing.retime(shape, drawing.after_s(shape) + later);
-    // Less than what is written of a time is none.
+    // Smaller changes vanish in the rounding of the text.
     if shape > 0 && later.abs() >= 0.005 {
         editor.change(session, "time of shape", &change, at);
     }

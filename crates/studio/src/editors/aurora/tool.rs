@@ -1,4 +1,4 @@
-//! What the pointer does in the planes of the aurora editor.
+//! The tools of the aurora editor.
 
 /// What a drag or a click does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl DrawTool {
     ];
 
     /// Its name and what it does.
-    pub(super) fn words(self) -> (&'static str, &'static str) {
+    pub(super) fn name_and_help(self) -> (&'static str, &'static str) {
         match self {
             Self::Draw => ("Draw", "Drag on the right to draw the yellow sheet; click a sheet to draw that one next"),
             Self::Move => ("Move", "Drag points of the sheets on the right"),

@@ -1,4 +1,4 @@
-//! All curves of what is chosen on top of the live picture, to be shaped where they are seen to work.
+//! An overlay on the viewport with all curves of the selected table.
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
@@ -8,7 +8,7 @@ use bansho::{
 use crate::{
     app::{
         panels::inspector::words,
-        widgets::curve_editor::{self, Allowed},
+        widgets::curve_editor::{self, CurveBounds},
     },
     session::{Session, selection::Selection},
 };
@@ -18,12 +18,12 @@ use eframe::egui::{self, Color32, Frame, Rect, Ui, vec2};
 const WIDTH: f32 = 150.0;
 /// Its height with its name.
 const HEIGHT: f32 = 116.0;
-/// Between two of them.
+/// Gap between two curves.
 const GAP: f32 = 8.0;
-/// Behind them, and once more behind each: so thin that the picture shows through.
-const VEIL: Color32 = Color32::from_black_alpha(70);
-/// Of the picture's height they take so much at most; the rest is scrolled to.
-const MOST: f32 = 0.5;
+/// Translucent background of the overlay and of each curve.
+const BACKGROUND: Color32 = Color32::from_black_alpha(70);
+/// Largest height as a fraction of the viewport; the rest scrolls.
+const MAX_HEIGHT: f32 = 0.5;
 
 /// Whether `selection` has any curves.
 pub(crate) fn has_any(selection: &Selection) -> bool {
@@ -38,24 +38,24 @@ pub(crate) fn has_any(selection: &Selection) -> bool {
 }
 
 /// Shows them along the lower edge of the picture in `viewport`, row over row.
-pub(crate) fn show(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
+pub(crate) fn curves_ui(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
     let Some(descriptor) = selection.descriptor() else { return };
     let mut curves = Vec::new();
-    gather(&selection.place(), descriptor, &mut curves);
+    collect_curves(&selection.place(), descriptor, &mut curves);
     let across = (((viewport.width() - GAP) / (WIDTH + GAP)) as usize).clamp(1, curves.len().max(1));
     let down = curves.len().div_ceil(across);
-    let height = (down as f32 * (HEIGHT + GAP) + GAP).min(MOST * viewport.height());
+    let height = (down as f32 * (HEIGHT + GAP) + GAP).min(MAX_HEIGHT * viewport.height());
     let corner = egui::pos2(viewport.left(), viewport.bottom() - height);
     let area = egui::Area::new(egui::Id::unique("curves")).order(egui::Order::Middle).fixed_pos(corner);
     area.constrain_to(viewport).show(ui.ctx(), |ui| {
-        Frame::new().fill(VEIL).inner_margin(0.5 * GAP).show(ui, |ui| {
-            // The picture is dark whatever the theme.
+        Frame::new().fill(BACKGROUND).inner_margin(0.5 * GAP).show(ui, |ui| {
+            // The picture is dark in every theme.
             ui.visuals_mut().override_text_color = Some(Color32::from_gray(225));
-            ui.visuals_mut().extreme_bg_color = VEIL;
+            ui.visuals_mut().extreme_bg_color = BACKGROUND;
             egui::ScrollArea::vertical().max_height(height - GAP).show(ui, |ui| {
                 egui::Grid::new("curves").spacing(vec2(GAP, GAP)).show(ui, |ui| {
                     for (index, (place, parameter)) in curves.iter().enumerate() {
-                        curve(ui, session, place, parameter);
+                        curve_ui(ui, session, place, parameter);
                         if (index + 1) % across == 0 {
                             ui.end_row();
                         }
@@ -67,18 +67,18 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session, selection: &Selection, vi
 }
 
 /// Every curve of a table and of those within it.
-fn gather(place: &Place, table: &'static TableDescriptor, curves: &mut Vec<(Place, &'static Descriptor)>) {
+fn collect_curves(place: &Place, table: &'static TableDescriptor, curves: &mut Vec<(Place, &'static Descriptor)>) {
     for parameter in &table.parameters {
         let own = place.key(parameter.key);
         match &parameter.kind {
             Kind::Curve { .. } => curves.push((own, parameter)),
-            Kind::Table(inner) => gather(&own, inner(), curves),
+            Kind::Table(inner) => collect_curves(&own, inner(), curves),
             _ => {}
         }
     }
 }
 
-fn curve(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
+fn curve_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
     let Kind::Curve { x, y, rising } = parameter.kind else { return };
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let present: Option<Value> = stated.or_else(|| parameter.default.clone());
@@ -86,7 +86,8 @@ fn curve(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descript
         ui.vertical(|ui| {
             ui.set_width(WIDTH);
             let label = ui.label(title(parameter)).on_hover_text(&parameter.doc).id;
-            let edited = present.and_then(|value| curve_editor::show(ui, label, &value, Allowed { x, y, rising }));
+            let edited = present
+                .and_then(|value| curve_editor::curve_editor_ui(ui, label, &value, CurveBounds { x, y, rising }));
             if let Some(value) = edited {
                 session.set(parameter.key, place, value);
             }
@@ -94,7 +95,7 @@ fn curve(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descript
     });
 }
 
-/// Its name, and before that the symbol that its description begins with, if the paper gave it one: `V(w), eq. (4)`.
+/// Its name, preceded by the paper's symbol if its description begins with one: `V(w), eq. (4)`.
 fn title(parameter: &Descriptor) -> String {
     let symbol = parameter.doc.split(',').next().filter(|symbol| symbol.len() <= 8 && symbol.contains('('));
     let symbol = symbol.or_else(|| parameter.doc.split(',').next().filter(|symbol| symbol.starts_with("1 - ")));
@@ -113,7 +114,7 @@ mod tests {
         let sheet = Selection { key: "flame_sheet", index: Some(0) };
         assert!(has_any(&sheet) && !has_any(&Selection { key: "camera", index: None }));
         let mut curves = Vec::new();
-        gather(&sheet.place(), sheet.descriptor().unwrap(), &mut curves);
+        collect_curves(&sheet.place(), sheet.descriptor().unwrap(), &mut curves);
         let titles: Vec<String> = curves.iter().map(|(_, parameter)| title(parameter)).collect();
         for symbol in ["V(w)", "H(u)", "C(s)", "R(s)", "G(s)", "B(s)", "A(w)", "D(w)", "1 - F"] {
             assert_eq!(titles.iter().filter(|title| title.starts_with(symbol)).count(), 1, "{symbol}: {titles:?}");

@@ -1,4 +1,4 @@
-//! The window of a flame sheet's stages, and the curves beside it.
+//! The flame sheet's stages and curves.
 
 pub(crate) mod curves_ui;
 pub(crate) mod stages_ui;

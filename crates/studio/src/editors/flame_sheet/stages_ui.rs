@@ -1,4 +1,4 @@
-//! How a flame sheet comes to be: texture, thresholded, sharpened and coloured as small live pictures, above the curves that shape them.
+//! Live thumbnails of a flame sheet's stages: texture, thresholded, sharpened, colored.
 
 use eframe::egui::{
     self, CollapsingHeader, Color32, ColorImage, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2,
@@ -6,7 +6,7 @@ use eframe::egui::{
 
 use crate::{document::stages, player::Picture, session::Session};
 
-/// The pictures on the screen.
+/// The textures of the thumbnails, each with the serial number of its picture.
 #[derive(Default)]
 pub(crate) struct StagesView {
     textures: Vec<(TextureHandle, u64)>,
@@ -14,13 +14,13 @@ pub(crate) struct StagesView {
 
 impl StagesView {
     /// Shows the stages of flame sheet `index`, and asks for them while they are seen.
-    pub(crate) fn show(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {
+    pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {
         let header = CollapsingHeader::new("Stages").default_open(true).show(ui, |ui| {
             ui.horizontal(|ui| {
                 let gaps = 3.0 * ui.spacing().item_spacing.x;
                 let width = ((ui.available_width() - gaps) / 4.0).clamp(30.0, 160.0);
                 for (stage, name) in stages::names().enumerate() {
-                    self.stage(ui, session, stage, name, width);
+                    self.stage_ui(ui, session, stage, name, width);
                 }
             });
         });
@@ -30,7 +30,7 @@ impl StagesView {
         session.stages = header.body_returned.is_some().then_some(index);
     }
 
-    fn stage(&mut self, ui: &mut Ui, session: &Session, stage: usize, name: &str, width: f32) {
+    fn stage_ui(&mut self, ui: &mut Ui, session: &Session, stage: usize, name: &str, width: f32) {
         ui.vertical(|ui| {
             let (rect, response) = ui.allocate_exact_size(vec2(width, width), Sense::hover());
             let label = format!("Stage {name}");
@@ -46,7 +46,7 @@ impl StagesView {
     }
 
     fn texture(&mut self, ui: &Ui, stage: usize, picture: &Picture, drawn: u64) -> egui::TextureId {
-        let image = || image(picture);
+        let image = || color_image(picture);
         while self.textures.len() <= stage {
             let name = format!("stage {}", self.textures.len());
             self.textures.push((ui.ctx().load_texture(name, image(), TextureOptions::LINEAR), 0));
@@ -60,8 +60,8 @@ impl StagesView {
     }
 }
 
-/// A picture for the screen.
-pub fn image(picture: &Picture) -> ColorImage {
-    let colours = picture.pixels.iter().map(|[r, g, b, _]| Color32::from_rgb(*r, *g, *b)).collect();
-    ColorImage::new(picture.size, colours)
+/// A picture as an egui image.
+pub fn color_image(picture: &Picture) -> ColorImage {
+    let colors = picture.pixels.iter().map(|[r, g, b, _]| Color32::from_rgb(*r, *g, *b)).collect();
+    ColorImage::new(picture.size, colors)
 }

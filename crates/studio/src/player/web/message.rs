@@ -1,4 +1,4 @@
-//! What a page and its worker say to each other, as arrays that the browser copies from one to the other.
+//! Messages between page and worker as JavaScript arrays (structured clone).
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use crate::{
 use js_sys::{Array, Uint8Array};
 use wasm_bindgen::{JsCast, JsValue};
 
-/// What the page says.
+/// A message from the page to the worker.
 pub(super) enum PageMessage {
     /// A file that no folder holds.
     File(String, Vec<u8>),
-    /// A wish, with its number.
-    FrameRequest(u64, FrameRequest),
+    /// A frame request, with its number.
+    Request(u64, FrameRequest),
 }
 
 impl PageMessage {
@@ -30,7 +30,7 @@ impl PageMessage {
         let [width, height] = request.within.map(|side| JsValue::from(side as f64));
         let flags = [request.exact, request.draft, request.full_quality].map(JsValue::from);
         let head = [
-            JsValue::from("wish"),
+            JsValue::from("request"),
             count(number),
             count(request.revision.0),
             (&*request.name).into(),
@@ -40,12 +40,12 @@ impl PageMessage {
         head.into_iter().chain([frame, width, height]).chain(flags).chain([stages]).collect()
     }
 
-    /// Reads a message; wishes find their files in `assets`.
+    /// Reads a message; requests find their files in `assets`.
     pub(super) fn read(message: &JsValue, assets: &Arc<dyn Assets>) -> Option<Self> {
         let mut fields = Fields::of(message)?;
         Some(match fields.text()?.as_str() {
             "file" => Self::File(fields.text()?, fields.bytes()?),
-            "wish" => {
+            "request" => {
                 let number = fields.count()?;
                 let request = FrameRequest {
                     revision: Revision(fields.count()?),
@@ -59,7 +59,7 @@ impl PageMessage {
                     full_quality: fields.flag()?,
                     stages: fields.next()?.as_f64().map(|sheet| sheet as usize),
                 };
-                Self::FrameRequest(number, request)
+                Self::Request(number, request)
             }
             _ => return None,
         })
@@ -70,15 +70,15 @@ impl Reply {
     pub(super) fn write(self) -> Array {
         match self {
             Self::Ready => array(["ready".into()]),
-            Self::Checked { number, found: Ok(ev100) } => array(["judged".into(), count(number), ev100.into()]),
+            Self::Checked { number, found: Ok(ev100) } => array(["checked".into(), count(number), ev100.into()]),
             Self::Checked { number, found: Err(faults) } => {
                 let faults: Array = faults.iter().map(fault).collect();
-                array(["judged".into(), count(number), faults.into()])
+                array(["checked".into(), count(number), faults.into()])
             }
             Self::Drawn { picture } => drawn("drawn", &picture).collect(),
             Self::Stage { stage, picture } => drawn("stage", &picture).chain([JsValue::from(stage as f64)]).collect(),
             Self::FullQualityFrame { frame, png } => {
-                array(["still".into(), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
+                array(["full_quality_frame".into(), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
             }
             Self::Failed { number, reason } => array(["failed".into(), count(number), reason.into()]),
             Self::Panicked { number, message } => array(["panicked".into(), count(number), message.into()]),
@@ -90,7 +90,7 @@ impl Reply {
         let mut fields = Fields::of(message)?;
         Some(match fields.text()?.as_str() {
             "ready" => Self::Ready,
-            "judged" => {
+            "checked" => {
                 let number = fields.count()?;
                 let said = fields.next()?;
                 let faults =
@@ -102,7 +102,7 @@ impl Reply {
                 let picture = fields.picture()?;
                 Self::Stage { stage: fields.number()? as usize, picture }
             }
-            "still" => Self::FullQualityFrame { frame: fields.number()? as i64, png: fields.bytes()? },
+            "full_quality_frame" => Self::FullQualityFrame { frame: fields.number()? as i64, png: fields.bytes()? },
             "failed" => Self::Failed { number: fields.count()?, reason: fields.text()? },
             "panicked" => Self::Panicked { number: fields.count()?, message: fields.text()? },
             "done" => Self::Done { number: fields.count()? },

@@ -1,4 +1,4 @@
-//! What a page wished for of its worker, and what came of it; a worker that panics is gone, and another takes its place.
+//! The requests that a page sent to its worker and that are not finished. A worker that panics terminates, and is replaced.
 
 use std::collections::VecDeque;
 
@@ -8,38 +8,38 @@ use crate::{
     player::{Event, FrameRequest},
 };
 
-/// Wishes that something may still come of.
+/// Unfinished requests.
 #[derive(Default)]
 pub(super) struct Pending {
     /// With their numbers, the oldest first.
     requests: VecDeque<(u64, FrameRequest)>,
-    /// How many were made.
+    /// Number of requests so far.
     made: u64,
-    /// The last one that nothing more comes of.
+    /// Number of the last finished request.
     done: u64,
-    /// Whether the worker ended while nothing was wished for.
+    /// Whether the worker terminated while idle.
     lost: bool,
 }
 
-/// What follows from what was heard.
+/// What follows from received messages.
 #[derive(Default)]
 pub(super) struct WorkerUpdate {
     pub(super) events: Vec<Event>,
-    /// Whether the worker listens from now on.
+    /// Whether the worker is ready for messages.
     pub(super) ready: bool,
-    /// Whether it is gone; another must take its place, and be told the newest wish.
+    /// Whether it terminated; it must be replaced, and the newest request sent again.
     pub(super) terminated: bool,
 }
 
 impl Pending {
-    /// Notes a wish; whether the worker lives that it is for.
-    pub(super) fn note(&mut self, request: FrameRequest) -> bool {
+    /// Adds a request. Returns whether its worker is alive.
+    pub(super) fn push(&mut self, request: FrameRequest) -> bool {
         self.made += 1;
         self.requests.push_back((self.made, request));
         !std::mem::take(&mut self.lost)
     }
 
-    /// The newest wish, with its number, unless nothing more comes of it.
+    /// The newest unfinished request, with its number.
     pub(super) fn newest(&self) -> Option<(u64, &FrameRequest)> {
         self.requests.back().map(|(number, request)| (*number, request))
     }
@@ -48,12 +48,12 @@ impl Pending {
         self.done != self.made
     }
 
-    /// Nothing comes of anything any more.
+    /// Finishes all requests: there is no worker any more.
     pub(super) fn give_up(&mut self) {
         self.finish(self.made);
     }
 
-    /// Takes in what a worker said since the last time. Whatever comes after its end is no more than an echo of that.
+    /// Handles the messages received since the last call. Messages after the termination are ignored.
     pub(super) fn handle_messages(&mut self, heard: Vec<WorkerMessage>) -> WorkerUpdate {
         let mut update = WorkerUpdate::default();
         for heard in heard {
@@ -99,7 +99,7 @@ impl Pending {
         })
     }
 
-    /// The worker is gone, over wish `number` as far as it said, else over the oldest. Of newer ones the newest may still be had.
+    /// The worker terminated at request `number`; without a number, at the oldest. Of newer requests the newest is kept.
     fn worker_failed(&mut self, number: Option<u64>, message: String) -> Option<Event> {
         let Some(number) = number.or_else(|| self.requests.front().map(|(number, _)| *number)) else {
             self.lost = true;
@@ -149,11 +149,11 @@ mod tests {
     #[test]
     fn a_worker_that_panics_ends_once() {
         let mut pending = Pending::default();
-        assert!(pending.note(request(SCENE, 3)));
+        assert!(pending.push(request(SCENE, 3)));
         // A trap follows the last words, in the same moment.
         let update = pending.handle_messages(vec![panicked(1), WorkerMessage::Terminated]);
         assert_eq!((broken(&update.events), update.terminated, pending.is_busy()), (vec![Some(3)], true, false));
-        assert!(pending.note(request(SCENE, 4)), "another worker is there");
+        assert!(pending.push(request(SCENE, 4)), "another worker is there");
         let update = pending.handle_messages(said(Reply::Done { number: 2 }));
         assert_eq!((update.events.len(), update.terminated, pending.is_busy()), (0, false, false));
     }
@@ -162,7 +162,7 @@ mod tests {
     fn what_was_wished_for_since_is_still_to_be_had() {
         let mut pending = Pending::default();
         for number in 3..6 {
-            pending.note(request(SCENE, number));
+            pending.push(request(SCENE, number));
         }
         let update = pending.handle_messages(vec![panicked(1), WorkerMessage::Terminated]);
         assert_eq!(broken(&update.events), [Some(3)]);
@@ -178,9 +178,9 @@ mod tests {
         let mut pending = Pending::default();
         let update = pending.handle_messages(vec![WorkerMessage::Terminated]);
         assert!(update.events.is_empty() && !update.terminated, "else one that cannot start would be started for ever");
-        assert!(!pending.note(request(SCENE, 0)));
+        assert!(!pending.push(request(SCENE, 0)));
         assert_eq!(pending.newest().map(|(number, _)| number), Some(1));
-        assert!(pending.note(request(SCENE, 1)), "the other one");
+        assert!(pending.push(request(SCENE, 1)), "the other one");
         pending.give_up();
         assert!(!pending.is_busy() && pending.newest().is_none());
     }
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn what_a_worker_says_of_a_wish_is_passed_on() {
         let mut pending = Pending::default();
-        pending.note(request(SCENE, 7));
+        pending.push(request(SCENE, 7));
         let picture = Picture {
             revision: pending.requests[0].1.revision,
             number: 7,

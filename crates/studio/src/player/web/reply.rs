@@ -1,30 +1,30 @@
-//! What a page hears from its worker.
+//! Messages from the worker to the page.
 
 use crate::{document::ReportedProblem, player::Picture};
 
-/// What a worker says.
+/// A message of the worker.
 pub(super) enum Reply {
-    /// It listens.
+    /// It is ready for messages.
     Ready,
-    /// The scene of wish `number` was checked: its exposure, or its faults.
+    /// The scene of request `number` was checked: its exposure, or its faults.
     Checked { number: u64, found: Result<f32, Vec<ReportedProblem>> },
-    /// A picture.
+    /// A preview.
     Drawn { picture: Picture },
     /// A small picture of a stage.
     Stage { stage: usize, picture: Picture },
     /// A finished picture: its frame, and the file.
     FullQualityFrame { frame: i64, png: Vec<u8> },
-    /// Why wish `number` has no picture.
+    /// Why request `number` has no picture.
     Failed { number: u64, reason: String },
-    /// What a phenomenon said when it panicked over wish `number`. The worker is gone.
+    /// What a phenomenon said when it panicked over request `number`. The worker has terminated.
     Panicked { number: u64, message: String },
-    /// Nothing more comes of wish `number`.
+    /// Nothing more comes of request `number`.
     Done { number: u64 },
 }
 
-/// What comes from a worker.
+/// What the page receives from a worker.
 pub(super) enum WorkerMessage {
     Reply(Reply),
-    /// It ended: without a word, as where memory runs out, or after it told of a panic.
+    /// It terminated: without a message, as when out of memory, or after it reported a panic.
     Terminated,
 }

@@ -1,5 +1,5 @@
-//! Wishes fulfilled by a worker of the page, which runs this same program in a thread of its own: however long a picture
-//! takes, the page answers. Nothing is shared; both sides hear messages only.
+//! A player in a web worker, which runs this same program on a thread of its own, so that the page stays responsive while a frame
+//! renders. Page and worker share no memory, only messages.
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 
@@ -19,23 +19,23 @@ use js_sys::Array;
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use web_sys::{DedicatedWorkerGlobalScope, MessageEvent, Worker, WorkerOptions, WorkerType};
 
-/// The script that starts the program in a worker; the page's maker puts it beside the page.
+/// The script that starts the program in a worker; `web/build` puts it beside the page.
 const SCRIPT: &str = "worker.js";
 
 /// The page's side.
 pub struct WorkerPlayer {
     worker: WorkerHandle,
     wake: Rc<dyn Fn()>,
-    /// What a worker must know that takes the place of one that panicked.
+    /// Added files, to be sent again to a worker that replaces one that panicked.
     files: Vec<(String, Vec<u8>)>,
     pending: Pending,
 }
 
-/// A worker, and what it said.
+/// A worker and its message queues.
 struct WorkerHandle {
     worker: Worker,
     inbox: Rc<RefCell<Vec<WorkerMessage>>>,
-    /// What waits until it listens.
+    /// Messages to send once the worker is ready.
     outbox: Option<Vec<Array>>,
     _listen: Closure<dyn FnMut(MessageEvent)>,
     _mourn: Closure<dyn FnMut()>,
@@ -59,7 +59,7 @@ impl WorkerHandle {
             wake();
         });
         worker.set_onerror(Some(worker_failed.as_ref().unchecked_ref()));
-        // The program, compiled already.
+        // The compiled program.
         worker.post_message(&wasm_bindgen::module())?;
         Ok(Self { worker, inbox, outbox: Some(Vec::new()), _listen: listen, _mourn: worker_failed })
     }
@@ -81,7 +81,7 @@ impl WorkerHandle {
 
 impl Drop for WorkerHandle {
     fn drop(&mut self) {
-        // Nobody is there any more for what is still on its way.
+        // Messages that are still queued are dropped.
         self.worker.set_onmessage(None);
         self.worker.set_onerror(None);
         self.worker.terminate();
@@ -99,11 +99,10 @@ impl WorkerPlayer {
         Ok(Self { worker, wake, files: Vec::new(), pending: Pending::default() })
     }
 
-    /// Another worker in place of one that is gone, and the newest wish for it. Where none can be had, nothing more is drawn, as the panic
-    /// told.
+    /// Replaces a worker that terminated and sends it the newest request. Where the browser gives no other, rendering ends.
     fn restart(&mut self) {
         let Ok(worker) = WorkerHandle::start(self.wake.clone()) else { return self.pending.give_up() };
-        // What the old one may still say goes with it.
+        // Messages of the old worker are dropped with it.
         self.worker = worker;
         self.files.iter().for_each(|(name, bytes)| self.worker.say(PageMessage::file(name, bytes)));
         self.tell_newest();
@@ -118,7 +117,7 @@ impl WorkerPlayer {
 
 impl Player for WorkerPlayer {
     fn request(&mut self, request: FrameRequest) {
-        if self.pending.note(request) {
+        if self.pending.push(request) {
             self.tell_newest();
         } else {
             self.restart();
@@ -156,13 +155,13 @@ struct WorkerMain {
     player: PolledPlayer,
     bundle: Bundle,
     assets: Arc<dyn Assets>,
-    /// Of the wish that is being fulfilled.
+    /// Number of the current request.
     number: u64,
-    /// Whether work goes on by itself.
+    /// Whether a time slice is scheduled.
     working: bool,
 }
 
-/// Fulfils the wishes of the page that this program is the worker of.
+/// Runs the worker: serves the requests of the page that started it.
 pub fn run_worker() {
     let scope: DedicatedWorkerGlobalScope = js_sys::global().unchecked_into();
     let worker = Rc::new(RefCell::new(WorkerMain {
@@ -188,7 +187,7 @@ fn say(scope: &DedicatedWorkerGlobalScope, reply: Reply) {
     let _ = scope.post_message(&reply.write());
 }
 
-/// Works until nothing is wished for, with a look at new messages between any two slices.
+/// Schedules time slices until no request is left; messages are received between two slices.
 fn go_on(worker: &Rc<RefCell<WorkerMain>>) {
     let mut own = worker.borrow_mut();
     if own.working || !own.player.is_busy() {
@@ -210,7 +209,7 @@ impl WorkerMain {
                 self.bundle.add_file(name, bytes);
                 self.assets = Arc::new(self.bundle.clone());
             }
-            Some(PageMessage::FrameRequest(number, request)) => {
+            Some(PageMessage::Request(number, request)) => {
                 self.number = number;
                 self.tell_panics_of(number);
                 self.player.request(request);
@@ -219,7 +218,7 @@ impl WorkerMain {
         }
     }
 
-    /// A panic ends the program here; its last words go to the page.
+    /// A panic ends the program on wasm: the hook sends its message to the page.
     fn tell_panics_of(&self, number: u64) {
         std::panic::set_hook(Box::new(move |panic| {
             let said = panic.payload_as_str().unwrap_or("no reason given");
@@ -251,7 +250,7 @@ fn reply(number: u64, event: Event) -> Reply {
     }
 }
 
-/// What the page cannot find out by itself without making every phenomenon.
+/// What the page could only find out by building every phenomenon.
 fn found(outcome: Result<Arc<Plan>, SceneError>) -> Result<f32, Vec<ReportedProblem>> {
     let faults = |error: SceneError| error.problems.iter().map(ReportedProblem::from).collect();
     outcome.map(|plan| plan.exposure_ev100).map_err(faults)

@@ -1,4 +1,4 @@
-//! What hands do to shapes, as operations on the scene.
+//! Edits of shapes as operations on the scene.
 
 use bansho::{
     aurora::shapes::{Correspondence, Form, LinkParameters, SheetParameters},
@@ -14,37 +14,37 @@ use super::{
     links::rounded,
     polyline,
     renumber::SheetRemap,
-    sheets::{curve_chain, curve_part, stated, with_form, with_points},
+    sheets::{curve_chain, curve_range, non_default, with_form, with_points},
 };
 
 /// An end of a sheet: which sheet, and whether its last point rather than its first.
 pub type SheetEnd = (usize, bool);
 
-/// The sheets of a shape after a change, and what became of places on those before.
+/// The sheets of a shape after an edit, and how positions on the old sheets map to them.
 type RemappedSheets = (Vec<SheetParameters>, SheetRemap);
 
-/// Half of the gap between the two parts of a sheet that was split, as a share of the square's side.
+/// Half of the gap between the two halves of a split sheet, as a fraction of the map's side.
 const HALF_GAP: f64 = 0.012;
 
 impl AuroraDrawing {
-    /// A stroke in stead of sheet `sheet` of shape `shape`, or as a new one.
+    /// A stroke in place of sheet `sheet` of shape `shape`, or as a new one.
     pub fn draw(&self, shape: usize, sheet: Option<usize>, stroke: &[DVec2]) -> Vec<Operation> {
         let points = self.written(stroke);
-        self.put(shape, sheet, |old| with_points(old, points))
+        self.put_sheet(shape, sheet, |old| with_points(old, points))
     }
 
-    /// A named form in stead of sheet `sheet`, or as a new one.
+    /// A named form in place of sheet `sheet`, or as a new one.
     pub fn put_form(&self, shape: usize, sheet: Option<usize>, form: Form) -> Vec<Operation> {
-        self.put(shape, sheet, |old| with_form(old, form))
+        self.put_sheet(shape, sheet, |old| with_form(old, form))
     }
 
-    fn put(
+    fn put_sheet(
         &self,
         shape: usize,
         sheet: Option<usize>,
         change: impl FnOnce(&SheetParameters) -> SheetParameters,
     ) -> Vec<Operation> {
-        // Shapes that the scene does not state give way to what is drawn.
+        // Default shapes are replaced by what is drawn.
         let mut sheets = if self.is_stated() { self.sheets(shape) } else { Vec::new() };
         match sheet.and_then(|sheet| sheets.get_mut(sheet)) {
             Some(old) => *old = change(old),
@@ -53,7 +53,7 @@ impl AuroraDrawing {
         self.write(shape, &sheets)
     }
 
-    /// The strokes of the SVG file `path` in stead of the sheets of the first shape.
+    /// The strokes of the SVG file `path` in place of the sheets of the first shape.
     pub fn trace(&self, path: Value) -> Vec<Operation> {
         let mut sheet = Table::default();
         sheet.push("path", path);
@@ -66,7 +66,7 @@ impl AuroraDrawing {
         vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }]
     }
 
-    /// Other points for sheet `sheet`, as they are moved and mended.
+    /// New points for sheet `sheet`.
     pub fn set_points(&self, shape: usize, sheet: usize, points: &[DVec2]) -> Vec<Operation> {
         let mut sheets = self.sheets(shape);
         let points = points.iter().map(|&point| self.rounded(point)).collect();
@@ -76,7 +76,7 @@ impl AuroraDrawing {
         self.write(shape, &sheets)
     }
 
-    /// More or less of `factor` around the share `at` of sheet `sheet`.
+    /// Changes `factor` by `by` around the fraction `at` of the length of sheet `sheet`.
     pub fn paint(&self, shape: usize, sheet: usize, factor: Factor, at: f64, by: f64) -> Vec<Operation> {
         const POINTS: usize = 16;
         const REACH: f64 = 0.12;
@@ -94,7 +94,7 @@ impl AuroraDrawing {
         self.write(shape, &sheets)
     }
 
-    /// Splits sheet `sheet` of the shape before `shape` at the share `at` of its length; what it becomes from there on is cut too.
+    /// Splits sheet `sheet` of the shape before `shape` at the fraction `at` of its length; the sheets that it becomes are cut too.
     pub fn split(&self, shape: usize, sheet: usize, at: f64) -> Vec<Operation> {
         let at = rounded(at);
         let mut change = Table::default();
@@ -102,7 +102,7 @@ impl AuroraDrawing {
         change.push("at", Value::Number(at));
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
-        // Of the two parts that come of a linked sheet the first is meant from now on.
+        // A link of the split sheet now means its first half.
         let part = |link: &LinkParameters| match link.at {
             None if link.from == sheet as i64 + 1 => LinkParameters { at: Some(rounded(0.5 * at)), ..link.clone() },
             _ => link.clone(),
@@ -117,7 +117,7 @@ impl AuroraDrawing {
         operations
     }
 
-    /// Merges two ends of the shape before `shape`; what they become from there on is joined too.
+    /// Merges two ends of the shape before `shape`; the sheets that they become are joined too.
     pub fn merge(&self, shape: usize, ends: [SheetEnd; 2]) -> Vec<Operation> {
         let mut change = Table::default();
         let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
@@ -140,8 +140,7 @@ impl AuroraDrawing {
         operations
     }
 
-    /// What `change` makes of shape `shape` and of all that come of it, where points of the shape before arrive, for as long as it
-    /// makes something of them.
+    /// Applies `change` to shape `shape` and the shapes after it, at the points where `from` arrives, until it returns `None`.
     fn propagated(
         &self,
         shape: usize,
@@ -164,8 +163,8 @@ impl AuroraDrawing {
         changed
     }
 
-    /// The operations that make shapes from `first` on what they were changed to, and let everything follow that counts their sheets;
-    /// splits to a shape that are `needless` then go.
+    /// The operations that write the changed shapes from `first` on, and renumber everything that refers to their sheets. Splits that are
+    /// `needless` then are removed.
     pub(super) fn write_all(
         &self,
         first: usize,
@@ -192,7 +191,7 @@ impl AuroraDrawing {
     /// One more shape, as the last one is.
     pub fn add_shape(&self) -> Vec<Operation> {
         let mut shape = Table::default();
-        shape.push("sheets", list_of(&self.sheets(self.arrivals().len() - 1)));
+        shape.push("sheets", sheet_list(&self.sheets(self.arrivals().len() - 1)));
         let shape = Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) };
         // Shapes that the scene does not state must be stated before another can come of them.
         if self.is_stated() { vec![shape] } else { vec![shape.clone(), shape] }
@@ -258,18 +257,18 @@ impl AuroraDrawing {
         let all = self.lines(shape);
         let (sheet, on) = polyline::nearest_among(&all, target)?;
         let line = &all[sheet];
-        let fraction = polyline::share_of(line, on);
-        // A short part keeps most of itself.
+        let fraction = polyline::fraction_of(line, on);
+        // A short segment keeps most of its length.
         if fraction * (1.0 - fraction) < f64::EPSILON {
-            // Where the sheet is cut already the scene has the words for it.
+            // Where the sheet is cut already, the validation reports it.
             return None;
         }
         let gap = HALF_GAP * self.extent_km() / polyline::length(line).max(f64::MIN_POSITIVE);
         let ranges = [[0.0, fraction - gap.min(0.25 * fraction)], [fraction + gap.min(0.25 * (1.0 - fraction)), 1.0]];
         let parts = ranges.map(|range| SheetParameters {
-            flux: curve_part(&sheets[sheet].flux, range),
-            energy: curve_part(&sheets[sheet].energy, range),
-            ..with_points(&sheets[sheet], self.written(&polyline::part(line, range)))
+            flux: curve_range(&sheets[sheet].flux, range),
+            energy: curve_range(&sheets[sheet].energy, range),
+            ..with_points(&sheets[sheet], self.written(&polyline::range(line, range)))
         });
         sheets.splice(sheet..=sheet, parts);
         Some((sheets, (sheet, fraction)))
@@ -302,28 +301,28 @@ impl AuroraDrawing {
         Some((sheets, remap))
     }
 
-    /// The operations that make the sheets of shape `shape` to be `sheets`, and leave everything else as it stands.
+    /// The operations that set the sheets of shape `shape`, and change nothing else.
     fn write(&self, shape: usize, sheets: &[SheetParameters]) -> Vec<Operation> {
         let place = self.shape(shape).key("sheets");
         let Some(old) = self.parameters.shapes.get(shape).map(|shape| &shape.sheets) else {
             let mut shape = Table::default();
-            shape.push("sheets", list_of(sheets));
+            shape.push("sheets", sheet_list(sheets));
             return vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }];
         };
-        exchanged(&place, old, sheets).unwrap_or_else(|| vec![Operation::Set { place, value: list_of(sheets) }])
+        list_edits(&place, old, sheets).unwrap_or_else(|| vec![Operation::Set { place, value: sheet_list(sheets) }])
     }
 }
 
-/// What makes the list at `place` of `old` sheets one of `new` ones entry by entry, so that each keeps its comments; `None` where
-/// entries would come in between others.
-fn exchanged(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
+/// The operations that turn the list at `place` from `old` into `new` entry by entry, which keeps comments; `None` where entries would
+/// have to be inserted.
+fn list_edits(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
     if old.is_empty() {
         return None;
     }
     let mut rest = new.iter().peekable();
     let gone: Vec<usize> = (0..old.len()).filter(|&index| rest.next_if(|own| **own == old[index]).is_none()).collect();
     if rest.peek().is_none() {
-        // The last first, so that those before keep their numbers.
+        // From the last to the first, so that indices stay valid.
         return Some(gone.iter().rev().map(|&index| Operation::Remove { place: place.index(index) }).collect());
     }
     let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
@@ -338,7 +337,7 @@ fn exchanged(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) ->
     operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: place.index(sheet) }));
     let added = new.get(kept..).filter(|_| made > kept).unwrap_or_default();
     operations.extend(
-        added.iter().map(|sheet| Operation::Append { place: place.clone(), value: Value::Table(stated(sheet)) }),
+        added.iter().map(|sheet| Operation::Append { place: place.clone(), value: Value::Table(non_default(sheet)) }),
     );
     Some(operations)
 }
@@ -351,13 +350,13 @@ fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<SheetEnd> {
     ends.flatten().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, end)| end)
 }
 
-fn list_of(sheets: &[SheetParameters]) -> Value {
-    Value::List(sheets.iter().map(|sheet| Value::Table(stated(sheet)).into()).collect())
+fn sheet_list(sheets: &[SheetParameters]) -> Value {
+    Value::List(sheets.iter().map(|sheet| Value::Table(non_default(sheet)).into()).collect())
 }
 
-/// What must be stated and taken out so that `old` becomes `new`.
+/// The keys to set and to remove so that `old` becomes `new`.
 fn differences(place: &Place, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
-    let [old, new] = [stated(old), stated(new)];
+    let [old, new] = [non_default(old), non_default(new)];
     let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
     let change = |key: &'static str| match (old.get(key), new.get(key)) {
         (old, new) if old == new => None,

@@ -1,4 +1,4 @@
-//! Sheets and points that a hand sends elsewhere than by place: links of one transition.
+//! Links: explicit correspondences of sheets and points in one transition.
 
 use bansho::{
     aurora::shapes::LinkParameters,
@@ -11,17 +11,17 @@ use bansho::{
 
 use super::{AuroraDrawing, polyline};
 
-/// A place on a sheet: which, and the share of its length.
+/// A position on a sheet: its index, and the fraction of its length.
 pub type SheetPosition = (usize, f64);
 
-/// Links that leave nearer to each other than this are the same, as a share of a sheet's length.
+/// Links whose starts are closer than this fraction of the sheet's length are the same.
 const SAME: f64 = 0.02;
 
 impl AuroraDrawing {
     /// Makes what lies at `from` on the shape before `shape` become sheet `to`. No other transition changes.
     pub fn link_sheet(&self, shape: usize, from: SheetPosition, to: usize) -> Vec<Operation> {
         if !self.shows_changes() {
-            // There the order of the list says what becomes what.
+            // Without transitions, the order of the list decides what becomes what.
             return self.exchange_sheets(shape, from.0, to);
         }
         let splits = self.parameters.shapes.get(shape).is_some_and(|shape| !shape.split.is_empty());

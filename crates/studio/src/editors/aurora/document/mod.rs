@@ -1,5 +1,5 @@
-//! What an aurora's shapes look like, and what hands do to them: strokes drawn and mended, sheets split and merged.
-//! Whether a change is possible is for the scene itself to say; a refusal has its words.
+//! Edits of an aurora's shapes as operations on the scene's text: draw and smooth strokes, split, merge and link sheets.
+//! `bansho::aurora::shapes` validates every edit; its error is shown.
 
 mod changes;
 mod links;
@@ -36,7 +36,7 @@ pub use changes::SheetEnd;
 pub use links::SheetPosition;
 pub use sheets::Factor;
 
-/// The drawn shapes of one aurora of a scene.
+/// The shapes of one aurora of a scene.
 #[derive(Clone, Debug)]
 pub struct AuroraDrawing {
     place: Place,
@@ -44,16 +44,16 @@ pub struct AuroraDrawing {
     sequence: Sequence,
 }
 
-/// Why shapes cannot be shown, or a change of them is refused.
+/// Why shapes cannot be shown or edited.
 #[derive(Debug, thiserror::Error)]
 pub enum ShapeEditError {
     /// There is no such aurora.
     #[error("the aurora is not in the scene any more")]
     Missing,
-    /// Something that is not about shapes.
+    /// A problem outside of the shapes.
     #[error("{0}")]
     Faulty(String),
-    /// Shapes that an aurora cannot take.
+    /// Invalid shapes.
     #[error("shape {}: {}", shape_number(.0), .0.kind)]
     Shape(ShapeFault),
     /// The text cannot be edited.
@@ -61,7 +61,7 @@ pub enum ShapeEditError {
     Edit(#[from] EditError),
 }
 
-/// The shape that a fault is about, as a person counts.
+/// The 1-based number of the shape with the fault.
 fn shape_number(fault: &ShapeFault) -> usize {
     let number = fault.key.split('.').nth(1).and_then(|segment| segment.parse::<usize>().ok());
     number.unwrap_or_default() + 1
@@ -90,12 +90,12 @@ impl AuroraDrawing {
         Ok(Self { place, parameters, sequence })
     }
 
-    /// Side of the drawn square, km.
+    /// Side of the map, km.
     pub fn extent_km(&self) -> f64 {
         self.parameters.extent_km
     }
 
-    /// Whether the scene states shapes; an aurora without any takes some of its own.
+    /// Whether the scene states shapes; an aurora without any has default shapes.
     pub fn is_stated(&self) -> bool {
         !self.parameters.shapes.is_empty()
     }
@@ -122,7 +122,7 @@ impl AuroraDrawing {
         }
     }
 
-    /// What sheet `sheet` of shape `shape` comes from: the parts of the shape before that go there.
+    /// The segments of the previous shape that become sheet `sheet` of shape `shape`.
     pub fn origins(&self, shape: usize, sheet: usize) -> Vec<Vec<DVec2>> {
         let all = self.lines(shape);
         let arrives = |point_paths: &&Vec<[DVec2; 2]>| {
@@ -133,17 +133,17 @@ impl AuroraDrawing {
         strands.iter().filter(arrives).map(|point_paths| point_paths.iter().map(|way| way[0]).collect()).collect()
     }
 
-    /// Where the points of shape `shape` go on the way to the next, km, strand by strand.
+    /// The paths of the points of shape `shape` to the next one, km, by strand: start and end.
     pub fn point_paths(&self, shape: usize) -> Vec<Vec<[DVec2; 2]>> {
         self.sequence.ways(shape)
     }
 }
 
 impl Document {
-    /// Carries out `operations` as [`edit`](Self::edit) does if aurora `index` can take the shapes that come of them.
+    /// Applies `operations` as [`edit`](Self::edit) does, if the resulting shapes of aurora `index` are valid.
     ///
     /// # Errors
-    /// It cannot, for the reason given; nothing is changed then.
+    /// They are invalid; nothing is changed then.
     pub fn edit_shapes(
         &mut self,
         label: &str,

@@ -1,41 +1,41 @@
-//! Lines as hands draw and mend them. Points are km, x east and y south.
+//! Polylines: nearest point, arc length, simplification, smoothing. Points are km, x east and y south.
 
 use bansho::base::math::{DVec2, lerp};
 
-/// A place on a line.
+/// A position on a polyline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinePoint {
     /// The segment, from the point of that number to the next.
     pub segment: usize,
-    /// The share of the segment.
+    /// The fraction of the segment.
     pub fraction: f64,
-    /// Where it is, km.
+    /// The point, km.
     pub point: DVec2,
-    /// How far that is from what was asked for, km.
+    /// Its distance from the query point, km.
     pub distance: f64,
 }
 
-/// The place on `line` that is nearest to `to`; `None` where the line has no segment.
+/// The position on `line` that is nearest to `to`; `None` where the line has no segment.
 pub fn nearest(line: &[DVec2], to: DVec2) -> Option<LinePoint> {
     let on = |(segment, ends): (usize, &[DVec2])| {
-        let (from, way) = (ends[0], ends[1] - ends[0]);
-        let squared = way.length_squared();
-        let fraction = if squared > 0.0 { ((to - from).dot(way) / squared).clamp(0.0, 1.0) } else { 0.0 };
-        let point = from + fraction * way;
+        let (from, segment_vector) = (ends[0], ends[1] - ends[0]);
+        let squared = segment_vector.length_squared();
+        let fraction = if squared > 0.0 { ((to - from).dot(segment_vector) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        let point = from + fraction * segment_vector;
         LinePoint { segment, fraction, point, distance: point.distance(to) }
     };
     line.windows(2).enumerate().map(on).min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
-/// Which of some lines comes nearest to a point, and where on it that is.
+/// The nearest of several lines, and the nearest position on it.
 pub fn nearest_among(all: &[Vec<DVec2>], to: DVec2) -> Option<(usize, LinePoint)> {
     let on = |(number, line): (usize, &Vec<DVec2>)| Some((number, nearest(line, to)?));
     all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))
 }
 
-/// The point of `line` at a share of its length.
+/// The point of `line` at a fraction of its length.
 pub fn at(line: &[DVec2], fraction: f64) -> Option<DVec2> {
-    part(line, [fraction, 1.0]).first().copied()
+    range(line, [fraction, 1.0]).first().copied()
 }
 
 /// Length of `line`, km.
@@ -43,31 +43,31 @@ pub fn length(line: &[DVec2]) -> f64 {
     line.windows(2).map(|ends| ends[0].distance(ends[1])).sum()
 }
 
-/// The share of the whole length up to `at`.
-pub fn share_of(line: &[DVec2], at: LinePoint) -> f64 {
+/// The fraction of the total length up to `at`.
+pub fn fraction_of(line: &[DVec2], at: LinePoint) -> f64 {
     let before = length(line.get(..=at.segment).unwrap_or(line));
     let here = line.get(at.segment..at.segment + 2).map_or(0.0, length);
     let total = length(line);
     if total > 0.0 { (before + at.fraction * here) / total } else { 0.5 }
 }
 
-/// The part of `line` between two shares of its length.
-pub fn part(line: &[DVec2], [from, to]: [f64; 2]) -> Vec<DVec2> {
+/// The range of `line` between two fractions of its length.
+pub fn range(line: &[DVec2], [from, to]: [f64; 2]) -> Vec<DVec2> {
     let total = length(line);
-    let mut way = 0.0;
+    let mut distance = 0.0;
     let mut points = Vec::new();
     for ends in line.windows(2) {
         let step = ends[0].distance(ends[1]);
-        let at = |fraction: f64| ends[0].lerp(ends[1], (fraction * total - way) / step);
-        let [starts, stops] = [from, to].map(|fraction| (way..way + step).contains(&(fraction * total)));
+        let at = |fraction: f64| ends[0].lerp(ends[1], (fraction * total - distance) / step);
+        let [starts, stops] = [from, to].map(|fraction| (distance..distance + step).contains(&(fraction * total)));
         if starts {
             points.push(at(from));
         }
         if stops && to < 1.0 {
             points.push(at(to));
         }
-        way += step;
-        if way > from * total && (way < to * total || to >= 1.0) {
+        distance += step;
+        if distance > from * total && (distance < to * total || to >= 1.0) {
             points.push(ends[1]);
         }
     }
@@ -91,7 +91,7 @@ pub fn simplified(points: &[DVec2], tolerance: f64) -> Vec<DVec2> {
     points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
 }
 
-/// Points within `radius` of `around` drawn toward the middle of their neighbours, most in the middle; ends stay.
+/// Laplacian smoothing within `radius` of `around`, weighted by distance; end points stay.
 pub fn smoothed(points: &[DVec2], around: DVec2, radius: f64) -> Vec<DVec2> {
     let mut smooth = points.to_vec();
     for (index, three) in points.windows(3).enumerate() {
@@ -101,7 +101,7 @@ pub fn smoothed(points: &[DVec2], around: DVec2, radius: f64) -> Vec<DVec2> {
     smooth
 }
 
-/// Factors along a sheet, as (share, factor), brushed by `by` at the share `at`, less and less up to `reach` to both sides.
+/// Factors along a sheet, as (fraction, factor), changed by `by` at the fraction `at`, falling linearly to 0 at distance `reach`.
 pub fn brushed(factors: &[[f64; 2]], at: f64, by: f64, reach: f64) -> Vec<[f64; 2]> {
     let weight = |fraction: f64| (1.0 - (fraction - at).abs() / reach).max(0.0);
     factors.iter().map(|&[fraction, factor]| [fraction, lerp(factor, factor + by, weight(fraction))]).collect()
@@ -120,19 +120,19 @@ mod tests {
         let corner = line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]);
         let on = nearest(&corner, DVec2::new(1.0, -2.0)).unwrap();
         assert_eq!((on.segment, on.point, on.distance), (0, DVec2::new(1.0, 0.0), 2.0));
-        assert_eq!(share_of(&corner, on), 0.25);
+        assert_eq!(fraction_of(&corner, on), 0.25);
         let end = nearest(&corner, DVec2::new(4.0, 1.0)).unwrap();
-        assert_eq!((end.segment, end.fraction, share_of(&corner, end)), (1, 1.0, 1.0));
+        assert_eq!((end.segment, end.fraction, fraction_of(&corner, end)), (1, 1.0, 1.0));
         assert_eq!(nearest(&corner[..1], DVec2::ZERO), None);
     }
 
     #[test]
     fn parts_begin_and_end_where_they_should() {
         let corner = line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]);
-        assert_eq!(part(&corner, [0.25, 0.5]), line(&[[1.0, 0.0], [2.0, 0.0]]));
-        assert_eq!(part(&corner, [0.5, 1.0]), line(&[[2.0, 0.0], [3.0, 0.0], [3.0, 1.0]]));
-        assert_eq!(part(&corner, [0.0, 0.875]), line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 0.5]]));
-        assert_eq!(part(&corner, [0.0, 1.0]), corner);
+        assert_eq!(range(&corner, [0.25, 0.5]), line(&[[1.0, 0.0], [2.0, 0.0]]));
+        assert_eq!(range(&corner, [0.5, 1.0]), line(&[[2.0, 0.0], [3.0, 0.0], [3.0, 1.0]]));
+        assert_eq!(range(&corner, [0.0, 0.875]), line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 0.5]]));
+        assert_eq!(range(&corner, [0.0, 1.0]), corner);
     }
 
     #[test]

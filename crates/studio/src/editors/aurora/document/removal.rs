@@ -1,4 +1,4 @@
-//! A sheet goes with what came of it: where each sheet comes from one and becomes one, all its shapes lose it.
+//! Removing a sheet from all shapes: with the sheets that only come from it, and those that only become it.
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use bansho::{aurora::shapes::LinkParameters, render::scene::operation::Operation
 
 use super::{AuroraDrawing, polyline, renumber::SheetRemap};
 
-/// Strands on the way from a shape to the next: the sheet that each is part of before, and after.
+/// Strands from a shape to the next: the sheet of each before and after.
 type Strands = Vec<(usize, usize)>;
 
 impl AuroraDrawing {

@@ -1,4 +1,4 @@
-//! Sheets as the scene states them, changed by hands.
+//! Sheets as the scene states them, and their edits.
 
 use bansho::{
     aurora::shapes::SheetParameters,
@@ -10,12 +10,12 @@ use bansho::{
 
 use super::{AuroraDrawing, links::rounded, polyline};
 
-/// What can be painted along a sheet, each a factor of the aurora's own.
+/// What can be painted along a sheet: a factor of the aurora's own value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Factor {
     /// Energy flux: how bright it is.
     Flux,
-    /// Energy of the electrons: how low it reaches, and its colours.
+    /// Energy of the electrons: lower altitude and other colors.
     Energy,
 }
 
@@ -28,7 +28,7 @@ impl Factor {
         }
     }
 
-    /// Its least and its greatest value by hand; a file may say more.
+    /// The range of painting; a file may state more.
     pub(super) fn bounds(self) -> [f64; 2] {
         match self {
             Self::Flux => [0.0, 8.0],
@@ -38,23 +38,23 @@ impl Factor {
 }
 
 impl AuroraDrawing {
-    /// A line is kept within this share of the square's side.
+    /// Tolerance of simplified lines, as a fraction of the map's side.
     const TOLERANCE: f64 = 0.002;
 
-    /// A line with few points, as a person would write them down.
+    /// The line simplified and rounded, as it is written to the file.
     pub(super) fn written(&self, line: &[DVec2]) -> Vec<[f64; 2]> {
         let points = polyline::simplified(line, Self::TOLERANCE * self.extent_km());
         points.into_iter().map(|point| self.rounded(point)).collect()
     }
 
-    /// To a thousandth of the square's side or finer, within the square.
+    /// Rounded to a thousandth of the map's side or finer, clamped to the map.
     pub(super) fn rounded(&self, point: DVec2) -> [f64; 2] {
         let half = self.extent_km() / 2.0;
         let places = if self.extent_km() >= 100.0 { 10.0 } else { 1000.0 };
         point.clamp(DVec2::splat(-half), DVec2::splat(half)).to_array().map(|km| (km * places).round() / places)
     }
 
-    /// The points of sheet `sheet` of shape `shape` as hands move them: those of the file where it lists them.
+    /// The control points of sheet `sheet` of shape `shape`: those of the file where it lists them.
     pub fn points(&self, shape: usize, sheet: usize) -> Vec<DVec2> {
         let entry = self.sheets(shape).into_iter().nth(sheet);
         match entry.filter(is_plain).and_then(|entry| entry.points) {
@@ -66,7 +66,7 @@ impl AuroraDrawing {
         }
     }
 
-    /// One entry a sheet: what the file says where it says so sheet by sheet, else what comes of it, with all that lies along it.
+    /// One entry per sheet: the file's own where it has one per sheet, else entries made from the evaluated lines and factors.
     pub(super) fn sheets(&self, shape: usize) -> Vec<SheetParameters> {
         let stated = self.parameters.shapes.get(shape).map(|shape| shape.sheets.clone()).unwrap_or_default();
         let lines = self.lines(shape);
@@ -76,24 +76,24 @@ impl AuroraDrawing {
         let entry = |(sheet, line): (usize, &Vec<DVec2>)| {
             let along = |factor| along(line, &self.factors(shape, sheet, factor));
             let [flux, energy] = [Factor::Flux, Factor::Energy].map(along);
-            // Their fading ends are in the factors.
+            // The factors include the fading ends.
             SheetParameters { flux, energy, fade: 0.0, ..with_points(&SheetParameters::default(), self.written(line)) }
         };
         lines.iter().enumerate().map(entry).collect()
     }
 }
 
-/// The curve of a factor along `line`, which is one of `values` at each of its points.
+/// The curve of a factor along `line` with `values` at its points.
 fn along(line: &[DVec2], values: &[f64]) -> Curve {
-    /// A factor is kept within this.
+    /// Tolerance of a factor.
     const TOLERANCE: f64 = 0.01;
     let usual = SheetParameters::default().flux;
     let total = polyline::length(line).max(f64::MIN_POSITIVE);
-    let mut way = 0.0;
+    let mut distance = 0.0;
     let mut points = Vec::new();
     for (index, value) in values.iter().enumerate().take(line.len()) {
-        way += index.checked_sub(1).map_or(0.0, |before| line[before].distance(line[index]));
-        points.push(DVec2::new(way / total, *value));
+        distance += index.checked_sub(1).map_or(0.0, |before| line[before].distance(line[index]));
+        points.push(DVec2::new(distance / total, *value));
     }
     let first = values.first().copied().unwrap_or(1.0);
     if values.iter().all(|value| (value - first).abs() < TOLERANCE) {
@@ -104,7 +104,7 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
             Curve::new(even, usual.interpolation()).unwrap_or(usual)
         };
     }
-    // Between few points a curve may swing away from the lines that would do.
+    // The interpolated curve may overshoot between few points; finer tolerances follow then.
     let with = |tolerance: f64| {
         let kept = polyline::simplified(&points, tolerance).into_iter().map(|point| point.to_array().map(rounded));
         Curve::new(kept.collect(), usual.interpolation()).ok()
@@ -115,13 +115,13 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
     found.unwrap_or(usual)
 }
 
-/// Whether the points of `sheet` are where they are said to be.
+/// Whether `sheet` has no transform.
 fn is_plain(sheet: &SheetParameters) -> bool {
     let placing = |sheet: &SheetParameters| (sheet.position_km, sheet.rotation_deg, sheet.scale, sheet.mirror);
     placing(sheet) == placing(&SheetParameters::default())
 }
 
-/// `sheet` as a stroke through `points`, whatever it was before.
+/// `sheet` with a stroke through `points`.
 pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> SheetParameters {
     SheetParameters {
         points: Some(points),
@@ -133,7 +133,7 @@ pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> She
     }
 }
 
-/// `sheet` as a named form of the usual size, where it was.
+/// `sheet` with a named form of default size, at the same position.
 pub(super) fn with_form(sheet: &SheetParameters, form: bansho::aurora::shapes::Form) -> SheetParameters {
     SheetParameters {
         points: None,
@@ -147,8 +147,8 @@ pub(super) fn with_form(sheet: &SheetParameters, form: bansho::aurora::shapes::F
     }
 }
 
-/// The part of a factor's curve between two shares of the length.
-pub(super) fn curve_part(curve: &Curve, [from, to]: [f64; 2]) -> Curve {
+/// The range of a factor's curve between two fractions of the length.
+pub(super) fn curve_range(curve: &Curve, [from, to]: [f64; 2]) -> Curve {
     if curve.points().len() < 2 {
         return curve.clone();
     }
@@ -159,9 +159,9 @@ pub(super) fn curve_part(curve: &Curve, [from, to]: [f64; 2]) -> Curve {
     Curve::new(points, curve.interpolation()).unwrap_or_else(|_| curve.clone())
 }
 
-/// Two curves end to end, the first up to the share `fraction`; each may run against its own direction.
+/// Two curves end to end, the first up to the fraction `fraction`; each may run against its own direction.
 pub(super) fn curve_chain(parts: [(&Curve, bool); 2], fraction: f64) -> Curve {
-    /// What the two meet over, as a share of the whole.
+    /// Width of the seam, as a fraction of the length.
     const SEAM: f64 = 1e-3;
     let [first, second] = parts;
     if first.0 == second.0 && first.0.points().len() < 2 {
@@ -170,7 +170,7 @@ pub(super) fn curve_chain(parts: [(&Curve, bool); 2], fraction: f64) -> Curve {
     let ranges = [[0.0, fraction - SEAM], [fraction + SEAM, 1.0]];
     let mut points = Vec::new();
     for ((curve, reversed), [from, to]) in parts.into_iter().zip(ranges) {
-        let mut own = curve_part(&sampled(curve), [0.0, 1.0]).points().to_vec();
+        let mut own = curve_range(&sampled(curve), [0.0, 1.0]).points().to_vec();
         if reversed {
             own = own.iter().rev().map(|&[at, value]| [1.0 - at, value]).collect();
         }
@@ -179,15 +179,15 @@ pub(super) fn curve_chain(parts: [(&Curve, bool); 2], fraction: f64) -> Curve {
     Curve::new(points, first.0.interpolation()).unwrap_or_else(|_| first.0.clone())
 }
 
-/// The curve with points from end to end.
+/// The curve with control points at both ends.
 pub(super) fn sampled(curve: &Curve) -> Curve {
     let value = |at: f64| [at, curve.eval(at)];
     let ends = Curve::new(vec![value(0.0), value(1.0)], curve.interpolation()).unwrap_or_else(|_| curve.clone());
     if curve.points().len() < 2 { ends } else { curve.clone() }
 }
 
-/// What `parameters` say beside the defaults.
-pub(super) fn stated<P: Parameters>(parameters: &P) -> Table {
+/// The keys of `parameters` that differ from the defaults.
+pub(super) fn non_default<P: Parameters>(parameters: &P) -> Table {
     let usual = P::default().to_table();
     let mut table = Table::default();
     for entry in parameters.to_table().entries {
