@@ -1,17 +1,18 @@
-//! The studio: everything a scene file says, seen and changed live. What is done here is a scene file that
-//! `bansho render` renders identically.
+//! The studio: an editor of scene files with a live preview. The file that it saves is rendered identically by `bansho render`.
 //!
-//! Three storeys, each knowing only those below: [`document`] is the scene as text with its history and its faults;
-//! [`player`] draws frames off the window's thread and keeps the time; [`app`] is the window. Where there is no GPU, `software` paints it.
+//! Layers, each of which uses only those above it in this list:
+//! - [`document`]: the scene as text, with its undo history and its problems.
+//! - [`player`]: renders frames off the window's thread, and keeps the time.
+//! - [`session`]: an open document with its player, without widgets.
+//! - [`editors`]: editors of single kinds of phenomena. [`app`]: the window.
+//!
+//! Without a GPU, the crate `bansho-egui-software` paints the window.
 
 pub mod app;
-pub mod beginnings;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod bench;
 pub mod document;
-pub mod examples;
+pub mod editors;
 pub mod player;
-#[cfg(not(target_arch = "wasm32"))]
-pub mod program;
-#[cfg(not(target_arch = "wasm32"))]
-pub mod software;
+pub mod scenes;
+pub mod session;

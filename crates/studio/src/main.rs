@@ -3,9 +3,9 @@
 #[cfg(target_arch = "wasm32")]
 fn main() {
     match web_sys::window() {
-        Some(_) => wasm_bindgen_futures::spawn_local(page::main()),
+        Some(_) => wasm_bindgen_futures::spawn_local(web::main()),
         // The page's worker runs the same program.
-        None => bansho_studio::player::serve(),
+        None => bansho_studio::player::run_worker(),
     }
 }
 
@@ -15,7 +15,7 @@ fn main() -> std::process::ExitCode {
 }
 
 #[cfg(target_arch = "wasm32")]
-mod page;
+mod web;
 
 #[cfg(not(target_arch = "wasm32"))]
 mod native;

@@ -270,7 +270,7 @@ const panicking = await open("torch", (page) => page.addInitScript(() => {
       this.addEventListener("message", ({ data }) => (window.drawn[own] += data[0] === "drawn" ? 1 : 0));
     }
     postMessage(message, ...rest) {
-      if (!window.breaks || message[0] !== "wish") return super.postMessage(message, ...rest);
+      if (!window.breaks || message[0] !== "request") return super.postMessage(message, ...rest);
       window.breaks = false;
       setTimeout(() => {
         this.dispatchEvent(new MessageEvent("message", { data: ["panicked", message[1], "broken on purpose"] }));

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, process::Command};
 
 /// Each crate with those of the workspace that it may depend on: the table of ARCHITECTURE.md.
-const MAY_KNOW: [(&str, &[&str]); 11] = [
+const MAY_KNOW: [(&str, &[&str]); 12] = [
     ("bansho-base", &[]),
     ("bansho-sph", &["bansho-base"]),
     // No phenomenon knows another.
@@ -29,13 +29,14 @@ const MAY_KNOW: [(&str, &[&str]); 11] = [
         ],
     ),
     ("bansho-cli", &["bansho"]),
-    ("bansho-studio", &["bansho"]),
+    ("bansho-egui-software", &[]),
+    ("bansho-studio", &["bansho", "bansho-egui-software"]),
 ];
 
 /// Dependencies with the only crates that may have them.
 const RESERVED: [(&str, &[&str]); 9] = [
     ("wgpu", &["bansho-studio"]),
-    ("egui", &["bansho-studio"]),
+    ("egui", &["bansho-egui-software"]),
     ("eframe", &["bansho-studio"]),
     ("clap", &["bansho-cli"]),
     ("clap_complete", &["bansho-cli"]),

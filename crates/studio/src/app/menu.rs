@@ -1,26 +1,29 @@
-//! The menu at the top.
+//! The menu bar.
 
 use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
-use crate::{beginnings::BEGINNINGS, document::recovery::Recovered, examples};
+use crate::{
+    document::files::autosave::RecoveredWork,
+    scenes::{examples, new_scene::NEW_SCENES},
+};
 
 impl Studio {
-    /// The bar at the top.
-    pub(super) fn menu(&mut self, ui: &mut Ui) {
+    /// The menu bar.
+    pub(super) fn menu_ui(&mut self, ui: &mut Ui) {
         egui::MenuBar::new().ui(ui, |ui| {
-            ui.menu_button("File", |ui| self.file_menu(ui));
-            ui.menu_button("Edit", |ui| self.edit_menu(ui));
-            ui.menu_button("View", |ui| self.view_menu(ui));
-            self.offer_recovered(ui);
+            ui.menu_button("File", |ui| self.file_menu_ui(ui));
+            ui.menu_button("Edit", |ui| self.edit_menu_ui(ui));
+            ui.menu_button("View", |ui| self.view_menu_ui(ui));
+            self.recover_menu_ui(ui);
             let star = if self.session.document.is_dirty() { " •" } else { "" };
             ui.weak(format!("{}{star}", self.session.document.name()));
         });
     }
 
-    fn file_menu(&mut self, ui: &mut Ui) {
+    fn file_menu_ui(&mut self, ui: &mut Ui) {
         ui.menu_button("New", |ui| {
-            for (name, text) in BEGINNINGS {
+            for (name, text) in NEW_SCENES {
                 if ui.button(name).clicked() {
                     self.files.open_bundled(&mut self.session, "scene", text);
                 }
@@ -29,14 +32,14 @@ impl Studio {
         if ui.button("Open…").clicked() {
             self.files.ask_to_open(ui.ctx(), &mut self.session);
         }
-        ui.menu_button("Examples", |ui| self.examples_menu(ui));
+        ui.menu_button("Examples", |ui| self.examples_menu_ui(ui));
         if ui.button("Save").clicked() {
             self.files.save(&mut self.session);
         }
-        self.files.menu(ui, &mut self.session);
+        self.files.menu_ui(ui, &mut self.session);
     }
 
-    fn examples_menu(&mut self, ui: &mut Ui) {
+    fn examples_menu_ui(&mut self, ui: &mut Ui) {
         egui::ScrollArea::vertical().show(ui, |ui| {
             for &(name, text) in examples::SCENES {
                 let words = name.trim_end_matches(".toml").replace('_', " ");
@@ -47,7 +50,7 @@ impl Studio {
         });
     }
 
-    fn edit_menu(&mut self, ui: &mut Ui) {
+    fn edit_menu_ui(&mut self, ui: &mut Ui) {
         let named = |verb: &str, label: Option<&str>| label.map_or(verb.to_owned(), |label| format!("{verb} {label}"));
         let document = &mut self.session.document;
         let undo = named("Undo", document.undo_label());
@@ -58,11 +61,11 @@ impl Studio {
         if ui.add_enabled(document.redo_label().is_some(), egui::Button::new(redo)).clicked() {
             document.redo();
         }
-        ui.menu_button("Undo back to", |ui| self.undo_list(ui));
+        ui.menu_button("Undo back to", |ui| self.undo_list_ui(ui));
     }
 
-    /// The last steps, the last first: a click takes back that one and all after it.
-    fn undo_list(&mut self, ui: &mut Ui) {
+    /// The last undo steps, newest first: a click undoes that step and all after it.
+    fn undo_list_ui(&mut self, ui: &mut Ui) {
         const LISTED: usize = 20;
         let document = &mut self.session.document;
         let labels: Vec<String> = document.undo_labels().take(LISTED).map(str::to_owned).collect();
@@ -78,10 +81,10 @@ impl Studio {
         }
     }
 
-    fn view_menu(&mut self, ui: &mut Ui) {
-        ui.checkbox(&mut self.shows.text, "Text");
-        ui.checkbox(&mut self.shows.picture_alone, "Only the picture");
-        ui.checkbox(&mut self.shows.shortcuts, "Shortcuts");
+    fn view_menu_ui(&mut self, ui: &mut Ui) {
+        ui.checkbox(&mut self.visible_panels.text, "Text");
+        ui.checkbox(&mut self.visible_panels.picture_only, "Only the picture");
+        ui.checkbox(&mut self.visible_panels.shortcuts, "Shortcuts");
         ui.separator();
         let mut theme = ui.ctx().options(|options| options.theme_preference);
         for (choice, name) in [
@@ -94,12 +97,12 @@ impl Studio {
         ui.ctx().set_theme(theme);
     }
 
-    /// Unsaved work of a studio that did not end well.
-    fn offer_recovered(&mut self, ui: &mut Ui) {
+    /// Unsaved work of a studio that crashed.
+    fn recover_menu_ui(&mut self, ui: &mut Ui) {
         if self.files.unsaved.recovered.is_empty() {
             return;
         }
-        let name = |recovered: &Recovered| match recovered.origin.as_str() {
+        let name = |recovered: &RecoveredWork| match recovered.origin.as_str() {
             "" => "a scene never saved".to_owned(),
             origin => origin.to_owned(),
         };

@@ -1,68 +1,50 @@
-//! The window: panels over one [`Session`]. It holds no formulas of any phenomenon.
+//! The window: panels around a viewport, over one [`Session`].
 
-mod aurora;
-mod broken;
-mod curve_editor;
-mod curves_view;
 mod files;
-mod gesture;
-mod hands;
-mod icon;
-mod inspector;
-mod keyed;
 mod layout;
 mod menu;
-mod problems;
-mod rate;
-mod relink;
-mod scene_panel;
-mod session;
+pub(crate) mod panels;
 mod shortcuts;
-mod stages_view;
 mod status;
-mod store;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests;
-mod text_panel;
-mod things;
-mod timeline;
-mod value;
 mod viewport;
+pub(crate) mod widgets;
 
 use std::time::Duration;
 
 use eframe::egui;
 
-use self::{
-    aurora::AuroraEditor, files::Files, inspector::Inspector, layout::Layout, problems::Wanted, scene_panel::Subject,
-    stages_view::StagesView, store::Store, text_panel::TextPanel, viewport::Viewport,
+pub use self::shortcuts::function_keys;
+use self::{files::Files, layout::Layout, viewport::Viewport};
+pub use super::session::{AssetsForFolder, Session};
+pub use crate::editors::flame_sheet::stages_ui::color_image;
+use crate::{
+    editors::{aurora::AuroraEditor, flame_sheet::stages_ui::StagesView},
+    session::{selection::Selection, settings_store::SettingsStore},
 };
-pub use self::{
-    session::{AssetsOf, Session},
-    shortcuts::function_keys,
-    stages_view::image as screen_image,
-};
+use panels::{inspector::Inspector, problems::ProblemAction, text::TextPanel};
 
-/// The kind of phenomenon whose shapes are drawn.
+/// The kind of phenomenon with an editor of shapes.
 const KIND_WITH_SHAPES: &str = "aurora";
 
-/// The kind of phenomenon that burns on burners.
+/// The kind of phenomenon with burners.
 const KIND_WITH_BURNERS: &str = "flame_particles";
 
-/// The kind of phenomenon that comes to be in stages.
+/// The kind of phenomenon with pictures of its stages.
 const KIND_WITH_STAGES: &str = "flame_sheet";
 
 /// The whole window.
 pub struct Studio {
     session: Session,
-    subject: Subject,
+    selection: Selection,
     viewport: Viewport,
     aurora: AuroraEditor,
     stages: StagesView,
     inspector: Inspector,
     text: TextPanel,
     files: Files,
-    shows: Shows,
+    visible_panels: VisiblePanels,
     layout: Layout,
     /// Which of the documents that were opened is shown.
     opened: u64,
@@ -72,148 +54,149 @@ pub struct Studio {
 
 /// How large the window was when it was closed last, or is at first, points of the screen.
 pub fn window_size(home: Option<&std::path::Path>) -> [f32; 2] {
-    Layout::read(Store::new(home.map(Into::into))).window_size()
+    Layout::read(SettingsStore::new(home.map(Into::into))).window_size()
 }
 
 /// Which parts of the window are open.
 #[derive(Clone, Copy, Debug, Default)]
-struct Shows {
+struct VisiblePanels {
     text: bool,
     shortcuts: bool,
-    /// Nothing but the picture and its tools.
-    picture_alone: bool,
+    /// Only the picture and its tools.
+    picture_only: bool,
 }
 
 impl Studio {
-    /// A window on `session`. `home` is where the studio keeps recent files and unsaved work; without it, nothing is kept.
+    /// A window on `session`. `home` is the folder for settings, recent files and autosaves; without it, nothing is stored.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
-        let subject = Subject::first_of(&session.document);
-        let store = Store::new(home);
+        let selection = Selection::first_of(&session.document);
+        let store = SettingsStore::new(home);
         let layout = Layout::read(store.clone());
         Self {
             session,
-            subject,
+            selection,
             viewport: Viewport::default(),
             aurora: AuroraEditor::default(),
             stages: StagesView::default(),
             inspector: Inspector::default(),
             text: TextPanel::default(),
             files: Files::new(&store),
-            shows: Shows { text: layout.get("text shown", 0.0) > 0.0, ..Shows::default() },
+            visible_panels: VisiblePanels { text: layout.get("text shown", 0.0) > 0.0, ..VisiblePanels::default() },
             layout,
             opened: 0,
             field: None,
         }
     }
 
-    /// What it works on.
+    /// The open session.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
     }
 
-    /// Whether something would be lost if the window closed now: work, or pictures under way.
-    pub fn would_lose_something(&self) -> bool {
+    /// Whether closing now would lose unsaved work or stop rendering.
+    pub fn has_unfinished_work(&self) -> bool {
         self.session.document.is_dirty() || self.files.progress().is_some()
     }
 
-    /// The window closes: what is kept for the next time is written.
-    pub fn end(&mut self) {
+    /// Called when the window closes: stores the settings.
+    pub fn on_exit(&mut self) {
         self.files.unsaved.end();
-        self.layout.keep();
+        self.layout.save();
     }
 
-    /// Shows everything and takes in what hands do.
-    pub fn show(&mut self, ui: &mut egui::Ui) {
+    /// Builds the user interface of one frame.
+    pub fn ui(&mut self, ui: &mut egui::Ui) {
         if ui.ctx().cumulative_pass_nr() == 0 {
             self.layout.apply_theme(ui.ctx());
         }
-        let (now, hands) = now_and_hands(ui);
-        // Before anything is shown, so that a picture is on the screen as soon as it is there.
-        self.session.listen(now, hands);
-        self.begin_gestures(ui.ctx());
-        self.take_shortcuts(ui.ctx());
-        self.files.tend(ui, &mut self.session, &self.subject);
-        egui::Panel::top("menu").show(ui, |ui| self.menu(ui));
-        egui::Panel::bottom("status").show(ui, |ui| status::show(ui, &mut self.session, &mut self.files));
-        egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, &mut self.session));
-        self.follow_opening();
-        if self.shows.picture_alone {
+        let (now, dragging) = time_and_dragging(ui);
+        // Polled first, so that a new picture is shown in this frame.
+        self.session.poll_player(now, dragging);
+        self.begin_undo_steps(ui.ctx());
+        self.handle_shortcuts(ui.ctx());
+        self.files.poll(ui, &mut self.session, &self.selection);
+        egui::Panel::top("menu").show(ui, |ui| self.menu_ui(ui));
+        egui::Panel::bottom("status").show(ui, |ui| status::status_ui(ui, &mut self.session, &mut self.files));
+        egui::Panel::bottom("timeline").show(ui, |ui| panels::timeline::timeline_ui(ui, &mut self.session));
+        self.reset_on_open();
+        if self.visible_panels.picture_only {
             self.session.stages = None;
         } else {
-            self.panels(ui);
+            self.panels_ui(ui);
         }
         let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
         egui::CentralPanel::default()
             .frame(bare)
-            .show(ui, |ui| self.viewport.show(ui, &mut self.session, &self.subject));
-        if self.shows.shortcuts {
-            shortcuts::window(ui.ctx(), &mut self.shows.shortcuts);
+            .show(ui, |ui| self.viewport.ui(ui, &mut self.session, &self.selection));
+        if self.visible_panels.shortcuts {
+            shortcuts::shortcuts_ui(ui.ctx(), &mut self.visible_panels.shortcuts);
         }
-        self.end_gestures(ui);
-        self.layout.note_theme(ui.ctx());
-        self.layout.note("text shown", f32::from(u8::from(self.shows.text)));
-        self.layout.note_window(ui.ctx());
-        self.follow(ui);
+        self.end_undo_steps(ui);
+        self.layout.record_theme(ui.ctx());
+        self.layout.set("text shown", f32::from(u8::from(self.visible_panels.text)));
+        self.layout.record_window_size(ui.ctx());
+        self.request_frame(ui);
     }
 
-    /// Begins with what a hand would reach for first in a scene that was just opened.
-    fn follow_opening(&mut self) {
-        let gone = self.subject.index.is_some() && self.subject.place().find(self.session.document.values()).is_none();
+    /// Resets the selection after a scene was opened, or where the selected table is gone.
+    fn reset_on_open(&mut self) {
+        let gone =
+            self.selection.index.is_some() && self.selection.place().find(self.session.document.values()).is_none();
         if self.opened != self.session.opened || gone {
             self.opened = self.session.opened;
-            self.subject = Subject::first_of(&self.session.document);
+            self.selection = Selection::first_of(&self.session.document);
             self.aurora = AuroraEditor::default();
         }
     }
 
-    fn panels(&mut self, ui: &mut egui::Ui) {
-        self.side_panels(ui);
-        if let (KIND_WITH_SHAPES, Some(index)) = (self.subject.key, self.subject.index) {
+    fn panels_ui(&mut self, ui: &mut egui::Ui) {
+        self.side_panels_ui(ui);
+        if let (KIND_WITH_SHAPES, Some(index)) = (self.selection.key, self.selection.index) {
             let panel = egui::Panel::bottom("aurora").resizable(true);
             let Self { aurora, session, layout, .. } = self;
-            layout.panel("aurora", panel, 420.0, ui, |ui| aurora.show(ui, session, index));
+            layout.panel_ui("aurora", panel, 420.0, ui, |ui| aurora.ui(ui, session, index));
         }
     }
 
-    fn side_panels(&mut self, ui: &mut egui::Ui) {
-        match problems::show(ui, &self.session) {
-            Some(Wanted::Sight(span)) => {
-                self.shows.text = true;
+    fn side_panels_ui(&mut self, ui: &mut egui::Ui) {
+        match panels::problems::problems_ui(ui, &self.session) {
+            Some(ProblemAction::ShowInText(span)) => {
+                self.visible_panels.text = true;
                 self.text.jump_to(span);
             }
-            Some(Wanted::File(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
+            Some(ProblemAction::Relink(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
             None => {}
         }
-        let Self { session, subject, text, stages, inspector, layout, shows, .. } = self;
-        layout.panel("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| scene_panel::show(ui, session, subject));
+        let Self { session, selection, text, stages, inspector, layout, visible_panels, .. } = self;
+        layout.panel_ui("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| panels::scene::scene_ui(ui, session, selection));
         });
-        if shows.text {
-            layout.panel("text", egui::Panel::right("text"), 380.0, ui, |ui| text.show(ui, session));
+        if visible_panels.text {
+            layout.panel_ui("text", egui::Panel::right("text"), 380.0, ui, |ui| text.ui(ui, session));
         }
-        layout.panel("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+        layout.panel_ui("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
             session.stages = None;
-            if let (KIND_WITH_STAGES, Some(index)) = (subject.key, subject.index) {
-                stages.show(ui, session, index);
+            if let (KIND_WITH_STAGES, Some(index)) = (selection.key, selection.index) {
+                stages.ui(ui, session, index);
             }
-            // A row that is too wide is scrolled to: it must not widen the panel, which would widen the rows.
-            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.show(ui, session, subject));
+            // Wide rows scroll: otherwise they would widen the panel, which widens the rows.
+            egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.ui(ui, session, selection));
         });
     }
 
-    /// What is done from one press to its letting go, in one field, or by one turn of the wheel is one step of the history.
-    fn begin_gestures(&mut self, ctx: &egui::Context) {
+    /// Starts an undo step at a press or a change of focus: a drag, the edits in one field, or one turn of the wheel are one step.
+    fn begin_undo_steps(&mut self, ctx: &egui::Context) {
         let field = ctx.memory(egui::Memory::focused);
         let (pressed, held) = ctx.input(|input| (input.pointer.any_pressed(), input.pointer.any_down()));
         if pressed || (self.field != field && !held) {
-            self.session.document.seal();
+            self.session.document.end_step();
         }
         self.field = field;
     }
 
-    /// When everything is let go, what was done is done.
-    fn end_gestures(&mut self, ui: &egui::Ui) {
-        /// Turns of the wheel that follow one another faster are one, s.
+    /// Ends the undo step once nothing is pressed, typed in or scrolled.
+    fn end_undo_steps(&mut self, ui: &egui::Ui) {
+        /// Scrolling with shorter pauses is one step, s.
         const TURN_S: f32 = 0.5;
         let typing = ui.ctx().egui_wants_keyboard_input();
         let (held, turned) = ui.input(|input| {
@@ -224,37 +207,37 @@ impl Studio {
             return;
         }
         if !turned {
-            self.session.document.seal();
+            self.session.document.end_step();
         }
-        // Pages end without being asked.
+        // A page is closed without notice.
         if cfg!(target_arch = "wasm32") {
-            self.layout.keep();
+            self.layout.save();
         }
     }
 
-    fn follow(&mut self, ui: &egui::Ui) {
-        let (now, hands) = now_and_hands(ui);
-        if let Some(sleep_s) = self.session.follow(now, self.viewport.pixels(), hands) {
+    fn request_frame(&mut self, ui: &egui::Ui) {
+        let (now, dragging) = time_and_dragging(ui);
+        if let Some(sleep_s) = self.session.advance_time(now, self.viewport.pixels(), dragging) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
         }
-        self.session.wait(now, hands);
-        self.viewport.take_picture(ui, &self.session);
+        self.session.wait(now, dragging);
+        self.viewport.upload_picture(ui, &self.session);
     }
 }
 
-/// What time it is, s, and whether something is being dragged.
-fn now_and_hands(ui: &egui::Ui) -> (f64, bool) {
+/// The time, s, and whether something is being dragged.
+fn time_and_dragging(ui: &egui::Ui) -> (f64, bool) {
     let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
     (now, held && ui.ctx().dragged_id().is_some())
 }
 
 #[cfg(not(target_arch = "wasm32"))]
-impl crate::program::Program for Studio {
-    fn show(&mut self, ui: &mut egui::Ui, _settle: &mut dyn FnMut()) {
-        Self::show(self, ui);
+impl bansho_egui_software::App for Studio {
+    fn ui(&mut self, ui: &mut egui::Ui, _wait_until_presented: &mut dyn FnMut()) {
+        Self::ui(self, ui);
     }
 
-    fn end(&mut self) {
-        Self::end(self);
+    fn on_exit(&mut self) {
+        Self::on_exit(self);
     }
 }

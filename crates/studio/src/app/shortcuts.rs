@@ -1,10 +1,10 @@
-//! Keys: one list, from which they are both taken and shown.
+//! Keyboard shortcuts: one list, for handling and for the help window.
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
 
 use super::Studio;
 
-/// What a key does.
+/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Action {
     Undo,
@@ -18,11 +18,11 @@ pub(super) enum Action {
     FrameOn,
     FirstFrame,
     Text,
-    PictureAlone,
+    PictureOnly,
     Shortcuts,
 }
 
-/// A key, what it does, and how that is called.
+/// A key, its action and the action's name.
 pub(super) struct Shortcut {
     pub(super) keys: KeyboardShortcut,
     pub(super) action: Action,
@@ -60,25 +60,25 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
     plain(Key::ArrowLeft, Action::FrameBack, "Frame back"),
     plain(Key::ArrowRight, Action::FrameOn, "Frame on"),
     plain(Key::Home, Action::FirstFrame, "First frame"),
-    plain(Key::F, Action::PictureAlone, "Only the picture, or everything"),
+    plain(Key::F, Action::PictureOnly, "Only the picture, or everything"),
     plain(Key::Questionmark, Action::Shortcuts, "These shortcuts"),
 ];
 
 impl Studio {
-    /// Does what pressed keys say. Keys that write something belong to whatever is being typed in.
-    pub(super) fn take_shortcuts(&mut self, ctx: &Context) {
+    /// Performs the actions of pressed keys. While a text field has the focus, plain keys belong to it.
+    pub(super) fn handle_shortcuts(&mut self, ctx: &Context) {
         let typing = ctx.egui_wants_keyboard_input();
         for shortcut in &SHORTCUTS {
             let mine = !typing || shortcut.keys.modifiers.command || is_function(shortcut.keys.logical_key);
             if mine && ctx.input_mut(|input| pressed(input, shortcut)) {
-                self.act(ctx, shortcut.action);
+                self.perform(ctx, shortcut.action);
             }
         }
     }
 
-    fn act(&mut self, ctx: &Context, action: Action) {
+    fn perform(&mut self, ctx: &Context, action: Action) {
         if matches!(action, Action::Save | Action::Open | Action::RenderStill | Action::RenderShot) {
-            self.viewport.let_go(&mut self.session);
+            self.viewport.end_wind_drag(&mut self.session);
         }
         let transport = &mut self.session.transport;
         match action {
@@ -96,9 +96,9 @@ impl Studio {
             Action::FrameBack => transport.step(-1),
             Action::FrameOn => transport.step(1),
             Action::FirstFrame => transport.go_to(*transport.range().start()),
-            Action::Text => self.shows.text = !self.shows.text,
-            Action::PictureAlone => self.shows.picture_alone = !self.shows.picture_alone,
-            Action::Shortcuts => self.shows.shortcuts = !self.shows.shortcuts,
+            Action::Text => self.visible_panels.text = !self.visible_panels.text,
+            Action::PictureOnly => self.visible_panels.picture_only = !self.visible_panels.picture_only,
+            Action::Shortcuts => self.visible_panels.shortcuts = !self.visible_panels.shortcuts,
         }
     }
 }
@@ -119,7 +119,7 @@ fn pressed(input: &mut egui::InputState, shortcut: &Shortcut) -> bool {
 }
 
 /// The window that lists them.
-pub(super) fn window(ctx: &Context, open: &mut bool) {
+pub(super) fn shortcuts_ui(ctx: &Context, open: &mut bool) {
     egui::Window::new("Shortcuts").open(open).resizable(false).show(ctx, |ui| {
         egui::Grid::new("shortcuts").num_columns(2).striped(true).show(ui, |ui| {
             for shortcut in &SHORTCUTS {

@@ -1,15 +1,15 @@
-//! One line that says what is shown and what goes on.
+//! The status line.
 
 use eframe::egui::{ProgressBar, Ui};
 
-use super::{
-    files::Files,
-    icon::{self, Icon},
+use super::files::Files;
+use crate::{
+    app::widgets::icon::{self, Icon},
     session::Session,
 };
 
 /// Shows the line.
-pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
+pub(super) fn status_ui(ui: &mut Ui, session: &mut Session, files: &mut Files) {
     ui.horizontal(|ui| {
         if session.is_busy() {
             ui.spinner();
@@ -23,16 +23,16 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
                 ui.weak("draft").on_hover_text("Simulated with fewer particles than the scene has; see Draft above");
             }
             if !picture.exact && ui.link("live state").on_hover_text(LIVE).clicked() {
-                session.draw_exactly();
+                session.redraw_exact();
             }
         }
-        if let Some(rate) = session.pictures_per_s() {
+        if let Some(rate) = session.frames_per_s() {
             ui.weak(format!("{rate:.0} pictures/s"));
         }
         if let Some([done, total]) = files.progress() {
-            rendering(ui, files, done, total);
+            render_progress_ui(ui, files, done, total);
         }
-        if session.is_broken() && ui.button("Retry").on_hover_text(RETRY).clicked() {
+        if session.has_panicked() && ui.button("Retry").on_hover_text(RETRY).clicked() {
             session.set_notice(None);
             session.retry();
         }
@@ -46,12 +46,12 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, files: &mut Files) {
     });
 }
 
-/// How far rendering has come, and a way to stop it.
-fn rendering(ui: &mut Ui, files: &mut Files, done: usize, total: usize) {
+/// The progress of rendering, and a button to stop it.
+fn render_progress_ui(ui: &mut Ui, files: &mut Files, done: usize, total: usize) {
     let text = if total == 0 { "rendering…".to_owned() } else { format!("rendering: {done} of {total}") };
     ui.label(text);
-    let share = done as f32 / total.max(1) as f32;
-    ui.add(ProgressBar::new(share).desired_width(90.0).desired_height(8.0));
+    let fraction = done as f32 / total.max(1) as f32;
+    ui.add(ProgressBar::new(fraction).desired_width(90.0).desired_height(8.0));
     if icon::button(ui, Icon::Cross, "Stop rendering").clicked() {
         files.stop_rendering();
     }

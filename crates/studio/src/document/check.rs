@@ -24,7 +24,7 @@ fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
 
 /// A scene without faults: built, and planned.
 #[derive(Clone)]
-pub struct Checked {
+pub struct PlannedScene {
     /// What it shows.
     pub compiled: Arc<CompiledScene>,
     /// How it is drawn.
@@ -35,7 +35,7 @@ pub struct Checked {
 ///
 /// # Errors
 /// Every fault of the text and of the assets it names.
-pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Checked, SceneError> {
+pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<PlannedScene, SceneError> {
     Checker::default().check(name, text, assets)
 }
 
@@ -53,11 +53,11 @@ impl Checker {
     ///
     /// # Errors
     /// Every fault of the text and of the assets it names.
-    pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<Checked, SceneError> {
+    pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<PlannedScene, SceneError> {
         let compiled = build(name, text, assets, &mut self.good)?;
         let plan = Plan::new(&compiled, &PlanOptions::default());
         let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
-        Ok(Checked { compiled, plan })
+        Ok(PlannedScene { compiled, plan })
     }
 
     /// A draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
@@ -69,15 +69,15 @@ impl Checker {
         name: &str,
         text: &str,
         assets: &Arc<dyn Assets>,
-    ) -> Option<Result<Checked, SceneError>> {
+    ) -> Option<Result<PlannedScene, SceneError>> {
         let fewer = fewer_particles(&values(text).ok()?);
         let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
         let whole = self.check(name, text, assets);
-        let planned = |whole: Checked| {
+        let planned = |whole: PlannedScene| {
             let compiled = build(name, &draft, assets, &mut self.draft)?;
             let plan = Plan::given(compiled.scene().clone(), &PlanOptions::default(), whole.plan.exposure_ev100, 0);
             let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
-            Ok(Checked { compiled, plan })
+            Ok(PlannedScene { compiled, plan })
         };
         Some(whole.and_then(planned))
     }
@@ -99,7 +99,7 @@ fn build(
 
 /// A fault that another [`check`] found, in words.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct ReportedProblem {
     /// The bytes of the text that it is about, if it lies anywhere.
     pub span: Option<Span>,
     /// The parameter.
@@ -110,7 +110,7 @@ pub struct Found {
     pub asset: Option<String>,
 }
 
-impl From<&Problem> for Found {
+impl From<&Problem> for ReportedProblem {
     fn from(problem: &Problem) -> Self {
         let Problem { span, path, kind } = problem;
         let (asset, reason) = match kind {
@@ -121,9 +121,9 @@ impl From<&Problem> for Found {
     }
 }
 
-impl From<Found> for Problem {
-    fn from(found: Found) -> Self {
-        let Found { span, path, reason, asset } = found;
+impl From<ReportedProblem> for Problem {
+    fn from(found: ReportedProblem) -> Self {
+        let ReportedProblem { span, path, reason, asset } = found;
         let kind = match asset {
             Some(path) => ProblemKind::Asset(AssetError { path, problem: AssetProblem::Told(reason) }),
             None => ProblemKind::Conflict(reason),
@@ -136,7 +136,7 @@ impl From<Found> for Problem {
 ///
 /// # Errors
 /// Every fault of the text, or what the other check found.
-pub fn recheck(name: &str, text: &str, found: Result<f32, Vec<Found>>) -> Result<Arc<Plan>, SceneError> {
+pub fn recheck(name: &str, text: &str, found: Result<f32, Vec<ReportedProblem>>) -> Result<Arc<Plan>, SceneError> {
     let scene = parse(name, text)?;
     match found {
         Ok(ev100) => {
@@ -203,9 +203,9 @@ mod tests {
     };
 
     use super::*;
-    use crate::examples::Bundle;
+    use crate::scenes::examples::Bundle;
 
-    fn draft(text: &str) -> Option<Result<Checked, SceneError>> {
+    fn draft(text: &str) -> Option<Result<PlannedScene, SceneError>> {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
         Checker::default().check_draft("scene", text, &assets)
     }
@@ -294,7 +294,7 @@ mod tests {
         let counting = Arc::new(Counting::default());
         let assets: Arc<dyn Assets> = counting.clone();
         let error = check("scene", text, &assets).err().unwrap();
-        let found: Vec<Found> = error.problems.iter().map(Found::from).collect();
+        let found: Vec<ReportedProblem> = error.problems.iter().map(ReportedProblem::from).collect();
         let made = counting.meshes.load(Ordering::Relaxed);
         let told = recheck("scene", text, Err(found)).err().unwrap();
         assert_eq!(counting.meshes.load(Ordering::Relaxed), made);

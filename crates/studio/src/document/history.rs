@@ -1,9 +1,9 @@
-//! What was done, to be taken back and done again. Scenes are small, so each step keeps both texts.
+//! Undo and redo. Scenes are small, so each step keeps both texts.
 
 use std::sync::Arc;
 
-/// Most steps that are kept.
-const LONGEST: usize = 1000;
+/// Most undo steps.
+const MAX_STEPS: usize = 1000;
 
 #[derive(Default)]
 pub(super) struct History {
@@ -21,7 +21,7 @@ struct Step {
 
 impl History {
     /// Notes a step from `before` to `after`, which goes on with an open one of the same label.
-    pub(super) fn note(&mut self, label: &str, before: &Arc<str>, after: &str) {
+    pub(super) fn record(&mut self, label: &str, before: &Arc<str>, after: &str) {
         if **before == *after {
             return;
         }
@@ -31,18 +31,18 @@ impl History {
             Some(last) => last.after = after.into(),
             None => {
                 self.done.push(Step { label: label.to_owned(), before: before.clone(), after: after.into() });
-                self.done.drain(..self.done.len().saturating_sub(LONGEST));
+                self.done.drain(..self.done.len().saturating_sub(MAX_STEPS));
             }
         }
         self.open = true;
     }
 
-    pub(super) fn seal(&mut self) {
+    pub(super) fn end_step(&mut self) {
         self.open = false;
     }
 
     /// Forgets the last step where it is called `label` and still open; the text before it.
-    pub(super) fn abandon(&mut self, label: &str) -> Option<Arc<str>> {
+    pub(super) fn discard_step(&mut self, label: &str) -> Option<Arc<str>> {
         let open = std::mem::take(&mut self.open);
         let step = self.done.pop_if(|step| open && step.label == label)?;
         Some(step.before)

@@ -1,17 +1,14 @@
-//! The scene as text: edits that keep its comments, undo, faults at their lines, and the last plan that was good.
+//! The scene as text: edits that keep comments, undo, problems with their lines, and the last good plan.
 
 mod check;
-pub mod drawing;
 pub mod files;
 mod history;
+pub(crate) mod keyframes;
 mod named_files;
 pub(crate) mod phenomena;
-pub mod recovery;
 pub mod stages;
 #[cfg(test)]
 mod tests;
-#[cfg(not(target_arch = "wasm32"))]
-pub mod watch;
 
 use std::sync::{
     Arc,
@@ -28,18 +25,18 @@ use bansho::{
     },
 };
 
-pub use check::{Checked, Checker, Found, check, recheck};
+pub use check::{Checker, PlannedScene, ReportedProblem, check, recheck};
 pub use named_files::named_files;
-pub use phenomena::{Listed, operations};
+pub use phenomena::{PhenomenonEntry, operations};
 
 use history::History;
 
-/// Counts the states of all documents of this run, so that work on one can be told from work on any other.
+/// A revision of a document, unique among all documents of this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Revision(pub(crate) u64);
 
 impl Revision {
-    /// One that no state has had.
+    /// A new revision.
     fn next() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Self(NEXT.fetch_add(1, Ordering::Relaxed))
@@ -51,20 +48,20 @@ pub struct Document {
     name: String,
     text: Arc<str>,
     saved: Arc<str>,
-    /// Whether its file was taken away.
-    gone: bool,
-    /// Its first state.
+    /// Whether its file was deleted.
+    file_missing: bool,
+    /// Its first revision.
     first: Revision,
     revision: Revision,
     history: History,
     values: Table,
     syntax: Option<Problem>,
-    verdict: Verdict,
+    check_state: CheckState,
 }
 
-/// What checking found out so far.
+/// The result of the last check.
 #[derive(Default)]
-struct Verdict {
+struct CheckState {
     of: Option<Revision>,
     plan: Option<Arc<Plan>>,
     error: Option<Arc<SceneError>>,
@@ -78,25 +75,25 @@ impl Document {
         let mut document = Self {
             name: name.into(),
             saved: text.clone(),
-            gone: false,
+            file_missing: false,
             text,
             first,
             revision: first,
             history: History::default(),
             values: Table::default(),
             syntax: None,
-            verdict: Verdict::default(),
+            check_state: CheckState::default(),
         };
-        document.read();
+        document.parse();
         document
     }
 
-    /// What errors call it.
+    /// The name in error messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Calls it otherwise, as after saving it elsewhere.
+    /// Renames it, as after Save As.
     pub fn rename(&mut self, name: impl Into<String>) {
         self.name = name.into();
     }
@@ -106,153 +103,152 @@ impl Document {
         &self.text
     }
 
-    /// Which state this is.
+    /// The current revision.
     pub fn revision(&self) -> Revision {
         self.revision
     }
 
-    /// Whether `revision` is, or was, a state of this document rather than of another.
-    pub fn has_been(&self, revision: Revision) -> bool {
+    /// Whether `revision` is or was a revision of this document.
+    pub fn includes_revision(&self, revision: Revision) -> bool {
         (self.first..=self.revision).contains(&revision)
     }
 
-    /// What the text says, or said when it was TOML last.
+    /// The values of the text, or of the last text that was valid TOML.
     pub fn values(&self) -> &Table {
         &self.values
     }
 
-    /// Whether it differs from what lies in its file.
+    /// Whether it differs from its file.
     pub fn is_dirty(&self) -> bool {
-        self.gone || self.differs()
+        self.file_missing || self.is_modified()
     }
 
-    /// Whether something was done here since it was saved or opened.
-    pub fn differs(&self) -> bool {
+    /// Whether it was edited since it was saved or opened.
+    pub fn is_modified(&self) -> bool {
         self.text != self.saved
     }
 
-    /// Notes that `text` is what lies in its file now.
+    /// Records that its file has `text` now.
     pub fn mark_saved(&mut self, text: Arc<str>) {
-        (self.saved, self.gone) = (text, false);
+        (self.saved, self.file_missing) = (text, false);
     }
 
-    /// Notes whether its file was taken away.
-    pub fn mark_gone(&mut self, gone: bool) {
-        self.gone = gone;
+    /// Records whether its file was deleted.
+    pub fn set_file_missing(&mut self, gone: bool) {
+        self.file_missing = gone;
     }
 
-    /// The last plan that was good, if there ever was one.
+    /// The last good plan.
     pub fn plan(&self) -> Option<&Arc<Plan>> {
-        self.verdict.plan.as_ref()
+        self.check_state.plan.as_ref()
     }
 
-    /// What is wrong with the text, as far as is known.
+    /// The problems of the text, if they are known.
     pub fn error(&self) -> Option<&Arc<SceneError>> {
-        self.verdict.error.as_ref()
+        self.check_state.error.as_ref()
     }
 
-    /// Whether this state has been checked.
+    /// Whether the current revision has been checked.
     pub fn is_checked(&self) -> bool {
-        self.verdict.of == Some(self.revision)
+        self.check_state.of == Some(self.revision)
     }
 
-    /// Takes what [`check`] found out about state `revision`; stale news is no news.
-    pub fn judge(&mut self, revision: Revision, outcome: Result<Arc<Plan>, SceneError>) {
+    /// Sets the result of [`check`] for `revision`; results of older revisions are ignored.
+    pub fn set_check_result(&mut self, revision: Revision, outcome: Result<Arc<Plan>, SceneError>) {
         if revision != self.revision {
             return;
         }
-        self.verdict.of = Some(revision);
+        self.check_state.of = Some(revision);
         match outcome {
             Ok(plan) => {
-                self.verdict.plan = Some(plan);
-                self.verdict.error = None;
+                self.check_state.plan = Some(plan);
+                self.check_state.error = None;
             }
-            Err(error) => self.verdict.error = Some(Arc::new(error)),
+            Err(error) => self.check_state.error = Some(Arc::new(error)),
         }
     }
 
-    /// Checks this state here and now.
+    /// Checks the current revision synchronously.
     pub fn check_now(&mut self, assets: &Arc<dyn Assets>) {
-        let outcome = check(&self.name, &self.text, assets).map(|checked| checked.plan);
-        self.judge(self.revision, outcome);
+        let outcome = check(&self.name, &self.text, assets).map(|scene| scene.plan);
+        self.set_check_result(self.revision, outcome);
     }
 
-    /// Carries out `operations` as a step of the history. Steps of one label that follow one another, as those of a slider that is
-    /// dragged, are one until [`seal`](Self::seal).
+    /// Applies `operations` as an undo step. Successive edits with the same label, as those of a dragged slider, are one step until [`end_step`](Self::end_step).
     ///
     /// # Errors
-    /// The text is no TOML, or an operation leads nowhere; nothing is changed then.
+    /// The text is not TOML, or an operation's path does not exist; nothing is changed then.
     pub fn edit(&mut self, label: &str, operations: &[Operation]) -> Result<(), EditError> {
         let text = operation::apply(&self.text, operations)?;
-        self.history.note(label, &self.text, &text);
-        self.show(text.into());
+        self.history.record(label, &self.text, &text);
+        self.set_text(text.into());
         Ok(())
     }
 
-    /// Goes on to `text`, which says `values`, as [`edit`](Self::edit) does.
-    fn go_on(&mut self, label: &str, text: String, values: Table) {
-        self.history.note(label, &self.text, &text);
+    /// Sets `text` with its parsed `values`, as [`edit`](Self::edit) does.
+    pub(crate) fn apply_text(&mut self, label: &str, text: String, values: Table) {
+        self.history.record(label, &self.text, &text);
         if *text != *self.text {
             (self.text, self.revision) = (text.into(), Revision::next());
             (self.values, self.syntax) = (values, None);
         }
     }
 
-    /// Replaces the whole text, as typing does; typing is one step until [`seal`](Self::seal).
+    /// Replaces the whole text, as typing does; edits with the same label are one step until [`end_step`](Self::end_step).
     pub fn replace(&mut self, label: &str, text: &str) {
-        self.history.note(label, &self.text, text);
-        self.show(text.into());
+        self.history.record(label, &self.text, text);
+        self.set_text(text.into());
     }
 
-    /// Ends a step: what comes next is a step of its own.
-    pub fn seal(&mut self) {
-        self.history.seal();
+    /// Ends the undo step: the next edit starts another.
+    pub fn end_step(&mut self) {
+        self.history.end_step();
     }
 
-    /// Takes back the step `label` while it is still open, as if it had never been.
-    pub fn abandon(&mut self, label: &str) {
-        if let Some(text) = self.history.abandon(label) {
-            self.show(text);
+    /// Reverts and discards the open undo step `label`.
+    pub fn discard_step(&mut self, label: &str) {
+        if let Some(text) = self.history.discard_step(label) {
+            self.set_text(text);
         }
     }
 
-    /// What undoing would take back.
+    /// The label of the step that undo would revert.
     pub fn undo_label(&self) -> Option<&str> {
         self.history.undo_label()
     }
 
-    /// All that undoing would take back, the last step first.
+    /// The labels of all steps that can be undone, newest first.
     pub fn undo_labels(&self) -> impl Iterator<Item = &str> {
         self.history.undo_labels()
     }
 
-    /// What redoing would do again.
+    /// The label of the step that redo would apply.
     pub fn redo_label(&self) -> Option<&str> {
         self.history.redo_label()
     }
 
-    /// Takes back the last step; whether there was one.
+    /// Undoes the last step. Returns whether there was one.
     pub fn undo(&mut self) -> bool {
         let text = self.history.undo();
-        text.map(|text| self.show(text)).is_some()
+        text.map(|text| self.set_text(text)).is_some()
     }
 
-    /// Does the step again that was taken back last; whether there was one.
+    /// Redoes the step that was undone last. Returns whether there was one.
     pub fn redo(&mut self) -> bool {
         let text = self.history.redo();
-        text.map(|text| self.show(text)).is_some()
+        text.map(|text| self.set_text(text)).is_some()
     }
 
-    fn show(&mut self, text: Arc<str>) {
+    fn set_text(&mut self, text: Arc<str>) {
         if text == self.text {
             return;
         }
         self.text = text;
         self.revision = Revision::next();
-        self.read();
+        self.parse();
     }
 
-    fn read(&mut self) {
+    fn parse(&mut self) {
         match values(&self.text) {
             Ok(values) => {
                 self.values = values;
@@ -262,7 +258,7 @@ impl Document {
         }
     }
 
-    /// Where the text stops being TOML; operations cannot be carried out then.
+    /// The TOML syntax error, if there is one; operations cannot be applied then.
     pub fn syntax_problem(&self) -> Option<&Problem> {
         self.syntax.as_ref()
     }

@@ -1,4 +1,4 @@
-//! The files that a scene names, with the places that name them.
+//! The files that a scene names, with the paths of the parameters that name them.
 
 use bansho::{
     KINDS,
@@ -6,7 +6,7 @@ use bansho::{
     render::scene::{Place, SHARED_TABLES},
 };
 
-/// Each place of the scene `root` that names a file, and what it says.
+/// Each parameter of the scene `root` that names a file, and the name.
 pub fn named_files(root: &Table) -> Vec<(Place, String)> {
     let shared = SHARED_TABLES.iter().map(|table| (table.key, (table.table)()));
     let kinds = KINDS.iter().map(|kind| (kind.key, (kind.table)()));

@@ -10,7 +10,7 @@ use super::Document;
 
 /// A phenomenon as the text lists it; it need not be without faults.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Listed {
+pub struct PhenomenonEntry {
     /// Its kind, such as `rain`.
     pub kind: &'static str,
     /// Which of its kind.
@@ -21,7 +21,7 @@ pub struct Listed {
     pub enabled: bool,
 }
 
-impl Listed {
+impl PhenomenonEntry {
     /// Where it stands.
     pub fn place(&self) -> Place {
         Place::root().key(self.kind).index(self.index)
@@ -30,7 +30,7 @@ impl Listed {
 
 impl Document {
     /// All phenomena, kind by kind in the order of the file.
-    pub fn phenomena(&self) -> Vec<Listed> {
+    pub fn phenomena(&self) -> Vec<PhenomenonEntry> {
         let mut listed = Vec::new();
         for entry in &self.values().entries {
             let Some(kind) = KINDS.iter().find(|kind| kind.key == entry.key) else { continue };
@@ -45,18 +45,18 @@ impl Document {
     }
 }
 
-fn describe(kind: &'static str, index: usize, table: &Table) -> Listed {
+fn describe(kind: &'static str, index: usize, table: &Table) -> PhenomenonEntry {
     let name = match table.get("name").map(|node| &node.value) {
         Some(Value::Text(name)) => name.clone(),
         _ if index == 0 => kind.to_owned(),
         _ => format!("{kind} {}", index + 1),
     };
     let enabled = table.get("enabled").is_none_or(|node| node.value != Value::Bool(false));
-    Listed { kind, index, name, enabled }
+    PhenomenonEntry { kind, index, name, enabled }
 }
 
 /// A name that none of `listed` has: `wanted`, or `wanted` with a number.
-fn free_name(wanted: &str, listed: &[Listed]) -> String {
+fn free_name(wanted: &str, listed: &[PhenomenonEntry]) -> String {
     let taken = |name: &str| listed.iter().any(|other| other.name == name);
     if !taken(wanted) {
         return wanted.to_owned();
@@ -66,7 +66,7 @@ fn free_name(wanted: &str, listed: &[Listed]) -> String {
     numbered.into_iter().find(|name| !taken(name)).unwrap_or_default()
 }
 
-/// The operations behind the buttons of the scene panel.
+/// The operations of the scene panel.
 pub mod operations {
     use super::*;
 
@@ -78,7 +78,7 @@ pub mod operations {
     }
 
     /// Adds a phenomenon like `original` under a name of its own.
-    pub fn duplicate(document: &Document, original: &Listed) -> Vec<Operation> {
+    pub fn duplicate(document: &Document, original: &PhenomenonEntry) -> Vec<Operation> {
         let Some(Value::Table(table)) = original.place().find(document.values()).map(|node| &node.value) else {
             return Vec::new();
         };
@@ -90,7 +90,7 @@ pub mod operations {
     }
 
     /// Draws it, or does not.
-    pub fn set_enabled(listed: &Listed, enabled: bool) -> Operation {
+    pub fn set_enabled(listed: &PhenomenonEntry, enabled: bool) -> Operation {
         let place = listed.place().key("enabled");
         match (enabled, listed.enabled) {
             // Being drawn is the default.
@@ -100,10 +100,10 @@ pub mod operations {
     }
 
     /// Draws only this one; all, where it is the only one already.
-    pub fn solo(document: &Document, chosen: &Listed) -> Vec<Operation> {
+    pub fn solo(document: &Document, chosen: &PhenomenonEntry) -> Vec<Operation> {
         let all = document.phenomena();
         let alone = all.iter().all(|each| each.enabled == (each == chosen));
-        let wanted = |each: &Listed| alone || each == chosen;
+        let wanted = |each: &PhenomenonEntry| alone || each == chosen;
         let change = all.iter().filter(|each| each.enabled != wanted(each));
         change.map(|each| set_enabled(each, wanted(each))).collect()
     }

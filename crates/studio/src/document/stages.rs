@@ -10,7 +10,7 @@ use bansho::{
         parameters::{Auto, Parameters, Reader, Table, Value},
         phenomenon::kind::Describe,
     },
-    fire::sheet::{FlameSheetParameters, StageShown},
+    fire::sheet::{FlameSheetParameters, Stage},
     render::scene::{
         Instance, Place, PlateParameters, Scene,
         operation::{self, Operation},
@@ -18,7 +18,7 @@ use bansho::{
     },
 };
 
-use super::Checked;
+use super::PlannedScene;
 
 /// Size of a stage's picture, pixels.
 const SIZE: [usize; 2] = [112, 112];
@@ -31,16 +31,22 @@ const AROUND: f64 = 1.08;
 
 /// What the stages are called in a scene, in their order; the finished flame is none of them.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    StageShown::CHOICES.iter().map(|choice| choice.name).filter(|name| *name != StageShown::Flame.name())
+    Stage::CHOICES.iter().map(|choice| choice.name).filter(|name| *name != Stage::Flame.name())
 }
 
 /// Plans of the stages of flame sheet `index` of the scene `text`; `None` where it is faulty or has no such sheet.
-pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<Checked>> {
+pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<PlannedScene>> {
     let root = values(text).ok()?;
     names().map(|stage| plan(name, [text, stage], &root, assets, index)).collect()
 }
 
-fn plan(name: &str, [text, stage]: [&str; 2], root: &Table, assets: &Arc<dyn Assets>, index: usize) -> Option<Checked> {
+fn plan(
+    name: &str,
+    [text, stage]: [&str; 2],
+    root: &Table,
+    assets: &Arc<dyn Assets>,
+    index: usize,
+) -> Option<PlannedScene> {
     let place = Place::root().key(FlameSheetParameters::KEY).index(index);
     let Value::Table(table) = &place.find(root)?.value else { return None };
     let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
@@ -56,7 +62,7 @@ fn plan(name: &str, [text, stage]: [&str; 2], root: &Table, assets: &Arc<dyn Ass
     let mut picture = scene.picture.clone();
     // Grays are shares of the full luminance.
     let full = sheet.colour.luminance.bounds()[1].max(f64::MIN_POSITIVE);
-    let coloured = stage == StageShown::Coloured.name();
+    let coloured = stage == Stage::Colored.name();
     picture.exposure_ev100 = if coloured { Auto::Auto } else { Auto::Set(ev100_of_white_luminance(full)) };
     let scene = Scene {
         picture,
@@ -73,7 +79,7 @@ fn plan(name: &str, [text, stage]: [&str; 2], root: &Table, assets: &Arc<dyn Ass
     let scene = scene.adapted(&SceneOptions::default()).ok()?;
     let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
     let plan = Arc::new(Plan::new(&compiled, &options).ok()?);
-    Some(Checked { compiled, plan })
+    Some(PlannedScene { compiled, plan })
 }
 
 /// A camera before a sheet at the origin that sees all of it.
@@ -102,7 +108,7 @@ mod tests {
         let plans = plans("scene", text, &assets, 1).unwrap();
         assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "coloured"]);
         assert_eq!(plans.len(), 4);
-        for Checked { plan, .. } in &plans {
+        for PlannedScene { plan, .. } in &plans {
             let names: Vec<&str> = plan.scene().instances.iter().map(|instance| instance.name.as_str()).collect();
             assert_eq!((names, plan.size()), (vec!["second"], SIZE));
             assert_eq!(plan.scene().camera.target.at(0.0), [0.0, 1.5, 0.0]);

@@ -7,11 +7,13 @@ use bansho::{
 };
 
 use super::{
-    files::{self, Outside, Recent},
-    recovery::{self, Autosave},
+    files::{self, ExternalChange, Recent},
     *,
 };
-use crate::document::phenomena::operations;
+use crate::document::{
+    files::autosave::{self, Autosave},
+    phenomena::operations,
+};
 
 const SCENE: &str = "\
 # A fire in the rain.
@@ -39,7 +41,7 @@ fn height(value: f64) -> Operation {
 fn edits_are_undone_and_done_again_one_by_one() {
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    document.seal();
+    document.end_step();
     let once = document.text().clone();
     document.edit("height", &[height(2.0)]).unwrap();
     assert_eq!(document.undo_label(), Some("height"));
@@ -57,7 +59,7 @@ fn what_a_drag_does_is_one_step() {
     for step in 1..=50 {
         document.edit("height", &[height(f64::from(step) * 0.1)]).unwrap();
     }
-    document.seal();
+    document.end_step();
     assert!(document.undo());
     assert_eq!(**document.text(), *SCENE);
 }
@@ -66,14 +68,14 @@ fn what_a_drag_does_is_one_step() {
 fn an_open_step_can_be_abandoned_as_if_it_had_never_been() {
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    document.abandon("blow");
+    document.discard_step("blow");
     assert!(document.text().contains("height"), "that was another step");
-    document.seal();
+    document.end_step();
     document.edit("blow", &[height(2.0)]).unwrap();
     document.edit("blow", &[height(3.0)]).unwrap();
-    document.abandon("blow");
+    document.discard_step("blow");
     assert!(document.text().contains("height = 1.0") && document.redo_label().is_none());
-    document.abandon("height");
+    document.discard_step("height");
     assert_eq!(document.undo_label(), Some("height"), "sealed steps stay");
 }
 
@@ -120,7 +122,7 @@ fn stale_news_is_no_news() {
     let mut document = scene();
     let before = document.revision();
     document.edit("height", &[height(1.0)]).unwrap();
-    document.judge(before, check("fire.toml", SCENE, &assets()).map(|checked| checked.plan));
+    document.set_check_result(before, check("fire.toml", SCENE, &assets()).map(|scene| scene.plan));
     assert!(document.plan().is_none() && !document.is_checked());
 }
 
@@ -180,19 +182,19 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
     assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
-    assert_eq!(files::outside(&document, &path), Outside::Same);
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Same);
     fs::write(&path, "bansho = 1\n").unwrap();
-    assert_eq!(files::outside(&document, &path), Outside::Changed("bansho = 1\n".into()));
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Changed("bansho = 1\n".into()));
     fs::remove_file(&path).unwrap();
-    assert_eq!(files::outside(&document, &path), Outside::Gone);
-    document.mark_gone(true);
-    assert!(document.is_dirty() && !document.differs(), "what lies nowhere is not saved");
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Gone);
+    document.set_file_missing(true);
+    assert!(document.is_dirty() && !document.is_modified(), "what lies nowhere is not saved");
     let text = document.text().clone();
     files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
     assert!(files::open(&folder.path().join("none.toml")).is_err());
     fs::write(&path, b"\xff\xfe").unwrap();
-    assert!(matches!(files::outside(&document, &path), Outside::Unreadable(_)), "no UTF-8");
+    assert!(matches!(files::external_change(&document, &path), ExternalChange::Unreadable(_)), "no UTF-8");
 }
 
 #[test]
@@ -226,13 +228,13 @@ fn unsaved_work_outlives_its_studio_but_a_living_ones_is_left_alone() {
     document.edit("height", &[height(1.0)]).unwrap();
     autosave.keep(&document, Some("scenes/fire.toml".as_ref())).unwrap();
     other.keep(&scene(), None).unwrap();
-    assert_eq!(recovery::recoverable(folder.path()), [], "both are running");
+    assert_eq!(autosave::recoverable(folder.path()), [], "both are running");
     drop(autosave);
-    let found = recovery::recoverable(folder.path());
+    let found = autosave::recoverable(folder.path());
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].origin.as_str(), found[0].text.as_str()), ("scenes/fire.toml", &**document.text()));
     found[0].forget();
-    assert_eq!(recovery::recoverable(folder.path()), []);
+    assert_eq!(autosave::recoverable(folder.path()), []);
 }
 
 #[test]

@@ -1,63 +1,64 @@
-//! What the program is asked to do.
+//! Command line arguments.
 
 use std::{ffi::OsString, path::PathBuf};
 
-use super::{USAGE, painting::Painting};
+use super::{USAGE, renderer_choice::RendererChoice};
 
-/// All of it.
+/// The parsed arguments.
 #[derive(Debug, PartialEq)]
-pub(super) struct Asked {
-    pub(super) painter: Painting,
-    pub(super) work: Work,
+pub(super) struct Arguments {
+    pub(super) painter: RendererChoice,
+    pub(super) mode: Mode,
 }
 
-/// What is to be done.
+/// What to do.
 #[derive(Debug, PartialEq)]
-pub(super) enum Work {
+pub(super) enum Mode {
     Help,
-    /// Of phenomena whose name contains this.
+    /// Benchmarks of phenomena whose name contains this.
     Bench(String),
     BenchWindow(String),
     Scene(Option<PathBuf>),
 }
 
-impl Asked {
+impl Arguments {
     /// Reads the program's arguments.
     ///
     /// # Errors
     /// What is to be told where they make no sense.
-    pub(super) fn of(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, String> {
-        let mut painter = Painting::default();
+    pub(super) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, String> {
+        let mut painter = RendererChoice::default();
         let mut rest = Vec::new();
         let mut arguments = arguments.into_iter();
         while let Some(argument) = arguments.next() {
             let text = argument.to_string_lossy();
             match text.strip_prefix("--painter") {
                 Some("") => {
-                    let name =
-                        arguments.next().ok_or_else(|| format!("error: --painter needs one of {}", Painting::NAMES))?;
-                    painter = Painting::named(&name.to_string_lossy())?;
+                    let name = arguments
+                        .next()
+                        .ok_or_else(|| format!("error: --painter needs one of {}", RendererChoice::NAMES))?;
+                    painter = RendererChoice::named(&name.to_string_lossy())?;
                 }
-                Some(value) if value.starts_with('=') => painter = Painting::named(&value[1..])?,
+                Some(value) if value.starts_with('=') => painter = RendererChoice::named(&value[1..])?,
                 _ => rest.push(argument),
             }
         }
         let text = |argument: &OsString| argument.to_string_lossy().into_owned();
-        let work = match rest.as_slice() {
-            [] => Work::Scene(None),
+        let mode = match rest.as_slice() {
+            [] => Mode::Scene(None),
             [option, name @ ..] if name.len() < 2 && text(option).starts_with("--") => {
                 let wanted = name.first().map(text).unwrap_or_default();
                 match text(option).as_str() {
-                    "--help" if name.is_empty() => Work::Help,
-                    "--bench" => Work::Bench(wanted),
-                    "--bench-window" => Work::BenchWindow(wanted),
+                    "--help" if name.is_empty() => Mode::Help,
+                    "--bench" => Mode::Bench(wanted),
+                    "--bench-window" => Mode::BenchWindow(wanted),
                     other => return Err(format!("error: {other} means nothing here\n{USAGE}")),
                 }
             }
-            [scene] => Work::Scene(Some(scene.into())),
+            [scene] => Mode::Scene(Some(scene.into())),
             _ => return Err(USAGE.to_owned()),
         };
-        Ok(Self { painter, work })
+        Ok(Self { painter, mode })
     }
 }
 
@@ -65,19 +66,19 @@ impl Asked {
 mod tests {
     use super::*;
 
-    fn asked(arguments: &[&str]) -> Result<Asked, String> {
-        Asked::of(arguments.iter().map(OsString::from))
+    fn asked(arguments: &[&str]) -> Result<Arguments, String> {
+        Arguments::parse(arguments.iter().map(OsString::from))
     }
 
     #[test]
     fn the_painter_is_named_anywhere() {
-        let scene = Work::Scene(Some("a.toml".into()));
-        assert_eq!(asked(&["a.toml"]), Ok(Asked { painter: Painting::Auto, work: scene }));
+        let scene = Mode::Scene(Some("a.toml".into()));
+        assert_eq!(asked(&["a.toml"]), Ok(Arguments { painter: RendererChoice::Auto, mode: scene }));
         for arguments in [["--painter", "software", "a.toml"], ["a.toml", "--painter", "software"]] {
-            assert_eq!(asked(&arguments).unwrap().painter, Painting::Software);
+            assert_eq!(asked(&arguments).unwrap().painter, RendererChoice::Software);
         }
         let bench = asked(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
-        assert_eq!(bench, Asked { painter: Painting::Gpu, work: Work::BenchWindow("rain".into()) });
+        assert_eq!(bench, Arguments { painter: RendererChoice::Gpu, mode: Mode::BenchWindow("rain".into()) });
     }
 
     #[test]

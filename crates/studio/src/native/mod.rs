@@ -1,4 +1,4 @@
-//! The studio in a window of the system.
+//! The native program.
 
 use std::{
     io::Write,
@@ -10,21 +10,21 @@ use std::{
 use bansho::{Assets, media::assets::FileAssets};
 use bansho_studio::{
     app::{Session, Studio, window_size},
-    beginnings::FLAME_SHEET,
     bench,
     document::{Document, files},
     player::{StartError, ThreadPlayer},
-    software::window::Build,
+    scenes::new_scene::FLAME_SHEET,
 };
 
 use self::{
-    arguments::{Asked, Work},
-    painting::Painting,
+    arguments::{Arguments, Mode},
+    renderer_choice::RendererChoice,
 };
+use bansho_egui_software::window::Build;
 use eframe::egui;
 
 mod arguments;
-mod painting;
+mod renderer_choice;
 
 const USAGE: &str = "usage: bansho-studio [--painter auto|gpu|software] [SCENE]
        bansho-studio --bench [NAME]           pictures a second of each phenomenon here
@@ -35,32 +35,32 @@ const USAGE: &str = "usage: bansho-studio [--painter auto|gpu|software] [SCENE]
 const TITLE: &str = "Bansho Studio";
 
 pub(super) fn main() -> ExitCode {
-    let asked = match Asked::of(std::env::args_os().skip(1)) {
-        Ok(asked) => asked,
+    let arguments = match Arguments::parse(std::env::args_os().skip(1)) {
+        Ok(arguments) => arguments,
         Err(message) => return fail(&message),
     };
-    let painter = asked.painter;
-    match asked.work {
-        Work::Help => say(USAGE),
-        Work::Bench(wanted) => bench(&wanted),
-        Work::BenchWindow(wanted) => bench_window(painter, wanted),
-        Work::Scene(scene) => match run(painter, scene) {
+    let painter = arguments.painter;
+    match arguments.mode {
+        Mode::Help => say(USAGE),
+        Mode::Bench(wanted) => bench(&wanted),
+        Mode::BenchWindow(wanted) => bench_window(painter, wanted),
+        Mode::Scene(scene) => match run(painter, scene) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => fail(&format!("error: {error}")),
         },
     }
 }
 
-/// How fast the studio follows hands here, of the phenomena whose name contains `wanted`.
+/// Measures the studio on the phenomena whose name contains `wanted`.
 fn bench(wanted: &str) -> ExitCode {
     for speed in bench::measure(wanted) {
-        let bench::Speed { name, pictures_per_s, advance_s, draw_s, answer_s } = match speed {
+        let bench::Speed { name, frames_per_s, advance_s, draw_s, answer_s } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
         let [advance, draw, answer] = [advance_s, draw_s, answer_s].map(|seconds| 1000.0 * seconds);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
+            "{name:24} {frames_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
              19 of 20 changes show within {answer:4.0} ms"
         ));
     }
@@ -68,7 +68,7 @@ fn bench(wanted: &str) -> ExitCode {
 }
 
 /// The same with the window.
-fn bench_window(painter: Painting, wanted: String) -> ExitCode {
+fn bench_window(painter: RendererChoice, wanted: String) -> ExitCode {
     let (sender, results) = mpsc::channel();
     let build: Build = Box::new(move |ctx| {
         let session = session(ctx, Document::new("scene", FLAME_SHEET), None)?;
@@ -78,13 +78,13 @@ fn bench_window(painter: Painting, wanted: String) -> ExitCode {
         return fail(&format!("error: {error}"));
     }
     for speed in results {
-        let bench::WindowSpeed { name, pictures_per_s, played_size, answer_s, size } = match speed {
+        let bench::WindowSpeed { name, frames_per_s, played_size, answer_s, size } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
         let ([width, height], [whole_width, whole_height]) = (played_size, size);
         say(&format!(
-            "{name:24} {pictures_per_s:6.1} pictures/s of {width} x {height}, \
+            "{name:24} {frames_per_s:6.1} pictures/s of {width} x {height}, \
              19 of 20 changes painted at {whole_width} x {whole_height} within {:4.0} ms",
             1000.0 * answer_s
         ));
@@ -93,18 +93,18 @@ fn bench_window(painter: Painting, wanted: String) -> ExitCode {
 }
 
 fn say(message: &str) -> ExitCode {
-    // Nobody is left to be told that this failed.
+    // A failure to print cannot be reported.
     let _ = writeln!(std::io::stdout(), "{message}");
     ExitCode::SUCCESS
 }
 
 fn fail(message: &str) -> ExitCode {
-    // Nobody is left to be told that this failed.
+    // A failure to print cannot be reported.
     let _ = writeln!(std::io::stderr(), "{message}");
     ExitCode::FAILURE
 }
 
-fn run(painter: Painting, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
+fn run(painter: RendererChoice, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
     let (opened, fault) = match scene.as_deref().map(files::open).transpose() {
         Ok(opened) => (opened, None),
         Err(error) => (None, Some(error.to_string())),
@@ -124,7 +124,7 @@ fn viewport(size: [f32; 2]) -> egui::ViewportBuilder {
     egui::ViewportBuilder::default().with_title(TITLE).with_inner_size(size)
 }
 
-/// `document`, which lies in `scene`, with a player that wakes the window.
+/// A session on `document` from the file `scene`, with a player that requests repaints.
 fn session(ctx: &egui::Context, document: Document, scene: Option<PathBuf>) -> Result<Session, StartError> {
     let ctx = ctx.clone();
     let player = ThreadPlayer::start(move || ctx.request_repaint())?;
@@ -135,7 +135,7 @@ fn assets(folder: &Path) -> Arc<dyn Assets> {
     Arc::new(FileAssets::new(folder))
 }
 
-/// Where the user's programs keep their own files.
+/// The folder for settings in the user's data directory.
 fn home() -> Option<PathBuf> {
     let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let base = variable("XDG_DATA_HOME")

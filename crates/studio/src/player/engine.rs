@@ -1,4 +1,4 @@
-//! One wish fulfilled: the text checked where it is new, the shot brought to the frame, the frame drawn and shown.
+//! Serves one request: checks the text if it is new, advances the shot to the frame, draws it and converts it to display pixels.
 
 use std::{path::Path, sync::Arc};
 
@@ -12,14 +12,14 @@ use bansho::{
     },
     render::fingerprint,
 };
+
+use super::{Event, FrameRequest, Picture, snapshot_cache::SnapshotCache};
+use crate::document::{Checker, PlannedScene, Revision, stages};
 use web_time::Instant;
 
-use super::{Event, Picture, Wish, states::States};
-use crate::document::{Checked, Checker, Revision, stages};
-
-/// Why a wish is not fulfilled.
+/// Why a request has no picture.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Unfulfilled {
+pub(super) enum RequestError {
     /// No picture can be drawn, or it was stopped.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -28,134 +28,140 @@ pub(super) enum Unfulfilled {
     Media(#[from] MediaError),
 }
 
-impl Unfulfilled {
+impl RequestError {
     /// Whether the observer asked to stop.
     pub(super) fn is_stop(&self) -> bool {
         matches!(self, Self::Render(RenderError::Cancelled(_)))
     }
 }
 
-/// What is kept from one wish to the next.
+/// What is kept from one request to the next.
 #[derive(Default)]
 pub(super) struct Engine {
-    /// What was judged last.
-    judged: Option<Judged>,
+    /// The revision that was checked last.
+    checked: Option<Checked>,
     checker: Checker,
-    /// The last good scene with its plan, at the scene's own size, and whether it is a draft.
-    checked: Option<(Checked, bool)>,
-    shot: Option<Opened>,
-    /// Of finished pictures; each goes on from the one before.
-    still: Option<(Checked, Shot)>,
-    states: States,
+    /// The last good scene, planned at its own size, and whether it is a draft.
+    scene: Option<(PlannedScene, bool)>,
+    shot: Option<OpenShot>,
+    /// The shot of full-quality frames; each continues from the frame before.
+    full_quality: Option<(PlannedScene, Shot)>,
+    snapshots: SnapshotCache,
     stages: StageShots,
 }
 
-/// A state of a document, with its assets, and whether it was judged as a draft if it could be one.
-struct Judged {
+/// A checked revision with its assets, and whether a draft was asked for.
+struct Checked {
     revision: Revision,
     assets: Arc<dyn Assets>,
     draft: bool,
 }
 
-/// A shot, with the plan and the size that it was last planned for.
-struct Opened {
+/// An open shot, with the plan and the size that it was last planned for.
+struct OpenShot {
     shot: Shot,
-    of: Checked,
+    of: PlannedScene,
     size: [usize; 2],
 }
 
 impl Engine {
-    /// Fulfils `wish` and tells `emit` what came of it. Stops when `observer` says so; another call then goes on.
+    /// Serves `request` and reports to `emit`. Stops when `observer` cancels; another call then continues.
     ///
     /// # Errors
     /// No picture can be drawn or made a file, or the observer asked to stop.
-    pub(super) fn fulfil(
+    pub(super) fn process(
         &mut self,
-        wish: &Wish,
+        request: &FrameRequest,
         observer: &dyn Observer,
         emit: &mut dyn FnMut(Event),
-    ) -> Result<(), Unfulfilled> {
-        let draft = wish.draft && !wish.exact && !wish.still;
-        let Wish { name, text, assets, .. } = wish;
-        let same =
-            |last: &Judged| (last.revision, last.draft) == (wish.revision, draft) && Arc::ptr_eq(&last.assets, assets);
-        if !self.judged.as_ref().is_some_and(same) {
+    ) -> Result<(), RequestError> {
+        let draft = request.draft && !request.exact && !request.full_quality;
+        let FrameRequest { name, text, assets, .. } = request;
+        let same = |last: &Checked| {
+            (last.revision, last.draft) == (request.revision, draft) && Arc::ptr_eq(&last.assets, assets)
+        };
+        if !self.checked.as_ref().is_some_and(same) {
             let drafted = if draft { self.checker.check_draft(name, text, assets) } else { None };
             let is_draft = drafted.is_some();
             let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
-            self.judged = Some(Judged { revision: wish.revision, assets: assets.clone(), draft });
-            if let Ok(checked) = &outcome {
-                self.checked = Some((checked.clone(), is_draft));
+            self.checked = Some(Checked { revision: request.revision, assets: assets.clone(), draft });
+            if let Ok(scene) = &outcome {
+                self.scene = Some((scene.clone(), is_draft));
             }
-            emit(Event::Judged { revision: wish.revision, outcome: outcome.map(|checked| checked.plan) });
+            emit(Event::Checked { revision: request.revision, outcome: outcome.map(|scene| scene.plan) });
         }
-        let Some((checked, draft)) = self.checked.clone() else { return Ok(()) };
-        if wish.still {
-            let number = wish.number.unwrap_or(checked.plan.frames().start);
-            emit(Event::Still { number, png: self.finish(&checked, number, observer)? });
+        let Some((scene, draft)) = self.scene.clone() else { return Ok(()) };
+        if request.full_quality {
+            let number = request.number.unwrap_or(scene.plan.frames().start);
+            emit(Event::FullQualityFrame { number, png: self.finish(&scene, number, observer)? });
             return Ok(());
         }
-        let picture = self.draw(&checked, wish, observer)?;
+        let picture = self.draw(&scene, request, observer)?;
         emit(Event::Drawn(Picture { draft, ..picture }));
-        if let Some(sheet) = wish.stages {
-            self.stages.turn_to(&checked, sheet, wish);
+        if let Some(sheet) = request.stages {
+            self.stages.set_scene(&scene, sheet, request);
             for (stage, opened) in self.stages.shots.iter_mut().enumerate() {
                 let picture =
-                    opened.draw(wish, wish.number.unwrap_or(checked.plan.frames().start), &mut None, observer)?;
+                    opened.draw(request, request.number.unwrap_or(scene.plan.frames().start), &mut None, observer)?;
                 emit(Event::Stage(stage, picture));
             }
         }
         Ok(())
     }
 
-    /// Forgets the shot, as after a panic in it.
+    /// Discards the shots after a panic in one.
     #[cfg(not(target_arch = "wasm32"))]
-    pub(super) fn forget(&mut self) {
-        *self = Self { judged: self.judged.take(), checked: self.checked.take(), ..Self::default() };
+    pub(super) fn reset_after_panic(&mut self) {
+        *self = Self { checked: self.checked.take(), scene: self.scene.take(), ..Self::default() };
     }
 
     /// The file of the finished frame `number`. Where it was stopped, or the last one ended, it goes on.
-    fn finish(&mut self, checked: &Checked, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, Unfulfilled> {
-        let begun = self.still.take().filter(|(of, _)| Arc::ptr_eq(&of.plan, &checked.plan));
-        let (_, shot) = self.still.insert(match begun {
+    fn finish(&mut self, scene: &PlannedScene, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, RequestError> {
+        let begun = self.full_quality.take().filter(|(of, _)| Arc::ptr_eq(&of.plan, &scene.plan));
+        let (_, shot) = self.full_quality.insert(match begun {
             Some(begun) => begun,
-            None => (checked.clone(), Shot::open(checked.compiled.clone(), checked.plan.clone())),
+            None => (scene.clone(), Shot::open(scene.compiled.clone(), scene.plan.clone())),
         });
         let frame = bansho::draw(shot, number, observer)?;
-        let png = encoded(&frame);
+        let png = encode_png(&frame);
         shot.recycle(frame);
         Ok(png?)
     }
 
-    fn draw(&mut self, checked: &Checked, wish: &Wish, observer: &dyn Observer) -> Result<Picture, RenderError> {
-        let number = wish.number.unwrap_or(checked.plan.frames().start);
-        let size = fitted(checked.plan.size(), wish.within);
-        let opened = open(&mut self.shot, checked, size, wish.exact);
-        opened.draw(wish, number, &mut Some(&mut self.states), observer)
+    fn draw(
+        &mut self,
+        scene: &PlannedScene,
+        request: &FrameRequest,
+        observer: &dyn Observer,
+    ) -> Result<Picture, RenderError> {
+        let number = request.number.unwrap_or(scene.plan.frames().start);
+        let size = fit_within(scene.plan.size(), request.within);
+        let opened = open(&mut self.shot, scene, size, request.exact);
+        opened.draw(request, number, &mut Some(&mut self.snapshots), observer)
     }
 }
 
-impl Opened {
-    /// Draws frame `number`, by way of the nearest of `states` where there are any.
+impl OpenShot {
+    /// Draws frame `number`, by way of the nearest of `snapshots` where there are any.
     fn draw(
         &mut self,
-        wish: &Wish,
+        request: &FrameRequest,
         number: i64,
-        states: &mut Option<&mut States>,
+        snapshots: &mut Option<&mut SnapshotCache>,
         observer: &dyn Observer,
     ) -> Result<Picture, RenderError> {
         let Self { shot, of, size } = self;
         let began = Instant::now();
-        states.iter_mut().for_each(|states| states.seek(&of.compiled, shot, number));
+        snapshots.iter_mut().for_each(|snapshots| snapshots.seek(&of.compiled, shot, number));
         shot.advance(number, observer)?;
-        states.iter_mut().for_each(|states| states.keep(&of.compiled, shot, number));
+        snapshots.iter_mut().for_each(|snapshots| snapshots.store(&of.compiled, shot, number));
         let advanced = Instant::now();
         shot.draw(observer)?;
         let mut frame = shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
-        let pixels = shown(&mut frame);
+        let pixels = to_display_pixels(&mut frame);
         shot.recycle(frame);
         Ok(Picture {
-            revision: wish.revision,
+            revision: request.revision,
             number,
             size: *size,
             scene_size: of.plan.size(),
@@ -171,50 +177,53 @@ impl Opened {
 /// Shots of the stages of a flame sheet.
 #[derive(Default)]
 struct StageShots {
-    /// Of which plan and which sheet.
-    of: Option<(Checked, usize)>,
-    shots: Vec<Opened>,
+    /// Of which scene and which sheet.
+    of: Option<(PlannedScene, usize)>,
+    shots: Vec<OpenShot>,
 }
 
 impl StageShots {
-    fn turn_to(&mut self, checked: &Checked, sheet: usize, wish: &Wish) {
-        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(&of.plan, &checked.plan) && *own == sheet) {
+    fn set_scene(&mut self, scene: &PlannedScene, sheet: usize, request: &FrameRequest) {
+        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(&of.plan, &scene.plan) && *own == sheet) {
             return;
         }
         // Of a text with faults there are none; the last pictures stay.
-        let plans = stages::plans(&wish.name, &wish.text, &wish.assets, sheet).unwrap_or_default();
-        let open =
-            |of: Checked| Opened { shot: Shot::open(of.compiled.clone(), of.plan.clone()), size: of.plan.size(), of };
+        let plans = stages::plans(&request.name, &request.text, &request.assets, sheet).unwrap_or_default();
+        let open = |of: PlannedScene| OpenShot {
+            shot: Shot::open(of.compiled.clone(), of.plan.clone()),
+            size: of.plan.size(),
+            of,
+        };
         self.shots = plans.into_iter().map(open).collect();
-        self.of = Some((checked.clone(), sheet));
+        self.of = Some((scene.clone(), sheet));
     }
 }
 
-/// The shot of a scene at `size`: the one there is where it can go on, else a new one.
-fn open<'a>(slot: &'a mut Option<Opened>, checked: &Checked, size: [usize; 2], exact: bool) -> &'a mut Opened {
-    let is_of = |opened: &Opened| Arc::ptr_eq(&opened.of.plan, &checked.plan);
+/// The shot of `scene` at `size`: the one there is where it can go on, else a new one.
+fn open<'a>(slot: &'a mut Option<OpenShot>, scene: &PlannedScene, size: [usize; 2], exact: bool) -> &'a mut OpenShot {
+    let is_of = |opened: &OpenShot| Arc::ptr_eq(&opened.of.plan, &scene.plan);
     let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && is_of(opened)));
-    let (compiled, plan) = (checked.compiled.clone(), || Arc::new(checked.plan.at_size(size)));
+    let (compiled, plan) = (scene.compiled.clone(), || Arc::new(scene.plan.at_size(size)));
     let opened = match usable {
-        None => Opened { shot: Shot::open(compiled, plan()), of: checked.clone(), size },
+        None => OpenShot { shot: Shot::open(compiled, plan()), of: scene.clone(), size },
         Some(opened) if is_of(&opened) && opened.size == size => opened,
         Some(mut opened) => {
             opened.shot.replan(compiled, plan());
-            Opened { of: checked.clone(), size, ..opened }
+            OpenShot { of: scene.clone(), size, ..opened }
         }
     };
     slot.insert(opened)
 }
 
-/// The largest size of `size`'s proportions that fits `within`; `size` itself where that does.
-fn fitted(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
+/// The largest size with the aspect ratio of `size` that fits `within`; never larger than `size`.
+fn fit_within(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
     let ratio = |axis: usize| within[axis] as f64 / size[axis] as f64;
     let scale = ratio(0).min(ratio(1)).min(1.0);
     size.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 
-/// The frame over black: premultiplied light over black is the light itself.
-fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
+/// The frame composited over black as display pixels: premultiplied color over black is the color itself.
+fn to_display_pixels(frame: &mut Frame) -> Vec<[u8; 4]> {
     let opaque = std::mem::replace(&mut frame.opaque, true);
     let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     frame.opaque = opaque;
@@ -224,11 +233,11 @@ fn shown(frame: &mut Frame) -> Vec<[u8; 4]> {
     }
 }
 
-/// The frame as `bansho render` writes it unless it is told otherwise.
-fn encoded(frame: &Frame) -> Result<Vec<u8>, MediaError> {
-    let shown = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
+/// The frame as a PNG with the default options of `bansho render`.
+fn encode_png(frame: &Frame) -> Result<Vec<u8>, MediaError> {
+    let to_display_pixels = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let fingerprint = fingerprint::of_png(frame.header.fingerprint, BitDepth::Eight, AlphaConvention::Encoded);
-    png::encode(&shown, &fingerprint, PngEffort::default(), Path::new("still.png"))
+    png::encode(&to_display_pixels, &fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 
 #[cfg(test)]
@@ -240,11 +249,11 @@ mod tests {
     #[test]
     fn a_picture_that_fits_no_file_is_told_of() {
         let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
-        let checked = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
-        let mut shot = Shot::open(checked.compiled, checked.plan);
+        let scene = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
+        let mut shot = Shot::open(scene.compiled, scene.plan);
         let mut frame = bansho::draw(&mut shot, 0, &bansho::Unobserved).unwrap();
-        assert!(encoded(&frame).unwrap().starts_with(b"\x89PNG"));
+        assert!(encode_png(&frame).unwrap().starts_with(b"\x89PNG"));
         frame.beauty = Image::filled(png::SIDE_LIMIT + 1, 1, [0.0; 4]);
-        assert!(matches!(encoded(&frame), Err(MediaError::Size { .. })));
+        assert!(matches!(encode_png(&frame), Err(MediaError::Size { .. })));
     }
 }

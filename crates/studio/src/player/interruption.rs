@@ -1,4 +1,4 @@
-//! When work may be stopped: a simulation goes on where it stands, a drawing that is stopped is lost.
+//! Cancellation of work in progress. A simulation that was cancelled resumes where it stopped; a drawing that was cancelled is lost.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

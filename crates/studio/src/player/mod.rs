@@ -1,28 +1,24 @@
-//! Pictures of a document, drawn off the window's thread, and the time that is played.
+//! Renders frames of a document off the window's thread, and keeps the playback time.
 //!
-//! A window says what it wants to see ([`Wish`]); the newest wish wins. Natively a thread with a rayon pool fulfils it
-//! (`ThreadPlayer`), in a page a worker (`WorkerPlayer`), in which [`SlicePlayer`] works in slices between two looks at what
-//! is wanted. All report [`Event`]s.
+//! The window states which frame it wants ([`FrameRequest`]); only the newest request counts. Natively `ThreadPlayer` serves it on a
+//! thread with a rayon pool. In a web page `WorkerPlayer` passes it to a worker, in which [`PolledPlayer`] works in time slices
+//! between two messages. All report [`Event`]s.
+//!
+//! `engine` serves one request: check the text, advance the shot, draw. `snapshot_cache` keeps simulation states, so that scrubbing
+//! backwards does not restart the simulation; `preview_size` chooses the preview's resolution by the measured cost.
 
 mod engine;
 mod interruption;
-#[cfg(target_arch = "wasm32")]
-mod message;
-mod pace;
-#[cfg(any(test, target_arch = "wasm32"))]
-mod pending;
-#[cfg(any(test, target_arch = "wasm32"))]
-mod reply;
-pub mod shoot;
-mod slices;
-mod states;
+mod polled;
+mod preview_size;
+pub mod render_job;
+mod snapshot_cache;
 #[cfg(test)]
 pub(crate) mod tests;
 #[cfg(not(target_arch = "wasm32"))]
 mod thread;
 mod transport;
-#[cfg(target_arch = "wasm32")]
-mod worker;
+pub(crate) mod web;
 
 use std::{sync::Arc, time::Duration};
 
@@ -30,43 +26,43 @@ use bansho::{Assets, Plan, SceneError};
 
 use crate::document::Revision;
 
-pub use pace::{Pace, Took};
-pub use slices::SlicePlayer;
+pub use polled::PolledPlayer;
+pub use preview_size::{FrameTiming, PreviewScale};
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{StartError, ThreadPlayer};
 pub use transport::Transport;
 #[cfg(target_arch = "wasm32")]
-pub use worker::{WorkerPlayer, serve};
+pub use web::worker::{WorkerPlayer, run_worker};
 
-/// What a window wants to see.
+/// The frame that a window wants to show.
 #[derive(Clone)]
-pub struct Wish {
-    /// The state of the document.
+pub struct FrameRequest {
+    /// The revision of the document.
     pub revision: Revision,
-    /// What errors call it.
+    /// The name in error messages.
     pub name: String,
     /// Its text.
     pub text: Arc<str>,
-    /// Where its pictures come from.
+    /// Where its plates, meshes and drawings are read from.
     pub assets: Arc<dyn Assets>,
-    /// The frame; the scene's first where it is left out.
+    /// The frame number; `None` for the scene's first frame.
     pub number: Option<i64>,
-    /// Pixels that the picture may have at most; it keeps the scene's proportions and is never larger than the scene's.
+    /// Largest size, pixels. The picture keeps the scene's aspect ratio and is never larger than the scene's own size.
     pub within: [usize; 2],
-    /// Whether the state must be the one that the scene leads to from its beginning.
+    /// Whether the simulation state must be exact: the one that the scene leads to from its first frame.
     pub exact: bool,
     /// Whether it may be simulated with fewer particles.
     pub draft: bool,
     /// Whether the finished picture is wanted, as `bansho render` writes it, in place of one for a window.
-    pub still: bool,
+    pub full_quality: bool,
     /// The flame sheet whose stages are wanted besides.
     pub stages: Option<usize>,
 }
 
-/// A picture that was drawn.
+/// A rendered preview.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// The state of the document that was wished for; with faults in it the last good one is shown.
+    /// The requested revision. Where it has problems, the last good plan is shown.
     pub revision: Revision,
     /// The frame.
     pub number: i64,
@@ -76,20 +72,20 @@ pub struct Picture {
     pub scene_size: [usize; 2],
     /// Display pixels over black, row after row from the top.
     pub pixels: Vec<[u8; 4]>,
-    /// Whether the state is the one that the scene leads to from its beginning.
+    /// Whether the simulation state is exact: the one that the scene leads to from its first frame.
     pub exact: bool,
     /// Whether it was simulated with fewer particles than the scene has.
     pub draft: bool,
-    /// How long drawing took, without the simulation, s.
+    /// Time to draw, without the simulation, s.
     pub draw_s: f64,
-    /// How long the simulation took, s.
+    /// Time to simulate, s.
     pub advance_s: f64,
 }
 
 /// What a player reports.
 pub enum Event {
     /// A state of the document was checked.
-    Judged {
+    Checked {
         /// Which.
         revision: Revision,
         /// Its plan, or its faults.
@@ -100,7 +96,7 @@ pub enum Event {
     /// A small picture of a stage of the flame sheet that was asked for, which of [`stages`](crate::document::stages::names).
     Stage(usize, Picture),
     /// The finished picture of a frame is there.
-    Still {
+    FullQualityFrame {
         /// The frame.
         number: i64,
         /// The file that `bansho render` writes, a PNG.
@@ -125,28 +121,28 @@ pub enum Event {
 }
 
 impl Event {
-    /// The state of the document that it is about.
+    /// The revision of the document that it is about.
     pub fn revision(&self) -> Option<Revision> {
         match self {
-            Self::Judged { revision, .. } | Self::Failed { revision, .. } | Self::Panicked { revision, .. } => {
+            Self::Checked { revision, .. } | Self::Failed { revision, .. } | Self::Panicked { revision, .. } => {
                 Some(*revision)
             }
             Self::Drawn(picture) | Self::Stage(_, picture) => Some(picture.revision),
-            Self::Still { .. } => None,
+            Self::FullQualityFrame { .. } => None,
         }
     }
 }
 
-/// What a panic said.
-fn said(panic: &(dyn std::any::Any + Send)) -> String {
+/// The message of a panic.
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())
 }
 
-/// Fulfils wishes.
+/// Serves frame requests.
 pub trait Player {
-    /// What is wanted now, in place of anything that was.
-    fn wish(&mut self, wish: Wish);
+    /// Requests a frame, in place of any request before.
+    fn request(&mut self, request: FrameRequest);
 
     /// What happened since the last time. A player without threads works here: it cuts simulations short, but neither a check nor a
     /// drawing, which take as long as the scene makes them.
@@ -155,13 +151,13 @@ pub trait Player {
     /// Waits until there is something to [`poll`](Self::poll), for `at_most` so long. Players of pages never wait.
     fn wait(&mut self, _at_most: Duration) {}
 
-    /// Whether a wish is not fulfilled yet.
+    /// Whether a request is not finished yet.
     fn is_busy(&self) -> bool;
 
     /// Takes the bytes of a file that no folder holds. Only players that work elsewhere need them: others find the file in
-    /// the assets of a wish.
-    fn give(&mut self, _name: &str, _bytes: &[u8]) {}
+    /// the assets of a request.
+    fn add_file(&mut self, _name: &str, _bytes: &[u8]) {}
 
     /// Whether nothing more happens unless it is polled.
-    fn waits_for_poll(&self) -> bool;
+    fn needs_polling(&self) -> bool;
 }

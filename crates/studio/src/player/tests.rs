@@ -21,8 +21,8 @@ const SCENE: &str = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flam
 const STEPPED: &str =
     "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.1\n";
 
-pub(super) fn wish(text: &str, number: i64) -> Wish {
-    Wish {
+pub(super) fn request(text: &str, number: i64) -> FrameRequest {
+    FrameRequest {
         revision: Document::new("", "").revision(),
         name: "scene".into(),
         text: text.into(),
@@ -31,14 +31,14 @@ pub(super) fn wish(text: &str, number: i64) -> Wish {
         within: [10_000; 2],
         exact: false,
         draft: false,
-        still: false,
+        full_quality: false,
         stages: None,
     }
 }
 
-fn fulfil(engine: &mut engine::Engine, wish: &Wish) -> Vec<Event> {
+fn process(engine: &mut engine::Engine, request: &FrameRequest) -> Vec<Event> {
     let mut events = Vec::new();
-    engine.fulfil(wish, &Unobserved, &mut |event| events.push(event)).unwrap();
+    engine.process(request, &Unobserved, &mut |event| events.push(event)).unwrap();
     events
 }
 
@@ -73,10 +73,10 @@ fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
 fn a_picture_of_the_scenes_size_is_the_one_that_is_rendered() {
     let mut engine = engine::Engine::default();
     for (text, number) in [(SCENE, 7), (STEPPED, 9), (STEPPED, 3)] {
-        let wish = Wish { revision: bumped(text), ..wish(text, number) };
-        let drawn = picture(fulfil(&mut engine, &wish));
+        let request = FrameRequest { revision: bumped(text), ..request(text, number) };
+        let drawn = picture(process(&mut engine, &request));
         assert!(drawn.exact || text == STEPPED);
-        let exact = picture(fulfil(&mut engine, &Wish { exact: true, ..wish }));
+        let exact = picture(process(&mut engine, &FrameRequest { exact: true, ..request }));
         assert_eq!((exact.size, exact.exact), ([64, 36], true));
         assert!(exact.pixels == rendered(text, number), "frame {number}");
         assert!(exact.pixels.iter().any(|pixel| pixel[0] > 0), "it is not black");
@@ -91,53 +91,54 @@ fn bumped(text: &str) -> crate::document::Revision {
 #[test]
 fn another_document_is_judged_and_the_same_one_only_once() {
     let mut engine = engine::Engine::default();
-    let judged = |events: Vec<Event>| events.iter().filter(|event| matches!(event, Event::Judged { .. })).count();
-    let first = wish(SCENE, 0);
-    let second = wish(STEPPED, 0);
-    assert_eq!([&first, &first, &second].map(|wish| judged(fulfil(&mut engine, wish))), [1, 0, 1]);
-    assert!(picture(fulfil(&mut engine, &Wish { exact: true, ..second })).pixels == rendered(STEPPED, 0));
+    let checked = |events: Vec<Event>| events.iter().filter(|event| matches!(event, Event::Checked { .. })).count();
+    let first = request(SCENE, 0);
+    let second = request(STEPPED, 0);
+    assert_eq!([&first, &first, &second].map(|request| checked(process(&mut engine, request))), [1, 0, 1]);
+    assert!(picture(process(&mut engine, &FrameRequest { exact: true, ..second })).pixels == rendered(STEPPED, 0));
 }
 
 #[test]
 fn small_windows_get_small_pictures_of_the_same_proportions() {
-    let drawn = picture(fulfil(&mut engine::Engine::default(), &Wish { within: [32, 400], ..wish(SCENE, 0) }));
+    let drawn =
+        picture(process(&mut engine::Engine::default(), &FrameRequest { within: [32, 400], ..request(SCENE, 0) }));
     assert_eq!((drawn.size, drawn.scene_size, drawn.pixels.len()), ([32, 18], [64, 36], 32 * 18));
 }
 
 #[test]
 fn going_back_in_time_comes_to_the_same_picture() {
     let mut engine = engine::Engine::default();
-    let first = picture(fulfil(&mut engine, &wish(STEPPED, 11)));
-    fulfil(&mut engine, &wish(STEPPED, 19));
-    let again = picture(fulfil(&mut engine, &wish(STEPPED, 11)));
+    let first = picture(process(&mut engine, &request(STEPPED, 11)));
+    process(&mut engine, &request(STEPPED, 19));
+    let again = picture(process(&mut engine, &request(STEPPED, 11)));
     assert!(again.exact && again.pixels == first.pixels);
 }
 
 #[test]
 fn a_changed_wind_goes_on_from_where_the_flame_is_and_says_so() {
     let mut engine = engine::Engine::default();
-    fulfil(&mut engine, &wish(STEPPED, 10));
+    process(&mut engine, &request(STEPPED, 10));
     let text = format!("{STEPPED}[wind]\nvelocity = [2.0, 0, 0]\n");
-    let blown = Wish { revision: bumped(&text), ..wish(&text, 11) };
-    assert!(!picture(fulfil(&mut engine, &blown)).exact);
-    let exact = picture(fulfil(&mut engine, &Wish { exact: true, ..blown }));
+    let blown = FrameRequest { revision: bumped(&text), ..request(&text, 11) };
+    assert!(!picture(process(&mut engine, &blown)).exact);
+    let exact = picture(process(&mut engine, &FrameRequest { exact: true, ..blown }));
     assert!(exact.exact && exact.pixels == rendered(&text, 11));
 }
 
 #[test]
 fn faults_are_judged_and_the_last_good_scene_is_drawn() {
     let mut engine = engine::Engine::default();
-    let good = picture(fulfil(&mut engine, &wish(SCENE, 4)));
-    let faulty = Wish { revision: bumped(SCENE), ..wish("bansho = 1\n[[flame_shet]]\n", 4) };
-    let events = fulfil(&mut engine, &faulty);
-    assert!(matches!(&events[0], Event::Judged { outcome: Err(error), .. } if error.problems.len() == 1));
+    let good = picture(process(&mut engine, &request(SCENE, 4)));
+    let faulty = FrameRequest { revision: bumped(SCENE), ..request("bansho = 1\n[[flame_shet]]\n", 4) };
+    let events = process(&mut engine, &faulty);
+    assert!(matches!(&events[0], Event::Checked { outcome: Err(error), .. } if error.problems.len() == 1));
     assert!(picture(events).pixels == good.pixels);
 }
 
 #[test]
 fn slices_come_to_the_same_picture() {
-    let mut player = SlicePlayer::default();
-    player.wish(wish(STEPPED, 9));
+    let mut player = PolledPlayer::default();
+    player.request(request(STEPPED, 9));
     let mut events = Vec::new();
     while player.is_busy() {
         events.extend(player.poll());
@@ -156,7 +157,7 @@ fn the_newest_wish_wins() {
     let (sender, woken) = mpsc::channel();
     let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
     for number in 0..20 {
-        player.wish(wish(SCENE, number));
+        player.request(request(SCENE, number));
     }
     let mut drawn = Vec::new();
     while drawn.last() != Some(&19) {
@@ -171,9 +172,9 @@ fn the_newest_wish_wins() {
 }
 
 /// Assets whose maker made a mistake.
-pub(crate) struct Broken;
+pub(crate) struct PanickedFrames;
 
-impl Assets for Broken {
+impl Assets for PanickedFrames {
     fn picture(&self, _: &str, _: i64) -> Result<Arc<Plate>, AssetError> {
         panic!("broken on purpose")
     }
@@ -196,10 +197,10 @@ fn a_panic_is_told_and_the_player_lives_on() {
     let (sender, woken) = mpsc::channel();
     let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
     let text = format!("{SCENE}[plate]\nimage = \"plate.png\"\n");
-    player.wish(Wish { assets: Arc::new(Broken), ..wish(&text, 0) });
+    player.request(FrameRequest { assets: Arc::new(PanickedFrames), ..request(&text, 0) });
     let events = wait(&mut player, &woken);
     assert!(matches!(&events[..], [Event::Panicked { message, .. }] if message == "broken on purpose"));
-    player.wish(Wish { revision: bumped(&text), ..wish(SCENE, 0) });
+    player.request(FrameRequest { revision: bumped(&text), ..request(SCENE, 0) });
     while !wait(&mut player, &woken).iter().any(|event| matches!(event, Event::Drawn(_))) {}
 }
 
@@ -264,12 +265,12 @@ fn the_range_repeats_and_stays_within_the_shot() {
 
 /// The file that the job writes of frame `number`.
 fn file_of(text: &str, folder: &std::path::Path, number: i64) -> std::path::PathBuf {
-    let job = shoot::job(text, &folder.join("scene.toml"), Some(number));
-    let mut shooting = shoot::Shooting::start(job, || {}).unwrap();
+    let job = render_job::job(text, &folder.join("scene.toml"), Some(number));
+    let mut render_job = render_job::RenderJob::start(job, || {}).unwrap();
     loop {
-        match shooting.finished() {
+        match render_job.finished() {
             Some(result) => {
-                assert_eq!(shooting.progress(), [1, 1]);
+                assert_eq!(render_job.progress(), [1, 1]);
                 break result.unwrap();
             }
             None => std::thread::sleep(Duration::from_millis(2)),
@@ -284,11 +285,10 @@ fn a_still_is_the_file_that_render_writes() {
     for (text, number, name) in [(SCENE, 5, "scene.0005.png"), (&before, -5, "scene.-0005.png")] {
         let file = file_of(text, folder.path(), number);
         assert_eq!(file, folder.path().join("out/scene").join(name));
-        let still = Wish { still: true, revision: bumped(text), ..wish(text, number) };
-        let events = fulfil(&mut engine::Engine::default(), &still);
+        let full_quality = FrameRequest { full_quality: true, revision: bumped(text), ..request(text, number) };
+        let events = process(&mut engine::Engine::default(), &full_quality);
         let written = std::fs::read(&file).unwrap();
-        let same =
-            |event: &Event| matches!(event, Event::Still { number: own, png } if *own == number && *png == written);
+        let same = |event: &Event| matches!(event, Event::FullQualityFrame { number: own, png } if *own == number && *png == written);
         assert!(same(&events[1]), "{name}");
         let decoded = bansho::media::assets::FileAssets::new(folder.path());
         let plate = decoded.picture(&format!("out/scene/{name}"), 0).unwrap();
@@ -300,23 +300,23 @@ fn a_still_is_the_file_that_render_writes() {
 #[test]
 fn a_panic_while_rendering_is_told_in_its_own_words() {
     let folder = tempfile::tempdir().unwrap();
-    let job = shoot::job(SCENE, &folder.path().join("scene.toml"), Some(5));
-    let mut shooting = shoot::Shooting::start(job, || panic!("broken on purpose")).unwrap();
+    let job = render_job::job(SCENE, &folder.path().join("scene.toml"), Some(5));
+    let mut render_job = render_job::RenderJob::start(job, || panic!("broken on purpose")).unwrap();
     let ended = loop {
-        match shooting.finished() {
+        match render_job.finished() {
             Some(ended) => break ended,
             None => std::thread::sleep(Duration::from_millis(2)),
         }
     };
-    assert_eq!(ended, Err(shoot::Ended::Panicked("broken on purpose".into())));
+    assert_eq!(ended, Err(render_job::JobFailure::Panicked("broken on purpose".into())));
 }
 
 #[test]
 fn finished_pictures_that_go_on_from_one_another_are_those_that_are_rendered() {
     let finished = |engine: &mut engine::Engine, number: i64| {
-        let events = fulfil(engine, &Wish { still: true, ..wish(STEPPED, number) });
+        let events = process(engine, &FrameRequest { full_quality: true, ..request(STEPPED, number) });
         events.into_iter().find_map(|event| match event {
-            Event::Still { number: own, png } if own == number => Some(png),
+            Event::FullQualityFrame { number: own, png } if own == number => Some(png),
             _ => None,
         })
     };
@@ -339,7 +339,8 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
     let text =
         |rain: &str| format!("bansho = 1\n[picture]\nsize = [160, 90]\n[sky]\nkind = \"overcast\"\n[[rain]]\n{rain}\n");
     let mut engine = engine::Engine::default();
-    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 7) }));
+    let mut drawn =
+        |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 7) }));
     let steady = drawn(&text("rate_mm_per_h = 20.0"));
     let other_drops = difference(&steady, &drawn(&text("rate_mm_per_h = 20.0").replace("size", "seed = 9\nsize")));
     assert!(other_drops > 0.1, "{other_drops}");
@@ -357,7 +358,8 @@ fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
         )
     };
     let mut engine = engine::Engine::default();
-    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 7) }));
+    let mut drawn =
+        |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 7) }));
     let steady = drawn(&text("0.02", "1.0"));
     let other_drops = difference(&steady, &drawn(&text("0.02", "1.0").replace("size = [160", "seed = 9\nsize = [160")));
     assert!(other_drops > 0.1, "{other_drops}");
@@ -374,7 +376,8 @@ fn rain_that_is_blown_late_keeps_its_drops_too() {
         format!("bansho = 1\n[picture]\nsize = [160, 90]\nframes = 900\n{sky}[{wind}, 0.0, 0.0]\n[[rain]]\n")
     };
     let mut engine = engine::Engine::default();
-    let mut drawn = |text: &str| picture(fulfil(&mut engine, &Wish { revision: bumped(text), ..wish(text, 899) }));
+    let mut drawn =
+        |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 899) }));
     let steady = drawn(&text("2.0"));
     let other_drops = difference(&steady, &drawn(&text("2.0").replace("size", "seed = 9\nsize")));
     // After 30 s, drops that were carried from time 0 would stand 15 cm elsewhere.
@@ -387,7 +390,7 @@ fn waiting_ends_with_what_is_waited_for() {
     let mut player = ThreadPlayer::start(|| {}).unwrap();
     for number in 0..20 {
         let began = std::time::Instant::now();
-        player.wish(wish(SCENE, number));
+        player.request(request(SCENE, number));
         let mut pictures = 0;
         while player.is_busy() {
             // The picture comes a moment before the player rests, which no wait must miss.

@@ -1,4 +1,4 @@
-//! Wishes fulfilled by a thread with a rayon pool of its own.
+//! A player on a thread of its own, with a rayon pool.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -11,52 +11,52 @@ use std::{
     time::Duration,
 };
 
-use super::{Event, Player, Wish, engine::Engine, interruption::Interruption, said};
+use super::{Event, FrameRequest, Player, engine::Engine, interruption::Interruption, panic_text};
 
-/// Draws on a thread of its own, in a pool of as many threads as the machine has cores.
+/// Renders on a thread of its own, in a rayon pool with one thread per core.
 pub struct ThreadPlayer {
-    desk: Arc<Desk>,
-    /// What comes of wishes; nothing, once, where a wish was dealt with.
+    slot: Arc<RequestSlot>,
+    /// Events; `None` marks the end of a request.
     events: mpsc::Receiver<Option<Event>>,
-    /// What came while it was waited for.
+    /// Events received by [`wait`](Player::wait).
     waited: Vec<Event>,
     worker: Option<JoinHandle<()>>,
 }
 
-/// Where wishes are left.
+/// The slot with the newest request.
 #[derive(Default)]
-struct Desk {
-    wish: Mutex<Option<Wish>>,
-    left: Condvar,
-    /// Counts wishes, so that work on an old one knows it.
+struct RequestSlot {
+    request: Mutex<Option<FrameRequest>>,
+    request_added: Condvar,
+    /// Number of requests so far; work on an older one can be cancelled.
     newest: AtomicU64,
-    /// Counts wishes that were dealt with.
+    /// Number of the last finished request.
     done: AtomicU64,
     closing: AtomicBool,
 }
 
-impl Desk {
-    fn wish(&self) -> MutexGuard<'_, Option<Wish>> {
-        // A wish is only ever replaced whole.
-        self.wish.lock().unwrap_or_else(PoisonError::into_inner)
+impl RequestSlot {
+    fn request(&self) -> MutexGuard<'_, Option<FrameRequest>> {
+        // The request is replaced as a whole, so that a poisoned lock holds a valid one.
+        self.request.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a wish; `None` when the player closes.
-    fn take(&self) -> Option<(Wish, u64)> {
-        let mut slot = self.wish();
+    /// Waits for a request; `None` when the player closes.
+    fn take(&self) -> Option<(FrameRequest, u64)> {
+        let mut slot = self.request();
         loop {
             if self.closing.load(Ordering::Relaxed) {
                 return None;
             }
-            if let Some(wish) = slot.take() {
-                return Some((wish, self.newest.load(Ordering::Relaxed)));
+            if let Some(request) = slot.take() {
+                return Some((request, self.newest.load(Ordering::Relaxed)));
             }
-            slot = self.left.wait(slot).unwrap_or_else(PoisonError::into_inner);
+            slot = self.request_added.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    /// Whether nobody wants wish `number` any more: the player closes, or what is under way `may_stop` for a newer wish.
-    fn has_moved_on(&self, number: u64, may_stop: bool) -> bool {
+    /// Whether request `number` is obsolete: the player closes, or the work `may_stop` for a newer request.
+    fn is_obsolete(&self, number: u64, may_stop: bool) -> bool {
         self.closing.load(Ordering::Relaxed) || (may_stop && self.newest.load(Ordering::Relaxed) != number)
     }
 }
@@ -68,13 +68,13 @@ impl ThreadPlayer {
     /// The system gives no threads.
     pub fn start(wake: impl Fn() + Send + 'static) -> Result<Self, StartError> {
         let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("draw {index}")).build()?;
-        let desk = Arc::new(Desk::default());
+        let slot = Arc::new(RequestSlot::default());
         let (sender, events) = mpsc::channel();
         let work = {
-            let desk = desk.clone();
+            let slot = slot.clone();
             move || {
                 pool.install(move || {
-                    work(&desk, &mut |event| {
+                    work(&slot, &mut |event| {
                         let wakes = event.is_some();
                         // Nobody listens any more when the window is closing.
                         let _ = sender.send(event);
@@ -86,7 +86,7 @@ impl ThreadPlayer {
             }
         };
         let worker = std::thread::Builder::new().name("player".into()).spawn(work)?;
-        Ok(Self { desk, events, waited: Vec::new(), worker: Some(worker) })
+        Ok(Self { slot, events, waited: Vec::new(), worker: Some(worker) })
     }
 }
 
@@ -100,40 +100,40 @@ pub enum StartError {
     Thread(#[from] std::io::Error),
 }
 
-/// Fulfils wishes until the player closes. Work that nobody wants any more is stopped: a simulation at once, for it goes
-/// on where it stands; a drawing only where the one before it was not stopped too, so that hands that never rest still
-/// see pictures.
-fn work(desk: &Desk, tell: &mut dyn FnMut(Option<Event>)) {
+/// Serves requests until the player closes. Obsolete work is cancelled: a simulation at once, since it resumes where it stopped;
+/// a drawing only if the drawing before it was not cancelled too, so that continuous dragging still shows pictures.
+fn work(slot: &RequestSlot, tell: &mut dyn FnMut(Option<Event>)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
-    while let Some((wish, number)) = desk.take() {
-        let watch = Interruption::new(|advancing| desk.has_moved_on(number, advancing || !must_draw));
-        let outcome = catch_unwind(AssertUnwindSafe(|| engine.fulfil(&wish, &watch, &mut |event| tell(Some(event)))));
-        desk.done.store(number, Ordering::Relaxed);
+    while let Some((request, number)) = slot.take() {
+        let watch = Interruption::new(|advancing| slot.is_obsolete(number, advancing || !must_draw));
+        let outcome =
+            catch_unwind(AssertUnwindSafe(|| engine.process(&request, &watch, &mut |event| tell(Some(event)))));
+        slot.done.store(number, Ordering::Relaxed);
         must_draw = matches!(&outcome, Ok(Err(error)) if error.is_stop());
         match outcome {
             Ok(Ok(())) => {}
             Ok(Err(error)) if error.is_stop() => {}
-            Ok(Err(error)) => tell(Some(Event::Failed { revision: wish.revision, reason: error.to_string() })),
+            Ok(Err(error)) => tell(Some(Event::Failed { revision: request.revision, reason: error.to_string() })),
             Err(panic) => {
-                engine.forget();
-                let message = said(panic.as_ref());
-                tell(Some(Event::Panicked { revision: wish.revision, number: wish.number, message }));
+                engine.reset_after_panic();
+                let message = panic_text(panic.as_ref());
+                tell(Some(Event::Panicked { revision: request.revision, number: request.number, message }));
             }
         }
-        // Who waits for more need not: nothing more comes of it.
+        // Wakes those who wait: no more events come of this request.
         tell(None);
     }
 }
 
 impl Player for ThreadPlayer {
-    fn wish(&mut self, wish: Wish) {
-        let mut slot = self.desk.wish();
-        *slot = Some(wish);
-        // Counted while nobody can take the wish, so that it is taken with its own number.
-        self.desk.newest.fetch_add(1, Ordering::Relaxed);
+    fn request(&mut self, request: FrameRequest) {
+        let mut slot = self.slot.request();
+        *slot = Some(request);
+        // Counted under the lock, so that the request is taken with its own number.
+        self.slot.newest.fetch_add(1, Ordering::Relaxed);
         drop(slot);
-        self.desk.left.notify_one();
+        self.slot.request_added.notify_one();
     }
 
     fn poll(&mut self) -> Vec<Event> {
@@ -147,19 +147,19 @@ impl Player for ThreadPlayer {
     }
 
     fn is_busy(&self) -> bool {
-        self.desk.done.load(Ordering::Relaxed) != self.desk.newest.load(Ordering::Relaxed)
+        self.slot.done.load(Ordering::Relaxed) != self.slot.newest.load(Ordering::Relaxed)
     }
 
-    fn waits_for_poll(&self) -> bool {
+    fn needs_polling(&self) -> bool {
         false
     }
 }
 
 impl Drop for ThreadPlayer {
     fn drop(&mut self) {
-        self.desk.closing.store(true, Ordering::Relaxed);
-        drop(self.desk.wish());
-        self.desk.left.notify_one();
+        self.slot.closing.store(true, Ordering::Relaxed);
+        drop(self.slot.request());
+        self.slot.request_added.notify_one();
         if let Some(worker) = self.worker.take() {
             // Panics of phenomena are caught; nothing is left to tell.
             let _ = worker.join();

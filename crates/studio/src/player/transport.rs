@@ -1,4 +1,4 @@
-//! Play, pause, step, scrub and the range that repeats. It keeps no clock: the window tells it the time.
+//! Playback: play, pause, step, scrub and the loop range. The window passes the time in.
 
 use std::ops::RangeInclusive;
 

@@ -1,116 +1,115 @@
-//! The window's files: what is opened and saved, what is kept while it is unsaved, what waits to be asked. Where files
-//! lie, on the disk or at the browser, is for its `Shelf` to know.
+//! Opening, saving, rendering to files, autosave, and the dialogs that ask first. `native` has the parts for a file system, `web` those
+//! for a browser: both define `PlatformFiles` and the same methods of [`Files`].
 
 #[cfg(target_arch = "wasm32")]
-pub(super) mod browser;
-#[cfg(not(target_arch = "wasm32"))]
-mod chooser;
-#[cfg(not(target_arch = "wasm32"))]
-mod disk;
-#[cfg(not(target_arch = "wasm32"))]
-mod moving;
+pub(crate) mod browser_io;
 #[cfg(target_arch = "wasm32")]
-mod page;
-mod question;
-#[cfg(target_arch = "wasm32")]
-mod tabs;
+mod browser_tabs;
+#[cfg(not(target_arch = "wasm32"))]
+mod dialog;
+#[cfg(not(target_arch = "wasm32"))]
+mod native;
+mod questions;
+pub(crate) mod relink;
+#[cfg(not(target_arch = "wasm32"))]
+mod save_as;
 mod unsaved;
+#[cfg(target_arch = "wasm32")]
+mod web;
 
 use std::path::PathBuf;
 
 use eframe::egui::{self, Ui};
 
-#[cfg(not(target_arch = "wasm32"))]
-use self::disk::Shelf;
-#[cfg(target_arch = "wasm32")]
-use self::page::Shelf;
-use self::{
-    question::{Answer, Leaving, Question, answer},
-    unsaved::Unsaved,
-};
-use super::{scene_panel::Subject, session::Session, store::Store};
+use self::unsaved::UnsavedWork;
 use crate::{
-    document::{Document, files, recovery::Recovered},
-    player::shoot::Ended,
+    document::{Document, files, files::autosave::RecoveredWork},
+    player::render_job::JobFailure,
+    session::{Session, selection::Selection, settings_store::SettingsStore},
 };
+#[cfg(not(target_arch = "wasm32"))]
+use native::PlatformFiles;
+use questions::{Answer, PendingAction, Question, answer_ui};
+#[cfg(target_arch = "wasm32")]
+use web::PlatformFiles;
 
-/// Files of the window: what lies where, and what waits to be asked.
+/// The file operations of the window, and the open question.
 pub(super) struct Files {
     question: Option<Question>,
-    pub(super) unsaved: Unsaved,
+    pub(super) unsaved: UnsavedWork,
     closing: bool,
-    shelf: Shelf,
+    platform: PlatformFiles,
 }
 
 impl Files {
-    /// Files of a window that keeps what it must in `store`.
-    pub(super) fn new(store: &Store) -> Self {
-        Self { question: None, unsaved: Unsaved::new(store), closing: false, shelf: Shelf::new(store) }
+    /// File operations with autosaves in `store`.
+    pub(super) fn new(store: &SettingsStore) -> Self {
+        Self { question: None, unsaved: UnsavedWork::new(store), closing: false, platform: PlatformFiles::new(store) }
     }
 
-    /// Opens a scene that the studio brings along, after asking where that would lose work.
+    /// Opens a bundled scene, after asking where that would lose work.
     pub(super) fn open_bundled(&mut self, session: &mut Session, name: &str, text: &str) {
         self.open_text(session, name, text.to_owned(), None);
     }
 
     /// Opens a scene that was read, after asking where that would lose work.
     fn open_text(&mut self, session: &mut Session, name: &str, text: String, path: Option<PathBuf>) {
-        self.leave_after_asking(session, Leaving::Open { name: name.to_owned(), text, path });
+        self.confirm_then(session, PendingAction::Open { name: name.to_owned(), text, path });
     }
 
-    /// Opens work of a studio that did not end well, after asking where that would lose work.
-    pub(super) fn recover(&mut self, session: &mut Session, recovered: Recovered) {
-        self.leave_after_asking(session, Leaving::Recover(recovered));
+    /// Opens recovered work, after asking where that would lose work.
+    pub(super) fn recover(&mut self, session: &mut Session, recovered: RecoveredWork) {
+        self.confirm_then(session, PendingAction::Recover(recovered));
     }
 
-    fn leave_after_asking(&mut self, session: &mut Session, leaving: Leaving) {
+    fn confirm_then(&mut self, session: &mut Session, action: PendingAction) {
         if session.document.is_dirty() {
-            self.question = Some(Question::Leave(leaving));
+            self.question = Some(Question::Leave(action));
         } else {
-            self.leave(session, leaving);
+            self.proceed(session, action);
         }
     }
 
-    /// What must be done now and then, and the question that waits. `subject` is what is chosen.
-    pub(super) fn tend(&mut self, ui: &mut Ui, session: &mut Session, subject: &Subject) {
-        self.unsaved.tend(ui, session);
-        self.tend_shelf(ui, session, subject);
-        self.hold_close(ui, session);
-        self.ask(ui, session);
+    /// Polls autosave, the platform's files and closing, and shows the open question.
+    pub(super) fn poll(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+        self.unsaved.poll_autosave(ui, session);
+        self.poll_platform(ui, session, selection);
+        self.confirm_close(ui, session);
+        self.question_ui(ui, session);
     }
 
     /// Closing with unsaved work asks first, and so does closing while pictures are rendered.
-    fn hold_close(&mut self, ui: &Ui, session: &mut Session) {
+    fn confirm_close(&mut self, ui: &Ui, session: &mut Session) {
         let wants = ui.input(|input| input.viewport().close_requested());
         if self.closing {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         } else if wants && (session.document.is_dirty() || self.progress().is_some()) {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::CancelClose);
-            self.leave_after_asking(session, Leaving::Close);
+            self.confirm_then(session, PendingAction::Close);
         }
     }
 
-    fn ask(&mut self, ui: &mut Ui, session: &mut Session) {
+    fn question_ui(&mut self, ui: &mut Ui, session: &mut Session) {
         let Some(mut question) = self.question.take() else { return };
-        let answer = egui::Modal::new(ui.scope_id().with("question")).show(ui.ctx(), |ui| answer(ui, &mut question));
+        let answer = egui::Modal::new(ui.scope_id().with("question")).show(ui.ctx(), |ui| answer_ui(ui, &mut question));
         match answer.inner {
             None if answer.should_close() => {}
             None => self.question = Some(question),
             Some(Answer::Cancel) => {}
-            Some(yes) => self.answered(session, question, yes),
+            Some(answer) => self.apply_answer(session, question, answer),
         }
         if self.closing {
             ui.ctx().request_repaint();
         }
     }
 
-    fn answered(&mut self, session: &mut Session, question: Question, answer: Answer) {
+    fn apply_answer(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match question {
-            Question::Leave(leaving) => {
+            Question::Leave(action) => {
                 if answer == Answer::Save {
-                    self.save_and(session, Some(leaving));
+                    self.save_and(session, Some(action));
                 } else {
-                    self.leave(session, leaving);
+                    self.proceed(session, action);
                 }
             }
             Question::StopRendering => {
@@ -118,42 +117,42 @@ impl Files {
                 self.closing = true;
             }
             #[cfg(not(target_arch = "wasm32"))]
-            question => self.answered_about_disk(session, question, answer),
+            question => self.apply_native_answer(session, question, answer),
         }
     }
 
-    fn leave(&mut self, session: &mut Session, leaving: Leaving) {
-        match leaving {
-            Leaving::Open { name, text, path } => session.open(Document::new(name, text), path),
-            Leaving::Recover(recovered) => {
-                let (document, path) = reopened(&recovered);
+    fn proceed(&mut self, session: &mut Session, action: PendingAction) {
+        match action {
+            PendingAction::Open { name, text, path } => session.open(Document::new(name, text), path),
+            PendingAction::Recover(recovered) => {
+                let (document, path) = recovered_document(&recovered);
                 session.open(document, path);
-                self.unsaved.keep_in_stead(recovered, session);
+                self.unsaved.adopt(recovered, session);
             }
-            Leaving::Close if self.progress().is_some() => self.question = Some(Question::StopRendering),
-            Leaving::Close => self.closing = true,
+            PendingAction::Close if self.progress().is_some() => self.question = Some(Question::StopRendering),
+            PendingAction::Close => self.closing = true,
         }
     }
 }
 
-/// Tells the user how rendering ended: with this, or why not. After a panic the work is kept at once.
-fn tell_end(session: &mut Session, ended: Result<String, Ended>) {
+/// Shows how rendering ended. After a panic the work is saved at once.
+fn report_end(session: &mut Session, ended: Result<String, JobFailure>) {
     let told = match ended {
-        Ok(told) | Err(Ended::Failed(told)) => told,
-        Err(Ended::Panicked(message)) => session.told_of_panic(&message),
+        Ok(told) | Err(JobFailure::Failed(told)) => told,
+        Err(JobFailure::Panicked(message)) => session.panic_message(&message),
     };
     session.set_notice(Some(told));
 }
 
-/// What was `recovered`, as an edit of what lies in its file now.
-fn reopened(recovered: &Recovered) -> (Document, Option<PathBuf>) {
+/// Recovered work as an undoable edit of the file's current text.
+fn recovered_document(recovered: &RecoveredWork) -> (Document, Option<PathBuf>) {
     let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
-    // A page knows names, but no files.
+    // A page has no file system.
     let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
     let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
     let mut document = Document::new(named.map_or("scene", String::as_str), saved);
     document.replace("recover", &recovered.text);
-    document.seal();
+    document.end_step();
     (document, path)
 }
 
@@ -162,16 +161,16 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{examples::Bundle, player::SlicePlayer};
+    use crate::{player::PolledPlayer, scenes::examples::Bundle};
 
     #[test]
     fn a_panic_while_rendering_is_told_and_the_work_kept_at_once() {
         let document = Document::new("scene", "bansho = 1\n");
-        let mut session = Session::new(document, None, Box::<SlicePlayer>::default(), |_| Arc::new(Bundle::default()));
-        tell_end(&mut session, Err(Ended::Failed("the disk is full".into())));
-        assert_eq!((session.notice(), session.keep_now), (Some("the disk is full"), false));
-        tell_end(&mut session, Err(Ended::Panicked("broken on purpose".into())));
+        let mut session = Session::new(document, None, Box::<PolledPlayer>::default(), |_| Arc::new(Bundle::default()));
+        report_end(&mut session, Err(JobFailure::Failed("the disk is full".into())));
+        assert_eq!((session.notice(), session.autosave_now), (Some("the disk is full"), false));
+        report_end(&mut session, Err(JobFailure::Panicked("broken on purpose".into())));
         assert!(session.notice().is_some_and(|notice| notice.contains("panicked") && notice.contains("on purpose")));
-        assert!(session.keep_now);
+        assert!(session.autosave_now);
     }
 }

@@ -1,33 +1,33 @@
-//! Unsaved work is kept every few seconds while it changes, and offered at the next start where the studio did not end well.
+//! Autosave: unsaved work is stored every few seconds while it changes, and offered at the next start after a crash.
 
 use std::time::Duration;
 
 use eframe::egui::Ui;
 
 #[cfg(target_arch = "wasm32")]
-use super::tabs::Tabs;
+use super::browser_tabs::BrowserTabs;
 #[cfg(not(target_arch = "wasm32"))]
-use crate::document::recovery::Autosave;
+use crate::document::files::autosave::Autosave;
 use crate::{
-    app::{session::Session, store::Store},
     document::{
         Revision,
-        recovery::{self, Recovered},
+        files::autosave::{self, RecoveredWork},
     },
+    session::{Session, settings_store::SettingsStore},
 };
 
-/// Seconds between two keepings.
-const EVERY_S: f64 = 5.0;
+/// Seconds between two autosaves.
+const INTERVAL_S: f64 = 5.0;
 
-/// Under which it is kept: a folder, or what the names of texts in the browser begin with.
+/// The folder of autosaves, or the prefix of their names in the browser.
 const NAME: &str = "unsaved";
 
-/// Unsaved work, of now and of before.
-pub(crate) struct Unsaved {
+/// The autosave of this session, and recovered work of others.
+pub(crate) struct UnsavedWork {
     /// Work of a studio that did not end well.
-    pub(crate) recovered: Vec<Recovered>,
+    pub(crate) recovered: Vec<RecoveredWork>,
     /// Such work that is open again, to be forgotten once it is kept as this studio's own.
-    reopened: Vec<Recovered>,
+    reopened: Vec<RecoveredWork>,
     /// When something was kept last, s.
     last_kept: f64,
     /// What was kept last: a state of the document, and whether that was unsaved.
@@ -38,12 +38,12 @@ pub(crate) struct Unsaved {
     #[cfg(not(target_arch = "wasm32"))]
     untold: Option<String>,
     #[cfg(target_arch = "wasm32")]
-    tabs: Tabs,
+    tabs: BrowserTabs,
 }
 
-impl Unsaved {
+impl UnsavedWork {
     #[cfg(not(target_arch = "wasm32"))]
-    pub(super) fn new(store: &Store) -> Self {
+    pub(super) fn new(store: &SettingsStore) -> Self {
         let folder = store.file(NAME);
         let begun = folder.as_deref().map(|folder| Autosave::begin(folder, "studio")).transpose();
         // Where nothing can be kept, the studio works without, and says so once there is something to keep.
@@ -52,7 +52,7 @@ impl Unsaved {
             Err(error) => (None, Some(error.to_string())),
         };
         Self {
-            recovered: folder.as_deref().map(recovery::recoverable).unwrap_or_default(),
+            recovered: folder.as_deref().map(autosave::recoverable).unwrap_or_default(),
             reopened: Vec::new(),
             last_kept: 0.0,
             kept: None,
@@ -62,22 +62,22 @@ impl Unsaved {
     }
 
     #[cfg(target_arch = "wasm32")]
-    pub(super) fn new(store: &Store) -> Self {
-        let tabs = Tabs::begin(store.clone(), NAME);
+    pub(super) fn new(store: &SettingsStore) -> Self {
+        let tabs = BrowserTabs::begin(store.clone(), NAME);
         Self { recovered: Vec::new(), reopened: Vec::new(), last_kept: 0.0, kept: None, tabs }
     }
 
     /// Keeps what changed, now and then; where nothing did, nothing is done and the window may rest.
-    pub(super) fn tend(&mut self, ui: &Ui, session: &mut Session) {
+    pub(super) fn poll_autosave(&mut self, ui: &Ui, session: &mut Session) {
         #[cfg(target_arch = "wasm32")]
         self.recovered.extend(self.tabs.found(ui.ctx()));
-        let at_once = std::mem::take(&mut session.keep_now);
+        let at_once = std::mem::take(&mut session.autosave_now);
         let present = (session.document.revision(), session.document.is_dirty());
         if self.kept == Some(present) && !at_once {
             return;
         }
         let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
-        let wait_s = self.last_kept + EVERY_S - now;
+        let wait_s = self.last_kept + INTERVAL_S - now;
         // What is under a hand may pass, as wind does that blows only while it is dragged.
         if !at_once && present.1 && (held || wait_s > 0.0) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(wait_s.max(0.1)));
@@ -110,7 +110,7 @@ impl Unsaved {
     #[cfg(target_arch = "wasm32")]
     fn keep(&mut self, session: &mut Session) -> bool {
         let document = &session.document;
-        let work = document.is_dirty().then(|| recovery::kept(document.name(), document.text()));
+        let work = document.is_dirty().then(|| autosave::kept(document.name(), document.text()));
         let kept = self.tabs.keep(work.as_deref());
         if !kept {
             session.set_notice(Some("the browser keeps no unsaved work here; save it now and then".into()));
@@ -119,14 +119,14 @@ impl Unsaved {
     }
 
     /// Keeps what was `recovered`, and is open again, as this studio's own work from now on.
-    pub(super) fn keep_in_stead(&mut self, recovered: Recovered, session: &mut Session) {
+    pub(super) fn adopt(&mut self, recovered: RecoveredWork, session: &mut Session) {
         self.recovered.retain(|other| *other != recovered);
         self.reopened.push(recovered);
-        session.keep_now = true;
+        session.autosave_now = true;
     }
 
     /// Forgets work that is not wanted.
-    pub(crate) fn forget(&mut self, recovered: &Recovered) {
+    pub(crate) fn forget(&mut self, recovered: &RecoveredWork) {
         forget(recovered);
         self.recovered.retain(|other| other != recovered);
     }
@@ -145,11 +145,11 @@ impl Unsaved {
 }
 
 #[cfg(not(target_arch = "wasm32"))]
-fn forget(recovered: &Recovered) {
+fn forget(recovered: &RecoveredWork) {
     recovered.forget();
 }
 
 #[cfg(target_arch = "wasm32")]
-fn forget(recovered: &Recovered) {
-    Store::default().forget(&recovered.kept_in.to_string_lossy());
+fn forget(recovered: &RecoveredWork) {
+    SettingsStore::default().remove(&recovered.kept_in.to_string_lossy());
 }

@@ -4,7 +4,7 @@ use eframe::egui::{Event, Modifiers, Pos2, Rect, Role, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, choosing, drag, drawn, press, release, sky, text, window};
-use crate::document::drawing::{Drawing, Factor};
+use crate::editors::aurora::document::{AuroraDrawing, Factor};
 
 fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
     harness.get_by_label(name).rect()
@@ -18,7 +18,7 @@ fn at(plane: Rect, x: f32, y: f32) -> Pos2 {
 /// Draws a line through shares of the target plane.
 fn stroke(harness: &mut Harness<'_, Studio>, line: &[[f32; 2]]) {
     let plane = plane(harness, "Aurora target");
-    let place = |share: &[f32; 2]| at(plane, share[0], share[1]);
+    let place = |fraction: &[f32; 2]| at(plane, fraction[0], fraction[1]);
     press(harness, place(&line[0]));
     for pair in line.windows(2) {
         for step in 1..=6 {
@@ -39,9 +39,9 @@ fn choose(harness: &mut Harness<'_, Studio>, button: &str) {
     drawn(harness);
 }
 
-fn drawing(harness: &mut Harness<'_, Studio>) -> Drawing {
+fn drawing(harness: &mut Harness<'_, Studio>) -> AuroraDrawing {
     let session = harness.state_mut().session();
-    Drawing::read(session.document.values(), 0, session.assets()).unwrap()
+    AuroraDrawing::read(session.document.values(), 0, session.assets()).unwrap()
 }
 
 #[test]

@@ -10,7 +10,7 @@ use eframe::egui::{DroppedFile, Event, Key, Modifiers, Role};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, SCENE, drawn, sky, text, window};
-use crate::document::drawing::Drawing;
+use crate::editors::aurora::document::AuroraDrawing;
 
 /// Types `path` as the name that the window asks for, and answers with `button`.
 pub(super) fn answer(harness: &mut Harness<'_, Studio>, path: &Path, button: &str) {
@@ -82,7 +82,7 @@ fn drop_on(harness: &mut Harness<'_, Studio>, files: &[PathBuf]) {
 }
 
 /// A plate, a mesh, drawings and scenes in a folder of their own.
-fn things() -> tempfile::TempDir {
+fn handles() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     fs::copy(scenes.join("plates/checkerboard.png"), folder.path().join("board.png")).unwrap();
@@ -97,8 +97,8 @@ fn things() -> tempfile::TempDir {
 
 #[test]
 fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
-    let things = things();
-    let file = |name: &str| things.path().join(name);
+    let handles = handles();
+    let file = |name: &str| handles.path().join(name);
     let mut harness =
         window(&sky(2, "[[aurora]]\npreroll_s = 0.0\nparticles = { count = 300 }\nfield = { cells = 31 }\n"));
     drop_on(&mut harness, &[file("board.png")]);
@@ -112,7 +112,8 @@ fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
     menu(&mut harness, &["aurora 2"]);
     drop_on(&mut harness, &[file("arc.svg")]);
     let session = harness.state_mut().session();
-    let stated = |index: usize| Drawing::read(session.document.values(), index, session.assets()).unwrap().is_stated();
+    let stated =
+        |index: usize| AuroraDrawing::read(session.document.values(), index, session.assets()).unwrap().is_stated();
     assert_eq!([stated(0), stated(1)], [false, true], "the aurora that is chosen");
 
     let before = text(&mut harness);
@@ -130,8 +131,8 @@ fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
 
 #[test]
 fn a_mesh_that_is_dropped_burns_and_of_several_files_none_is_forgotten() {
-    let things = things();
-    let file = |name: &str| things.path().join(name);
+    let handles = handles();
+    let file = |name: &str| handles.path().join(name);
     let mut harness =
         window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
     drop_on(&mut harness, &[file("ring.glb"), file("board.png")]);
@@ -204,17 +205,17 @@ fn examples_that_are_saved_take_their_plates_with_them() {
 
 #[test]
 fn a_scene_that_is_saved_in_another_folder_names_the_same_files() {
-    let things = things();
+    let handles = handles();
     let scene = format!("{SCENE}[plate]\nimage = \"board.png\" # the ground\n");
-    fs::write(things.path().join("scene.toml"), &scene).unwrap();
+    fs::write(handles.path().join("scene.toml"), &scene).unwrap();
     let mut harness = window("bansho = 1\n");
-    open(&mut harness, &things.path().join("scene.toml"));
+    open(&mut harness, &handles.path().join("scene.toml"));
     menu(&mut harness, &["File", "Save as…"]);
-    answer(&mut harness, &things.path().join("deep/er/scene.toml"), "Save");
-    let saved = fs::read_to_string(things.path().join("deep/er/scene.toml")).unwrap();
+    answer(&mut harness, &handles.path().join("deep/er/scene.toml"), "Save");
+    let saved = fs::read_to_string(handles.path().join("deep/er/scene.toml")).unwrap();
     assert!(saved.contains("image = \"../../board.png\" # the ground"), "{saved}");
     assert!(harness.state_mut().session().document.error().is_none());
-    assert_eq!(fs::read_to_string(things.path().join("scene.toml")).unwrap(), scene, "the first one stays");
+    assert_eq!(fs::read_to_string(handles.path().join("scene.toml")).unwrap(), scene, "the first one stays");
 }
 
 #[test]
@@ -233,8 +234,8 @@ fn a_scene_that_cannot_be_saved_says_so_and_stays_unsaved() {
 
 #[test]
 fn a_scene_that_cannot_be_saved_elsewhere_keeps_its_paths() {
-    let things = things();
-    let file = |name: &str| things.path().join(name);
+    let handles = handles();
+    let file = |name: &str| handles.path().join(name);
     let scene = format!("{SCENE}[plate]\nimage = \"board.png\"\n");
     fs::write(file("scene.toml"), &scene).unwrap();
     let mut harness = window("bansho = 1\n");

@@ -9,23 +9,23 @@ use egui_kittest::{Harness, kittest::Queryable};
 use super::{SCENE, Session, Studio, assets};
 use crate::{
     document::{Document, Revision, check},
-    player::{Event, Picture, Player, Wish},
+    player::{Event, FrameRequest, Picture, Player},
 };
 
 /// What was wished for, and what is reported next.
 #[derive(Default)]
-struct Desk {
-    wishes: Vec<Wish>,
+struct RequestSlot {
+    requests: Vec<FrameRequest>,
     events: Vec<Event>,
 }
 
 /// A player that only does what its desk says.
 #[derive(Clone, Default)]
-struct Fake(Rc<RefCell<Desk>>);
+struct Fake(Rc<RefCell<RequestSlot>>);
 
 impl Player for Fake {
-    fn wish(&mut self, wish: Wish) {
-        self.0.borrow_mut().wishes.push(wish);
+    fn request(&mut self, request: FrameRequest) {
+        self.0.borrow_mut().requests.push(request);
     }
 
     fn poll(&mut self) -> Vec<Event> {
@@ -36,18 +36,18 @@ impl Player for Fake {
         false
     }
 
-    fn waits_for_poll(&self) -> bool {
+    fn needs_polling(&self) -> bool {
         false
     }
 }
 
 impl Fake {
-    fn last(&self) -> Wish {
-        self.0.borrow().wishes.last().expect("a wish").clone()
+    fn last(&self) -> FrameRequest {
+        self.0.borrow().requests.last().expect("a wish").clone()
     }
 
     fn wished(&self) -> usize {
-        self.0.borrow().wishes.len()
+        self.0.borrow().requests.len()
     }
 
     /// A phenomenon panics at frame `number` of `revision`.
@@ -57,25 +57,25 @@ impl Fake {
     }
 
     /// Fulfils the last wish: the scene is good, and its picture took so long, s.
-    fn fulfil(&self, draw_s: f64) {
-        let wish = self.last();
+    fn process(&self, draw_s: f64) {
+        let request = self.last();
         let nowhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-        let outcome = check(&wish.name, &wish.text, &nowhere).map(|checked| checked.plan);
+        let outcome = check(&request.name, &request.text, &nowhere).map(|checked| checked.plan);
         let scene_size = outcome.as_ref().map_or([64, 36], |plan| plan.size());
-        let size = wish.within.map(|side| side.min(640));
+        let size = request.within.map(|side| side.min(640));
         let picture = Picture {
-            revision: wish.revision,
-            number: wish.number.unwrap_or_default(),
+            revision: request.revision,
+            number: request.number.unwrap_or_default(),
             size,
             scene_size,
             pixels: vec![[90, 60, 30, 255]; size[0] * size[1]],
-            exact: wish.exact,
-            draft: wish.draft,
+            exact: request.exact,
+            draft: request.draft,
             draw_s,
             advance_s: 0.0,
         };
-        let judged = Event::Judged { revision: wish.revision, outcome };
-        self.0.borrow_mut().events.extend([judged, Event::Drawn(picture)]);
+        let checked = Event::Checked { revision: request.revision, outcome };
+        self.0.borrow_mut().events.extend([checked, Event::Drawn(picture)]);
     }
 }
 
@@ -92,12 +92,12 @@ fn previews_shrink_while_something_is_dragged_slowly_and_are_whole_again_after()
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     assert_eq!((fake.last().within, fake.last().number), (WINDOW, None));
-    fake.fulfil(0.4);
+    fake.process(0.4);
     session.update(0.4, WINDOW, false);
     for step in 0..3 {
         session.document.replace("typing", &SCENE.replace("0.9", &format!("1.{step}")));
         session.update(1.0 + f64::from(step), WINDOW, true);
-        fake.fulfil(0.4 * fake.last().within[0] as f64 / 640.0);
+        fake.process(0.4 * fake.last().within[0] as f64 / 640.0);
     }
     session.update(5.0, WINDOW, true);
     assert!(fake.last().within[0] <= 320, "{:?}", fake.last().within);
@@ -112,13 +112,13 @@ fn previews_shrink_while_something_is_dragged_slowly_and_are_whole_again_after()
 fn drafts_are_wished_for_unless_the_exact_frame_is() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
-    assert!(fake.last().draft && !fake.last().exact && !fake.last().still);
-    fake.fulfil(0.01);
+    assert!(fake.last().draft && !fake.last().exact && !fake.last().full_quality);
+    fake.process(0.01);
     session.update(0.1, WINDOW, false);
-    session.draw_exactly();
+    session.redraw_exact();
     assert!(fake.last().exact && fake.last().revision == session.document.revision());
-    let finished = session.finished(3);
-    assert!(finished.still && finished.exact && !finished.draft && finished.number == Some(3));
+    let finished = session.full_quality_request(3);
+    assert!(finished.full_quality && finished.exact && !finished.draft && finished.number == Some(3));
     session.draft = false;
     session.update(0.2, WINDOW, false);
     assert!(!fake.last().draft);
@@ -128,7 +128,7 @@ fn drafts_are_wished_for_unless_the_exact_frame_is() {
 fn late_news_of_a_document_that_was_open_before_is_none() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
-    fake.fulfil(0.01);
+    fake.process(0.01);
     session.open(Document::new("other.toml", SCENE.replace("frames = 10", "frames = 3")), None);
     session.go_to_time(0.1);
     session.open(Document::new("third.toml", SCENE.replace("frames = 10", "frames = 5")), None);
@@ -141,8 +141,8 @@ fn late_news_of_a_document_that_was_open_before_is_none() {
         message: "late".into(),
     });
     session.update(0.2, WINDOW, false);
-    assert!(!session.is_broken() && session.notice().is_none());
-    fake.fulfil(0.01);
+    assert!(!session.has_panicked() && session.notice().is_none());
+    fake.process(0.01);
     session.update(0.3, WINDOW, false);
     assert_eq!(session.picture().map(|(picture, _)| picture.revision), Some(revision));
     assert_eq!(
@@ -159,18 +159,18 @@ fn what_was_broken_by_a_file_is_tried_again_with_another() {
     let revision = session.document.revision();
     fake.panic(revision, 0);
     session.update(0.1, WINDOW, false);
-    assert!(session.is_broken());
+    assert!(session.has_panicked());
     let wished = fake.wished();
     session.reload_assets();
     session.update(0.2, WINDOW, false);
-    assert!(!session.is_broken() && fake.wished() == wished + 1);
+    assert!(!session.has_panicked() && fake.wished() == wished + 1);
 }
 
 #[test]
 fn a_frame_that_panicked_is_not_drawn_again_unless_asked_for_and_others_are() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
-    fake.fulfil(0.01);
+    fake.process(0.01);
     session.update(0.1, WINDOW, false);
     let revision = session.document.revision();
     let mut at = |number: i64| {
@@ -180,26 +180,26 @@ fn a_frame_that_panicked_is_not_drawn_again_unless_asked_for_and_others_are() {
         if number == 3 {
             fake.panic(revision, number);
         } else {
-            fake.fulfil(0.01);
+            fake.process(0.01);
         }
         session.update(0.3, WINDOW, false);
-        (wished, session.is_broken())
+        (wished, session.has_panicked())
     };
     assert_eq!([at(3), at(4)], [(true, true), (true, false)], "of one state");
     let wished = fake.wished();
     session.transport.go_to(3);
     session.update(0.4, WINDOW, false);
-    assert!(session.is_broken() && fake.wished() == wished);
+    assert!(session.has_panicked() && fake.wished() == wished);
     session.retry();
     session.update(0.5, WINDOW, false);
-    assert!(!session.is_broken() && fake.last().number == Some(3));
+    assert!(!session.has_panicked() && fake.last().number == Some(3));
 }
 
 #[test]
 fn a_scene_that_panics_while_it_is_checked_is_broken_at_every_frame() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
-    fake.fulfil(0.01);
+    fake.process(0.01);
     session.update(0.1, WINDOW, false);
     session.document.replace("typing", "bansho = 1\n[[rain]]\n");
     session.update(0.2, WINDOW, false);
@@ -208,7 +208,7 @@ fn a_scene_that_panics_while_it_is_checked_is_broken_at_every_frame() {
     let wished = fake.wished();
     session.transport.go_to(4);
     session.update(0.4, WINDOW, false);
-    assert!(session.is_broken() && fake.wished() == wished);
+    assert!(session.has_panicked() && fake.wished() == wished);
 }
 
 #[test]
@@ -217,7 +217,7 @@ fn the_window_offers_to_draw_a_frame_once_more_that_panicked() {
     let revision = session.document.revision();
     let mut harness = Harness::builder()
         .with_size(vec2(1200.0, 800.0))
-        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+        .build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     harness.run_steps(2);
     assert!(harness.query_by_label("Retry").is_none());
     fake.panic(revision, 0);
@@ -235,15 +235,15 @@ fn the_window_says_what_is_a_draft_or_a_live_state_and_draws_it_exactly_when_ask
     let (session, fake) = session();
     let mut harness = Harness::builder()
         .with_size(vec2(1200.0, 800.0))
-        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+        .build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     harness.run_steps(2);
-    fake.fulfil(0.01);
+    fake.process(0.01);
     harness.run_steps(2);
     harness.get_by_label("draft");
     harness.get_by_label("live state").click();
     harness.run_steps(2);
     assert!(fake.last().exact);
-    fake.fulfil(0.01);
+    fake.process(0.01);
     harness.run_steps(2);
     assert!(harness.query_by_label("live state").is_none());
 }

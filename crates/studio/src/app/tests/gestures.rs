@@ -216,7 +216,8 @@ fn dragging_a_point_of_a_template_is_one_step() {
     drawn(&mut harness);
     let target = harness.get_by_label("Aurora target").rect();
     let session = harness.state_mut().session();
-    let drawing = crate::document::drawing::Drawing::read(session.document.values(), 0, session.assets()).unwrap();
+    let drawing =
+        crate::editors::aurora::document::AuroraDrawing::read(session.document.values(), 0, session.assets()).unwrap();
     let point = drawing.points(0, 0)[0];
     let scale = target.width() / drawing.extent_km() as f32;
     let from = target.center() + vec2(point.x as f32, point.y as f32) * scale;
@@ -304,7 +305,9 @@ fn shapes_stay_under_the_hand_that_drags_them_in_time() {
     let at = |harness: &Harness<'_, Studio>, shape: &str| harness.get_by_label(shape).rect().center().x;
     let arrivals = |harness: &mut Harness<'_, Studio>| {
         let session = harness.state_mut().session();
-        let drawing = crate::document::drawing::Drawing::read(session.document.values(), 0, session.assets()).unwrap();
+        let drawing =
+            crate::editors::aurora::document::AuroraDrawing::read(session.document.values(), 0, session.assets())
+                .unwrap();
         drawing.arrivals().to_vec()
     };
     // Once chosen it has its time beside the line, which is shorter then.

@@ -13,8 +13,8 @@ use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, PATIENCE, SCENE, Session, assets, choosing, drag, drawn, text, window};
 use crate::{
-    document::{Document, recovery::Autosave},
-    player::{SlicePlayer, ThreadPlayer, tests::Broken},
+    document::{Document, files::autosave::Autosave},
+    player::{PolledPlayer, ThreadPlayer, tests::PanickedFrames},
 };
 
 /// A window on a scene that lies in `folder`.
@@ -242,10 +242,10 @@ fn a_studio_that_can_keep_nothing_says_so_once() {
 #[test]
 fn work_of_a_studio_that_crashed_is_offered() {
     let home = crashed("3.5");
-    let session = Session::new(Document::new("scene", "bansho = 1\n"), None, Box::<SlicePlayer>::default(), assets);
+    let session = Session::new(Document::new("scene", "bansho = 1\n"), None, Box::<PolledPlayer>::default(), assets);
     let studio = Studio::new(session, Some(home.path().to_path_buf()));
     let mut harness =
-        Harness::builder().with_max_steps(64).build_ui_state(|ui, studio: &mut Studio| studio.show(ui), studio);
+        Harness::builder().with_max_steps(64).build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
     drawn(&mut harness);
     harness.get_by_label("Recover").click();
     harness.run_steps(3);
@@ -261,10 +261,11 @@ fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
     let path = folder.path().join("scene.toml");
     fs::write(&path, SCENE).unwrap();
     let player = ThreadPlayer::start(|| {}).unwrap();
-    let session = Session::new(Document::new("scene.toml", SCENE), Some(path), Box::new(player), |_| Arc::new(Broken));
+    let session =
+        Session::new(Document::new("scene.toml", SCENE), Some(path), Box::new(player), |_| Arc::new(PanickedFrames));
     let mut harness = Harness::builder()
         .with_max_steps(64)
-        .build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+        .build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     drawn(&mut harness);
     edit(&mut harness, "[[light]]", "[plate]\nimage = \"plate.png\"\n[[light]]");
     until(&mut harness, "the panic is told", |harness| {
@@ -338,10 +339,10 @@ fn a_shot_that_is_rendered_is_stopped_and_goes_on_later() {
 
 /// A window that keeps what it must in `home`.
 fn window_at_home(home: &Path) -> Harness<'static, Studio> {
-    let session = Session::new(Document::new("fire.toml", SCENE), None, Box::<SlicePlayer>::default(), assets);
+    let session = Session::new(Document::new("fire.toml", SCENE), None, Box::<PolledPlayer>::default(), assets);
     let studio = Studio::new(session, Some(home.to_path_buf()));
     let builder = Harness::builder().with_size(vec2(1200.0, 800.0)).with_max_steps(64);
-    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.show(ui), studio);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
     drawn(&mut harness);
     harness
 }
@@ -367,7 +368,7 @@ fn layout_theme_and_recent_files_are_there_again() {
         drag(&mut harness, border, vec2(60.0, 0.0));
         let wide = width(&harness);
         assert!(wide < before - 40.0, "{before} {wide}");
-        harness.state_mut().end();
+        harness.state_mut().on_exit();
         wide
     };
     let mut again = window_at_home(home.path());

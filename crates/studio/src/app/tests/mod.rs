@@ -19,7 +19,7 @@ use std::{
 use bansho::{Assets, base::math::DVec3, media::assets::FileAssets};
 
 use super::{Session, Studio, shortcuts::SHORTCUTS};
-use crate::{document::Document, player::SlicePlayer};
+use crate::{document::Document, player::PolledPlayer};
 use eframe::egui::{self, Key, Modifiers, Role, vec2};
 use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
 
@@ -48,9 +48,9 @@ fn window(text: &str) -> Harness<'static, Studio> {
 }
 
 fn window_by(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, Studio> {
-    let session = Session::new(Document::new("fire.toml", text), None, Box::<SlicePlayer>::default(), assets);
+    let session = Session::new(Document::new("fire.toml", text), None, Box::<PolledPlayer>::default(), assets);
     let builder = builder.with_max_steps(64);
-    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.show(ui), Studio::new(session, None));
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
     drawn(&mut harness);
     harness
 }

@@ -15,7 +15,7 @@ use egui_kittest::{
 use image::{Rgba, RgbaImage};
 
 use super::{super::Studio, SCENE, drawn, sky, window_by};
-use crate::software::{Area, Painter};
+use bansho_egui_software::{Painter, PixelRect};
 
 /// Small, for they are kept with the code.
 const SIZE: [f32; 2] = [960.0, 620.0];
@@ -92,7 +92,7 @@ impl TestRenderer for Software {
         let same = show(&mut self.painter).1;
         self.painter.forget();
         let (anew, all) = show(&mut self.painter);
-        let whole = Area { left: 0, top: 0, right: size[0] as i32, bottom: size[1] as i32 };
+        let whole = PixelRect { left: 0, top: 0, right: size[0] as i32, bottom: size[1] as i32 };
         if !same.is_empty() || all != [whole] || pixels != anew {
             return Err(format!("in places, {changed:?}, it is not painted as all at once"));
         }

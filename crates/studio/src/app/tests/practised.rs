@@ -4,7 +4,7 @@ use eframe::egui::{Pos2, pos2};
 use egui_kittest::{Harness, kittest::Queryable};
 
 use super::{super::Studio, text, window};
-use crate::{beginnings::FLAME_SHEET, document::drawing::Drawing};
+use crate::{editors::aurora::document::AuroraDrawing, scenes::new_scene::FLAME_SHEET};
 
 /// Times of the keystroke-level model, s (Card, Moran and Newell, "The keystroke-level model for user performance time with interactive
 /// systems", 1980): to think of the next step, to point at something, to press or let go a button, and to draw, for each line of a stroke
@@ -69,7 +69,7 @@ impl Hand {
     }
 
     fn stroke(&mut self, line: &[[f32; 2]]) {
-        let line: Vec<Pos2> = line.iter().map(|&share| self.place("Aurora target", share)).collect();
+        let line: Vec<Pos2> = line.iter().map(|&fraction| self.place("Aurora target", fraction)).collect();
         let mut seconds = 0.0;
         self.press(line[0]);
         for pair in line.windows(2) {
@@ -112,7 +112,7 @@ fn practised_hands_make_an_s_that_splits_in_less_than_a_minute() {
     let assets = session.assets().clone();
     session.document.check_now(&assets);
     assert!(session.document.error().is_none());
-    let drawing = Drawing::read(session.document.values(), 0, &assets).unwrap();
+    let drawing = AuroraDrawing::read(session.document.values(), 0, &assets).unwrap();
     assert_eq!([0, 1, 2].map(|shape| drawing.lines(shape).len()), [1, 1, 2], "{}", text(&mut hand.harness));
     assert!(text(&mut hand.harness).contains("split = [{ sheet = 1, at = 0."), "{}", text(&mut hand.harness));
     assert!(hand.seconds < 45.0, "{} s", hand.seconds);

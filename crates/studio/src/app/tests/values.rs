@@ -219,8 +219,8 @@ fn a_value_beyond_its_bounds_is_told_and_left_as_it_is() {
         SCENE.replace("height = 0.9", "height = -5.0").replace("bansho = 1", "bansho = 1\n[camera]\nroll_deg = 9999.0");
     let mut harness = window(&faulty);
     harness.get_by_label_contains("-5 is out of range");
-    for subject in ["fire", "camera"] {
-        harness.get_by_role_and_label(Role::Button, subject).click();
+    for selection in ["fire", "camera"] {
+        harness.get_by_role_and_label(Role::Button, selection).click();
         drawn(&mut harness);
         assert_eq!(text(&mut harness), faulty, "looking mends nothing");
     }

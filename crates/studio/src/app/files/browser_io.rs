@@ -1,0 +1,95 @@
+//! Browser file access: the file chooser, dropped files, and downloads.
+
+use std::{
+    cell::RefCell,
+    io::{self, Write},
+    rc::Rc,
+};
+
+use eframe::egui::{Context, DroppedFileHandle};
+use wasm_bindgen::{JsCast, JsValue, closure::Closure};
+use wasm_bindgen_futures::{JsFuture, spawn_local};
+use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
+
+/// Files that arrived, by name.
+pub(super) type Inbox = Rc<RefCell<Vec<(String, Vec<u8>)>>>;
+
+/// Asks the user for a file, which comes into `inbox` later.
+///
+/// # Errors
+/// The page cannot ask.
+pub(super) fn ask_for_file(inbox: &Inbox, ctx: &Context) -> Result<(), JsValue> {
+    let input: HtmlInputElement = element("input")?;
+    input.set_type("file");
+    let (inbox, ctx, chosen) = (inbox.clone(), ctx.clone(), input.clone());
+    let taken = Closure::once_into_js(move || {
+        let Some(file) = chosen.files().and_then(|files| files.get(0)) else { return };
+        spawn_local(async move {
+            if let Ok(bytes) = bytes_of(&file).await {
+                inbox.borrow_mut().push((file.name(), bytes));
+                ctx.request_repaint();
+            }
+        });
+    });
+    input.set_onchange(Some(taken.unchecked_ref()));
+    input.click();
+    Ok(())
+}
+
+/// Takes a file that was dropped on the page into `inbox`, once it is read.
+pub(super) fn take_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Context) {
+    let (inbox, ctx) = (inbox.clone(), ctx.clone());
+    spawn_local(async move {
+        if let Ok(bytes) = file.bytes_async().await {
+            inbox.borrow_mut().push((file.path().display().to_string(), bytes));
+            ctx.request_repaint();
+        }
+    });
+}
+
+/// The bytes of a file in browser memory, since wasm memory is small.
+#[derive(Default)]
+pub(super) struct BlobParts(js_sys::Array);
+
+impl BlobParts {
+    /// A file that is made already.
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        Self(js_sys::Array::of1(&js_sys::Uint8Array::from(bytes)))
+    }
+}
+
+impl Write for BlobParts {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.push(&js_sys::Uint8Array::from(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Hands a file called `name` to the user.
+///
+/// # Errors
+/// The page cannot make files.
+pub(super) fn download(name: &str, parts: &BlobParts) -> Result<(), JsValue> {
+    let blob = Blob::new_with_u8_array_sequence(&parts.0)?;
+    let url = Url::create_object_url_with_blob(&blob)?;
+    let link: HtmlAnchorElement = element("a")?;
+    link.set_href(&url);
+    link.set_download(name);
+    link.click();
+    Url::revoke_object_url(&url)
+}
+
+async fn bytes_of(file: &File) -> Result<Vec<u8>, JsValue> {
+    let buffer = JsFuture::from(file.array_buffer()).await?;
+    Ok(js_sys::Uint8Array::new(&buffer).to_vec())
+}
+
+fn element<T: JsCast>(name: &str) -> Result<T, JsValue> {
+    let document = web_sys::window().and_then(|window| window.document());
+    let document = document.ok_or_else(|| JsValue::from_str("there is no page"))?;
+    document.create_element(name)?.dyn_into().map_err(JsValue::from)
+}

@@ -1,0 +1,220 @@
+//! Files in a web page: chosen or dropped by the user, and saved as downloads.
+
+use std::path::Path;
+
+use bansho::{
+    media::{output::naming, zip::ZipWriter},
+    render::scene::Place,
+};
+
+use super::{
+    Files,
+    browser_io::{self, BlobParts, Inbox},
+    questions::PendingAction,
+    report_end,
+};
+use crate::{
+    player::{Event, FrameRequest, Player, WorkerPlayer, render_job::JobFailure},
+    session::{Session, selection::Selection, settings_store::SettingsStore},
+};
+use eframe::egui::{Context, Ui};
+
+/// The state of files in a page.
+pub(super) struct PlatformFiles {
+    /// Files that came by way of the browser.
+    inbox: Inbox,
+    /// The parameter that shall name the next file that arrives.
+    relink: Option<Place>,
+    rendering: Option<Rendering>,
+}
+
+/// Full-quality rendering, in a worker of its own, so that the preview stays live.
+struct Rendering {
+    player: WorkerPlayer,
+    /// The current request.
+    request: FrameRequest,
+    /// The name of the scene without its extension.
+    stem: String,
+    done: usize,
+    total: usize,
+    /// The archive of a shot's pictures.
+    shot: Option<ZipWriter<BlobParts>>,
+}
+
+impl PlatformFiles {
+    pub(super) fn new(_store: &SettingsStore) -> Self {
+        Self { inbox: Inbox::default(), relink: None, rendering: None }
+    }
+}
+
+impl Files {
+    /// Asks which file to open.
+    pub(in crate::app) fn ask_to_open(&mut self, ctx: &Context, session: &mut Session) {
+        self.platform.relink = None;
+        self.ask_for_file(ctx, session);
+    }
+
+    /// Asks which file `place` shall name.
+    pub(in crate::app) fn ask_to_relink(&mut self, ctx: &Context, session: &mut Session, place: Place) {
+        self.platform.relink = Some(place);
+        self.ask_for_file(ctx, session);
+    }
+
+    fn ask_for_file(&self, ctx: &Context, session: &mut Session) {
+        if browser_io::ask_for_file(&self.platform.inbox, ctx).is_err() {
+            session.set_notice(Some("the browser cannot ask for files here".into()));
+        }
+    }
+
+    /// Hands the scene to the browser, which saves it where it saves what it is given.
+    pub(in crate::app) fn save(&mut self, session: &mut Session) {
+        self.save_and(session, None);
+    }
+
+    /// Saves, and goes to `action` once that is done.
+    pub(super) fn save_and(&mut self, session: &mut Session, action: Option<PendingAction>) {
+        let text = session.document.text().clone();
+        match browser_io::download(&format!("{}.toml", stem(session)), &BlobParts::of(text.as_bytes())) {
+            Ok(()) => {
+                session.document.mark_saved(text);
+                action.into_iter().for_each(|action| self.proceed(session, action));
+            }
+            Err(_) => session.set_notice(Some("the browser cannot save files here".into())),
+        }
+    }
+
+    /// What the menu has for files of a page.
+    pub(in crate::app) fn menu_ui(&mut self, ui: &mut Ui, session: &mut Session) {
+        ui.separator();
+        if ui.button("Render still").on_hover_text("The finished picture of this frame, as a PNG").clicked() {
+            self.render_still(ui.ctx(), session);
+        }
+        if ui.button("Render shot").on_hover_text("The finished pictures of all frames, as PNGs in a ZIP").clicked() {
+            self.render_shot(ui.ctx(), session);
+        }
+    }
+
+    /// Makes the present frame as `bansho render` does, to be saved once it is there.
+    pub(in crate::app) fn render_still(&mut self, ctx: &Context, session: &mut Session) {
+        let number = session.transport.number();
+        self.render(ctx, session, number, 1, None);
+    }
+
+    /// Makes all frames as `bansho render` does, to be saved together once they are there.
+    pub(in crate::app) fn render_shot(&mut self, ctx: &Context, session: &mut Session) {
+        let frames = session.transport.frames();
+        let total = (frames.end() - frames.start() + 1) as usize;
+        self.render(ctx, session, *frames.start(), total, Some(ZipWriter::new(BlobParts::default())));
+    }
+
+    /// Makes `total` frames from `first` on as `bansho render` does; those of a `shot` are saved together.
+    fn render(
+        &mut self,
+        ctx: &Context,
+        session: &mut Session,
+        first: i64,
+        total: usize,
+        shot: Option<ZipWriter<BlobParts>>,
+    ) {
+        if self.progress().is_some() {
+            session.set_notice(Some(
+                "pictures are being rendered already; wait, or stop that with the cross beside its bar".into(),
+            ));
+            return;
+        }
+        let ctx = ctx.clone();
+        let Ok(mut player) = WorkerPlayer::start(move || ctx.request_repaint()) else {
+            session.set_notice(Some("the browser gives no worker to render in".into()));
+            return;
+        };
+        session.added_files().iter().for_each(|(name, bytes)| player.add_file(name, bytes));
+        let request = session.full_quality_request(first);
+        player.request(request.clone());
+        self.platform.rendering =
+            Some(Rendering { player, request, stem: stem(session).to_owned(), done: 0, total, shot });
+    }
+
+    /// Frames that are rendered, and all; `None` where nothing is.
+    pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
+        self.platform.rendering.as_ref().map(|rendering| [rendering.done, rendering.total])
+    }
+
+    /// Stops what is rendered.
+    pub(in crate::app) fn stop_rendering(&mut self) {
+        self.platform.rendering = None;
+    }
+
+    /// Collects rendered frames, and reports how rendering ended.
+    fn poll_rendering(&mut self, session: &mut Session) {
+        if let Some(ended) = self.platform.rendering.as_mut().and_then(Rendering::poll) {
+            self.platform.rendering = None;
+            report_end(session, ended);
+        }
+    }
+
+    /// Handles files that arrived: a scene is opened, other files are added to the open scene.
+    pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
+        self.poll_rendering(session);
+        let dropped = ui.input(|input| input.raw.dropped_files.clone());
+        dropped.into_iter().for_each(|file| browser_io::take_dropped(file, &self.platform.inbox, ui.ctx()));
+        let added_files = self.platform.inbox.take();
+        for (name, bytes) in added_files {
+            if name.ends_with(".toml") {
+                match String::from_utf8(bytes) {
+                    Ok(text) => self.open_text(session, &name, text, None),
+                    Err(_) => session.set_notice(Some(format!("{name}: is not UTF-8"))),
+                }
+                continue;
+            }
+            session.add_file(&name, bytes);
+            match self.platform.relink.take() {
+                Some(place) => session.relink(&place, Path::new(&name)),
+                None => session.drop_file(Path::new(&name), selection),
+            }
+        }
+    }
+}
+
+/// The document's name without its extension.
+fn stem(session: &Session) -> &str {
+    let name = session.document.name();
+    name.strip_suffix(".toml").unwrap_or(name)
+}
+
+impl Rendering {
+    /// Takes in what was finished and asks for what comes next; how it ended, once it has.
+    fn poll(&mut self) -> Option<Result<String, JobFailure>> {
+        self.player.poll().into_iter().find_map(|event| match event {
+            Event::FullQualityFrame { number, png } => self.take(number, &png).map_err(JobFailure::Failed).transpose(),
+            Event::Checked { outcome: Err(error), .. } => {
+                Some(Err(JobFailure::Failed(format!("the scene has faults: {error}"))))
+            }
+            Event::Failed { reason, .. } => Some(Err(JobFailure::Failed(reason))),
+            Event::Panicked { message, .. } => Some(Err(JobFailure::Panicked(message))),
+            Event::Checked { .. } | Event::Drawn(_) | Event::Stage(..) => None,
+        })
+    }
+
+    /// Takes in the picture of frame `number`; what was saved, once that was the last.
+    fn take(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
+        let name = naming::picture(&self.stem, number);
+        self.done += 1;
+        let Some(shot) = &mut self.shot else { return save(&name, &BlobParts::of(png)).map(Some) };
+        shot.add(&name, png).map_err(|error| error.to_string())?;
+        if self.done < self.total {
+            self.request.number = Some(number + 1);
+            self.player.request(self.request.clone());
+            return Ok(None);
+        }
+        let pictures = self.shot.take().map(ZipWriter::finish).transpose().map_err(|error| error.to_string())?;
+        save(&format!("{}.zip", self.stem), &pictures.unwrap_or_default()).map(Some)
+    }
+}
+
+/// Hands a file to the browser; what the user is told.
+fn save(name: &str, parts: &BlobParts) -> Result<String, String> {
+    match browser_io::download(name, parts) {
+        Ok(()) => Ok(format!("rendered: {name}")),
+        Err(_) => Err("the browser cannot save files here".into()),
+    }
+}

@@ -1,0 +1,263 @@
+//! The inspector: every parameter of the selected table, generated from the descriptors that parser, book and schema read too.
+
+use bansho::{
+    base::parameters::{Descriptor, Kind, TableDescriptor, Value},
+    render::scene::{Place, operation::Operation},
+};
+
+use crate::{
+    app::{
+        viewport::handles::implies_one_item,
+        widgets::{
+            icon::{self, Icon},
+            value::{ValueEditor, initial_value},
+        },
+    },
+    document::keyframes,
+    session::{Session, selection::Selection},
+};
+
+use eframe::egui::{Align, CollapsingHeader, Label, Layout, Response, RichText, TextEdit, Ui, vec2};
+
+/// The panel and its search text.
+#[derive(Default)]
+pub(crate) struct Inspector {
+    filter: String,
+}
+
+impl Inspector {
+    /// Shows the parameters of `selection`: all, or those whose names or descriptions hold what is looked for.
+    pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
+        let Some(descriptor) = selection.descriptor() else { return };
+        let place = selection.place();
+        ui.heading(selection.title(&session.document));
+        ui.weak(&descriptor.doc);
+        ui.horizontal(|ui| {
+            let label = ui.label("Find").id;
+            let field = TextEdit::singleline(&mut self.filter).hint_text("a parameter").desired_width(f32::INFINITY);
+            ui.add(field).labelled_by(label);
+        });
+        ui.separator();
+        if selection.index.is_some() && selection.place().find(session.document.values()).is_none() {
+            ui.label("It is not in the scene any more.");
+            return;
+        }
+        let filter = SearchFilter::new(&self.filter);
+        if !filter.is_in(descriptor) {
+            ui.weak("Nothing here is called so.");
+        }
+        table_ui(ui, session, &place, descriptor, &filter);
+    }
+}
+
+/// A search text; empty matches everything.
+struct SearchFilter(String);
+
+impl SearchFilter {
+    fn new(text: &str) -> Self {
+        Self(text.trim().to_lowercase())
+    }
+
+    fn is_everything(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether a parameter, or any within it, matches.
+    fn is(&self, parameter: &Descriptor) -> bool {
+        let said = |text: &str| text.to_lowercase().contains(&self.0);
+        let within = match &parameter.kind {
+            Kind::Table(inner) => self.is_in(inner()),
+            Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.is_in(inner())),
+            _ => false,
+        };
+        within || said(&words(parameter.key)) || said(&parameter.doc)
+    }
+
+    fn is_in(&self, table: &TableDescriptor) -> bool {
+        table.parameters.iter().any(|parameter| self.is(parameter))
+    }
+}
+
+fn table_ui(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, filter: &SearchFilter) {
+    // Where the section itself matches, all of it is shown.
+    let all = SearchFilter(String::new());
+    let filter = if filter.is_in(descriptor) { filter } else { &all };
+    for parameter in descriptor.parameters.iter().filter(|parameter| filter.is(parameter)) {
+        let own = place.key(parameter.key);
+        match &parameter.kind {
+            Kind::Table(inner) => section_ui(ui, session, &own, parameter.key, inner(), filter),
+            Kind::List { item, .. } => list_ui(ui, session, &own, parameter, item, filter),
+            _ => row_ui(ui, session, &own, parameter),
+        }
+    }
+}
+
+/// A collapsing header that is open while searching.
+fn header(title: &str, place: &Place, filter: &SearchFilter) -> CollapsingHeader {
+    CollapsingHeader::new(words(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
+}
+
+fn section_ui(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    title: &str,
+    descriptor: &TableDescriptor,
+    filter: &SearchFilter,
+) {
+    let shown = header(title, place, filter).show(ui, |ui| {
+        table_ui(ui, session, place, descriptor, filter);
+    });
+    shown.header_response.on_hover_text(&descriptor.doc);
+}
+
+/// The items of a list; tables among them are sections.
+fn list_ui(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    parameter: &Descriptor,
+    item: &Kind,
+    filter: &SearchFilter,
+) {
+    let shown = header(parameter.key, place, filter).show(ui, |ui| {
+        let stated = place.find(session.document.values()).map(|node| node.value.clone());
+        let is_stated = stated.is_some();
+        let items = match stated.or_else(|| parameter.default.clone()) {
+            Some(Value::List(items)) => items,
+            _ => Vec::new(),
+        };
+        // An item of the default list can only be changed once the file states the list.
+        let state_list = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
+        let before = if is_stated || items.is_empty() { Vec::new() } else { vec![state_list] };
+        if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(place), item) {
+            // A change to the implied item states it.
+            let implied = place.index(0);
+            section_ui(ui, session, &implied, &format!("{implied}, as usual"), inner(), filter);
+        }
+        for (index, node) in items.iter().enumerate() {
+            list_item_ui(ui, session, &place.index(index), item, &node.value, filter, &before);
+        }
+        if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
+            let append = Operation::Append { place: place.clone(), value: initial_value(item) };
+            session.edit("add", &[before.as_slice(), &[append]].concat());
+        }
+    });
+    shown.header_response.on_hover_text(&parameter.doc);
+}
+
+/// An item of a list; `before` must be applied before it can be changed.
+fn list_item_ui(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &Place,
+    kind: &Kind,
+    value: &Value,
+    filter: &SearchFilter,
+    before: &[Operation],
+) {
+    ui.horizontal(|ui| {
+        if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
+            session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
+        }
+        match kind {
+            Kind::Table(inner) => section_ui(ui, session, place, &place.to_string(), inner(), filter),
+            kind => {
+                let label = ui.label(place.to_string()).id;
+                if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).ui(ui, value) {
+                    session.edit(
+                        &place.to_string(),
+                        &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
+                    );
+                }
+            }
+        }
+    });
+}
+
+/// One parameter: its name, its value at the current time, its keyframe button and its reset button.
+fn row_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
+    let stated = place.find(session.document.values()).map(|node| node.value.clone());
+    let time = session.transport.time_s();
+    let implied_value = session.implied_value(place).or_else(|| parameter.default.clone());
+    let present = stated.as_ref().or(implied_value.as_ref()).and_then(|value| keyframes::at(value, time));
+    let curve = matches!(parameter.kind, Kind::Curve { .. });
+    let name = RichText::new(words(parameter.key));
+    let name = if stated.is_some() { name.strong() } else { name };
+    ui.horizontal_wrapped(|ui| {
+        let label = name_ui(ui, name).on_hover_text(help(parameter)).id;
+        let Some(present) = present else {
+            if ui.button("Set").labelled_by(label).clicked() {
+                session.edit(
+                    parameter.key,
+                    &[Operation::Set { place: place.clone(), value: initial_value(&parameter.kind) }],
+                );
+            }
+            return;
+        };
+        if curve {
+            reset_button_ui(ui, session, place, parameter, stated.is_some());
+            ui.end_row();
+        }
+        let default = parameter.default.as_ref();
+        let widget = ValueEditor { kind: &parameter.kind, unit: parameter.unit, label, default };
+        if let Some(value) = widget.ui(ui, &present) {
+            session.set(parameter.key, place, value);
+        }
+        if parameter.animatable() {
+            key_button_ui(ui, session, place, stated.as_ref(), present);
+        }
+        if !curve {
+            reset_button_ui(ui, session, place, parameter, stated.is_some());
+        }
+    });
+}
+
+/// The name in a column of fixed width, so that values are aligned.
+fn name_ui(ui: &mut Ui, name: RichText) -> Response {
+    const WIDTH: f32 = 118.0;
+    let size = vec2(WIDTH, ui.spacing().interact_size.y);
+    let layout = Layout::left_to_right(Align::Center);
+    ui.allocate_ui_with_layout(size, layout, |ui| {
+        ui.set_min_width(WIDTH);
+        ui.add(Label::new(name).truncate())
+    })
+    .inner
+}
+
+fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {
+    let name = format!("Default of {}", words(parameter.key));
+    if stated && icon::button(ui, Icon::Reset, &name).clicked() {
+        session.edit("default", &[Operation::Remove { place: place.clone() }]);
+    }
+}
+
+/// A diamond that adds or removes the keyframe at the current time; filled where there is one.
+fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<&Value>, present: Value) {
+    let time = session.transport.time_s();
+    let half = 0.5 * session.transport.frame_s();
+    let keys = stated.map(keyframes::keys).unwrap_or_default();
+    let here = keys.iter().map(|(own, _)| *own).find(|own| (own - time).abs() < half);
+    let (sign, doc) = match here {
+        Some(_) => (Icon::KeyHere, "Take out the key at this time"),
+        None if keys.is_empty() => (Icon::Key, "Key the value at this time"),
+        None => (Icon::Keyed, "Keyed; key the value at this time"),
+    };
+    if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
+        match here {
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: place.clone(), time }]),
+            None => session.key(place, present),
+        }
+    }
+}
+
+/// What a parameter is, its unit and what it may be, as the book says it.
+fn help(parameter: &Descriptor) -> String {
+    let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
+    format!("{}{unit}\n\nAllowed: {}.", parameter.doc, parameter.kind.expectation())
+}
+
+/// A key in words.
+pub(crate) fn words(key: &str) -> String {
+    key.replace('_', " ")
+}

@@ -1,0 +1,132 @@
+//! The scene panel: phenomena to hide, solo, duplicate and remove, and the shared tables.
+
+use bansho::{
+    KINDS,
+    base::parameters::{Table, Value},
+    render::scene::{Place, SHARED_TABLES, operation::Operation},
+};
+
+use crate::{
+    document::{PhenomenonEntry, phenomena::operations},
+    session::{Session, selection::Selection},
+};
+
+use eframe::egui::{self, Ui};
+
+/// Shows the panel; `selection` is what is chosen.
+pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
+    ui.horizontal(|ui| {
+        ui.heading("Scene");
+        add_menu_ui(ui, session, selection);
+    });
+    for listed in session.document.phenomena() {
+        ui.push_id((listed.kind, listed.index), |ui| phenomenon_ui(ui, session, selection, &listed));
+    }
+    ui.separator();
+    for shared in SHARED_TABLES.iter().filter(|table| !table.many) {
+        row_ui(ui, selection, Selection { key: shared.key, index: None }, shared.key);
+    }
+    for shared in SHARED_TABLES.iter().filter(|table| table.many) {
+        let count = match session.document.values().get(shared.key).map(|node| &node.value) {
+            Some(Value::List(items)) => items.len(),
+            _ => 0,
+        };
+        for index in 0..count {
+            let own = Selection { key: shared.key, index: Some(index) };
+            let response = row_ui(ui, selection, own.clone(), &format!("{} {}", shared.key, index + 1));
+            response.context_menu(|ui| {
+                if ui.button("Remove").clicked() {
+                    session.edit("remove", &[Operation::Remove { place: own.place() }]);
+                    *selection = Selection::default();
+                }
+            });
+        }
+    }
+}
+
+fn row_ui(ui: &mut Ui, selection: &mut Selection, own: Selection, text: &str) -> egui::Response {
+    let response = ui.selectable_label(*selection == own, text);
+    if response.clicked() {
+        *selection = own;
+    }
+    response
+}
+
+fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
+    ui.menu_button("Add", |ui| {
+        for kind in KINDS {
+            if ui.button(kind.key).on_hover_text((kind.table)().doc.as_str()).clicked() {
+                let index = session.document.phenomena().iter().filter(|listed| listed.kind == kind.key).count();
+                let add = operations::add(&session.document, kind.key);
+                session.edit("add", &add);
+                *selection = Selection { key: kind.key, index: Some(index) };
+                ui.close();
+            }
+        }
+        ui.separator();
+        for shared in SHARED_TABLES.iter().filter(|table| table.many) {
+            if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
+                let place = Place::root().key(shared.key);
+                session.edit("add", &[Operation::Append { place, value: Value::Table(Table::default()) }]);
+                ui.close();
+            }
+        }
+    })
+    .response
+    .on_hover_text("Add a phenomenon, a light or an obstacle");
+}
+
+fn phenomenon_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
+    let own = Selection { key: listed.kind, index: Some(listed.index) };
+    ui.horizontal(|ui| {
+        let mut enabled = listed.enabled;
+        let name = format!("Draw {}", listed.name);
+        let shown = ui.checkbox(&mut enabled, "").on_hover_text(&name).accessible_name(name);
+        if shown.changed() {
+            session.edit("hide", &[operations::set_enabled(listed, enabled)]);
+        }
+        let response = row_ui(ui, selection, own, &listed.name).on_hover_text(listed.kind);
+        response.context_menu(|ui| phenomenon_menu_ui(ui, session, selection, listed));
+        let solo = ui.small_button("S").on_hover_text(format!("Draw only {}, or all again", listed.name));
+        let solo = solo.accessible_name(format!("Solo {}", listed.name));
+        if solo.clicked() {
+            let change = operations::solo(&session.document, listed);
+            session.edit("solo", &change);
+        }
+    });
+}
+
+fn phenomenon_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
+    rename_ui(ui, session, listed);
+    if ui.button("Duplicate").clicked() {
+        let copy = operations::duplicate(&session.document, listed);
+        session.edit("duplicate", &copy);
+        ui.close();
+    }
+    if ui.button("Remove").clicked() {
+        session.edit("remove", &[Operation::Remove { place: listed.place() }]);
+        *selection = Selection::default();
+        ui.close();
+    }
+}
+
+/// A field for its name, applied when the field loses the focus: a partial name may equal another's.
+fn rename_ui(ui: &mut Ui, session: &mut Session, listed: &PhenomenonEntry) {
+    let kept = ui.scope_id().with("name");
+    let mut name = ui.data(|data| data.get_temp::<String>(kept)).unwrap_or_else(|| listed.name.clone());
+    ui.horizontal(|ui| {
+        let label = ui.label("Name").id;
+        let field = ui.add(egui::TextEdit::singleline(&mut name).desired_width(120.0)).labelled_by(label);
+        if field.changed() {
+            ui.data_mut(|data| data.insert_temp(kept, name.clone()));
+        }
+        if field.lost_focus() {
+            ui.data_mut(|data| data.remove::<String>(kept));
+            if !name.trim().is_empty() && name != listed.name {
+                let place = listed.place().key("name");
+                session.edit("rename", &[Operation::Set { place, value: Value::Text(name.trim().to_owned()) }]);
+                ui.close();
+            }
+        }
+    });
+}

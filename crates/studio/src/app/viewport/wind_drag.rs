@@ -1,0 +1,72 @@
+//! A drag that sets the wind: while it lasts the drag vector is added to the wind, then the wind is what it was before.
+
+use bansho::{
+    base::{math::DVec3, parameters::Value},
+    render::scene::{Place, operation::Operation},
+};
+
+use super::pointer::rounded;
+use crate::{document::keyframes, session::Session};
+
+/// A wind drag, with the wind before it began.
+#[derive(Clone, Debug)]
+pub(super) struct WindDrag {
+    base_velocity: [f64; 3],
+    recording: bool,
+    /// When it began, s.
+    start_s: f64,
+}
+
+/// The name of the step in the history.
+const LABEL: &str = "blow";
+
+fn place() -> Place {
+    Place::root().key("wind").key("velocity")
+}
+
+impl WindDrag {
+    /// Begins a drag. While recording, the playback runs during the drag.
+    pub(super) fn begin(session: &mut Session) -> Self {
+        let base_velocity =
+            keyframes::vector(session.document.values(), &place(), session.transport.time_s()).unwrap_or_default();
+        let base_velocity = base_velocity.to_array();
+        let wind_drag = Self { base_velocity, recording: session.recording, start_s: session.transport.time_s() };
+        session.document.end_step();
+        if wind_drag.recording {
+            session.transport.play_to_the_end();
+            wind_drag.key(session, base_velocity);
+        }
+        wind_drag
+    }
+
+    /// Sets the wind to `wind`, m/s, on top of the wind before the drag.
+    pub(super) fn update(&self, session: &mut Session, wind: DVec3) {
+        let velocity = rounded(DVec3::from(self.base_velocity) + wind);
+        if self.recording {
+            // The keyframe at the start of the drag stays, and recording stops at the end of the shot.
+            if session.transport.time_s() != self.start_s && session.transport.is_playing() {
+                self.key(session, velocity);
+            }
+        } else {
+            session.edit(LABEL, &[Operation::Set { place: place(), value: Value::numbers(velocity) }]);
+        }
+    }
+
+    /// Ends the drag: recorded wind returns to the wind before it; unrecorded wind is reset without an undo step.
+    pub(super) fn end(self, session: &mut Session) {
+        if self.recording {
+            if session.transport.is_playing() {
+                self.key(session, self.base_velocity);
+            }
+            session.transport.set_playing(false);
+            session.document.end_step();
+        } else {
+            session.document.discard_step(LABEL);
+        }
+    }
+
+    fn key(&self, session: &mut Session, velocity: [f64; 3]) {
+        let key = session.keyframe(&place(), Value::numbers(velocity));
+        session.edit(LABEL, &[key]);
+    }
+}

@@ -1,0 +1,71 @@
+//! Small buttons with painted signs: no font needs to have them, and they look alike everywhere.
+
+use eframe::egui::{self, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
+
+/// A sign on a button.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Icon {
+    /// To the first frame.
+    First,
+    /// One frame back.
+    Back,
+    /// Lets time pass.
+    Play,
+    /// Stops time.
+    Pause,
+    /// One frame on.
+    On,
+    /// A key may be set.
+    Key,
+    /// Keyed, but not at this time.
+    Keyed,
+    /// A key stands here.
+    KeyHere,
+    /// Back to the default.
+    Reset,
+    /// Takes out, or away.
+    Cross,
+}
+
+/// A button with `icon`; `name` says what it does.
+pub(crate) fn button(ui: &mut Ui, icon: Icon, name: &str) -> Response {
+    let (rect, response) = ui.allocate_exact_size(Vec2::splat(ui.spacing().interact_size.y), Sense::click());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, ui.is_enabled(), name));
+    if ui.is_rect_visible(rect) {
+        let visuals = ui.style().interact(&response);
+        ui.painter().rect(rect, visuals.corner_radius, visuals.weak_bg_fill, visuals.bg_stroke, StrokeKind::Inside);
+        ui.painter().extend(icon.shapes(rect.shrink(0.3 * rect.height()), visuals.fg_stroke));
+    }
+    response.on_hover_text(name)
+}
+
+impl Icon {
+    fn shapes(self, rect: Rect, stroke: Stroke) -> Vec<Shape> {
+        let filled = |points: Vec<Pos2>| Shape::convex_polygon(points, stroke.color, Stroke::NONE);
+        let line = |points: Vec<Pos2>| Shape::line(points, Stroke::new(1.5, stroke.color));
+        let at = |x: f32, y: f32| pos2(rect.left() + x * rect.width(), rect.top() + y * rect.height());
+        let bar = |x: f32| Shape::rect_filled(Rect::from_min_max(at(x, 0.0), at(x + 0.28, 1.0)), 0.0, stroke.color);
+        let diamond = || vec![at(0.5, -0.1), at(1.1, 0.5), at(0.5, 1.1), at(-0.1, 0.5), at(0.5, -0.1)];
+        match self {
+            Self::First => vec![bar(-0.1), filled(vec![at(1.1, 0.0), at(1.1, 1.0), at(0.3, 0.5)])],
+            Self::Back => vec![filled(vec![at(0.75, 0.1), at(0.75, 0.9), at(0.15, 0.5)])],
+            Self::Play => vec![filled(vec![at(0.1, -0.1), at(1.1, 0.5), at(0.1, 1.1)])],
+            Self::Pause => vec![bar(0.08), bar(0.64)],
+            Self::On => vec![filled(vec![at(0.25, 0.1), at(0.85, 0.5), at(0.25, 0.9)])],
+            Self::Key => vec![line(diamond())],
+            Self::Keyed => vec![line(diamond()), Shape::circle_filled(rect.center(), 1.8, stroke.color)],
+            Self::KeyHere => vec![filled(diamond())],
+            Self::Reset => reset(rect, stroke),
+            Self::Cross => vec![line(vec![at(0.1, 0.1), at(0.9, 0.9)]), line(vec![at(0.9, 0.1), at(0.1, 0.9)])],
+        }
+    }
+}
+
+/// An arc with an arrow's head.
+fn reset(rect: Rect, stroke: Stroke) -> Vec<Shape> {
+    let radius = 0.5 * rect.width();
+    let on = |turns: f32| rect.center() + radius * Vec2::angled(std::f32::consts::TAU * turns);
+    let arc = (0..=18).map(|step| on(-0.12 + 0.75 * step as f32 / 18.0)).collect();
+    let head = |by: Vec2| Shape::line_segment([on(-0.12), on(-0.12) + by], Stroke::new(1.5, stroke.color));
+    vec![Shape::line(arc, Stroke::new(1.5, stroke.color)), head(vec2(-4.0, -0.5)), head(vec2(0.5, -4.0))]
+}

@@ -1,0 +1,97 @@
+//! Watches a file for changes by other programs: a thread polls its modification time and length.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::{Duration, SystemTime},
+};
+
+/// Polling interval.
+const POLL_INTERVAL: Duration = Duration::from_millis(700);
+
+/// Watches one file until it is dropped.
+#[derive(Debug)]
+pub struct FileWatcher {
+    path: PathBuf,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    touched: AtomicBool,
+    closing: AtomicBool,
+}
+
+/// Modification time and length.
+fn modification_stamp(path: &Path) -> Option<(SystemTime, u64)> {
+    let about = fs::metadata(path).ok()?;
+    Some((about.modified().ok()?, about.len()))
+}
+
+impl FileWatcher {
+    /// Looks at `path` from now on; `wake` is called from another thread when it was touched.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn start(path: &Path, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let (watched, own) = (path.to_path_buf(), shared.clone());
+        let look = move || {
+            let mut last = modification_stamp(&watched);
+            while !own.closing.load(Ordering::Relaxed) {
+                thread::sleep(POLL_INTERVAL);
+                let now = modification_stamp(&watched);
+                if now != last {
+                    last = now;
+                    own.touched.store(true, Ordering::Relaxed);
+                    wake();
+                }
+            }
+        };
+        thread::Builder::new().name("watch".into()).spawn(look)?;
+        Ok(Self { path: path.to_path_buf(), shared })
+    }
+
+    /// What it looks at.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether it was touched since this was asked last.
+    pub fn touched(&self) -> bool {
+        self.shared.touched.swap(false, Ordering::Relaxed)
+    }
+}
+
+impl Drop for FileWatcher {
+    fn drop(&mut self) {
+        self.shared.closing.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[test]
+    fn a_writing_is_told_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        fs::write(&path, "bansho = 1\n").unwrap();
+        let (sender, woken) = mpsc::channel();
+        let watch = FileWatcher::start(&path, move || sender.send(()).unwrap_or_default()).unwrap();
+        assert!(!watch.touched());
+        // The thread may have taken its first look before or after this.
+        thread::sleep(Duration::from_millis(200));
+        fs::write(&path, "bansho = 1 # longer\n").unwrap();
+        woken.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(watch.touched() && !watch.touched());
+    }
+}

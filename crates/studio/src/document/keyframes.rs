@@ -1,0 +1,123 @@
+//! Values keyed over time, as a scene states them.
+
+use bansho::{
+    KINDS,
+    base::{
+        math::{
+            DVec3,
+            curve::{Curve, Interpolation},
+        },
+        parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
+    },
+    render::scene::{Place, SHARED_TABLES, Segment},
+};
+
+/// Whether what stands at `place` of a scene may be keyed over time.
+pub(crate) fn animatable(place: &Place) -> bool {
+    let keys: Vec<&str> = place.segments().iter().filter_map(key).collect();
+    let [root, inner @ .., last] = keys.as_slice() else { return false };
+    let shared = SHARED_TABLES.iter().find(|table| table.key == *root).map(|table| (table.table)());
+    let table = shared.or_else(|| KINDS.iter().find(|kind| kind.key == *root).map(|kind| (kind.table)()));
+    let within = |table: &'static TableDescriptor, key: &&str| table_of(&parameter(table, key)?.kind);
+    let table = table.and_then(|table| inner.iter().try_fold(table, within));
+    table.and_then(|table| parameter(table, last)).is_some_and(Descriptor::animatable)
+}
+
+/// Items of a list are alike.
+fn key(segment: &Segment) -> Option<&str> {
+    match segment {
+        Segment::Key(key) => Some(key),
+        Segment::Index(_) => None,
+    }
+}
+
+fn parameter(table: &'static TableDescriptor, key: &str) -> Option<&'static Descriptor> {
+    table.parameters.iter().find(|parameter| parameter.key == key)
+}
+
+fn table_of(kind: &Kind) -> Option<&'static TableDescriptor> {
+    match kind {
+        Kind::Table(table) => Some(table()),
+        Kind::List { item, .. } => table_of(item),
+        _ => None,
+    }
+}
+
+/// Whether `value` is keyed: `{ keys = [[seconds, value], ...] }`.
+pub(crate) fn is_keyed(value: &Value) -> bool {
+    matches!(value, Value::Table(table) if table.get("keys").is_some())
+}
+
+/// The keys of a keyed value, (s, value), as far as they are well formed.
+pub(crate) fn keys(value: &Value) -> Vec<(f64, &Value)> {
+    let Value::Table(table) = value else { return Vec::new() };
+    let Some(Value::List(items)) = table.get("keys").map(|node| &node.value) else { return Vec::new() };
+    items.iter().filter_map(pair).collect()
+}
+
+fn pair(item: &Node) -> Option<(f64, &Value)> {
+    let Value::List(pair) = &item.value else { return None };
+    let [time, value] = pair.as_slice() else { return None };
+    Some((time.value.as_number()?, &value.value))
+}
+
+/// What `value` is at `time`: itself, or what its keys come to. `None` where those are faulty.
+pub(crate) fn at(value: &Value, time: f64) -> Option<Value> {
+    if !is_keyed(value) {
+        return Some(value.clone());
+    }
+    let keys = keys(value);
+    let interpolation = interpolation(value);
+    let number = |component: Option<usize>| {
+        let point = |(time, value): &(f64, &Value)| Some([*time, self::component(value, component)?]);
+        let points: Vec<[f64; 2]> = keys.iter().map(point).collect::<Option<_>>()?;
+        Some(Curve::new(points, interpolation).ok()?.eval(time))
+    };
+    match keys.first()?.1 {
+        Value::List(items) => {
+            let components: Vec<f64> = (0..items.len()).map(|index| number(Some(index))).collect::<Option<_>>()?;
+            Some(Value::numbers(components))
+        }
+        _ => number(None).map(Value::Number),
+    }
+}
+
+/// The three numbers at `place` of the scene `root` at `time`, if it states them.
+pub(crate) fn vector(root: &Table, place: &Place, time: f64) -> Option<DVec3> {
+    let Value::List(items) = at(&place.find(root)?.value, time)? else { return None };
+    let numbers: Vec<f64> = items.iter().map(|item| item.value.as_number()).collect::<Option<_>>()?;
+    Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?))
+}
+
+fn component(value: &Value, index: Option<usize>) -> Option<f64> {
+    match (value, index) {
+        (Value::List(items), Some(index)) => items.get(index)?.value.as_number(),
+        (value, None) => value.as_number(),
+        _ => None,
+    }
+}
+
+fn interpolation(value: &Value) -> Interpolation {
+    let Value::Table(table) = value else { return Interpolation::Monotone };
+    let name = match table.get("interpolation").map(|node| &node.value) {
+        Some(Value::Text(name)) => InterpolationName::from_name(name),
+        _ => None,
+    };
+    name.unwrap_or_default().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_know_whether_they_may_be_keyed() {
+        let within = |root: &str, keys: &[&str]| keys.iter().fold(Place::root().key(root), |place, key| place.key(key));
+        assert!(animatable(&within("wind", &["velocity"])) && animatable(&within("camera", &["position"])));
+        assert!(animatable(&Place::root().key("light").index(3).key("position")));
+        assert!(animatable(&Place::root().key("flame_sheet").index(0).key("colour").key("luminance")));
+        assert!(!animatable(&Place::root().key("flame_sheet").index(0).key("height")));
+        assert!(!animatable(&within("picture", &["size"])) && !animatable(&Place::root()));
+        assert!(!animatable(&within("no_such_table", &["at_all"])));
+    }
+}

@@ -1,0 +1,160 @@
+//! Edits of an aurora's shapes as operations on the scene's text: draw and smooth strokes, split, merge and link sheets.
+//! `bansho::aurora::shapes` validates every edit; its error is shown.
+
+mod changes;
+mod links;
+pub mod polyline;
+mod removal;
+mod renumber;
+mod sheets;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use bansho::{
+    Assets,
+    aurora::{
+        AuroraParameters,
+        shapes::{Sequence, ShapeError},
+    },
+    base::{
+        math::DVec2,
+        parameters::{Parameters, ProblemKind, Reader, Table, Value},
+    },
+    render::scene::{
+        Place,
+        edit::EditError,
+        operation::{self, Operation},
+        values,
+    },
+};
+
+use crate::document::Document;
+
+pub use changes::SheetEnd;
+pub use links::SheetPosition;
+pub use sheets::Factor;
+
+/// The shapes of one aurora of a scene.
+#[derive(Clone, Debug)]
+pub struct AuroraDrawing {
+    place: Place,
+    parameters: AuroraParameters,
+    sequence: Sequence,
+}
+
+/// Why shapes cannot be shown or edited.
+#[derive(Debug, thiserror::Error)]
+pub enum ShapeEditError {
+    /// There is no such aurora.
+    #[error("the aurora is not in the scene any more")]
+    Missing,
+    /// A problem outside of the shapes.
+    #[error("{0}")]
+    Faulty(String),
+    /// Invalid shapes.
+    #[error("shape {}: {}", shape_number(.0), .0.kind)]
+    Shape(ShapeError),
+    /// The text cannot be edited.
+    #[error(transparent)]
+    Edit(#[from] EditError),
+}
+
+/// The 1-based number of the shape with the fault.
+fn shape_number(fault: &ShapeError) -> usize {
+    let number = fault.key.split('.').nth(1).and_then(|segment| segment.parse::<usize>().ok());
+    number.unwrap_or_default() + 1
+}
+
+impl AuroraDrawing {
+    /// The shapes of aurora `index` of the scene `root`.
+    ///
+    /// # Errors
+    /// There is no such aurora, or its parameters or shapes are faulty.
+    pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, ShapeEditError> {
+        let place = Place::root().key("aurora").index(index);
+        let Some(Value::Table(table)) = place.find(root).map(|node| &node.value) else {
+            return Err(ShapeEditError::Missing);
+        };
+        let mut reader = Reader::new();
+        let parameters = AuroraParameters::read_table(table, &mut reader, &[]);
+        // Keys that every phenomenon has are not the aurora's own.
+        let own = |kind: &ProblemKind| !matches!(kind, ProblemKind::UnknownKey { .. });
+        if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| own(&problem.kind)) {
+            return Err(ShapeEditError::Faulty(problem.to_string()));
+        }
+        let AuroraParameters { shapes, motion, extent_km, .. } = &parameters;
+        let sequence =
+            Sequence::new(shapes, motion, *extent_km, assets.as_ref(), None).map_err(ShapeEditError::Shape)?;
+        Ok(Self { place, parameters, sequence })
+    }
+
+    /// Side of the map, km.
+    pub fn extent_km(&self) -> f64 {
+        self.parameters.extent_km
+    }
+
+    /// Whether the scene states shapes; an aurora without any has default shapes.
+    pub fn is_stated(&self) -> bool {
+        !self.parameters.shapes.is_empty()
+    }
+
+    /// When each shape is reached, s.
+    pub fn arrivals(&self) -> &[f64] {
+        if self.is_stated() { self.sequence.arrivals() } else { &self.sequence.arrivals()[..1] }
+    }
+
+    /// The lines of all sheets of shape `shape`, km.
+    pub fn lines(&self, shape: usize) -> Vec<Vec<DVec2>> {
+        let time = self.sequence.arrivals().get(shape).copied();
+        let sheets = time.map(|time| self.sequence.at(time).sheets).unwrap_or_default();
+        sheets.into_iter().map(|sheet| sheet.points).collect()
+    }
+
+    /// A factor at each control point of sheet `sheet`.
+    pub fn factors(&self, shape: usize, sheet: usize, factor: Factor) -> Vec<f64> {
+        let time = self.sequence.arrivals().get(shape).copied().unwrap_or_default();
+        let sheet = self.sequence.at(time).sheets.into_iter().nth(sheet).unwrap_or_default();
+        match factor {
+            Factor::Flux => sheet.flux,
+            Factor::Energy => sheet.energy,
+        }
+    }
+
+    /// The segments of the previous shape that become sheet `sheet` of shape `shape`.
+    pub fn origins(&self, shape: usize, sheet: usize) -> Vec<Vec<DVec2>> {
+        let all = self.lines(shape);
+        let arrives = |point_paths: &&Vec<[DVec2; 2]>| {
+            let Some([_, middle]) = point_paths.get(point_paths.len() / 2) else { return false };
+            polyline::nearest_among(&all, *middle).is_some_and(|(own, _)| own == sheet)
+        };
+        let strands = shape.checked_sub(1).map(|before| self.point_paths(before)).unwrap_or_default();
+        strands.iter().filter(arrives).map(|point_paths| point_paths.iter().map(|way| way[0]).collect()).collect()
+    }
+
+    /// The paths of the points of shape `shape` to the next one, km, by strand: start and end.
+    pub fn point_paths(&self, shape: usize) -> Vec<Vec<[DVec2; 2]>> {
+        self.sequence.control_point_paths(shape)
+    }
+}
+
+impl Document {
+    /// Applies `operations` as [`edit`](Self::edit) does, if the resulting shapes of aurora `index` are valid.
+    ///
+    /// # Errors
+    /// They are invalid; nothing is changed then.
+    pub fn edit_shapes(
+        &mut self,
+        label: &str,
+        operations: &[Operation],
+        index: usize,
+        assets: &Arc<dyn Assets>,
+    ) -> Result<AuroraDrawing, ShapeEditError> {
+        let text = operation::apply(self.text(), operations)?;
+        let root = values(&text).map_err(|problem| ShapeEditError::Faulty(problem.to_string()))?;
+        let drawing = AuroraDrawing::read(&root, index, assets)?;
+        self.apply_text(label, text, root);
+        Ok(drawing)
+    }
+}

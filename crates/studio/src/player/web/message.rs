@@ -1,0 +1,199 @@
+//! Messages between page and worker as JavaScript arrays (structured clone).
+
+use std::sync::Arc;
+
+use bansho::Assets;
+
+use super::reply::Reply;
+use crate::{
+    document::{ReportedProblem, Revision},
+    player::{FrameRequest, Picture},
+};
+use js_sys::{Array, Uint8Array};
+use wasm_bindgen::{JsCast, JsValue};
+
+/// A message from the page to the worker.
+pub(super) enum PageMessage {
+    /// A file that no folder holds.
+    File(String, Vec<u8>),
+    /// A frame request, with its number.
+    Request(u64, FrameRequest),
+}
+
+impl PageMessage {
+    pub(super) fn file(name: &str, bytes: &[u8]) -> Array {
+        array(["file".into(), name.into(), Uint8Array::from(bytes).into()])
+    }
+
+    pub(super) fn request(number: u64, request: &FrameRequest) -> Array {
+        let frame = request.number.map_or(JsValue::NULL, |frame| (frame as f64).into());
+        let [width, height] = request.within.map(|side| JsValue::from(side as f64));
+        let flags = [request.exact, request.draft, request.full_quality].map(JsValue::from);
+        let head = [
+            JsValue::from("request"),
+            count(number),
+            count(request.revision.0),
+            (&*request.name).into(),
+            (&*request.text).into(),
+        ];
+        let stages = request.stages.map_or(JsValue::NULL, |sheet| (sheet as f64).into());
+        head.into_iter().chain([frame, width, height]).chain(flags).chain([stages]).collect()
+    }
+
+    /// Reads a message; requests find their files in `assets`.
+    pub(super) fn read(message: &JsValue, assets: &Arc<dyn Assets>) -> Option<Self> {
+        let mut fields = Fields::of(message)?;
+        Some(match fields.text()?.as_str() {
+            "file" => Self::File(fields.text()?, fields.bytes()?),
+            "request" => {
+                let number = fields.count()?;
+                let request = FrameRequest {
+                    revision: Revision(fields.count()?),
+                    name: fields.text()?,
+                    text: fields.text()?.into(),
+                    assets: assets.clone(),
+                    number: fields.next()?.as_f64().map(|frame| frame as i64),
+                    within: fields.size()?,
+                    exact: fields.flag()?,
+                    draft: fields.flag()?,
+                    full_quality: fields.flag()?,
+                    stages: fields.next()?.as_f64().map(|sheet| sheet as usize),
+                };
+                Self::Request(number, request)
+            }
+            _ => return None,
+        })
+    }
+}
+
+impl Reply {
+    pub(super) fn write(self) -> Array {
+        match self {
+            Self::Ready => array(["ready".into()]),
+            Self::Checked { number, found: Ok(ev100) } => array(["checked".into(), count(number), ev100.into()]),
+            Self::Checked { number, found: Err(faults) } => {
+                let faults: Array = faults.iter().map(fault).collect();
+                array(["checked".into(), count(number), faults.into()])
+            }
+            Self::Drawn { picture } => drawn("drawn", &picture).collect(),
+            Self::Stage { stage, picture } => drawn("stage", &picture).chain([JsValue::from(stage as f64)]).collect(),
+            Self::FullQualityFrame { frame, png } => {
+                array(["full_quality_frame".into(), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
+            }
+            Self::Failed { number, reason } => array(["failed".into(), count(number), reason.into()]),
+            Self::Panicked { number, message } => array(["panicked".into(), count(number), message.into()]),
+            Self::Done { number } => array(["done".into(), count(number)]),
+        }
+    }
+
+    pub(super) fn read(message: &JsValue) -> Option<Self> {
+        let mut fields = Fields::of(message)?;
+        Some(match fields.text()?.as_str() {
+            "ready" => Self::Ready,
+            "checked" => {
+                let number = fields.count()?;
+                let said = fields.next()?;
+                let faults =
+                    || said.dyn_ref::<Array>().into_iter().flat_map(Array::iter).filter_map(read_fault).collect();
+                Self::Checked { number, found: said.as_f64().map(|ev100| ev100 as f32).ok_or_else(faults) }
+            }
+            "drawn" => Self::Drawn { picture: fields.picture()? },
+            "stage" => {
+                let picture = fields.picture()?;
+                Self::Stage { stage: fields.number()? as usize, picture }
+            }
+            "full_quality_frame" => Self::FullQualityFrame { frame: fields.number()? as i64, png: fields.bytes()? },
+            "failed" => Self::Failed { number: fields.count()?, reason: fields.text()? },
+            "panicked" => Self::Panicked { number: fields.count()?, message: fields.text()? },
+            "done" => Self::Done { number: fields.count()? },
+            _ => return None,
+        })
+    }
+}
+
+fn array<const N: usize>(fields: [JsValue; N]) -> Array {
+    fields.into_iter().collect()
+}
+
+/// A fault as a message holds it: without a place, both of its ends are null.
+fn fault(found: &ReportedProblem) -> Array {
+    let end = |at: Option<usize>| at.map_or(JsValue::NULL, |at| (at as f64).into());
+    let [start, stop] = [found.span.as_ref().map(|span| span.start), found.span.as_ref().map(|span| span.end)].map(end);
+    let asset = found.asset.as_deref().map_or(JsValue::NULL, JsValue::from);
+    array([start, stop, (&*found.path).into(), (&*found.reason).into(), asset])
+}
+
+fn read_fault(message: JsValue) -> Option<ReportedProblem> {
+    let mut fields = Fields::of(&message)?;
+    let [start, stop] = [fields.next()?, fields.next()?].map(|end| end.as_f64().map(|at| at as usize));
+    let span = start.zip(stop).map(|(start, stop)| start..stop);
+    Some(ReportedProblem { span, path: fields.text()?, reason: fields.text()?, asset: fields.next()?.as_string() })
+}
+
+/// Counts stay far below 2^53.
+fn count(number: u64) -> JsValue {
+    (number as f64).into()
+}
+
+fn drawn(kind: &str, picture: &Picture) -> impl Iterator<Item = JsValue> {
+    let Picture { revision, number: frame, size, scene_size, pixels, exact, draft, draw_s, advance_s } = picture;
+    let head = [JsValue::from(kind), count(revision.0), (*frame as f64).into()];
+    let sizes = [*size, *scene_size].concat().into_iter().map(|side| JsValue::from(side as f64));
+    let pixels = Uint8Array::from(pixels.as_flattened());
+    let tail = [pixels.into(), (*exact).into(), (*draft).into(), (*draw_s).into(), (*advance_s).into()];
+    head.into_iter().chain(sizes).chain(tail)
+}
+
+/// The fields of a message, one after another.
+struct Fields(std::vec::IntoIter<JsValue>);
+
+impl Fields {
+    fn of(message: &JsValue) -> Option<Self> {
+        Some(Self(message.dyn_ref::<Array>()?.to_vec().into_iter()))
+    }
+
+    fn next(&mut self) -> Option<JsValue> {
+        self.0.next()
+    }
+
+    fn text(&mut self) -> Option<String> {
+        self.next()?.as_string()
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        self.next()?.as_f64()
+    }
+
+    fn count(&mut self) -> Option<u64> {
+        self.number().map(|number| number as u64)
+    }
+
+    fn flag(&mut self) -> Option<bool> {
+        self.next()?.as_bool()
+    }
+
+    fn size(&mut self) -> Option<[usize; 2]> {
+        Some([self.number()? as usize, self.number()? as usize])
+    }
+
+    fn bytes(&mut self) -> Option<Vec<u8>> {
+        Some(self.next()?.dyn_into::<Uint8Array>().ok()?.to_vec())
+    }
+
+    fn picture(&mut self) -> Option<Picture> {
+        let (revision, number) = (Revision(self.count()?), self.number()? as i64);
+        let (size, scene_size, bytes) = (self.size()?, self.size()?, self.bytes()?);
+        let (pixels, _) = bytes.as_chunks();
+        Some(Picture {
+            revision,
+            number,
+            size,
+            scene_size,
+            pixels: pixels.to_vec(),
+            exact: self.flag()?,
+            draft: self.flag()?,
+            draw_s: self.number()?,
+            advance_s: self.number()?,
+        })
+    }
+}

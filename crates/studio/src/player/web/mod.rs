@@ -1,0 +1,10 @@
+//! The player of a web page: a worker that runs the same program, and the messages between both.
+
+#[cfg(target_arch = "wasm32")]
+pub(crate) mod message;
+#[cfg(any(test, target_arch = "wasm32"))]
+pub(crate) mod pending;
+#[cfg(any(test, target_arch = "wasm32"))]
+pub(crate) mod reply;
+#[cfg(target_arch = "wasm32")]
+pub(crate) mod worker;

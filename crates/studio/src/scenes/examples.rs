@@ -1,0 +1,209 @@
+//! The example scenes and their files, embedded in the program.
+
+use std::{path::Path, sync::Arc};
+
+use bansho::{
+    Assets, MemoryAssets,
+    base::{
+        geometry::{mesh::Mesh, strokes::Drawing},
+        host::assets::{AssetError, AssetProblem, Picture},
+    },
+    media::assets::{decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing},
+};
+
+macro_rules! files {
+    ($type:ty, $include:ident, $($name:literal),* $(,)?) => {
+        &[$(($name, $include!(concat!("../../../../scenes/", $name)) as $type)),*]
+    };
+}
+
+/// Every example: its file's name and its text.
+pub const SCENES: &[(&str, &str)] = files!(
+    &str,
+    include_str,
+    "bonfire.toml",
+    "burning_mesh.toml",
+    "campfire.toml",
+    "campfire_in_rain.toml",
+    "candle.toml",
+    "corona.toml",
+    "dome_night.toml",
+    "downpour_day.toml",
+    "drizzle.toml",
+    "fire_in_court.toml",
+    "headlights.toml",
+    "headlights_ahead.toml",
+    "hearth.toml",
+    "inagaki_density.toml",
+    "inagaki_haze.toml",
+    "inagaki_paper.toml",
+    "inagaki_still.toml",
+    "inagaki_wind_left.toml",
+    "inagaki_wind_right.toml",
+    "lake.toml",
+    "ohshima_itahashi.toml",
+    "quiet_arc.toml",
+    "rain_over_plate.toml",
+    "red_aurora.toml",
+    "sekiguchi_1.toml",
+    "sekiguchi_2.toml",
+    "sekiguchi_3.toml",
+    "sekiguchi_4.toml",
+    "sekiguchi_5.toml",
+    "street_lamp.toml",
+    "street_lamp_near.toml",
+    "torch.toml",
+    "torch_in_gusts.toml",
+);
+
+/// The files that they name.
+const FILES: &[(&str, &[u8])] = files!(
+    &[u8],
+    include_bytes,
+    "meshes/ring.glb",
+    "plates/checkerboard.png",
+    "plates/court.jpg",
+    "plates/court_depth.exr",
+    "plates/grove.jpg",
+    "plates/grove_depth.exr",
+    "plates/hearth.jpg",
+    "plates/hearth_depth.exr",
+);
+
+/// The embedded files, and files added by the user.
+#[derive(Clone, Debug, Default)]
+pub struct Bundle {
+    added_files: Vec<(String, Arc<[u8]>)>,
+}
+
+impl Bundle {
+    /// Adds the file `name`, in place of any of that name.
+    pub fn add_file(&mut self, name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) {
+        let name = name.into();
+        self.added_files.retain(|(other, _)| *other != name);
+        self.added_files.push((name, bytes.into()));
+    }
+
+    /// The files that were given, by name.
+    pub fn added_files(&self) -> &[(String, Arc<[u8]>)] {
+        &self.added_files
+    }
+
+    /// The bytes of the file `name`, if it is one of these.
+    pub fn bytes(&self, name: &str) -> Option<&[u8]> {
+        let added_files = self.added_files.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
+        added_files.or_else(|| FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes))
+    }
+
+    fn found(&self, name: &str) -> Result<&[u8], AssetError> {
+        self.bytes(name).ok_or_else(|| error(name, AssetProblem::Missing))
+    }
+
+    /// These files, with `files` for all that they lack.
+    pub fn overlay_on(self, files: Arc<dyn Assets>) -> OverlayAssets {
+        OverlayAssets { bundle: self, files }
+    }
+}
+
+/// A [`Bundle`] layered over other assets.
+pub struct OverlayAssets {
+    bundle: Bundle,
+    files: Arc<dyn Assets>,
+}
+
+impl OverlayAssets {
+    fn of(&self, name: &str) -> &dyn Assets {
+        if self.bundle.bytes(name).is_some() { &self.bundle } else { self.files.as_ref() }
+    }
+}
+
+impl Assets for OverlayAssets {
+    fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
+        self.of(path).picture(path, frame)
+    }
+
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
+        self.of(path).mesh(path)
+    }
+
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+        self.of(path).drawing(path)
+    }
+
+    fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
+        self.of(path).text(path)
+    }
+
+    fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
+        self.of(path).digest(path, frame)
+    }
+}
+
+fn error(name: &str, problem: AssetProblem) -> AssetError {
+    AssetError { path: name.to_owned(), problem }
+}
+
+fn extension(name: &str) -> &str {
+    Path::new(name).extension().and_then(|extension| extension.to_str()).unwrap_or_default()
+}
+
+impl Assets for Bundle {
+    fn picture(&self, path: &str, _frame: i64) -> Result<Arc<Picture>, AssetError> {
+        let picture = decode_picture(self.found(path)?, extension(path), MemoryLimit::default());
+        picture.map(Arc::new).map_err(|problem| error(path, problem))
+    }
+
+    fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
+        let beside = |name: &str, _: u64| self.found(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
+        let mesh = decode_mesh(self.found(path)?, extension(path), &beside, MemoryLimit::default());
+        mesh.map(Arc::new).map_err(|problem| error(path, problem))
+    }
+
+    fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
+        decode_drawing(&self.text(path)?).map(Arc::new).map_err(|problem| error(path, problem))
+    }
+
+    fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
+        let text = std::str::from_utf8(self.found(path)?);
+        text.map(Arc::from).map_err(|_| error(path, AssetProblem::Damaged("it is not UTF-8".into())))
+    }
+
+    fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
+        self.found(path)?;
+        // Within one run a name stands for the same bytes until another is given, which makes other assets.
+        let mut named = MemoryAssets::default();
+        named.insert_text(path, "");
+        named.digest(path, frame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::check;
+
+    #[test]
+    fn all_scenes_are_there_and_find_what_they_name() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<String> = entries.map(|name| name.into_string().unwrap()).collect();
+        names.retain(|name| name.ends_with(".toml"));
+        names.sort();
+        assert_eq!(names, SCENES.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+        let assets: Arc<dyn Assets> = Arc::new(Bundle::default());
+        for (name, text) in SCENES {
+            let scene = bansho::compile_scene(name, text, assets.clone());
+            assert!(scene.is_ok(), "{name}: {:?}", scene.err());
+        }
+        let (name, text) = SCENES.iter().find(|(name, _)| *name == "inagaki_haze.toml").unwrap();
+        assert!(check(name, text, &assets).is_ok());
+    }
+
+    #[test]
+    fn given_files_come_first_and_others_are_missing() {
+        let mut bundle = Bundle::default();
+        assert_eq!(bundle.text("drawing.svg").unwrap_err().problem, AssetProblem::Missing);
+        bundle.add_file("drawing.svg", "<svg/>".as_bytes());
+        assert_eq!(&*bundle.text("drawing.svg").unwrap(), "<svg/>");
+    }
+}

@@ -1,0 +1,109 @@
+//! Templates of new scenes: one phenomenon, and what it needs to be visible.
+
+/// Templates by name.
+pub const NEW_SCENES: [(&str, &str); 5] = [
+    ("Flame sheet", FLAME_SHEET),
+    ("Particle flame", PARTICLE_FLAME),
+    ("Rain", RAIN),
+    ("Aurora", AURORA),
+    ("Nothing", "bansho = 1\n"),
+];
+
+/// The template for a studio started without a scene.
+pub const FLAME_SHEET: &str = "\
+bansho = 1
+
+[[flame_sheet]]
+name = \"fire\"
+";
+
+const PARTICLE_FLAME: &str = "\
+bansho = 1
+
+[[flame_particles]]
+name = \"flame\"
+";
+
+/// Rain under a street lamp at dusk.
+const RAIN: &str = "\
+bansho = 1
+
+[picture]
+exposure_ev100 = 1.6
+
+[camera]
+position = [0.5, 1.5, 5.4]
+target = [0.2, 1.8, 0.0]
+
+[sky]
+luminance = 0.06
+hills_deg = 1.5
+trees_deg = 4.5
+temperature_k = 9000.0
+
+[[light]]
+kind = \"spot\"
+visible = true
+position = [0.0, 2.9, 0.0]
+direction = [0.0, -1.0, 0.0]
+colour = [1.0, 0.82, 0.55]
+intensity = 2500.0
+inner_deg = 40.0
+outer_deg = 78.0
+
+[[rain]]
+name = \"rain\"
+rate_mm_per_h = 20.0
+distance = 6.0
+";
+
+/// The view to the north, where the default shapes are.
+const AURORA: &str = "\
+bansho = 1
+
+[picture]
+exposure_ev100 = -6.9
+white_balance_k = 4000.0
+
+[camera]
+position = [0.0, 1.7, 0.0]
+target = [0.0, 32.0, -57.0]
+vertical_fov_deg = 62.0
+
+[sky]
+kind = \"night\"
+hills_deg = 2.0
+trees_deg = 1.1
+night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 }
+
+[[aurora]]
+name = \"aurora\"
+";
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bansho::{
+        Assets, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneOptions, Shot, Unobserved, base::color,
+        parse_scene,
+    };
+
+    use super::*;
+
+    #[test]
+    fn every_beginning_but_nothing_is_a_scene_that_shows_something() {
+        for (name, text) in NEW_SCENES {
+            let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+            let quick = text.replace("[[aurora]]", "[[aurora]]\nparticles = { count = 2000 }");
+            let scene = Arc::new(parse_scene(name, &quick).unwrap().adapted(&SceneOptions::default()).unwrap());
+            let compiled = Arc::new(CompiledScene::build(scene, assets, None).unwrap());
+            let plan = Plan::new(&compiled, &PlanOptions { size: Some([96, 54]), ..PlanOptions::default() }).unwrap();
+            let mut shot = Shot::open(compiled, Arc::new(plan));
+            let frame = bansho::draw(&mut shot, 3, &Unobserved).unwrap();
+            let brightest = frame.beauty.pixels().iter().map(|[r, g, b, _]| color::luminance([*r, *g, *b]));
+            let brightest = brightest.fold(0.0, f32::max);
+            assert_eq!(brightest > 0.3, name != "Nothing", "{name}: {brightest}");
+        }
+    }
+}
