@@ -4,11 +4,12 @@
 mod support;
 
 use bansho_base::{
+    host::assets::MemoryAssets,
     math::random::{Key, Purpose, uniform},
     parameters::{self, Kind, Value},
 };
 use bansho_render::{
-    PlanOptions, Scene,
+    PlanOptions,
     scene::{SHARED_TABLES, schema, template},
 };
 
@@ -16,7 +17,8 @@ use support::*;
 
 /// The one problem of a scene, as a person reads it.
 fn fault(text: &str) -> String {
-    let error = parse(text).err().unwrap_or_else(|| panic!("accepted: {text}"));
+    let compiled = compiled("test.toml", text, &kinds(), MemoryAssets::default());
+    let error = compiled.err().unwrap_or_else(|| panic!("accepted: {text}"));
     assert_eq!(error.problems.len(), 1, "one fault, one error: {error}");
     error.to_string()
 }
@@ -122,7 +124,7 @@ fn faults_name_their_place_and_what_is_allowed() {
 fn faults_of_a_particle_flame_are_located() {
     let fault = |body: &str| {
         let text = format!("bansho = 1\n[[flame_particles]]\n{body}");
-        let scene = Scene::parse("test.toml", &text, bansho::KINDS);
+        let scene = compiled("test.toml", &text, bansho::KINDS, MemoryAssets::default());
         scene.err().unwrap_or_else(|| panic!("accepted: {text}")).to_string()
     };
     for (body, expected) in [
@@ -287,7 +289,7 @@ fn a_commented_template_is_a_valid_scene_also_when_every_line_is_uncommented() {
     for kind in kinds().iter().chain(bansho::KINDS) {
         let text = template::commented(kind);
         let kinds: Vec<_> = kinds().into_iter().chain(bansho::KINDS.iter().copied()).collect();
-        let parse = |text: &str| Scene::parse("new.toml", text, &kinds);
+        let parse = |text: &str| compiled("new.toml", text, &kinds, MemoryAssets::default()).map(drop);
         parse(&text).unwrap_or_else(|error| panic!("{error}"));
         let uncommented: String = text
             .lines()
@@ -303,7 +305,8 @@ fn a_template_states_all_of_its_kinds_setting() {
     for kind in bansho::KINDS {
         let parse = |text: &str| {
             let kinds = bansho::KINDS;
-            Scene::parse("new.toml", text, kinds).unwrap_or_else(|error| panic!("{error}"))
+            let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
+            compiled.unwrap_or_else(|error| panic!("{error}")).scene().clone()
         };
         let stated = parse(&format!("bansho = 1\n{}\n[[{}]]\n", kind.setting, kind.key));
         let new = parse(&template::commented(kind));
@@ -317,8 +320,10 @@ fn a_template_states_all_of_its_kinds_setting() {
 fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
     let kinds = bansho::KINDS;
     for kind in kinds {
-        let parse =
-            |text: &str| Scene::parse("new.toml", text, kinds).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let parse = |text: &str| {
+            let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
+            compiled.unwrap_or_else(|error| panic!("{error}\n{text}")).scene().clone()
+        };
         let text = template::short(kind);
         let (short, long) = (parse(&text), parse(&template::commented(kind)));
         assert_eq!((&short.picture, &short.camera, &short.wind), (&long.picture, &long.camera, &long.wind));
@@ -347,7 +352,7 @@ fn a_models_fault_stays_what_it_is() {
     use bansho_fire::particles::ParticleFaultKind;
     let text = "bansho = 1\n[[flame_particles]]\nparticles = 900000000\n";
     let kinds = bansho::KINDS;
-    let error = Scene::parse("new.toml", text, kinds).err().unwrap();
+    let error = compiled("new.toml", text, kinds, MemoryAssets::default()).err().unwrap();
     let ProblemKind::Model(fault) = &error.problems[0].kind else { panic!("{error}") };
     let kind = fault.downcast::<ParticleFaultKind>();
     assert!(matches!(kind, Some(ParticleFaultKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
@@ -359,7 +364,7 @@ fn flames_together_may_not_have_more_particles_than_fit() {
     let check = |flames: [String; 3]| {
         let text = format!("bansho = 1\n{}", flames.concat());
         let kinds = bansho::KINDS;
-        Scene::parse("new.toml", &text, kinds).err().map(|error| error.to_string())
+        compiled("new.toml", &text, kinds, MemoryAssets::default()).err().map(|error| error.to_string())
     };
     let error = check([flame(12_000_000, true), flame(9_000_000, true), flame(8_000_000, true)]).unwrap();
     let expected = "9000000 particles beside 12000000 of other flames would take 13 GiB; allowed: up to ";
@@ -396,10 +401,10 @@ fn a_plate_of_another_depth_size_is_refused() {
         Picture { colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
     );
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
-    let error = Scene::parse("scene.toml", &text, &kinds()).err().unwrap().to_string();
+    let error = compiled("scene.toml", &text, &kinds(), assets.clone()).err().unwrap().to_string();
     assert!(error.contains("plate.depth: depth.exr: has 8 x 6 pixels; allowed: 16 x 12"), "{error}");
     assert!(error.starts_with("scene.toml:"), "{error}");
     let flat = text.replace("depth.exr", "plate.png");
-    let error = Scene::parse("scene.toml", &flat, &kinds()).err().unwrap().to_string();
+    let error = compiled("scene.toml", &flat, &kinds(), assets).err().unwrap().to_string();
     assert!(error.contains("plate.depth: plate.png: has no channel `Z`"), "{error}");
 }

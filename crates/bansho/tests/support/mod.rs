@@ -14,7 +14,7 @@ use bansho_base::{
     },
     image::{Frame, Image},
 };
-use bansho_render::{PlanOptions, Scene, SceneError, SceneOptions, Shot};
+use bansho_render::{CompiledScene, PlanOptions, Scene, SceneError, SceneOptions, Shot};
 
 pub(crate) use absorber::AbsorberParameters;
 pub(crate) use emitter::EmitterParameters;
@@ -39,6 +39,17 @@ vertical_fov_deg = 90
 
 pub(crate) fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse("test.toml", text, &kinds())
+}
+
+/// Reads a scene and builds all that it shows.
+pub(crate) fn compiled(
+    file: &str,
+    text: &str,
+    kinds: &[PhenomenonKind],
+    assets: MemoryAssets,
+) -> Result<CompiledScene, SceneError> {
+    let scene = Arc::new(Scene::parse(file, text, kinds)?);
+    CompiledScene::build(scene, Arc::new(assets), None).map_err(|errors| errors.located(file, text))
 }
 
 pub(crate) fn plan(text: &str, options: &PlanOptions) -> Planned {

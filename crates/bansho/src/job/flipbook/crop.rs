@@ -105,9 +105,9 @@ pub(super) fn lit(
     (small.layers, small.aovs) = (false, false);
     // Half a code of 8 bits, in codes of 16, of one pixel alone among those that a small one stands for.
     let least = if exact { 1 } else { (128.0 / (shrunk * shrunk)).max(1.0) as u16 };
-    let survey = Survey { lit: Mutex::default(), view: plan.display, least };
-    shoot(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &survey, observer)?;
-    let lit = survey.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let probe = LitRegionProbe { lit: Mutex::default(), view: plan.display, least };
+    shoot(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &probe, observer)?;
+    let lit = probe.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok((!lit.is_empty()).then(|| Region::of(&lit, size)))
 }
 
@@ -118,14 +118,14 @@ fn shrinking(size: [usize; 2]) -> f64 {
 }
 
 /// Gathers what is lit in any frame.
-struct Survey {
+struct LitRegionProbe {
     lit: Mutex<Rect>,
     view: View,
     /// Least alpha that counts, in codes of 16 bits; display pixels have alpha where they have light.
     least: u16,
 }
 
-impl Finish for Survey {
+impl Finish for LitRegionProbe {
     fn finish(&self, _index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         let own = bounds(frame, &self.view, self.least);
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);
