@@ -22,7 +22,7 @@
 //! | (2.6) | Gauss-Seidel iteration | [`gauss_seidel_sweep`](simulate::field::gauss_seidel_sweep) |
 //! | (2.7) to (2.9) | electric field by central differences | [`Grid2::gradient`](simulate::field::Grid2::gradient), `FieldBuilder::sample_table` |
 //! | (2.10) | Lorentz force | `simulate::forces::Integrator::integrate` |
-//! | (2.11), (2.12), (2.17) | SPH density | `simulate::forces::Repulsion::compute_accelerations`, by [`bansho_sph::densities`] |
+//! | (2.11), (2.12), (2.17) | SPH density | `simulate::forces::Repulsion::compute_accelerations`, by [`bansho_sph::compute_densities`] |
 //! | (2.13) | pressure | [`bansho_sph::StateEquation::pressure`] |
 //! | (2.14) to (2.16), (2.18) | pressure force | [`bansho_sph::PressureForce`] |
 //! | (2.19), (2.20) | time integration | `simulate::forces::Integrator::integrate` |

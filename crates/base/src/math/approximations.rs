@@ -1,7 +1,7 @@
 //! Branch-free `f32` approximations for hot loops.
 //!
 //! Each takes one number and is always inlined: a plain loop over `[f32; 16]` under `fearless_simd::dispatch!` becomes vector code, and the
-//! same function called alone is its scalar twin, bit for bit. Multiply-adds are [`Fused`] explicitly: slow where
+//! same function called alone is its scalar twin, bit for bit. Multiply-adds are [`MulAdd`] explicitly: slow where
 //! the processor (or the enclosing function, outside `dispatch!`) has no such instruction; outside hot loops use [`super::f32`].
 //! Coefficients are minimax fits with the stated error before rounding; the stated bounds include rounding and are tested.
 

@@ -166,7 +166,7 @@ pub struct Surroundings<'a> {
     pub air: &'a Air,
     /// The light of the sky.
     pub sky: Sky,
-    /// What is seen in the phenomenon's own [mirror](crate::phenomenon::Phenomenon::mirror): radiance (ACEScg, cd/m^2) and alpha of
+    /// What is seen in the phenomenon's own [mirror](crate::phenomenon::PhenomenonInfo::mirror): radiance (ACEScg, cd/m^2) and alpha of
     /// the whole picture.
     pub reflection: Option<&'a Image<4>>,
     /// Where there is a plate: what stands behind all phenomena in that mirror, plate and sky.

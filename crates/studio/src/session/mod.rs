@@ -321,7 +321,7 @@ impl Session {
         self.transport.sleep_s(now).filter(|_| !self.is_busy())
     }
 
-    /// Waits up to [`MAX_WAIT`] for a picture of a scene that is quick to draw, so that the change and its picture appear in the same
+    /// Waits up to 40 ms for a picture of a scene that is quick to draw, so that the change and its picture appear in the same
     /// frame of the window. While playing it does not wait: rendering and painting overlap then.
     pub fn wait(&mut self, now: f64, dragging: bool) {
         let began = Instant::now();
