@@ -8,7 +8,7 @@ const PROPERTIES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
 /// A whole file: places, velocities, then the cloud's quantities. The same particles give the same bytes.
 ///
 /// ```
-/// let file = self::encode(&bansho_base::geometry::point_cloud::PointCloud::default());
+/// let file = bansho_media::ply::encode(&bansho_base::geometry::point_cloud::PointCloud::default());
 /// assert!(file.starts_with(b"ply\nformat binary_little_endian 1.0\n") && file.ends_with(b"end_header\n"));
 /// ```
 #[must_use]

@@ -62,7 +62,7 @@ impl BlackBody {
     /// Light of a black body as ACEScg whose luminance is in cd/m^2. Linear between whole kelvins; dark (0) below about 150 K.
     ///
     /// ```
-    /// let candle = super::black_body().radiance(1900.0);
+    /// let candle = bansho_base::color::blackbody::black_body().radiance(1900.0);
     /// assert!(candle[0] > candle[1] && candle[1] > candle[2]);
     /// ```
     #[inline(always)]

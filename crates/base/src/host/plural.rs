@@ -3,7 +3,7 @@
 /// `count` things, each called `one`: `1 item`, `2 items`.
 ///
 /// ```
-/// use self::counted;
+/// use bansho_base::host::plural::counted;
 /// assert_eq!((counted(0, "item"), counted(1, "item"), counted(2, "item")), ("0 items".into(), "1 item".into(), "2 items".into()));
 /// ```
 #[must_use]

@@ -6,7 +6,7 @@ use std::{borrow::Cow, fmt::Write};
 /// names of files and values of scenes may hold any.
 ///
 /// ```
-/// use self::printable;
+/// use bansho_base::host::printable::printable;
 /// assert_eq!(printable("a\x1b[2J.png"), "a\\u{1b}[2J.png");
 /// assert_eq!(printable("火.png"), "火.png");
 /// ```
@@ -30,7 +30,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 /// (U+2400 and after), and a replacement character for what turns the direction of reading.
 ///
 /// ```
-/// assert_eq!(self::pictured("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
+/// assert_eq!(bansho_base::host::printable::pictured("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
 /// ```
 pub fn pictured(text: &str) -> String {
     let picture = |character: char| match character {
@@ -50,7 +50,7 @@ const SHOWN: [usize; 2] = [2000, 1000];
 /// and between them a value of any length.
 ///
 /// ```
-/// use self::message;
+/// use bansho_base::host::printable::message;
 /// let shown = message(&format!("`{}` is not known; allowed: fire", "a".repeat(1_000_000))).into_owned();
 /// assert!(shown.starts_with("`aaa") && shown.contains("aaa [...] aaa") && shown.ends_with("allowed: fire") && shown.len() < 3100);
 /// ```

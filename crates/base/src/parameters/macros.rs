@@ -3,16 +3,16 @@
 /// Declares a table of parameters: a plain struct with its defaults, and the descriptors from which all else derives.
 ///
 /// ```
-/// super! {
+/// bansho_base::parameters! {
 ///     /// A lamp.
 ///     pub struct Lamp {
 ///         /// Radiant power.
-///         power_w: f64 = 60.0, limits(super::Range::new(0.0, 1e6)), unit("W");
+///         power_w: f64 = 60.0, limits(bansho_base::parameters::Range::new(0.0, 1e6)), unit("W");
 ///         /// Whether it burns.
 ///         lit: bool = true;
 ///     }
 /// }
-/// use super::Parameters;
+/// use bansho_base::parameters::Parameters;
 /// assert_eq!(Lamp::table().parameters[0].key, "power_w");
 /// assert!(Lamp::default().lit);
 /// ```
@@ -113,7 +113,7 @@ macro_rules! parameters {
 /// Declares a choice: an enum whose names stand in scene files. The first is the default.
 ///
 /// ```
-/// crate::choice! {
+/// bansho_base::choice! {
 ///     /// How a thing moves.
 ///     pub enum Motion {
 ///         /// Not at all.
