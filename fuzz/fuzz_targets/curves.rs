@@ -4,7 +4,7 @@
 #![no_main]
 
 use bansho_base::{parameters::{animated::Animated, CurveLimits, Node, Parameter, Range, Reader}, math::curve::Curve};
-use bansho_render::scene::values;
+use bansho_scene::values;
 
 const LOW: f64 = -3.0;
 const HIGH: f64 = 1e6;

@@ -3,7 +3,7 @@
 
 use bansho_base::host::assets::MemoryAssets;
 use bansho::KINDS;
-use bansho_render::{Scene, scene::edit::{self, EditError}};
+use bansho_scene::{Scene, edit::{self, EditError}};
 use bansho_fuzz::{draw_small, one_thread};
 
 libfuzzer_sys::fuzz_target!(|text: &str| {

@@ -3,7 +3,7 @@
 
 use bansho_base::{host::assets::MemoryAssets, parameters::{self, Table}};
 use bansho::KINDS;
-use bansho_render::{Scene, scene::SHARED_TABLES};
+use bansho_scene::{Scene, SHARED_TABLES};
 use bansho_fuzz::{draw_small, one_thread};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -16,10 +16,8 @@ use bansho_base::{
 };
 use bansho::KINDS;
 use bansho_media::assets::{decode_picture, limits};
-use bansho_render::{
-    CompiledScene, Plan, PlanOptions, RenderError, Scene, SceneOptions, Shot,
-    display::{BitDepth, display},
-};
+use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError, Shot, display::{BitDepth, display}};
+use bansho_scene::{Scene, SceneOptions};
 
 /// Stops a frame that takes too long: a scene may rightly ask for much work, and that is no fault.
 struct Deadline(Instant);

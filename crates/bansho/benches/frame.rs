@@ -20,9 +20,10 @@ use bansho_base::{
     },
 };
 use bansho_render::{
-    CompiledScene, Plan, PlanOptions, Scene, Shot,
+    CompiledScene, Plan, PlanOptions, Shot,
     display::{BitDepth, display},
 };
+use bansho_scene::Scene;
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const SIZE: [usize; 2] = [1920, 1080];

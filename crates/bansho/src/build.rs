@@ -7,9 +7,8 @@ use bansho_base::{
     parameters::{Parameters, Table, Value},
     world::{air::Air, sky::SkyParameters, wind::WindParameters},
 };
-use bansho_render::{
-    Scene, SceneError,
-    scene::{FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters},
+use bansho_scene::{
+    FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters, Scene, SceneError,
 };
 
 use crate::KINDS;
@@ -19,7 +18,7 @@ use bansho_environment::ground::GroundParameters;
 /// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
 ///
 /// ```
-/// use bansho::{SceneBuilder, render::scene::PictureParameters};
+/// use bansho::{SceneBuilder, scene::PictureParameters};
 ///
 /// let picture = PictureParameters { size: [64, 36], frames: 2, ..Default::default() };
 /// let scene = SceneBuilder::new().picture(&picture).build()?;
@@ -120,7 +119,7 @@ impl SceneBuilder {
 
 #[cfg(test)]
 mod tests {
-    use bansho_render::scene::SHARED_TABLES;
+    use bansho_scene::SHARED_TABLES;
 
     use super::*;
 

@@ -35,6 +35,7 @@ pub use bansho_fire as fire;
 pub use bansho_media as media;
 pub use bansho_rain as rain;
 pub use bansho_render as render;
+pub use bansho_scene as scene;
 pub use bansho_sph as sph;
 
 pub use bansho_base::{
@@ -46,10 +47,10 @@ pub use bansho_base::{
     image::{DisplayImage, Frame, Image, Rect},
 };
 pub use bansho_render::{
-    BuildErrors, CompiledScene, LoopError, Plan, PlanError, PlanOptions, RenderError, Scene, SceneError, SceneOptions,
-    Shot,
+    BuildErrors, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},
 };
+pub use bansho_scene::{LoopError, Scene, SceneError, SceneOptions};
 pub use build::SceneBuilder;
 pub use kinds::KINDS;
 

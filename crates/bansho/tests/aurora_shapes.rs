@@ -12,7 +12,8 @@ use bansho_base::{
     math::DVec2,
     parameters::{Parameters, Reader},
 };
-use bansho_render::{PlanOptions, Scene};
+use bansho_render::PlanOptions;
+use bansho_scene::Scene;
 use planned::Planned;
 
 use bansho_aurora::{

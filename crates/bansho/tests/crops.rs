@@ -10,7 +10,8 @@ use bansho_base::{
     host::{assets::MemoryAssets, observer::Unobserved},
     image::{Frame, Rect},
 };
-use bansho_render::{PlanOptions, Scene};
+use bansho_render::PlanOptions;
+use bansho_scene::Scene;
 use planned::Planned;
 
 const SIZE: [usize; 2] = [101, 67];

@@ -2,10 +2,7 @@
 
 use bansho::KINDS;
 use bansho_base::parameters::{Auto, Value};
-use bansho_render::{
-    Scene, SceneOptions,
-    scene::{self, ImpliedBackdrop},
-};
+use bansho_scene::{self, ImpliedBackdrop, Scene, SceneOptions};
 
 fn read(text: &str) -> Scene {
     let text = format!("bansho = 1\n{text}");

@@ -15,9 +15,10 @@ use bansho_base::{
     image::{DisplayPixels, Frame, Image, Rect},
 };
 use bansho_render::{
-    PlanOptions, Scene,
+    PlanOptions,
     display::{BitDepth, display},
 };
+use bansho_scene::Scene;
 use planned::Planned;
 
 const SIZE: [usize; 2] = [160, 90];

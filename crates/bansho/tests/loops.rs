@@ -11,10 +11,8 @@ use bansho_base::{
     image::Frame,
     parameters::{Kind, TableDescriptor, Value},
 };
-use bansho_render::{
-    PlanOptions, Scene, SceneOptions,
-    scene::{SHARED_TABLES, SharedTable},
-};
+use bansho_render::PlanOptions;
+use bansho_scene::{SHARED_TABLES, Scene, SceneOptions, SharedTable};
 
 use support::*;
 

@@ -14,10 +14,10 @@ use bansho_base::{
     parameters::{Parameters, Reader, Table, Value, sample},
 };
 use bansho_render::{
-    CompiledScene, Plan, PlanOptions, Scene, SceneOptions, Shot,
+    CompiledScene, Plan, PlanOptions, Shot,
     display::{BitDepth, display},
-    scene::SHARED_TABLES,
 };
+use bansho_scene::{SHARED_TABLES, Scene, SceneOptions};
 use rayon::prelude::*;
 
 /// How many are drawn, unless `BANSHO_RANDOM_SCENES` says otherwise, as in `.ci/run` and `.ci/long`.

@@ -2,7 +2,7 @@
 
 use bansho::{
     KINDS,
-    render::scene::edit::{self, EditError, upgrade},
+    scene::edit::{self, EditError, upgrade},
 };
 
 fn set(text: &str, assignment: &str) -> Result<String, EditError> {

@@ -8,10 +8,8 @@ use bansho_base::{
     math::random::{Key, Purpose, uniform},
     parameters::{self, Kind, Value},
 };
-use bansho_render::{
-    PlanOptions,
-    scene::{SHARED_TABLES, schema, template},
-};
+use bansho_render::PlanOptions;
+use bansho_scene::{SHARED_TABLES, schema, template};
 
 use support::*;
 

@@ -8,10 +8,7 @@ use bansho_base::{
     host::assets::MemoryAssets,
     parameters::{Descriptor, Kind, ProblemKind, TableDescriptor, Value},
 };
-use bansho_render::{
-    Scene,
-    scene::{FORMAT, SHARED_TABLES},
-};
+use bansho_scene::{FORMAT, SHARED_TABLES, Scene};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/scene.md");
 

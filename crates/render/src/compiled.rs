@@ -22,8 +22,8 @@ use bansho_environment::{
 use crate::{
     crossfade::CrossfadeRun,
     fingerprint::{self, Fingerprint},
-    scene::{Instance, Scene, SceneError},
 };
+use bansho_scene::{Instance, Scene, SceneError};
 
 /// A scene whose phenomena, obstacles and distance fields are built.
 #[derive(Clone)]
@@ -61,10 +61,10 @@ impl fmt::Display for BuildErrors {
 impl BuildErrors {
     /// The faults at their places in the text that the scene was read from; `file` is what errors call it.
     pub fn located(self, file: &str, text: &str) -> SceneError {
-        let root = crate::scene::values(text).unwrap_or_default();
+        let root = bansho_scene::values(text).unwrap_or_default();
         let mut reader = Reader::new();
         for (path, error) in self.0 {
-            crate::scene::check::report(error, path, &root, &mut reader);
+            bansho_scene::report_build_error(error, path, &root, &mut reader);
         }
         let problems = reader.into_problems();
         SceneError {

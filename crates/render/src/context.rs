@@ -8,7 +8,8 @@ use bansho_base::{
     world::sky::{ElevationProfile, Sky},
 };
 
-use crate::{compiled::CompiledScene, composite::plate_light, fingerprint, plan::Plan, scene::Scene};
+use crate::{compiled::CompiledScene, composite::plate_light, fingerprint, plan::Plan};
+use bansho_scene::Scene;
 
 /// A compiled scene under a plan.
 pub(crate) struct ShotContext {

@@ -7,12 +7,9 @@ use bansho_base::{
     phenomenon::surroundings::Light,
 };
 
-use crate::{
-    compiled::CompiledScene,
-    plan::Plan,
-    scene::{LightParameters, Scene},
-};
+use crate::{compiled::CompiledScene, plan::Plan};
 use bansho_environment::ground::GroundParameters;
+use bansho_scene::{LightParameters, Scene};
 
 /// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core
 /// that nears white while its edges keep their colour.

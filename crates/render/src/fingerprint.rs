@@ -8,12 +8,8 @@ use bansho_base::{
 };
 use bansho_environment::ground::GroundParameters;
 
-use crate::{
-    compiled::CompiledScene,
-    display::BitDepth,
-    plan::Plan,
-    scene::{Instance, LightParameters, ObstacleParameters, Scene},
-};
+use crate::{compiled::CompiledScene, display::BitDepth, plan::Plan};
+use bansho_scene::{Instance, LightParameters, ObstacleParameters, Scene};
 
 /// A hash of everything that something depends on.
 pub type Fingerprint = [u8; 32];

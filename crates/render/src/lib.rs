@@ -12,11 +12,9 @@ pub mod frames;
 mod loop_start;
 pub mod plan;
 pub mod remarks;
-pub mod scene;
 pub mod shot;
 
 pub use compiled::{BuildErrors, CompiledScene};
 pub use composite::slices;
 pub use plan::{Plan, PlanError, PlanOptions};
-pub use scene::{LoopError, Scene, SceneError, SceneOptions};
 pub use shot::{RenderError, Shot};

@@ -8,13 +8,8 @@ use bansho_base::{
     phenomenon::strip::{Shutter, View},
 };
 
-use crate::{
-    compiled::CompiledScene,
-    exposure,
-    fingerprint::Fingerprint,
-    loop_start,
-    scene::{FrameRate, Scene},
-};
+use crate::{compiled::CompiledScene, exposure, fingerprint::Fingerprint, loop_start};
+use bansho_scene::{FrameRate, Scene};
 
 /// What a job may ask of a shot beside its scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -241,7 +236,7 @@ impl Plan {
 
 /// The drawn part within the picture with its overscan; crops count from the picture's own corner.
 fn window(size: [usize; 2], overscan: usize, crop: Option<Rect>) -> Result<Rect, PlanError> {
-    let most = crate::scene::picture::LARGEST_SIDE as usize;
+    let most = bansho_scene::picture::LARGEST_SIDE as usize;
     let [width, height] = size;
     if !(1..=most).contains(&width) || !(1..=most).contains(&height) {
         return Err(PlanError::Size { width, height, most });

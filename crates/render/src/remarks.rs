@@ -19,9 +19,9 @@ use crate::{
     exposure::assumed_of_plate,
     faint::faint,
     plan::Plan,
-    scene::PLATE_LAYER,
     shot::stepping::of_scene,
 };
+use bansho_scene::PLATE_LAYER;
 
 /// What there is in a scene at one moment.
 struct Moment<'a> {

@@ -8,7 +8,8 @@ use bansho_media::{
     input::InputError,
     output::{naming::NamingError, sprite_sheet::SheetError},
 };
-use bansho_render::{LoopError, PlanError, RenderError, SceneError, scene::edit::EditError};
+use bansho_render::{PlanError, RenderError};
+use bansho_scene::{LoopError, SceneError, edit::EditError};
 
 use super::{ranges::ranges, streaks::StreaksFault};
 

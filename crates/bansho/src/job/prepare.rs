@@ -18,7 +18,8 @@ use bansho_media::{
         sprite_sheet::SheetLayout,
     },
 };
-use bansho_render::{CompiledScene, Plan, PlanOptions, SceneOptions, display::BitDepth, scene::Positions};
+use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
+use bansho_scene::{Positions, SceneOptions};
 
 use super::{
     Job,

@@ -15,9 +15,10 @@ use bansho_media::{
     assets::InputLimits,
     input::{self, InputError},
 };
-use bansho_render::{
-    CompiledScene, Scene, SceneError,
-    scene::edit::{self, EditError},
+use bansho_render::CompiledScene;
+use bansho_scene::{
+    Scene, SceneError,
+    edit::{self, EditError},
 };
 
 use super::error::JobError;

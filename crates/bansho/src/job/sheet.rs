@@ -22,7 +22,7 @@ pub(super) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<S
 
 /// A sheet holds some tiles, and may be as large as a picture.
 pub(super) fn checked(sheet: SheetLayout, of: SheetKind) -> Result<SheetLayout, Conflict> {
-    let most = bansho_render::scene::picture::LARGEST_SIDE as usize;
+    let most = bansho_scene::picture::LARGEST_SIDE as usize;
     if !(1..=MOST_TILES).contains(&sheet.count) {
         return Err(Conflict::Tiles { of, tiles: sheet.count, most: MOST_TILES });
     }

@@ -7,7 +7,8 @@ use bansho_media::{
     output::{atomic, naming::NumberedPath, overwrite_policy::OverwritePolicy},
     ply,
 };
-use bansho_render::{CompiledScene, Plan, PlanOptions, SceneOptions, Shot};
+use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
+use bansho_scene::SceneOptions;
 
 use super::{
     error::{Conflict, JobError},

@@ -1,6 +1,6 @@
 //! New scenes, as `bansho new` writes them, as pictures.
 
-use bansho::{KINDS, SceneOptions, render::scene::template};
+use bansho::{KINDS, SceneOptions, scene::template};
 
 use crate::{
     SMALL,

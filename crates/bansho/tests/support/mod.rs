@@ -14,7 +14,8 @@ use bansho_base::{
     },
     image::{Frame, Image},
 };
-use bansho_render::{CompiledScene, PlanOptions, Scene, SceneError, SceneOptions, Shot};
+use bansho_render::{CompiledScene, PlanOptions, Shot};
+use bansho_scene::{Scene, SceneError, SceneOptions};
 
 pub(crate) use absorber::AbsorberParameters;
 pub(crate) use emitter::EmitterParameters;

@@ -5,7 +5,8 @@
 use std::{ops::Deref, sync::Arc};
 
 use bansho_base::{host::assets::Assets, phenomenon::Remark};
-use bansho_render::{CompiledScene, Plan, PlanOptions, Scene, SceneOptions, Shot};
+use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
+use bansho_scene::{Scene, SceneOptions};
 
 #[derive(Clone)]
 pub(crate) struct Planned {

@@ -6,10 +6,8 @@ use bansho::{
     AlphaConvention, BitDepth, Rect, View,
     job::{ContactBackground, FlipbookCrop, StreakFormat},
     rain::drops::terminal_velocity::VelocityLaw,
-    render::{
-        frames::{self, FrameSpecError},
-        scene::picture::LARGEST_SIDE,
-    },
+    render::frames::{self, FrameSpecError},
+    scene::picture::LARGEST_SIDE,
 };
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 

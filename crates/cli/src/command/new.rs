@@ -7,7 +7,7 @@ use bansho::{
     base::phenomenon::kind::PhenomenonKind,
     base::{host::printable::printable, parameters::nearest},
     media::{MediaError, output::atomic},
-    render::scene::template,
+    scene::template,
 };
 
 use crate::{

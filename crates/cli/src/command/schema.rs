@@ -1,6 +1,6 @@
 //! `bansho schema`
 
-use bansho::{KINDS, render::scene::schema::schema};
+use bansho::{KINDS, scene::schema::schema};
 
 use crate::output::to_stdout;
 

@@ -4,7 +4,7 @@ use bansho::{
     base::host::printable::printable,
     job::SceneFile,
     media::output::atomic,
-    render::scene::{FORMAT, edit},
+    scene::{FORMAT, edit},
 };
 
 use crate::{args::UpgradeArgs, output::to_stdout};

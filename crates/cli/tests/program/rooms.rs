@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, process::Command};
 
 /// Each crate with those of the workspace that it may depend on: the table of ARCHITECTURE.md.
-const MAY_KNOW: [(&str, &[&str]); 12] = [
+const MAY_KNOW: [(&str, &[&str]); 13] = [
     ("bansho-base", &[]),
     ("bansho-sph", &["bansho-base"]),
     // No phenomenon knows another.
@@ -11,8 +11,9 @@ const MAY_KNOW: [(&str, &[&str]); 12] = [
     ("bansho-rain", &["bansho-base"]),
     ("bansho-aurora", &["bansho-base", "bansho-sph"]),
     ("bansho-environment", &["bansho-base"]),
-    // It names no phenomenon: the face lists their kinds.
-    ("bansho-render", &["bansho-base", "bansho-environment"]),
+    // Scene and render name no phenomenon: the face lists their kinds.
+    ("bansho-scene", &["bansho-base", "bansho-environment"]),
+    ("bansho-render", &["bansho-base", "bansho-environment", "bansho-scene"]),
     ("bansho-media", &["bansho-base"]),
     // The job needs to draw and to write: the one edge from the face to files, behind the feature `files`.
     (
@@ -24,6 +25,7 @@ const MAY_KNOW: [(&str, &[&str]); 12] = [
             "bansho-rain",
             "bansho-aurora",
             "bansho-environment",
+            "bansho-scene",
             "bansho-render",
             "bansho-media",
         ],

@@ -16,11 +16,8 @@ use bansho_base::{
 };
 
 use super::mirror;
-use crate::{
-    context::ShotContext,
-    scene::{DepthKind, plate::PlatePictures},
-    shot::RenderError,
-};
+use crate::{context::ShotContext, shot::RenderError};
+use bansho_scene::{DepthKind, PlatePictures};
 use rayon::prelude::*;
 
 /// A plate, as large as the picture with its overscan.

@@ -19,7 +19,8 @@ use super::{
     background::{Behind, Sources},
     plate::PlateFrame,
 };
-use crate::{compiled::ActiveRun, scene::PLATE_LAYER};
+use crate::compiled::ActiveRun;
+use bansho_scene::PLATE_LAYER;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 

@@ -8,7 +8,7 @@ use std::{path::Path, sync::Arc, thread, time::Duration};
 use bansho::{
     Assets,
     base::parameters::Value,
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use crate::{

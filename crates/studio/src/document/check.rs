@@ -8,7 +8,7 @@ use bansho::{
         host::assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind, Span, Table, Value},
     },
-    render::scene::{
+    scene::{
         Place, Scene,
         operation::{self, Operation},
         values,

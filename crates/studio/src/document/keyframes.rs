@@ -9,7 +9,7 @@ use bansho::{
         },
         parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
     },
-    render::scene::{Place, SHARED_TABLES, Segment},
+    scene::{Place, SHARED_TABLES, Segment},
 };
 
 /// Whether what stands at `place` of a scene may be keyed over time.

@@ -18,7 +18,7 @@ use std::sync::{
 use bansho::{
     Assets, Plan, SceneError,
     base::parameters::{Problem, Table},
-    render::scene::{
+    scene::{
         edit::EditError,
         operation::{self, Operation},
         values,

@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::{Kind, Node, Table, TableDescriptor, Value},
-    render::scene::{Place, SHARED_TABLES},
+    scene::{Place, SHARED_TABLES},
 };
 
 /// Each parameter of the scene `root` that names a file, and the name.
@@ -52,7 +52,7 @@ fn in_value(place: &Place, node: &Node, kind: &Kind, found: &mut Vec<(Place, Str
 
 #[cfg(test)]
 mod tests {
-    use bansho::render::scene::values;
+    use bansho::scene::values;
 
     use super::*;
 

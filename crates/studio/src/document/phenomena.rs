@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::{Table, Value},
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use super::Document;

@@ -11,7 +11,7 @@ use bansho::{
         phenomenon::kind::Describe,
     },
     fire::sheet::{FlameSheetParameters, Stage},
-    render::scene::{
+    scene::{
         Instance, Place, PlateParameters, Scene,
         operation::{self, Operation},
         values,

@@ -3,7 +3,7 @@ use std::{fs, sync::Arc};
 use bansho::{
     Assets, MemoryAssets,
     base::parameters::{ProblemKind, Value},
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use super::{

@@ -19,7 +19,7 @@ use bansho::{
         camera::CameraParameters,
         parameters::{Parameters, Value},
     },
-    render::scene::{Place, Segment, edit::EditError, operation::Operation},
+    scene::{Place, Segment, edit::EditError, operation::Operation},
 };
 
 use crate::{

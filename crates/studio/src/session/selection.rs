@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::TableDescriptor,
-    render::scene::{Place, SHARED_TABLES},
+    scene::{Place, SHARED_TABLES},
 };
 
 use crate::document::Document;

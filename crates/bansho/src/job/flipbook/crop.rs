@@ -10,8 +10,8 @@ use bansho_base::{
 use bansho_render::{
     CompiledScene, Plan, Shot,
     display::{BitDepth, display},
-    scene::picture::LARGEST_SIDE,
 };
+use bansho_scene::picture::LARGEST_SIDE;
 
 use crate::job::{
     error::JobError,

@@ -16,7 +16,8 @@ use bansho_media::output::{
     overwrite_policy::OverwritePolicy,
     sprite_sheet::SheetLayout,
 };
-use bansho_render::{CompiledScene, Plan, PlanOptions, Scene, SceneOptions, Shot, display::BitDepth, scene::FrameRate};
+use bansho_render::{CompiledScene, Plan, PlanOptions, Shot, display::BitDepth};
+use bansho_scene::{FrameRate, Scene, SceneOptions};
 
 use self::{files::Files, motion::Tile};
 use super::{

@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use bansho::render::scene::Place;
+use bansho::scene::Place;
 
 use super::{
     Files,

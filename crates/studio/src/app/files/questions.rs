@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 #[cfg(not(target_arch = "wasm32"))]
-use bansho::render::scene::Place;
+use bansho::scene::Place;
 use eframe::egui::Ui;
 
 #[cfg(not(target_arch = "wasm32"))]

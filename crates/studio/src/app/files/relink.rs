@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bansho::{
     base::parameters::{Table, Value},
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use crate::{

@@ -9,7 +9,7 @@ use std::{
 use bansho::{
     base::parameters::Value,
     media::MediaError,
-    render::scene::{
+    scene::{
         edit::EditError,
         operation::{self, Operation},
     },

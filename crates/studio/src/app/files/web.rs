@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bansho::{
     media::{output::naming, zip::ZipWriter},
-    render::scene::Place,
+    scene::Place,
 };
 
 use super::{

@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::{ProblemKind, Span},
-    render::scene::Place,
+    scene::Place,
 };
 
 use crate::session::Session;

@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::{Table, Value},
-    render::scene::{Place, SHARED_TABLES, operation::Operation},
+    scene::{Place, SHARED_TABLES, operation::Operation},
 };
 
 use crate::{

@@ -5,7 +5,7 @@ use bansho::{
         math::DVec3,
         parameters::{Table, Value},
     },
-    render::scene::{Place, Segment},
+    scene::{Place, Segment},
 };
 
 use crate::{document::keyframes, session::Session};

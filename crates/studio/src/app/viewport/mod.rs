@@ -10,7 +10,7 @@ use bansho::{
         math::{DVec2, DVec3},
         parameters::Value,
     },
-    render::scene::Place,
+    scene::Place,
 };
 
 use crate::{

@@ -7,7 +7,7 @@ use bansho::{
         math::{self, DVec2, DVec3},
         parameters::Table,
     },
-    render::scene::Place,
+    scene::Place,
 };
 
 use crate::document::keyframes::vector;

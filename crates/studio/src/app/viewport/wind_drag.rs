@@ -2,7 +2,7 @@
 
 use bansho::{
     base::{math::DVec3, parameters::Value},
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use super::pointer::rounded;

@@ -10,7 +10,7 @@ mod tool;
 
 use std::sync::Arc;
 
-use bansho::{aurora::shapes::Form, render::scene::operation::Operation};
+use bansho::{aurora::shapes::Form, scene::operation::Operation};
 
 use self::{
     plane::{Plane, Side},

@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::Value,
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use super::{AuroraEditor, document::AuroraDrawing, pointer::DragState};

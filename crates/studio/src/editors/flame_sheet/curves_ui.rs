@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
-    render::scene::Place,
+    scene::Place,
 };
 
 use crate::{

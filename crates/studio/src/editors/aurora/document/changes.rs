@@ -6,7 +6,7 @@ use bansho::{
         math::{DVec2, curve::Curve},
         parameters::{Node, Parameters, Table, Value},
     },
-    render::scene::{Place, operation::Operation},
+    scene::{Place, operation::Operation},
 };
 
 use super::{

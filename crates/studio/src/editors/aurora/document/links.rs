@@ -6,7 +6,7 @@ use bansho::{
         math::DVec2,
         parameters::{Table, Value},
     },
-    render::scene::operation::Operation,
+    scene::operation::Operation,
 };
 
 use super::{AuroraDrawing, polyline};

@@ -22,7 +22,7 @@ use bansho::{
         math::DVec2,
         parameters::{Parameters, ProblemKind, Reader, Table, Value},
     },
-    render::scene::{
+    scene::{
         Place,
         edit::EditError,
         operation::{self, Operation},

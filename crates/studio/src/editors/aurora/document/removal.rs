@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use bansho::{aurora::shapes::LinkParameters, render::scene::operation::Operation};
+use bansho::{aurora::shapes::LinkParameters, scene::operation::Operation};
 
 use super::{AuroraDrawing, polyline, renumber::SheetRemap};
 

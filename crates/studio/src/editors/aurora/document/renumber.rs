@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use bansho::{
     aurora::shapes::{LinkParameters, MergeParameters, SplitParameters},
     base::parameters::{Auto, Node, Table, Value},
-    render::scene::operation::Operation,
+    scene::operation::Operation,
 };
 
 use super::{AuroraDrawing, SheetPosition, links::rounded};

@@ -23,7 +23,7 @@ fn open(text: &str) -> (Document, AuroraDrawing) {
     (document, drawing)
 }
 
-fn change(document: &mut Document, operations: &[bansho::render::scene::operation::Operation]) -> AuroraDrawing {
+fn change(document: &mut Document, operations: &[bansho::scene::operation::Operation]) -> AuroraDrawing {
     document.edit_shapes("change", operations, 0, &assets()).unwrap()
 }
 
@@ -202,7 +202,7 @@ split = [{{ sheet = 2, at = 0.5 }}]
 fn what_counts_sheets_follows_them() {
     let text = &exchanged_then_split("link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]\n");
     let (document, drawing) = open(text);
-    let after = |operations: &[bansho::render::scene::operation::Operation]| {
+    let after = |operations: &[bansho::scene::operation::Operation]| {
         let mut document = Document::new("aurora", document.text().clone());
         change(&mut document, operations);
         assert!(is_good(&mut document), "{}", document.text());

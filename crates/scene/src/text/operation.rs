@@ -5,7 +5,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Tab
 
 use super::{
     edit::{self, EditError},
-    place::{Place, Segment},
+    path::{Place, Segment},
 };
 
 /// One change of a scene.

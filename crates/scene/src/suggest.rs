@@ -2,7 +2,7 @@
 
 use bansho_base::parameters::{Kind, Table, TableDescriptor, Value, nearest};
 
-use super::{PhenomenonKind, SHARED_TABLES, toml};
+use super::{PhenomenonKind, SHARED_TABLES, text::toml};
 
 /// Most paths that are suggested.
 const MOST: usize = 3;

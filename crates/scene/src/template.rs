@@ -3,7 +3,7 @@
 
 use bansho_base::parameters::{Descriptor, Kind, Table, TableDescriptor, Value};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES, SharedTable, toml};
+use super::{FORMAT, PhenomenonKind, SHARED_TABLES, SharedTable, text::toml};
 
 /// Shared tables that a scene need not have, and has only where the phenomenon's setting does.
 const OPTIONAL: [&str; 5] = ["plate", "sky", "ground", "light", "obstacle"];

@@ -3,7 +3,7 @@
 use bansho_base::parameters::Span;
 
 /// Finds lines and columns. Places that are asked for in the order of the text take one pass over it, however many there are.
-pub(super) struct Lines<'t> {
+pub(crate) struct Lines<'t> {
     text: &'t str,
     /// The place that was asked for last.
     byte: usize,
@@ -16,13 +16,13 @@ pub(super) struct Lines<'t> {
 
 /// A part of a line with a mark below it.
 #[derive(Debug, PartialEq)]
-pub(super) struct Excerpt {
+pub(crate) struct Excerpt {
     /// The line, or what lies around the mark of a long one.
-    pub(super) shown: String,
+    pub(crate) shown: String,
     /// Characters before the mark.
-    pub(super) before: usize,
+    pub(crate) before: usize,
     /// Characters that are marked, at least one.
-    pub(super) marked: usize,
+    pub(crate) marked: usize,
 }
 
 /// Characters of a line that are shown before a mark and from its beginning on. Lines that people write are shown whole.
@@ -31,12 +31,12 @@ const SHOWN: [usize; 2] = [120, 160];
 const LEFT_OUT: &str = "...";
 
 impl<'t> Lines<'t> {
-    pub(super) fn new(text: &'t str) -> Self {
+    pub(crate) fn new(text: &'t str) -> Self {
         Self { text, byte: 0, start: 0, line: 1, column: 1 }
     }
 
     /// One-based line and column (in characters) of a byte of the text.
-    pub(super) fn position(&mut self, byte: usize) -> (usize, usize) {
+    pub(crate) fn position(&mut self, byte: usize) -> (usize, usize) {
         let byte = floor_char_boundary(self.text, byte);
         if byte < self.byte {
             *self = Self::new(self.text);
@@ -55,7 +55,7 @@ impl<'t> Lines<'t> {
     }
 
     /// The line in which `span` begins, with `span` marked as far as that line goes.
-    pub(super) fn excerpt(&mut self, span: Span) -> Excerpt {
+    pub(crate) fn excerpt(&mut self, span: Span) -> Excerpt {
         let (_, column) = self.position(span.start);
         let text = self.text;
         let line = text[self.byte..].lines().next().unwrap_or_default();

@@ -171,12 +171,12 @@ bansho_base::parameters! {
 
 impl LightParameters {
     /// Whether it shines one way.
-    pub(crate) fn is_directed(&self) -> bool {
+    pub fn is_directed(&self) -> bool {
         self.kind != LightKind::Point
     }
 
     /// Whether its direction is one.
-    pub(crate) fn has_direction(&self) -> bool {
+    pub fn has_direction(&self) -> bool {
         DVec3::from(self.direction).try_normalize().is_some()
     }
 

@@ -144,7 +144,7 @@ fn places_that_are_not_there_are_refused_and_nothing_is_done() {
 
 #[test]
 fn places_find_values_as_the_reader_sees_them() {
-    let root = crate::scene::values(SCENE).unwrap();
+    let root = crate::values(SCENE).unwrap();
     assert_eq!(at("flame_sheet.0.sparks.rate").find(&root).unwrap().value, Value::Number(3.0));
     assert_eq!(at("wind.velocity.0").find(&root).unwrap().value, Value::Number(0.5));
     assert!(at("flame_sheet.2").find(&root).is_none() && Place::root().find(&root).is_none());

@@ -1,20 +1,12 @@
 //! The scene file: what it may say, and a checked scene that cannot be invalid.
 
-pub(crate) mod check;
-pub mod defaults;
-pub mod edit;
-mod lines;
-pub mod obstacle;
-pub mod operation;
-pub mod picture;
-mod place;
-pub(crate) mod plate;
-mod positions;
+mod check;
 pub mod report;
 pub mod schema;
 mod suggest;
+mod tables;
 pub mod template;
-mod toml;
+mod text;
 
 use std::{collections::HashSet, sync::Arc};
 
@@ -30,15 +22,22 @@ use bansho_base::{
 
 use bansho_environment::ground::GroundParameters;
 
-pub(crate) use self::check::PLATE_LAYER;
 pub use self::{
-    defaults::ImpliedBackdrop,
-    obstacle::{ObstacleParameters, ObstacleShape},
-    picture::{DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
-    place::{Place, Segment},
-    positions::Positions,
+    check::{PLATE_LAYER, report_build_error},
     report::SceneError,
+    tables::{
+        defaults::ImpliedBackdrop,
+        obstacle::{ObstacleParameters, ObstacleShape},
+        picture::{self, DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
+        plate::PlatePictures,
+    },
+    text::{
+        edit, operation,
+        path::{Place, Segment},
+        positions::Positions,
+    },
 };
+use self::{tables::defaults, text::toml};
 
 /// The scene format that this version reads and writes.
 pub const FORMAT: i64 = 1;
@@ -60,7 +59,7 @@ pub struct SharedTable {
     /// Its parameters.
     pub table: fn() -> &'static TableDescriptor,
     /// Makes those of a scene that are keyed repeat every so many seconds, which must come back to where they began; the first that do not.
-    pub(crate) close_loop: fn(&mut Scene, f64) -> Option<String>,
+    close_loop: fn(&mut Scene, f64) -> Option<String>,
 }
 
 /// Shared tables, in the order in which a scene should state them.
@@ -175,7 +174,7 @@ fn loop_length(seconds: f64, fps: FrameRate) -> Result<f64, LoopError> {
 
 impl Scene {
     /// Reads and checks the scene `text`; `file` is what errors call it. No asset is read and nothing is built: see
-    /// [`CompiledScene`](crate::CompiledScene) for that.
+    /// `bansho_render::CompiledScene` for that.
     ///
     /// # Errors
     /// Every fault of the text, each with its place, what is wrong and what is allowed.
@@ -275,7 +274,7 @@ impl Scene {
     }
 
     /// Leaves sky, ground and lamps that the text does not state out of the picture; sky and lamps go on to light it.
-    pub(crate) fn hide_implied_backdrop(&mut self) {
+    fn hide_implied_backdrop(&mut self) {
         if let Some(sky) = self.sky.as_mut().filter(|_| self.implied.sky) {
             sky.visible = false;
         }

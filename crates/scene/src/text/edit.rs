@@ -2,7 +2,8 @@
 
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES, suggest, toml};
+use super::toml;
+use crate::{FORMAT, PhenomenonKind, SHARED_TABLES, suggest};
 
 /// Why an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

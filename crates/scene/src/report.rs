@@ -12,8 +12,10 @@ use bansho_base::{
 
 use super::{
     check,
-    lines::{Excerpt, Lines},
-    toml,
+    text::{
+        lines::{Excerpt, Lines},
+        toml,
+    },
 };
 
 /// A scene that cannot be used, with every reason why.

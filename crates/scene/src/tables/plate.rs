@@ -9,13 +9,14 @@ use bansho_base::{
 
 use bansho_base::phenomenon::kind::BuildError;
 
-use super::PlateParameters;
+use super::picture::PlateParameters;
 
 /// What a plate shows in one frame.
-pub(crate) struct PlatePictures {
-    pub(crate) image: Arc<Picture>,
+pub struct PlatePictures {
+    /// Its image.
+    pub image: Arc<Picture>,
     /// A picture of the same size that has depth.
-    pub(crate) depth: Option<Arc<Picture>>,
+    pub depth: Option<Arc<Picture>>,
 }
 
 fn size(picture: &Picture) -> [usize; 2] {
@@ -27,7 +28,7 @@ impl PlateParameters {
     ///
     /// # Errors
     /// A picture cannot be had, the depth has no depth, or is of another size than the image.
-    pub(crate) fn read_frame(&self, assets: &dyn Assets, frame: i64) -> Result<Option<PlatePictures>, BuildError> {
+    pub fn read_frame(&self, assets: &dyn Assets, frame: i64) -> Result<Option<PlatePictures>, BuildError> {
         let fault = |key: &str, kind| BuildError { key: key.to_owned(), kind };
         let read = |key: &str, path: &str| assets.picture(path, frame).map_err(|error| fault(key, error.into()));
         let Some(path) = &self.image else { return Ok(None) };

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use bansho_base::parameters::Table;
 
-use super::{Scene, check, lines::Lines, toml};
+use super::{lines::Lines, toml};
+use crate::{Scene, check};
 
 /// Finds the places of many phenomena with one look at the text.
 pub struct Positions<'t> {
@@ -19,7 +20,7 @@ impl<'t> Positions<'t> {
     #[must_use]
     pub fn new(scene: &Scene, text: &'t str) -> Self {
         let mut counts: HashMap<&str, usize> = HashMap::new();
-        let path = |instance: &super::Instance| {
+        let path = |instance: &crate::Instance| {
             let index = counts.entry(instance.kind.key).or_default();
             *index += 1;
             (instance.name.clone(), format!("{}.{}", instance.kind.key, *index - 1))

@@ -7,7 +7,7 @@ use toml_edit::{Document, Item, TableLike};
 ///
 /// # Errors
 /// The text is not TOML; one problem says where and why.
-pub(super) fn parse(text: &str) -> Result<Table, Problem> {
+pub(crate) fn parse(text: &str) -> Result<Table, Problem> {
     check_extent(text)?;
     let document = Document::parse(text).map_err(|error| Problem {
         span: error.span().or_else(|| deepest(text)),
@@ -19,13 +19,13 @@ pub(super) fn parse(text: &str) -> Result<Table, Problem> {
 
 /// Most values and tables of a text: in memory they take up to 1500 bytes for each sign that begins, ends or names one, 1.8 GB for so many.
 /// (Dots make tables of dotted keys.)
-pub(super) const MOST_VALUES: usize = 1_200_000;
+pub(crate) const MOST_VALUES: usize = 1_200_000;
 
 /// Whether a text says no more than can be read, which is found out before it is parsed.
 ///
 /// # Errors
 /// It does; the problem says where it becomes too much.
-pub(super) fn check_extent(text: &str) -> Result<(), Problem> {
+pub(crate) fn check_extent(text: &str) -> Result<(), Problem> {
     let signs = text.bytes().enumerate().filter(|(_, byte)| matches!(byte, b',' | b'[' | b'{' | b'=' | b'.'));
     match signs.map(|(at, _)| at).nth(MOST_VALUES) {
         None => Ok(()),

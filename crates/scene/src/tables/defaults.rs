@@ -14,13 +14,13 @@
 
 use bansho_base::parameters::{Node, Table, Value};
 
-use super::{PhenomenonKind, toml};
+use crate::{PhenomenonKind, text::toml};
 
 /// Temperature of the light that a camera is set to show as white at night, K.
 const NIGHT_WHITE_K: f64 = 4000.0;
 
 /// Which shared tables the text of a scene leaves out and its phenomena bring along. They light the scene; whether they are seen is said by
-/// [`SceneOptions::implied_backdrop`](super::SceneOptions::implied_backdrop).
+/// [`SceneOptions::implied_backdrop`](crate::SceneOptions::implied_backdrop).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImpliedBackdrop {
     /// `[sky]`
@@ -39,7 +39,7 @@ impl ImpliedBackdrop {
 }
 
 /// `root` with the values that its text leaves out, and which tables of it are a backdrop that nobody wrote.
-pub(super) fn complete(root: &Table, kinds: &[PhenomenonKind]) -> (Table, ImpliedBackdrop) {
+pub(crate) fn complete(root: &Table, kinds: &[PhenomenonKind]) -> (Table, ImpliedBackdrop) {
     let mut completed = root.clone();
     let implied = match only_kind(root, kinds) {
         Some(kind) if !has_plate(root) && root.get("obstacle").is_none() => imply_setting(&mut completed, root, kind),

@@ -8,7 +8,7 @@ use bansho_base::{
 
 use bansho_base::phenomenon::kind::{BuildError, PhenomenonKind};
 
-use super::{FORMAT, Place, SHARED_TABLES, Scene, picture::LightKind};
+use super::{FORMAT, Place, SHARED_TABLES, Scene, tables::picture::LightKind};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
 /// The format number must be one that this program reads.
@@ -49,7 +49,7 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
 }
 
 /// Name of the plate's own layer.
-pub(crate) const PLATE_LAYER: &str = "plate";
+pub const PLATE_LAYER: &str = "plate";
 
 /// Names of layers that the scene itself has, which no phenomenon may take.
 const RESERVED_NAMES: [&str; 4] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME];
@@ -111,8 +111,8 @@ pub(super) fn values(scene: &Scene, root: &Table, reader: &mut Reader) {
     plate(scene, root, reader);
 }
 
-/// Notes a fault of what stands at `path`.
-pub(crate) fn report(fault: BuildError, path: String, root: &Table, reader: &mut Reader) {
+/// Reports to `reader` an error of what was built from the table at the dotted `path` of the scene `root`, at the position of its key.
+pub fn report_build_error(fault: BuildError, path: String, root: &Table, reader: &mut Reader) {
     let place = place(root, &format!("{path}.{}", fault.key));
     reader.within(path, |reader| {
         reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
@@ -147,7 +147,7 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
         focal(max),
         focal(min)
     );
-    report(
+    report_build_error(
         BuildError { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(told) },
         "camera".into(),
         root,
@@ -163,7 +163,7 @@ fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
         let fault = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
         if light.is_directed() && !light.has_direction() {
             let told = "is no direction; allowed: any three numbers that are not all 0".to_owned();
-            report(fault("direction", told), path.clone(), root, reader);
+            report_build_error(fault("direction", told), path.clone(), root, reader);
         }
         let stated = Place::root().key("light").index(index).key("inner_deg").find(root).is_some();
         if light.kind == LightKind::Spot && stated && light.inner_deg > light.outer_deg {
@@ -171,7 +171,7 @@ fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
                 "a spot that is full up to {} degrees cannot be dark beyond {}; allowed: up to `outer_deg`",
                 light.inner_deg, light.outer_deg
             );
-            report(fault("inner_deg", told), path, root, reader);
+            report_build_error(fault("inner_deg", told), path, root, reader);
         }
     }
 }
@@ -185,7 +185,7 @@ fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     }
     if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {
         let told = "an exposure needs an `image` that was taken with it".to_owned();
-        report(
+        report_build_error(
             BuildError { key: "exposure_ev100".into(), kind: ProblemKind::Conflict(told) },
             "plate".into(),
             root,
