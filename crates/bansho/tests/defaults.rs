@@ -2,7 +2,7 @@
 
 use bansho::KINDS;
 use bansho_base::parameters::{Auto, Value};
-use bansho_scene::{self, ImpliedBackdrop, Scene, SceneOptions};
+use bansho_scene::{ImpliedBackdrop, Scene, SceneOptions};
 
 fn read(text: &str) -> Scene {
     let text = format!("bansho = 1\n{text}");
@@ -19,7 +19,7 @@ fn every_setting_is_a_scene() {
         let text = format!("bansho = 1\n{}[[{}]]\n", kind.setting, kind.key);
         let scene = Scene::parse("setting", &text, KINDS).unwrap_or_else(|error| panic!("{}: {error}", kind.key));
         assert_eq!(scene.implied, NONE, "{}: states all of it", kind.key);
-        let setting = scene::values(kind.setting).unwrap();
+        let setting = bansho_scene::values(kind.setting).unwrap();
         assert!(matches!(setting.get("camera").map(|node| &node.value), Some(Value::Table(_))), "{}", kind.key);
     }
 }
