@@ -61,6 +61,8 @@ pub struct Aurora {
     sequence: Arc<Sequence>,
     /// Made when it is first stepped or drawn: there may be hundreds of auroras, each of which is made to be checked.
     working: OnceLock<Working>,
+    /// How every run begins: made by the first run that needs it, shared by all.
+    beginning: Arc<OnceLock<Working>>,
     /// Luminance of the brightest column of all shapes, cd/m^2.
     brightest: f64,
     /// The shape, counted from 0, on whose way sheets first pass through each other.
@@ -127,6 +129,7 @@ impl Aurora {
             seed,
             brightest: brightest(&parameters, emission, &factors),
             working: OnceLock::new(),
+            beginning: Arc::default(),
             parameters,
             sequence: Arc::new(sequence),
             crossing,
@@ -135,7 +138,7 @@ impl Aurora {
     }
 
     fn working(&self) -> &Working {
-        get_or_make(&self.working, || self.set_to_work())
+        get_or_make(&self.working, || get_or_make(&self.beginning, || self.set_to_work()).clone())
     }
 
     fn set_to_work(&self) -> Working {
@@ -306,7 +309,7 @@ impl Phenomenon for Aurora {
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
-        self.working();
+        // A run takes its state from the beginning that all share when it is first stepped or drawn: remarks start hundreds that never are.
         Box::new((*self).clone())
     }
 }

@@ -203,10 +203,16 @@ fn build_obstacles(
 ) -> Vec<(Fingerprint, Occluder)> {
     let mut obstacles = Vec::new();
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
-        let fingerprint = fingerprint::of_obstacle(obstacle, scene, assets);
-        let known = previous.and_then(|previous| previous.obstacles.iter().find(|(own, _)| *own == fingerprint));
-        match known.map_or_else(|| obstacle.build(assets), |(_, known)| Ok(known.clone())) {
-            Ok(occluder) => obstacles.push((fingerprint, occluder)),
+        // A fingerprint reads every file that a mesh names, however many bytes they have together; building refuses too many. So it is
+        // taken only of what has been built, now or before.
+        let fingerprint = || fingerprint::of_obstacle(obstacle, scene, assets);
+        let same = previous.filter(|previous| previous.scene.obstacles.contains(obstacle));
+        let known = same.and_then(|previous| {
+            let fingerprint = fingerprint();
+            previous.obstacles.iter().find(|(own, _)| *own == fingerprint).cloned()
+        });
+        match known.map_or_else(|| obstacle.build(assets).map(|occluder| (fingerprint(), occluder)), Ok) {
+            Ok(obstacle) => obstacles.push(obstacle),
             Err(error) => errors.push((format!("obstacle.{index}"), error)),
         }
     }
@@ -237,10 +243,14 @@ fn build_instances(
                 }
             }
         }
-        let fingerprint = fingerprint::of_instance(instance, scene, assets);
-        let known = previous.and_then(|previous| previous.built.get(&fingerprint).cloned());
-        match known.map_or_else(|| build_instance(instance, scene, assets), Ok) {
-            Ok(phenomenon) => {
+        let fingerprint = || fingerprint::of_instance(instance, scene, assets);
+        let known = previous.and_then(|previous| {
+            let fingerprint = fingerprint();
+            previous.built.get(&fingerprint).map(|phenomenon| (fingerprint, phenomenon.clone()))
+        });
+        let build = || build_instance(instance, scene, assets).map(|phenomenon| (fingerprint(), phenomenon));
+        match known.map_or_else(build, Ok) {
+            Ok((fingerprint, phenomenon)) => {
                 built.insert(fingerprint, phenomenon);
                 enabled.extend(instance.enabled.then_some(fingerprint));
             }

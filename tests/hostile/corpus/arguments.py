@@ -95,7 +95,6 @@ def _words() -> list[Case]:
         _render("12 bits", ["--bits", "12"], places=["8, 16"]),
         _render("layers in a PNG", ["--layers"], words=r"--layers.*\.exr"),
         _render("encoded alpha of raw pixels", ["--view", "raw", "--alpha", "encoded"], words="--alpha"),
-        _render("a GPU", ["--backend", "gpu"], 4, "no usable GPU"),
         _render("two outputs", ["-o", "b.png"], words="cannot be used multiple times|--out"),
         Case("arguments", "nothing", [], 2, "", errors=0),
         Case("arguments", "an empty command", [""], 2, r"^error: "),
