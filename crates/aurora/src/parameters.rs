@@ -7,7 +7,7 @@ use crate::physics::extinction::Extinction;
 use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
 use crate::physics::precipitation::spectrum::ARC;
 use crate::physics::precipitation::{Spectrum, TrackModel};
-use bansho_base::host::once::get_or_make;
+use bansho_base::host::once::get_or_compute;
 use bansho_base::parameters::animated::Animated;
 use bansho_base::parameters::{Auto, Length, Range};
 use std::sync::OnceLock;
@@ -277,7 +277,7 @@ impl TrackModel {
         static TABLES: [OnceLock<Emission>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
             [const { OnceLock::new() }; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
         let index = self as usize * SpectrumShape::CHOICES.len() + shape as usize;
-        get_or_make(&TABLES[index], || self.emission(shape.spectrum()))
+        get_or_compute(&TABLES[index], || self.emission(shape.spectrum()))
     }
 }
 

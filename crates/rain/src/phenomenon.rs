@@ -11,12 +11,12 @@ use bansho_base::{
         observer::{Cancelled, Observer, check},
     },
     math::random::Key,
-    parameters::parameter_fault::{FaultKind, ParameterFault},
+    parameters::parameter_error::{ParameterError, ParameterErrorKind},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
         kind::{BuildContext, BuildError, Describe},
         strip::{DepthInterval, Shutter, View},
-        surroundings::{Emitter, Light, Neighbours, Publication, Surroundings},
+        surroundings::{Emitter, Light, OtherPhenomena, Publication, Surroundings},
     },
     world::wind::Wind,
 };
@@ -80,13 +80,13 @@ impl Rain {
     ///
     /// # Errors
     /// Diameters that do not ascend, or a loop that is no length of time.
-    pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterFault> {
+    pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
-            return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
+            return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
         }
         if let Some(pair) = parameters.diameters_mm.windows(2).find(|pair| pair[1] <= pair[0]) {
-            let kind = FaultKind::NotAscending { value: pair[0], next: pair[1] };
-            return Err(ParameterFault { key: "diameters_mm", kind });
+            let kind = ParameterErrorKind::NotAscending { value: pair[0], next: pair[1] };
+            return Err(ParameterError { key: "diameters_mm", kind });
         }
         constructions::count("rain");
         let velocity = TerminalVelocity { law: parameters.velocity, air: Air::default() };
@@ -199,7 +199,7 @@ impl Phenomenon for Rain {
         0.0
     }
 
-    fn remark(&self, neighbors: &Neighbours) -> Option<Remark> {
+    fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
         let unlit = neighbors.sky.is_dark() && neighbors.lights().all(dark);
         let message = "nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would";

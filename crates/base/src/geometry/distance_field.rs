@@ -10,13 +10,13 @@ use super::mesh::Mesh;
 use crate::math;
 
 /// Cells along the longest side of the mesh.
-const CELLS: f64 = 64.0;
+const CELLS_ALONG_LONGEST_SIDE: f64 = 64.0;
 /// Cells around the mesh on every side.
-const MARGIN: f64 = 3.0;
+const MARGIN_CELLS: f64 = 3.0;
 /// Cells across a thin mesh, so that some lie within it,
-const CELLS_ACROSS: f64 = 2.5;
+const MIN_CELLS_ACROSS: f64 = 2.5;
 /// and about as many cells in all at most for that.
-const MOST_CELLS: f64 = 7e5;
+const MAX_CELLS: f64 = 7e5;
 
 /// Signed distance to a mesh, m.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,12 +32,12 @@ impl DistanceField {
     /// The distances to `mesh`.
     pub fn new(mesh: &Mesh) -> Self {
         let [min, max] = mesh.bounds();
-        let spacing = spacing(mesh, (max - min).max_element());
-        let size = ((max - min) / spacing + 2.0 * MARGIN).ceil().as_uvec3() + UVec3::ONE;
-        let origin = min - MARGIN * spacing;
-        let mut building = Building::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
+        let spacing = grid_spacing(mesh, (max - min).max_element());
+        let size = ((max - min) / spacing + 2.0 * MARGIN_CELLS).ceil().as_uvec3() + UVec3::ONE;
+        let origin = min - MARGIN_CELLS * spacing;
+        let mut building = GridBuilder::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
         building.sweep();
-        let inside = building.inside();
+        let inside = building.classify_inside();
         let signed = |(distance, inside): (f32, bool)| if inside { -distance } else { distance };
         let distance =
             building.distance.iter().zip(inside).map(|(d, inside)| signed((*d * spacing as f32, inside))).collect();
@@ -71,7 +71,7 @@ impl DistanceField {
 }
 
 /// Distance between grid points for a mesh with such a longest side: small enough for its thickness, if that can be.
-fn spacing(mesh: &Mesh, longest: f64) -> f64 {
+fn grid_spacing(mesh: &Mesh, longest: f64) -> f64 {
     let [min, max] = mesh.bounds();
     let (middle, mut volume, mut area) = (0.5 * (min + max), 0.0, 0.0);
     for [a, b, c] in mesh.triangles().map(|corners| corners.map(|corner| corner - middle)) {
@@ -80,14 +80,14 @@ fn spacing(mesh: &Mesh, longest: f64) -> f64 {
     }
     // A plate's sides are all its area, twice; what is nowhere as thin is thicker by that.
     let thickness = 2.0 * volume.abs() / area.max(f64::MIN_POSITIVE);
-    let finest = math::cbrt((max - min + thickness).element_product() / MOST_CELLS);
+    let finest = math::cbrt((max - min + thickness).element_product() / MAX_CELLS);
     // A sheet without thickness has no inside that a finer grid would find.
-    let across = if thickness > finest { (thickness / CELLS_ACROSS).max(finest) } else { f64::INFINITY };
-    across.min(longest / CELLS).max(1e-9)
+    let across = if thickness > finest { (thickness / MIN_CELLS_ACROSS).max(finest) } else { f64::INFINITY };
+    across.min(longest / CELLS_ALONG_LONGEST_SIDE).max(1e-9)
 }
 
 /// The grid while it is filled; lengths in cells.
-struct Building {
+struct GridBuilder {
     size: [usize; 3],
     triangles: Vec<[Vec3; 3]>,
     distance: Vec<f32>,
@@ -96,18 +96,18 @@ struct Building {
 
 const NONE: u32 = u32::MAX;
 
-impl Building {
+impl GridBuilder {
     fn new(mesh: &Mesh, origin: DVec3, spacing: f64, size: [usize; 3]) -> Self {
         let cells = |corner: DVec3| ((corner - origin) / spacing).as_vec3();
         let count = size.iter().product();
         let triangles = mesh.triangles().map(|corners| corners.map(cells)).collect();
         let mut building = Self { size, triangles, distance: vec![f32::INFINITY; count], nearest: vec![NONE; count] };
-        (0..building.triangles.len()).for_each(|triangle| building.mark_near(triangle));
+        (0..building.triangles.len()).for_each(|triangle| building.compute_exact_distances(triangle));
         building
     }
 
     /// Exact distances of the points within a cell of the box around a triangle.
-    fn mark_near(&mut self, triangle: usize) {
+    fn compute_exact_distances(&mut self, triangle: usize) {
         let [a, b, c] = self.triangles[triangle];
         let low = (a.min(b).min(c).floor() - 1.0).max(Vec3::ZERO).as_uvec3();
         let high = (a.max(b).max(c).ceil() + 1.0).max(Vec3::ZERO).as_uvec3();
@@ -116,13 +116,13 @@ impl Building {
         for z in low.z as usize..end(2) {
             for y in low.y as usize..end(1) {
                 for x in low.x as usize..end(0) {
-                    self.offer([x, y, z], triangle as u32);
+                    self.update_distance([x, y, z], triangle as u32);
                 }
             }
         }
     }
 
-    fn offer(&mut self, place: [usize; 3], triangle: u32) {
+    fn update_distance(&mut self, place: [usize; 3], triangle: u32) {
         let index = (place[2] * self.size[1] + place[1]) * self.size[0] + place[0];
         let point = Vec3::from(place.map(|coordinate| coordinate as f32));
         let distance = distance_to_triangle(point, self.triangles[triangle as usize]);
@@ -141,7 +141,7 @@ impl Building {
                 for j in 0..height {
                     for i in 0..width {
                         let place = [forward(0, i, width), forward(1, j, height), forward(2, k, depth)];
-                        self.take_over(place, diagonal);
+                        self.propagate_from_neighbors(place, diagonal);
                     }
                 }
             }
@@ -149,35 +149,35 @@ impl Building {
     }
 
     /// Tries the nearest triangles of the three points behind `place`.
-    fn take_over(&mut self, place: [usize; 3], diagonal: usize) {
+    fn propagate_from_neighbors(&mut self, place: [usize; 3], diagonal: usize) {
         for axis in 0..3 {
             let mut behind = place;
             behind[axis] = if diagonal >> axis & 1 == 0 { place[axis].wrapping_sub(1) } else { place[axis] + 1 };
             if behind[axis] < self.size[axis] {
                 let triangle = self.nearest[(behind[2] * self.size[1] + behind[1]) * self.size[0] + behind[0]];
                 if triangle != NONE {
-                    self.offer(place, triangle);
+                    self.update_distance(place, triangle);
                 }
             }
         }
     }
 
     /// Whether each point is inside, by majority of three lines.
-    fn inside(&self) -> Vec<bool> {
+    fn classify_inside(&self) -> Vec<bool> {
         let mut votes = vec![0u8; self.distance.len()];
         for axis in 0..3 {
-            self.vote(axis, &mut votes);
+            self.add_inside_votes(axis, &mut votes);
         }
         votes.into_iter().map(|votes| votes >= 2).collect()
     }
 
     /// Adds a vote to every point before which the line along `axis` has crossed the surface an odd number of times.
-    fn vote(&self, axis: usize, votes: &mut [u8]) {
+    fn add_inside_votes(&self, axis: usize, votes: &mut [u8]) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let strides = [1, self.size[0], self.size[0] * self.size[1]];
         let mut crossings = vec![Vec::new(); self.size[u] * self.size[v]];
         for corners in &self.triangles {
-            mark_crossings(corners, [axis, u, v], [self.size[u], self.size[v]], &mut crossings);
+            find_crossings(corners, [axis, u, v], [self.size[u], self.size[v]], &mut crossings);
         }
         for (line, crossings) in crossings.iter_mut().enumerate() {
             crossings.sort_unstable_by(f32::total_cmp);
@@ -194,7 +194,7 @@ impl Building {
 }
 
 /// Notes where the grid's lines along the first of `axes` cross a triangle.
-fn mark_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2], crossings: &mut [Vec<f32>]) {
+fn find_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2], crossings: &mut [Vec<f32>]) {
     // Lines a hair beside the grid's points pass no corner and no edge of a mesh that was made on round numbers.
     let shift = [1.371e-4, 2.137e-4];
     let flat = corners.map(|corner| [corner[u] - shift[0], corner[v] - shift[1]]);

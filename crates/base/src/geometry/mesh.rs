@@ -3,15 +3,15 @@
 use glam::DVec3;
 
 /// Most triangles of a mesh.
-pub const MOST_TRIANGLES: usize = 4_000_000;
+pub const MAX_TRIANGLES: usize = 4_000_000;
 
 /// Most corners of a mesh: as many as that many triangles have which share none.
-pub const MOST_CORNERS: usize = 3 * MOST_TRIANGLES;
+pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 
 /// A surface of triangles, right-handed, y up, m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    corners: Vec<[f32; 3]>,
+    vertices: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
@@ -22,32 +22,32 @@ pub enum MeshError {
     #[error("it has no triangles with an area")]
     NoTriangles,
     /// More than are read.
-    #[error("it has {found} triangles; at most {MOST_TRIANGLES} are read")]
+    #[error("it has {found} triangles; at most {MAX_TRIANGLES} are read")]
     TooManyTriangles {
         /// How many it has.
         found: usize,
     },
     /// More than are read.
-    #[error("it has {found} corners; at most {MOST_CORNERS} are read")]
-    TooManyCorners {
+    #[error("it has {found} vertices; at most {MAX_VERTICES} are read")]
+    TooManyVertices {
         /// How many it has.
         found: usize,
     },
     /// A triangle names a corner that is not there.
-    #[error("triangle {} names corner {}, and there are {corners}", triangle + 1, u64::from(*corner) + 1)]
-    NoSuchCorner {
+    #[error("triangle {} refers to vertex {}, and there are {vertex_count}", triangle + 1, u64::from(*vertex) + 1)]
+    VertexIndexOutOfRange {
         /// Which triangle, from 0.
         triangle: usize,
         /// Which corner it names, from 0.
-        corner: u32,
+        vertex: u32,
         /// How many there are.
-        corners: usize,
+        vertex_count: usize,
     },
     /// A coordinate that is not finite or beyond 1e6 m.
-    #[error("corner {} lies beyond 1e6 m or nowhere", corner + 1)]
-    FarCorner {
+    #[error("vertex {} is not finite or lies beyond 1e6 m", vertex + 1)]
+    VertexOutOfBounds {
         /// Which corner, from 0.
-        corner: usize,
+        vertex: usize,
     },
 }
 
@@ -57,23 +57,23 @@ impl Mesh {
     /// # Errors
     /// No triangle with an area, too many, corners that are not there or not finite.
     pub fn new(corners: Vec<[f32; 3]>, mut triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
-        if triangles.len() > MOST_TRIANGLES {
+        if triangles.len() > MAX_TRIANGLES {
             return Err(MeshError::TooManyTriangles { found: triangles.len() });
         }
-        if corners.len() > MOST_CORNERS {
-            return Err(MeshError::TooManyCorners { found: corners.len() });
+        if corners.len() > MAX_VERTICES {
+            return Err(MeshError::TooManyVertices { found: corners.len() });
         }
         let near = |corner: &[f32; 3]| corner.iter().all(|value| value.abs() <= 1e6);
         if let Some(corner) = corners.iter().position(|corner| !near(corner)) {
-            return Err(MeshError::FarCorner { corner });
+            return Err(MeshError::VertexOutOfBounds { vertex: corner });
         }
         for (triangle, named) in triangles.iter().enumerate() {
             if let Some(&corner) = named.iter().find(|&&corner| corner as usize >= corners.len()) {
-                return Err(MeshError::NoSuchCorner { triangle, corner, corners: corners.len() });
+                return Err(MeshError::VertexIndexOutOfRange { triangle, vertex: corner, vertex_count: corners.len() });
             }
         }
-        triangles.retain(|named| normal(named.map(|corner| point(corners[corner as usize]))).length() > 0.0);
-        if triangles.is_empty() { Err(MeshError::NoTriangles) } else { Ok(Self { corners, triangles }) }
+        triangles.retain(|named| area_normal(named.map(|corner| to_dvec3(corners[corner as usize]))).length() > 0.0);
+        if triangles.is_empty() { Err(MeshError::NoTriangles) } else { Ok(Self { vertices: corners, triangles }) }
     }
 
     /// How many triangles it has; at least one.
@@ -83,7 +83,7 @@ impl Mesh {
 
     /// Bytes that it takes in memory.
     pub fn memory_bytes(&self) -> u64 {
-        (size_of_val(&self.corners[..]) + size_of_val(&self.triangles[..])) as u64
+        (size_of_val(&self.vertices[..]) + size_of_val(&self.triangles[..])) as u64
     }
 
     /// Never: a mesh has a triangle.
@@ -93,7 +93,7 @@ impl Mesh {
 
     /// The corners of every triangle, anticlockwise as seen from outside.
     pub fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
-        self.triangles.iter().map(|named| named.map(|corner| point(self.corners[corner as usize])))
+        self.triangles.iter().map(|named| named.map(|corner| to_dvec3(self.vertices[corner as usize])))
     }
 
     /// Least and greatest corner of the box around it.
@@ -106,19 +106,19 @@ impl Mesh {
     pub fn sampler(&self) -> SurfaceSampler {
         let mut area = 0.0;
         let triangles = self.triangles().map(|corners| {
-            area += 0.5 * normal(corners).length();
+            area += 0.5 * area_normal(corners).length();
             (area, corners)
         });
         SurfaceSampler { triangles: triangles.collect() }
     }
 }
 
-fn point(corner: [f32; 3]) -> DVec3 {
+fn to_dvec3(corner: [f32; 3]) -> DVec3 {
     DVec3::from(corner.map(f64::from))
 }
 
 /// Normal of a triangle, twice its area long.
-fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+fn area_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
@@ -136,14 +136,14 @@ impl SurfaceSampler {
     }
 
     /// The point and unit normal that belong to three numbers in [0, 1).
-    pub fn at(&self, [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+    pub fn sample(&self, [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
         let wanted = which * self.area();
         let index = self.triangles.partition_point(|(area, _)| *area <= wanted).min(self.triangles.len() - 1);
         let corners = self.triangles[index].1;
         // Folding the unit square over its diagonal keeps points even over the triangle.
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         let [a, b, c] = corners;
-        (a + (b - a) * u + (c - a) * v, normal(corners).normalize_or(DVec3::Y))
+        (a + (b - a) * u + (c - a) * v, area_normal(corners).normalize_or(DVec3::Y))
     }
 }
 
@@ -166,7 +166,8 @@ mod tests {
         let mut on_top = 0;
         for i in 0..6000 {
             let f = f64::from(i);
-            let (point, normal) = sampler.at([(f + 0.5) / 6000.0, (f * 0.618_034).fract(), (f * 0.414_214).fract()]);
+            let (point, normal) =
+                sampler.sample([(f + 0.5) / 6000.0, (f * 0.618_034).fract(), (f * 0.414_214).fract()]);
             let outside = (point - DVec3::splat(0.5)).abs().max_element();
             assert!((outside - 0.5).abs() < 1e-6);
             assert!(normal.dot(point - DVec3::splat(0.5)) > 0.0, "normals point out");
@@ -181,8 +182,8 @@ mod tests {
         assert_eq!(Mesh::new(corners.clone(), vec![[0, 1, 2]]), Err(MeshError::NoTriangles));
         assert_eq!(
             Mesh::new(corners, vec![[0, 1, 9]]),
-            Err(MeshError::NoSuchCorner { triangle: 0, corner: 9, corners: 3 })
+            Err(MeshError::VertexIndexOutOfRange { triangle: 0, vertex: 9, vertex_count: 3 })
         );
-        assert_eq!(Mesh::new(vec![[f32::NAN; 3]], vec![]), Err(MeshError::FarCorner { corner: 0 }));
+        assert_eq!(Mesh::new(vec![[f32::NAN; 3]], vec![]), Err(MeshError::VertexOutOfBounds { vertex: 0 }));
     }
 }

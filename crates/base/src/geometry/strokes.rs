@@ -17,9 +17,9 @@ pub struct Drawing {
     /// Its strokes.
     pub strokes: Vec<Stroke>,
     /// The corner of the sheet that was drawn on with the least coordinates.
-    pub low: DVec2,
+    pub min: DVec2,
     /// The corner with the greatest.
-    pub high: DVec2,
+    pub max: DVec2,
 }
 
 impl Drawing {

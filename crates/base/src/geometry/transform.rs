@@ -6,7 +6,7 @@ use crate::math;
 
 /// Scale, then turn, then move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
+pub struct Transform {
     /// Where its own origin comes to lie, m.
     pub position: DVec3,
     /// How it is turned.
@@ -15,10 +15,10 @@ pub struct Placement {
     pub scale: f64,
 }
 
-impl Placement {
+impl Transform {
     /// Moved to `position`, turned about x, then y, then z by `rotation_deg` degrees, `scale` times as large.
     pub fn new(position: [f64; 3], rotation_deg: [f64; 3], scale: f64) -> Self {
-        Self { position: position.into(), rotation: turn(rotation_deg.map(f64::to_radians)), scale }
+        Self { position: position.into(), rotation: rotation_from_euler(rotation_deg.map(f64::to_radians)), scale }
     }
 
     /// A point of the thing, in the world.
@@ -32,13 +32,13 @@ impl Placement {
     }
 
     /// A direction of the thing, in the world.
-    pub fn turn(&self, direction: DVec3) -> DVec3 {
+    pub fn transform_direction(&self, direction: DVec3) -> DVec3 {
         self.rotation * direction
     }
 }
 
 /// The turn about x, then y, then z by these angles, radians.
-fn turn(angles: [f64; 3]) -> DQuat {
+fn rotation_from_euler(angles: [f64; 3]) -> DQuat {
     let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| math::sin_cos(0.5 * angle));
     let (cc, cs, sc, ss) = (cx * cz, cx * sz, sx * cz, sx * sz);
     DQuat::from_xyzw(cy * sc - sy * cs, cy * ss + sy * cc, cy * cs - sy * sc, cy * cc + sy * ss)
@@ -50,15 +50,15 @@ mod tests {
 
     #[test]
     fn turns_are_about_x_then_y_then_z() {
-        let placement = Placement::new([1.0, 0.0, 0.0], [90.0, 0.0, 90.0], 2.0);
+        let placement = Transform::new([1.0, 0.0, 0.0], [90.0, 0.0, 90.0], 2.0);
         // y turns to z about x, and z stays when turned about z; x turns to y.
         assert!((placement.to_world(DVec3::Y) - DVec3::new(1.0, 0.0, 2.0)).length() < 1e-12);
-        assert!((placement.turn(DVec3::X) - DVec3::Y).length() < 1e-12);
+        assert!((placement.transform_direction(DVec3::X) - DVec3::Y).length() < 1e-12);
     }
 
     #[test]
     fn there_and_back_is_the_same_point() {
-        let placement = Placement::new([1.0, -2.0, 3.0], [10.0, 20.0, 30.0], 0.3);
+        let placement = Transform::new([1.0, -2.0, 3.0], [10.0, 20.0, 30.0], 0.3);
         let point = DVec3::new(0.4, 5.0, -6.0);
         assert!((placement.to_local(placement.to_world(point)) - point).length() < 1e-12);
     }

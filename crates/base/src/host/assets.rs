@@ -26,7 +26,7 @@ pub enum Encoding {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Red, green, blue, straight alpha (1 where the file has none), in `encoding`.
-    pub colour: Image<4>,
+    pub color: Image<4>,
     /// The file's depth channel (`Z`), if it has one; row after row.
     pub depth: Option<Vec<f32>>,
     /// What the colours mean.
@@ -45,11 +45,11 @@ pub struct AssetError {
     pub problem: AssetProblem,
 }
 
-fn of_all(others: u64) -> String {
-    if others == 0 { String::new() } else { format!(", since other inputs take {}", memory::shown(others)) }
+fn other_inputs_note(others: u64) -> String {
+    if others == 0 { String::new() } else { format!(", since other inputs take {}", memory::format_bytes(others)) }
 }
 
-fn only(instead: &[&str]) -> String {
+fn found_instead_note(instead: &[&str]) -> String {
     if instead.is_empty() { String::new() } else { format!(", only {}", instead.join(", ")) }
 }
 
@@ -80,7 +80,7 @@ pub enum AssetProblem {
         limit: u64,
     },
     /// It would take more memory than the inputs of a scene may.
-    #[error("takes {} of memory once it is read; allowed: up to {}{}", memory::shown(*.bytes), memory::shown(*.limit), of_all(*.others))]
+    #[error("takes {} of memory once it is read; allowed: up to {}{}", memory::format_bytes(*.bytes), memory::format_bytes(*.limit), other_inputs_note(*.others))]
     Memory {
         /// Bytes that it would take while it is read, at the most.
         bytes: u64,
@@ -90,7 +90,7 @@ pub enum AssetProblem {
         others: u64,
     },
     /// It would take more memory than the system has.
-    #[error("takes {} of memory once it is read, more than there is", memory::shown(*.bytes))]
+    #[error("takes {} of memory once it is read, more than there is", memory::format_bytes(*.bytes))]
     NoMemory {
         /// Bytes that it would take while it is read, at the most.
         bytes: u64,
@@ -103,9 +103,9 @@ pub enum AssetProblem {
     },
     /// What another program said of it, which had tried.
     #[error("{0}")]
-    Told(String),
+    Reported(String),
     /// A drawing without strokes.
-    #[error("holds no strokes{} (allowed: an SVG file with path, polyline, polygon or line elements)", only(.instead))]
+    #[error("holds no strokes{} (allowed: an SVG file with path, polyline, polygon or line elements)", found_instead_note(.instead))]
     NoStrokes {
         /// Names of the elements that it draws instead.
         instead: Vec<&'static str>,

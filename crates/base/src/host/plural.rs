@@ -13,6 +13,6 @@ pub fn counted(count: usize, one: &str) -> String {
 
 /// How many are allowed: `exactly 2 items` or `1 to 8 items`.
 #[must_use]
-pub fn between(min: usize, max: usize, one: &str) -> String {
+pub fn count_range(min: usize, max: usize, one: &str) -> String {
     if min == max { format!("exactly {}", counted(min, one)) } else { format!("{min} to {}", counted(max, one)) }
 }

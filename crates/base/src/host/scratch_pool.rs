@@ -7,23 +7,23 @@ use std::sync::{Mutex, PoisonError};
 
 /// As many things as there are tasks at once, made where none is left over.
 #[derive(Debug)]
-pub struct Spares<T, M> {
-    make: M,
-    left: Mutex<Vec<T>>,
+pub struct ScratchPool<T, M> {
+    create: M,
+    free: Mutex<Vec<T>>,
 }
 
-impl<T, M: Fn() -> T> Spares<T, M> {
+impl<T, M: Fn() -> T> ScratchPool<T, M> {
     /// None yet; `make` makes them.
-    pub fn new(make: M) -> Self {
-        Self { make, left: Mutex::default() }
+    pub fn new(create: M) -> Self {
+        Self { create, free: Mutex::default() }
     }
 
     /// Does a task with one of them, which is as the task before left it.
     #[inline(always)]
-    pub fn lend<R>(&self, task: impl FnOnce(&mut T) -> R) -> R {
-        let left = || self.left.lock().unwrap_or_else(PoisonError::into_inner);
+    pub fn with<R>(&self, task: impl FnOnce(&mut T) -> R) -> R {
+        let left = || self.free.lock().unwrap_or_else(PoisonError::into_inner);
         let spare = left().pop();
-        let mut spare = spare.unwrap_or_else(&self.make);
+        let mut spare = spare.unwrap_or_else(&self.create);
         let result = task(&mut spare);
         left().push(spare);
         result
@@ -36,12 +36,12 @@ mod tests {
 
     #[test]
     fn what_a_task_gives_back_the_next_one_has() {
-        let spares = Spares::new(Vec::new);
-        spares.lend(|first: &mut Vec<i32>| {
+        let spares = ScratchPool::new(Vec::new);
+        spares.with(|first: &mut Vec<i32>| {
             first.push(1);
             // While the first is lent, there is another.
-            spares.lend(|second| second.extend([2, 3]));
+            spares.with(|second| second.extend([2, 3]));
         });
-        spares.lend(|last| assert_eq!(*last, [1]));
+        spares.with(|last| assert_eq!(*last, [1]));
     }
 }

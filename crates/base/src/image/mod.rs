@@ -62,7 +62,7 @@ impl<const N: usize> Image<N> {
 
     /// The value at a place in pixels from the left and top edges, bilinear between the middles of pixels; beyond the outermost middles as at
     /// the nearest.
-    pub fn between(&self, place: DVec2) -> [f32; N] {
+    pub fn sample_bilinear(&self, place: DVec2) -> [f32; N] {
         if self.pixels.is_empty() {
             return [0.0; N];
         }

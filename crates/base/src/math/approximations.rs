@@ -8,19 +8,19 @@
 use super::MulAdd;
 
 /// 3 * 2^22: added to a number below 2^22 in size it rounds that to a whole number, which then stands in the low bits of the sum.
-pub const ROUND: f32 = 12_582_912.0;
-const SIGN: u32 = 0x8000_0000;
+pub const ROUNDING_MAGIC: f32 = 12_582_912.0;
+const SIGN_BIT: u32 = 0x8000_0000;
 
 /// The whole number nearest to `x`, ties to the even one; for `x` below 2^22 in size.
 #[inline(always)]
 pub fn rounded(x: f32) -> f32 {
-    (x + ROUND) - ROUND
+    (x + ROUNDING_MAGIC) - ROUNDING_MAGIC
 }
 
 /// The same as an integer. (A cast would check each lane of a vector by itself.)
 #[inline(always)]
-pub fn whole(x: f32) -> i32 {
-    (x + ROUND).to_bits().wrapping_sub(ROUND.to_bits()).cast_signed()
+pub fn round_to_i32(x: f32) -> i32 {
+    (x + ROUNDING_MAGIC).to_bits().wrapping_sub(ROUNDING_MAGIC.to_bits()).cast_signed()
 }
 
 /// 2 to the power `x`; relative error below 1.4e-7. From 128 on infinite, below -126 zero (no subnormals); NaN stays NaN.
@@ -28,8 +28,8 @@ pub fn whole(x: f32) -> i32 {
 pub fn exp2(x: f32) -> f32 {
     let held = if x > -127.0 { x } else { -127.0 };
     let held = if held < 128.0 { held } else { 128.0 };
-    let rounded = held + ROUND;
-    let f = held - (rounded - ROUND);
+    let rounded = held + ROUNDING_MAGIC;
+    let f = held - (rounded - ROUNDING_MAGIC);
     // 2^f = 1 + f q(f) on [-1/2, 1/2], fit 2.0e-9.
     let q = 1.535_336e-4f32.fma(f, 1.339_887_5e-3).fma(f, 9.618_437e-3);
     let q = q.fma(f, 5.550_332_5e-2).fma(f, 2.402_264_8e-1).fma(f, 6.931_472e-1);
@@ -44,8 +44,8 @@ pub fn exp2(x: f32) -> f32 {
 pub fn exp(x: f32) -> f32 {
     let held = if x > -88.0 { x } else { -88.0 };
     let held = if held < 89.0 { held } else { 89.0 };
-    let rounded = held.fma(std::f32::consts::LOG2_E, ROUND);
-    let whole = rounded - ROUND;
+    let rounded = held.fma(std::f32::consts::LOG2_E, ROUNDING_MAGIC);
+    let whole = rounded - ROUNDING_MAGIC;
     // ln 2 in two parts, so that what is left of a large x is not rounded away.
     let f = whole.fma(-0.693_359_4, held);
     let f = whole.fma(2.121_944_4e-4, f);
@@ -101,16 +101,16 @@ pub fn pow(x: f32, y: f32) -> f32 {
 pub fn sin_turns(x: f32) -> f32 {
     let r = x - x.round_ties_even();
     // Fold the outer quarters in: sin(pi - a) = sin a.
-    let size = f32::from_bits(r.to_bits() & !SIGN);
+    let size = f32::from_bits(r.to_bits() & !SIGN_BIT);
     let folded = if size > 0.25 { 0.5 - size } else { size };
-    sin_quarter(f32::from_bits(folded.to_bits() | (r.to_bits() & SIGN)))
+    sin_quarter(f32::from_bits(folded.to_bits() | (r.to_bits() & SIGN_BIT)))
 }
 
 /// Cosine of `x` turns; absolute error below 1.8e-7 beside that of `x` itself. NaN where `x` is not finite.
 #[inline(always)]
 pub fn cos_turns(x: f32) -> f32 {
     let r = x - x.round_ties_even();
-    sin_quarter(0.25 - f32::from_bits(r.to_bits() & !SIGN))
+    sin_quarter(0.25 - f32::from_bits(r.to_bits() & !SIGN_BIT))
 }
 
 /// Sine of `r` turns on [-1/4, 1/4]: odd polynomial of degree 9, fit 5.3e-9; held to [-1, 1].
@@ -126,7 +126,7 @@ fn sin_quarter(r: f32) -> f32 {
 /// Angle of the direction (`x`, `y`) from the first axis in [-pi, pi], radians; absolute error below 4e-7. 0 where both are 0.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
-    let (across, along) = (f32::from_bits(y.to_bits() & !SIGN), f32::from_bits(x.to_bits() & !SIGN));
+    let (across, along) = (f32::from_bits(y.to_bits() & !SIGN_BIT), f32::from_bits(x.to_bits() & !SIGN_BIT));
     let steep = across > along;
     let (least, greatest) = if steep { (along, across) } else { (across, along) };
     // atan r = r q(r^2) on [0, 1], fit 3.8e-8.
@@ -137,7 +137,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     let angle = r * q.fma(r2, 9.999_993e-1);
     let angle = if steep { std::f32::consts::FRAC_PI_2 - angle } else { angle };
     let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
-    f32::from_bits(angle.to_bits() | (y.to_bits() & SIGN))
+    f32::from_bits(angle.to_bits() | (y.to_bits() & SIGN_BIT))
 }
 
 #[cfg(test)]

@@ -93,8 +93,8 @@ pub const fn philox4x32_10(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
 
 #[inline(always)]
 const fn philox_round([a, b, c, d]: [u32; 4], [k0, k1]: [u32; 2]) -> [u32; 4] {
-    let (high0, low0) = multiply(0xd251_1f53, a);
-    let (high1, low1) = multiply(0xcd9e_8d57, c);
+    let (high0, low0) = mul_wide(0xd251_1f53, a);
+    let (high1, low1) = mul_wide(0xcd9e_8d57, c);
     [high1 ^ b ^ k0, low1, high0 ^ d ^ k1, low0]
 }
 
@@ -106,7 +106,7 @@ const fn next_key([k0, k1]: [u32; 2]) -> [u32; 2] {
 
 /// High and low half of a product.
 #[inline(always)]
-const fn multiply(a: u32, b: u32) -> (u32, u32) {
+const fn mul_wide(a: u32, b: u32) -> (u32, u32) {
     let product = a as u64 * b as u64;
     ((product >> 32) as u32, product as u32)
 }
@@ -170,7 +170,7 @@ pub fn direction(words: [u32; 2]) -> Vec3 {
 }
 
 /// Largest mean that [`poisson`] counts through.
-const POISSON_COUNTED_MEAN: f64 = 256.0;
+const MAX_INVERSION_MEAN: f64 = 256.0;
 const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
 
 /// A count with Poisson distribution of mean `mean`; 0 where the mean is not above 0 or NaN.
@@ -184,15 +184,15 @@ pub fn poisson(mean: f64, words: [u32; 2]) -> u64 {
     let u = (((words[0] as u64) << 32 | words[1] as u64) >> 12) as f64 * (1.0 / TWO_TO_52) + 0.5 / TWO_TO_52;
     if mean.is_nan() || mean <= 0.0 {
         0
-    } else if mean <= POISSON_COUNTED_MEAN {
-        poisson_counted(mean, u)
+    } else if mean <= MAX_INVERSION_MEAN {
+        poisson_by_inversion(mean, u)
     } else {
-        poisson_expanded(mean, u)
+        poisson_cornish_fisher(mean, u)
     }
 }
 
 /// Smallest n whose cumulative probability exceeds `u`.
-fn poisson_counted(mean: f64, u: f64) -> u64 {
+fn poisson_by_inversion(mean: f64, u: f64) -> u64 {
     let mut probability = math::exp(-mean);
     let mut cumulative = probability;
     let mut count = 0;
@@ -205,7 +205,7 @@ fn poisson_counted(mean: f64, u: f64) -> u64 {
     count
 }
 
-fn poisson_expanded(mean: f64, u: f64) -> u64 {
+fn poisson_cornish_fisher(mean: f64, u: f64) -> u64 {
     let z = normal_quantile(u);
     let deviation = math::sqrt(mean);
     let x = mean + deviation * z + (z * z - 1.0) / 6.0 + (z - z * z * z) / (72.0 * deviation);

@@ -7,7 +7,7 @@
 use std::arch::x86_64::{__m256, _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps};
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::approximations::ROUND;
+use super::approximations::ROUNDING_MAGIC;
 use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*, u32x16};
 
 /// Lanes of a vector, whatever the width of the processor's registers.
@@ -201,7 +201,7 @@ pub fn any_positive<S: Simd>(values: Lanes<S>) -> bool {
 
 /// Numbers in even steps from `first` to `last`.
 #[inline(always)]
-pub fn evenly_spaced<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
+pub fn linspace<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
     ramp(simd, first, (last - first) * (1.0 / (LANES - 1) as f32))
 }
 
@@ -210,25 +210,25 @@ pub fn evenly_spaced<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
 /// A whole number may come out as the one below with fraction 1, which interpolates to the same.
 #[inline(always)]
 pub fn wrap_split<S: Simd>(place: Lanes<S>, mask: u32) -> (u32x16<S>, Lanes<S>) {
-    let rounded = (place - place.broadcast(0.5)) + place.broadcast(ROUND);
-    (rounded.to_bits() & mask, place - (rounded - place.broadcast(ROUND)))
+    let rounded = (place - place.broadcast(0.5)) + place.broadcast(ROUNDING_MAGIC);
+    (rounded.to_bits() & mask, place - (rounded - place.broadcast(ROUNDING_MAGIC)))
 }
 
 /// The nearest whole number of each, from 0 to 2^22.
 #[inline(always)]
-pub fn nearest_whole<S: Simd>(value: Lanes<S>) -> u32x16<S> {
-    (value + value.broadcast(ROUND)).to_bits() & 0x003f_ffff
+pub fn round_to_u32<S: Simd>(value: Lanes<S>) -> u32x16<S> {
+    (value + value.broadcast(ROUNDING_MAGIC)).to_bits() & 0x003f_ffff
 }
 
 /// Fetches entry `index[lane]` of a table for each lane and turns entries of four into four batches.
 ///
 /// `N` is a power of two; indices wrap.
 #[inline(always)]
-pub fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: u32x16<S>) -> [Lanes<S>; 4] {
+pub fn gather<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: u32x16<S>) -> [Lanes<S>; 4] {
     let mut offsets = [0; LANES];
     ((index << 2) & (4 * N as u32 - 4)).store_slice(&mut offsets);
     let values = table.as_flattened();
-    let (low, high) = (fetch_half(simd, values, &offsets, 0), fetch_half(simd, values, &offsets, LANES / 2));
+    let (low, high) = (gather_half(simd, values, &offsets, 0), gather_half(simd, values, &offsets, LANES / 2));
     let mut batches = [Lanes::splat(simd, 0.0); 4];
     for k in 0..4 {
         batches[k] = low[k].combine(high[k]);
@@ -238,7 +238,7 @@ pub fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: u32
 
 /// The entries of eight lanes from `first` on, as four halves of batches.
 #[inline(always)]
-fn fetch_half<S: Simd>(simd: S, values: &[f32], offsets: &[u32; LANES], first: usize) -> [HalfLanes<S>; 4] {
+fn gather_half<S: Simd>(simd: S, values: &[f32], offsets: &[u32; LANES], first: usize) -> [HalfLanes<S>; 4] {
     let mut pairs = [HalfLanes::splat(simd, 0.0); 4];
     for (lane, pair) in pairs.iter_mut().enumerate() {
         let [near, far] = [first + lane, first + lane + 4].map(|lane| {
@@ -340,7 +340,7 @@ mod tests {
     fn fetching_gathers_entries_lane_by_lane() {
         let table: [[f32; 4]; 32] = std::array::from_fn(|i| std::array::from_fn(|k| (10 * i + k) as f32));
         let index: [u32; LANES] = std::array::from_fn(|lane| (7 * lane % 32) as u32);
-        let batches = crate::dispatch_baseline!(simd => fetch(simd, &table, u32x16::from_slice(simd, &index)).map(|batch| batch.as_slice().to_vec()));
+        let batches = crate::dispatch_baseline!(simd => gather(simd, &table, u32x16::from_slice(simd, &index)).map(|batch| batch.as_slice().to_vec()));
         for lane in 0..LANES {
             for k in 0..4 {
                 assert_eq!(batches[k][lane], table[index[lane] as usize][k]);

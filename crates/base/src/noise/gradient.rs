@@ -31,14 +31,14 @@ const FACTORS: [u32; 4] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d, 0x27d4_eb2f];
 /// Adds a coordinate other than the first to a hash. One round of mixing between coordinates is enough to leave no translation
 /// under which the lattice repeats; it is shared by all corners that have the coordinate.
 #[inline(always)]
-fn add(hash: u32, axis: usize, cell: u32) -> u32 {
+fn hash_coordinate(hash: u32, axis: usize, cell: u32) -> u32 {
     let hash = hash.wrapping_add(cell.wrapping_mul(FACTORS[axis]));
     (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d)
 }
 
 /// Adds the first coordinate and mixes all bits into the upper ones ("lowbias32" by Wellons, public domain, without its last shift).
 #[inline(always)]
-fn finish(hash: u32, cell: u32) -> u32 {
+fn hash_first(hash: u32, cell: u32) -> u32 {
     let hash = hash.wrapping_add(cell.wrapping_mul(FACTORS[0]));
     let hash = (hash ^ hash >> 16).wrapping_mul(0x7feb_352d);
     (hash ^ hash >> 15).wrapping_mul(0x846c_a68b)
@@ -57,13 +57,13 @@ fn fade(f: f32) -> f32 {
 }
 
 #[inline(always)]
-fn mixed(a: f32, b: f32, s: f32) -> f32 {
+fn lerp(a: f32, b: f32, s: f32) -> f32 {
     a + (b - a) * s
 }
 
 /// One of 8 unit vectors at 22.5 + 45 k degrees times (`x`, `y`).
 #[inline(always)]
-fn slope_2(hash: u32, x: f32, y: f32) -> f32 {
+fn gradient_dot_2(hash: u32, x: f32, y: f32) -> f32 {
     const COS: f32 = 0.923_879_5;
     const SIN: f32 = 0.382_683_43;
     let swap = (hash as i32) < 0;
@@ -74,7 +74,7 @@ fn slope_2(hash: u32, x: f32, y: f32) -> f32 {
 /// One of the 12 vertices of the icosahedron times (`x`, `y`, `z`): up to fifth order they favour no direction (a spherical
 /// 5-design), and none lies along an axis; the usual 12 edges of the cube manage third order.
 #[inline(always)]
-fn slope_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
+fn gradient_dot_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
     // (0, 1, phi) / sqrt(1 + phi^2) and its cyclic turns.
     const SHORT: f32 = 0.525_731_1;
     const LONG: f32 = 0.850_650_8;
@@ -99,7 +99,7 @@ fn slope_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
 
 /// One of the 24 vertices of the 24-cell, the turns of (1, 1, 0, 0) / sqrt(2), times (`x`, `y`, `z`, `w`): a spherical 5-design.
 #[inline(always)]
-fn slope_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
+fn gradient_dot_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
     const HALF_DIAGONAL: f32 = std::f32::consts::FRAC_1_SQRT_2;
     let bits = hash ^ hash >> 16;
     let (first, last) = thirds(hash);
@@ -126,37 +126,45 @@ fn thirds(hash: u32) -> (bool, bool) {
 /// Noise on the line between two corners of a cell, `hash` being that of all coordinates but the first.
 #[inline(always)]
 fn row_2(lower: u32, upper: u32, hash: u32, [x, y]: [f32; 2]) -> f32 {
-    mixed(slope_2(finish(hash, lower), x, y), slope_2(finish(hash, upper), x - 1.0, y), fade(x))
+    lerp(gradient_dot_2(hash_first(hash, lower), x, y), gradient_dot_2(hash_first(hash, upper), x - 1.0, y), fade(x))
 }
 
 #[inline(always)]
 fn row_3(lower: u32, upper: u32, hash: u32, [x, y, z]: [f32; 3]) -> f32 {
-    mixed(slope_3(finish(hash, lower), x, y, z), slope_3(finish(hash, upper), x - 1.0, y, z), fade(x))
+    lerp(
+        gradient_dot_3(hash_first(hash, lower), x, y, z),
+        gradient_dot_3(hash_first(hash, upper), x - 1.0, y, z),
+        fade(x),
+    )
 }
 
 #[inline(always)]
 fn row_4(lower: u32, upper: u32, hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
-    mixed(slope_4(finish(hash, lower), x, y, z, w), slope_4(finish(hash, upper), x - 1.0, y, z, w), fade(x))
+    lerp(
+        gradient_dot_4(hash_first(hash, lower), x, y, z, w),
+        gradient_dot_4(hash_first(hash, upper), x - 1.0, y, z, w),
+        fade(x),
+    )
 }
 
 /// Noise in a face between two rows.
 #[inline(always)]
 fn face_3(lower: [u32; 3], upper: [u32; 3], hash: u32, [x, y, z]: [f32; 3]) -> f32 {
-    let near = row_3(lower[0], upper[0], add(hash, 1, lower[1]), [x, y, z]);
-    mixed(near, row_3(lower[0], upper[0], add(hash, 1, upper[1]), [x, y - 1.0, z]), fade(y))
+    let near = row_3(lower[0], upper[0], hash_coordinate(hash, 1, lower[1]), [x, y, z]);
+    lerp(near, row_3(lower[0], upper[0], hash_coordinate(hash, 1, upper[1]), [x, y - 1.0, z]), fade(y))
 }
 
 #[inline(always)]
 fn face_4(lower: [u32; 4], upper: [u32; 4], hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
-    let near = row_4(lower[0], upper[0], add(hash, 1, lower[1]), [x, y, z, w]);
-    mixed(near, row_4(lower[0], upper[0], add(hash, 1, upper[1]), [x, y - 1.0, z, w]), fade(y))
+    let near = row_4(lower[0], upper[0], hash_coordinate(hash, 1, lower[1]), [x, y, z, w]);
+    lerp(near, row_4(lower[0], upper[0], hash_coordinate(hash, 1, upper[1]), [x, y - 1.0, z, w]), fade(y))
 }
 
 /// Noise in a cube between two faces.
 #[inline(always)]
 fn cube_4(lower: [u32; 4], upper: [u32; 4], hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
-    let near = face_4(lower, upper, add(hash, 2, lower[2]), [x, y, z, w]);
-    mixed(near, face_4(lower, upper, add(hash, 2, upper[2]), [x, y, z - 1.0, w]), fade(z))
+    let near = face_4(lower, upper, hash_coordinate(hash, 2, lower[2]), [x, y, z, w]);
+    lerp(near, face_4(lower, upper, hash_coordinate(hash, 2, upper[2]), [x, y, z - 1.0, w]), fade(z))
 }
 
 impl Dimension for [f32; 2] {
@@ -166,8 +174,8 @@ impl Dimension for [f32; 2] {
     #[inline(always)]
     fn gradient_noise(self, lower: [u32; 2], upper: [u32; 2], seed: u32) -> f32 {
         let [x, y] = self;
-        let near = row_2(lower[0], upper[0], add(seed, 1, lower[1]), self);
-        mixed(near, row_2(lower[0], upper[0], add(seed, 1, upper[1]), [x, y - 1.0]), fade(y)) * Self::SCALE
+        let near = row_2(lower[0], upper[0], hash_coordinate(seed, 1, lower[1]), self);
+        lerp(near, row_2(lower[0], upper[0], hash_coordinate(seed, 1, upper[1]), [x, y - 1.0]), fade(y)) * Self::SCALE
     }
 }
 
@@ -178,8 +186,8 @@ impl Dimension for [f32; 3] {
     #[inline(always)]
     fn gradient_noise(self, lower: [u32; 3], upper: [u32; 3], seed: u32) -> f32 {
         let [x, y, z] = self;
-        let near = face_3(lower, upper, add(seed, 2, lower[2]), self);
-        mixed(near, face_3(lower, upper, add(seed, 2, upper[2]), [x, y, z - 1.0]), fade(z)) * Self::SCALE
+        let near = face_3(lower, upper, hash_coordinate(seed, 2, lower[2]), self);
+        lerp(near, face_3(lower, upper, hash_coordinate(seed, 2, upper[2]), [x, y, z - 1.0]), fade(z)) * Self::SCALE
     }
 }
 
@@ -190,8 +198,8 @@ impl Dimension for [f32; 4] {
     #[inline(always)]
     fn gradient_noise(self, lower: [u32; 4], upper: [u32; 4], seed: u32) -> f32 {
         let [x, y, z, w] = self;
-        let near = cube_4(lower, upper, add(seed, 3, lower[3]), self);
-        mixed(near, cube_4(lower, upper, add(seed, 3, upper[3]), [x, y, z, w - 1.0]), fade(w)) * Self::SCALE
+        let near = cube_4(lower, upper, hash_coordinate(seed, 3, lower[3]), self);
+        lerp(near, cube_4(lower, upper, hash_coordinate(seed, 3, upper[3]), [x, y, z, w - 1.0]), fade(w)) * Self::SCALE
     }
 }
 
@@ -202,7 +210,9 @@ mod tests {
     /// Every gradient a function can give, each as often as it comes up among many hashes.
     fn gradients<const N: usize>(slope: impl Fn(u32, [f32; N]) -> f32) -> Vec<[f64; N]> {
         let unit = |axis: usize| std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
-        (0..60_000u32).map(|i| std::array::from_fn(|axis| slope(finish(add(0, 1, i), 3), unit(axis)) as f64)).collect()
+        (0..60_000u32)
+            .map(|i| std::array::from_fn(|axis| slope(hash_first(hash_coordinate(0, 1, i), 3), unit(axis)) as f64))
+            .collect()
     }
 
     /// Unit length, mean 0, and second and fourth moments of an even distribution over the sphere.
@@ -228,30 +238,38 @@ mod tests {
 
     #[test]
     fn gradients_favour_no_direction_up_to_fourth_order() {
-        assert_even(&gradients::<2>(|hash, [x, y]| slope_2(hash, x, y)), 8);
-        assert_even(&gradients::<3>(|hash, [x, y, z]| slope_3(hash, x, y, z)), 12);
-        assert_even(&gradients::<4>(|hash, [x, y, z, w]| slope_4(hash, x, y, z, w)), 24);
+        assert_even(&gradients::<2>(|hash, [x, y]| gradient_dot_2(hash, x, y)), 8);
+        assert_even(&gradients::<3>(|hash, [x, y, z]| gradient_dot_3(hash, x, y, z)), 12);
+        assert_even(&gradients::<4>(|hash, [x, y, z, w]| gradient_dot_4(hash, x, y, z, w)), 24);
     }
 
     #[test]
     fn one_cell_has_hand_worked_values() {
         // On a corner every slope is 0; beside it the noise is that corner's slope alone, as the fade begins with f^3.
         assert_eq!([0.0, 0.0].gradient_noise([3, 5], [4, 6], 9), 0.0);
-        let hash = finish(add(9, 1, 5), 3);
-        let (near, alone) =
-            ([1e-3f32, 0.0].gradient_noise([3, 5], [4, 6], 9), slope_2(hash, 1e-3, 0.0) * std::f32::consts::SQRT_2);
+        let hash = hash_first(hash_coordinate(9, 1, 5), 3);
+        let (near, alone) = (
+            [1e-3f32, 0.0].gradient_noise([3, 5], [4, 6], 9),
+            gradient_dot_2(hash, 1e-3, 0.0) * std::f32::consts::SQRT_2,
+        );
         assert!((near - alone).abs() < 4e-8, "{near} {alone}");
         assert_eq!(fade(0.5), 0.5);
         // The middle of a cell: a quarter of the sum of four slopes.
         let corners = [(3, 5, 0.5, 0.5), (4, 5, -0.5, 0.5), (3, 6, 0.5, -0.5), (4, 6, -0.5, -0.5)];
-        let sum: f32 = corners.iter().map(|&(i, j, x, y)| slope_2(finish(add(9, 1, j), i), x, y)).sum();
+        let sum: f32 =
+            corners.iter().map(|&(i, j, x, y)| gradient_dot_2(hash_first(hash_coordinate(9, 1, j), i), x, y)).sum();
         let middle = [0.5, 0.5].gradient_noise([3, 5], [4, 6], 9);
         assert!((middle - sum / 4.0 * std::f32::consts::SQRT_2).abs() < 1e-6);
     }
 
     #[test]
     fn hash_changes_half_its_upper_bits_with_any_coordinate_bit() {
-        let hash = |cell: [u32; 4]| finish(add(add(add(7, 3, cell[3]), 2, cell[2]), 1, cell[1]), cell[0]);
+        let hash = |cell: [u32; 4]| {
+            hash_first(
+                hash_coordinate(hash_coordinate(hash_coordinate(7, 3, cell[3]), 2, cell[2]), 1, cell[1]),
+                cell[0],
+            )
+        };
         for axis in 0..4 {
             for bit in 0..32 {
                 let changed = |i: u32| {

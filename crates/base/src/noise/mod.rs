@@ -143,7 +143,7 @@ where
     pub fn at(&self, point: [Coordinate; N]) -> f32 {
         let mut cells = std::array::from_fn(|axis| reduce(point[axis].cell, self.periods[axis]));
         let mut fractions = point.map(|coordinate| coordinate.fraction);
-        self.octaves.iter().fold(0.0, |sum, octave| sum + octave.descend(&mut cells, &mut fractions))
+        self.octaves.iter().fold(0.0, |sum, octave| sum + octave.refine_and_evaluate(&mut cells, &mut fractions))
     }
 
     /// Values at 16 points, given by axis. Call it inside `fearless_simd::dispatch!`, from functions that are `#[inline(always)]`.
@@ -157,7 +157,7 @@ where
             for lane in 0..LANES {
                 let mut cell = std::array::from_fn(|axis| cells[axis][lane]);
                 let mut fraction = std::array::from_fn(|axis| fractions[axis][lane]);
-                sums[lane] += octave.descend(&mut cell, &mut fraction);
+                sums[lane] += octave.refine_and_evaluate(&mut cell, &mut fraction);
                 for axis in 0..N {
                     cells[axis][lane] = cell[axis];
                     fractions[axis][lane] = fraction[axis];
@@ -181,7 +181,7 @@ where
             let mut cells = origin.map(|coordinate| [coordinate.cell; LANES]);
             let mut fractions = origin.map(|coordinate| [coordinate.fraction; LANES]);
             for lane in 0..LANES {
-                let x = origin[0].advanced(padded[lane]);
+                let x = origin[0].offset_by(padded[lane]);
                 cells[0][lane] = x.cell;
                 fractions[0][lane] = x.fraction;
             }
@@ -194,16 +194,16 @@ where
 impl Coordinate {
     /// This coordinate moved by `distance`, which is finite and not beyond 2^30.
     #[inline(always)]
-    pub fn advanced(self, distance: f32) -> Self {
+    pub fn offset_by(self, distance: f32) -> Self {
         let whole = distance.floor();
         let fraction = self.fraction + (distance - whole);
         let carry = fraction.floor();
         // 2^16 cells and what is left of them: each is small enough for [`approximations::whole`].
         let far = (whole * (1.0 / 65_536.0)).floor();
         let near = whole - far * 65_536.0;
-        let cells = (approximations::whole(far) << 16)
-            .wrapping_add(approximations::whole(near))
-            .wrapping_add(approximations::whole(carry));
+        let cells = (approximations::round_to_i32(far) << 16)
+            .wrapping_add(approximations::round_to_i32(near))
+            .wrapping_add(approximations::round_to_i32(carry));
         Self { cell: self.cell.wrapping_add(cells), fraction: fraction - carry }
     }
 }
@@ -214,12 +214,12 @@ where
 {
     /// Moves a point from the octave before into this one and gives its share of the sum.
     #[inline(always)]
-    fn descend(&self, cells: &mut [u32; N], fractions: &mut [f32; N]) -> f32 {
+    fn refine_and_evaluate(&self, cells: &mut [u32; N], fractions: &mut [f32; N]) -> f32 {
         let mut upper = [0; N];
         for axis in 0..N {
             let moved = fractions[axis] * self.ratio as f32 + self.shift[axis];
             let whole = moved.floor();
-            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(approximations::whole(whole) as u32);
+            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(approximations::round_to_i32(whole) as u32);
             // At most one period too far: the point was reduced before the first octave. Without a period nothing changes.
             let period = self.periods[axis];
             cells[axis] = cell.wrapping_sub(if cell >= period { period } else { 0 });

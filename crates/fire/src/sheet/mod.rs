@@ -51,9 +51,9 @@ use bansho_base::{
     host::{
         constructions,
         observer::{Cancelled, Observer, check},
-        once::get_or_make,
+        once::get_or_compute,
     },
-    parameters::parameter_fault::{FaultKind, ParameterFault},
+    parameters::parameter_error::{ParameterError, ParameterErrorKind},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
         kind::{BuildContext, BuildError, Describe},
@@ -99,9 +99,9 @@ impl FlameSheet {
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
-    ) -> Result<Self, ParameterFault> {
+    ) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
-            return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
+            return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
         }
         constructions::count("flame_sheet");
         let clock = Clock::new(parameters.speed.clone(), loop_s);
@@ -122,7 +122,7 @@ impl FlameSheet {
             shape: Box::new(ShapeTables::new(shape, texture, colour)),
             ramp: Box::new(ColorRamp::new(texture, colour, *stage)),
         };
-        get_or_make(&self.tables, make)
+        get_or_compute(&self.tables, make)
     }
 
     /// What of the chain does not change with time.

@@ -92,18 +92,18 @@ impl Curve {
 
     /// Value at `x`, never outside the values of the two points around it. NaN gives the first value.
     pub fn eval(&self, x: f64) -> f64 {
-        match self.place(x) {
-            Place::Before => self.points[0][1],
-            Place::Within(index, t) => self.segments[index].value(t),
-            Place::After => self.points[self.points.len() - 1][1],
+        match self.locate(x) {
+            Location::Before => self.points[0][1],
+            Location::Within(index, t) => self.segments[index].value(t),
+            Location::After => self.points[self.points.len() - 1][1],
         }
     }
 
     /// Slope at `x`: 0 outside the points and between the points of a step curve; at a corner that of the segment to the right.
     pub fn derivative(&self, x: f64) -> f64 {
-        match self.place(x) {
-            Place::Within(index, t) => self.segments[index].slope(t),
-            Place::Before | Place::After => 0.0,
+        match self.locate(x) {
+            Location::Within(index, t) => self.segments[index].slope(t),
+            Location::Before | Location::After => 0.0,
         }
     }
 
@@ -115,10 +115,10 @@ impl Curve {
     /// Integral from the first point to `x`.
     fn integral_from_first(&self, x: f64) -> f64 {
         let last = self.points.len() - 1;
-        match self.place(x) {
-            Place::Before => self.points[0][1] * (x - self.points[0][0]),
-            Place::Within(index, t) => self.integrals[index] + self.segments[index].integral(t),
-            Place::After => self.integrals[last] + self.points[last][1] * (x - self.points[last][0]),
+        match self.locate(x) {
+            Location::Before => self.points[0][1] * (x - self.points[0][0]),
+            Location::Within(index, t) => self.integrals[index] + self.segments[index].integral(t),
+            Location::After => self.integrals[last] + self.points[last][1] * (x - self.points[last][0]),
         }
     }
 
@@ -140,21 +140,21 @@ impl Curve {
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| [low.min(point[1]), high.max(point[1])])
     }
 
-    fn place(&self, x: f64) -> Place {
+    fn locate(&self, x: f64) -> Location {
         let after = self.points.partition_point(|point| point[0] <= x);
         if after == 0 {
-            Place::Before
+            Location::Before
         } else if after == self.points.len() {
-            Place::After
+            Location::After
         } else {
             let (start, end) = (self.points[after - 1][0], self.points[after][0]);
-            Place::Within(after - 1, (x - start) / (end - start))
+            Location::Within(after - 1, (x - start) / (end - start))
         }
     }
 }
 
 /// Where an x lies among the points.
-enum Place {
+enum Location {
     Before,
     /// In the segment of that index, at a fraction of its length.
     Within(usize, f64),
@@ -162,7 +162,7 @@ enum Place {
 }
 
 /// Slopes and lengths up to this size leave room for the products that the cubic needs.
-const LARGEST: f64 = 1e100;
+const MAX_MAGNITUDE: f64 = 1e100;
 
 fn check(points: &[[f64; 2]]) -> Result<(), CurveError> {
     if points.is_empty() {
@@ -176,7 +176,7 @@ fn check(points: &[[f64; 2]]) -> Result<(), CurveError> {
         if pair[1][0] <= pair[0][0] {
             return Err(CurveError::NotAscending { index: index + 1 });
         }
-        if length > LARGEST || rise.abs() > LARGEST || (rise / length).abs() > LARGEST {
+        if length > MAX_MAGNITUDE || rise.abs() > MAX_MAGNITUDE || (rise / length).abs() > MAX_MAGNITUDE {
             return Err(CurveError::OutOfRange { index: index + 1 });
         }
     }

@@ -7,44 +7,44 @@ pub(super) struct Segment {
     end: f64,
     length: f64,
     slope: f64,
-    bend: f64,
-    twist: f64,
+    quadratic: f64,
+    cubic: f64,
 }
 
 impl Segment {
     /// A straight line.
     pub(super) fn linear(from: [f64; 2], to: [f64; 2]) -> Self {
         let length = to[0] - from[0];
-        Self { start: from[1], end: to[1], length, slope: (to[1] - from[1]) / length, bend: 0.0, twist: 0.0 }
+        Self { start: from[1], end: to[1], length, slope: (to[1] - from[1]) / length, quadratic: 0.0, cubic: 0.0 }
     }
 
     /// The first value all the way.
     pub(super) fn level(from: [f64; 2], to: [f64; 2]) -> Self {
-        Self { start: from[1], end: from[1], length: to[0] - from[0], slope: 0.0, bend: 0.0, twist: 0.0 }
+        Self { start: from[1], end: from[1], length: to[0] - from[0], slope: 0.0, quadratic: 0.0, cubic: 0.0 }
     }
 
     /// The cubic Hermite piece with the given slopes at its ends.
     pub(super) fn cubic(from: [f64; 2], to: [f64; 2], slope: f64, end_slope: f64) -> Self {
         let length = to[0] - from[0];
         let secant = (to[1] - from[1]) / length;
-        let bend = 3.0 * secant - 2.0 * slope - end_slope;
-        Self { start: from[1], end: to[1], length, slope, bend, twist: slope + end_slope - 2.0 * secant }
+        let quadratic = 3.0 * secant - 2.0 * slope - end_slope;
+        Self { start: from[1], end: to[1], length, slope, quadratic, cubic: slope + end_slope - 2.0 * secant }
     }
 
     /// Value at the fraction `t`, held between the ends so that rounding cannot overshoot either.
     pub(super) fn value(&self, t: f64) -> f64 {
-        let value = self.start + self.length * t * (self.slope + t * (self.bend + t * self.twist));
+        let value = self.start + self.length * t * (self.slope + t * (self.quadratic + t * self.cubic));
         value.max(self.start.min(self.end)).min(self.start.max(self.end))
     }
 
     /// Slope at the fraction `t`.
     pub(super) fn slope(&self, t: f64) -> f64 {
-        self.slope + t * (2.0 * self.bend + 3.0 * t * self.twist)
+        self.slope + t * (2.0 * self.quadratic + 3.0 * t * self.cubic)
     }
 
     /// Integral over the first fraction `t` of the piece.
     pub(super) fn integral(&self, t: f64) -> f64 {
-        let cubic = self.slope / 2.0 + t * (self.bend / 3.0 + t * self.twist / 4.0);
+        let cubic = self.slope / 2.0 + t * (self.quadratic / 3.0 + t * self.cubic / 4.0);
         self.length * t * (self.start + self.length * t * cubic)
     }
 }
