@@ -1,18 +1,19 @@
-//! Whether the system would give memory, asked before it is needed: a program that runs out of it on the way is ended, and can tell nobody.
+//! Checks that memory is available before it is needed: a process that runs out of memory later is killed without an error message.
 
-/// Fewer bytes are not asked for in advance.
+/// Smaller amounts are not checked in advance, bytes.
 const UNCHECKED_BYTES: f64 = (1 << 30) as f64;
-/// What a program takes beside what it asks about, at the least, bytes.
+/// Lower bound of what a process needs besides the checked amount, bytes.
 const OVERHEAD_BYTES: f64 = (256 << 20) as f64;
 
-/// Whether the system would give so many bytes. They are asked for and given back untouched. A fuzzer takes asking for using, and is not asked.
+/// Whether that many bytes can be allocated. They are reserved and released without being touched. Under a fuzzer, which counts
+/// reserved memory as used, nothing is reserved and amounts from 1 GiB on are refused.
 pub fn can_allocate(bytes: f64) -> bool {
-    let granted = || Vec::<u8>::new().try_reserve_exact((bytes + OVERHEAD_BYTES) as usize).is_ok();
-    // No number at all would become 0 bytes.
-    bytes < UNCHECKED_BYTES || (!cfg!(fuzzing) && !bytes.is_nan() && granted())
+    let reserves = || Vec::<u8>::new().try_reserve_exact((bytes + OVERHEAD_BYTES) as usize).is_ok();
+    // NaN would be cast to 0 bytes.
+    bytes < UNCHECKED_BYTES || (!cfg!(fuzzing) && !bytes.is_nan() && reserves())
 }
 
-/// A number of bytes as people read it: in GiB, MiB or KiB with one decimal, or in bytes.
+/// A number of bytes for messages: in GiB, MiB or KiB with one decimal, or in bytes.
 pub fn format_bytes(bytes: u64) -> String {
     let units = [(1_u64 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
     match units.into_iter().find(|&(unit, _)| bytes >= unit) {
@@ -21,11 +22,11 @@ pub fn format_bytes(bytes: u64) -> String {
     }
 }
 
-/// The largest of the twentieths of `count` that `fits`; 0 where none does.
+/// The largest multiple of a twentieth of `count` for which `fits` holds; 0 if there is none.
 pub fn largest_fitting_count(count: i64, fits: impl Fn(i64) -> bool) -> i64 {
-    // Without overflow, and without losing what a division would leave of small counts.
-    let share = |parts: i64| count / 20 * parts + count % 20 * parts / 20;
-    (1..=20).rev().map(share).find(|&part| fits(part)).unwrap_or(0)
+    // Avoids overflow, and keeps the remainder of the division for small counts.
+    let fraction = |twentieths: i64| count / 20 * twentieths + count % 20 * twentieths / 20;
+    (1..=20).rev().map(fraction).find(|&candidate| fits(candidate)).unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -1,21 +1,21 @@
 //! One octave of gradient noise (Perlin 1985, 2002) on a hashed lattice, in 2, 3 and 4 dimensions.
 //!
-//! Everything here is branch-free and always inlined, so that a loop over 16 points becomes vector code. Products and sums are
-//! deliberately not fused: the arithmetic is mostly integer, and so the single point stays fast where there is no such instruction.
+//! All functions are branch-free and always inlined, so that a loop over 16 points is vectorized. Products and sums are
+//! deliberately not fused: the arithmetic is mostly integer, and the scalar version stays fast on processors without fused multiply-add.
 
-/// A number of dimensions in which there is noise: implemented for `[f32; 2]`, `[f32; 3]` and `[f32; 4]`.
+/// Dimensions of the noise: implemented for `[f32; 2]`, `[f32; 3]` and `[f32; 4]`.
 pub trait Dimension: Copy + private::Sealed {
-    /// Factor that brings the noise of unit gradients into [-1, 1].
+    /// Factor that scales the noise of unit gradients to [-1, 1].
     ///
-    /// At a corner at distance d a unit gradient gives at most d, so the noise is at most `sum w d <= sqrt(sum w d^2)` (weights w
-    /// sum to 1). That sum falls apart into one term an axis, `(1 - s) f^2 + s (1 - f)^2` with s the fade of f. As s <= f for f <=
+    /// The unit gradient of a corner at distance d contributes at most d, so the noise is at most `sum w d <= sqrt(sum w d^2)` (the weights w
+    /// sum to 1). That sum separates into one term per axis, `(1 - s) f^2 + s (1 - f)^2`, where s is the fade of f. Since s <= f for f <=
     /// 1/2, the term is at most `f^2 + f (1 - 2 f) = f - f^2 <= 1/4`: in n dimensions the noise is at most sqrt(n) / 2.
     const SCALE: f32;
 
     /// Noise in [-1, 1] at the fraction `self` of the cell that lies between the lattice coordinates `lower` and `upper`.
     fn gradient_noise(self, lower: Self::Cells, upper: Self::Cells, seed: u32) -> f32;
 
-    /// Whole-number coordinates, one an axis.
+    /// Integer coordinates, one per axis.
     type Cells: Copy;
 }
 
@@ -28,8 +28,8 @@ mod private {
 
 const FACTORS: [u32; 4] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d, 0x27d4_eb2f];
 
-/// Adds a coordinate other than the first to a hash. One round of mixing between coordinates is enough to leave no translation
-/// under which the lattice repeats; it is shared by all corners that have the coordinate.
+/// Adds a coordinate other than the first to a hash. One round of mixing between coordinates suffices to avoid translations
+/// under which the lattice repeats. The result is shared by all corners with that coordinate.
 #[inline(always)]
 fn hash_coordinate(hash: u32, axis: usize, cell: u32) -> u32 {
     let hash = hash.wrapping_add(cell.wrapping_mul(FACTORS[axis]));
@@ -44,13 +44,13 @@ fn hash_first(hash: u32, cell: u32) -> u32 {
     (hash ^ hash >> 15).wrapping_mul(0x846c_a68b)
 }
 
-/// Turns the sign of `x` if the highest bit of `bits` is set.
+/// Flips the sign of `x` if the highest bit of `bits` is set.
 #[inline(always)]
 fn signed(x: f32, bits: u32) -> f32 {
     f32::from_bits(x.to_bits() ^ (bits & 0x8000_0000))
 }
 
-/// The fade `6 f^5 - 15 f^4 + 10 f^3` (Perlin 2002): first and second derivative are 0 at both ends.
+/// The fade `6 f^5 - 15 f^4 + 10 f^3` (Perlin 2002): the first and second derivatives are 0 at both ends.
 #[inline(always)]
 fn fade(f: f32) -> f32 {
     f * f * f * (f * (f * 6.0 - 15.0) + 10.0)
@@ -61,7 +61,7 @@ fn lerp(a: f32, b: f32, s: f32) -> f32 {
     a + (b - a) * s
 }
 
-/// One of 8 unit vectors at 22.5 + 45 k degrees times (`x`, `y`).
+/// Dot product of (`x`, `y`) with one of 8 unit vectors, at 22.5 + 45 k degrees.
 #[inline(always)]
 fn gradient_dot_2(hash: u32, x: f32, y: f32) -> f32 {
     const COS: f32 = 0.923_879_5;
@@ -71,11 +71,11 @@ fn gradient_dot_2(hash: u32, x: f32, y: f32) -> f32 {
     signed(u * COS, hash << 1) + signed(v * SIN, hash << 2)
 }
 
-/// One of the 12 vertices of the icosahedron times (`x`, `y`, `z`): up to fifth order they favour no direction (a spherical
-/// 5-design), and none lies along an axis; the usual 12 edges of the cube manage third order.
+/// Dot product of (`x`, `y`, `z`) with one of the 12 vertices of the icosahedron. They are isotropic up to fifth order (a spherical
+/// 5-design), and none lies along an axis; the usual 12 edges of the cube are isotropic to third order only.
 #[inline(always)]
 fn gradient_dot_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
-    // (0, 1, phi) / sqrt(1 + phi^2) and its cyclic turns.
+    // (0, 1, phi) / sqrt(1 + phi^2) and its cyclic permutations.
     const SHORT: f32 = 0.525_731_1;
     const LONG: f32 = 0.850_650_8;
     let (first, last) = thirds(hash);
@@ -97,13 +97,14 @@ fn gradient_dot_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
     signed(u * SHORT, bits << 31) + signed(v * LONG, bits << 30)
 }
 
-/// One of the 24 vertices of the 24-cell, the turns of (1, 1, 0, 0) / sqrt(2), times (`x`, `y`, `z`, `w`): a spherical 5-design.
+/// Dot product of (`x`, `y`, `z`, `w`) with one of the 24 vertices of the 24-cell, the signed permutations of (1, 1, 0, 0) / sqrt(2): a spherical
+/// 5-design.
 #[inline(always)]
 fn gradient_dot_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
     const HALF_DIAGONAL: f32 = std::f32::consts::FRAC_1_SQRT_2;
     let bits = hash ^ hash >> 16;
     let (first, last) = thirds(hash);
-    // Three ways to part the axes in two pairs, and one of the two.
+    // There are three ways to divide the axes into two pairs; choose one, and one of its pairs.
     let other = bits & 4 != 0;
     let with_x = if first {
         y
@@ -116,14 +117,14 @@ fn gradient_dot_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
     (signed(u, bits << 31) + signed(v, bits << 30)) * HALF_DIAGONAL
 }
 
-/// Whether a hash lies in the first, or in the last, of three equal parts of its range.
+/// Whether a hash lies in the first and in the last third of its range.
 #[inline(always)]
 fn thirds(hash: u32) -> (bool, bool) {
     let hash = hash as i32;
     (hash < -715_827_883, hash >= 715_827_883)
 }
 
-/// Noise on the line between two corners of a cell, `hash` being that of all coordinates but the first.
+/// Noise on the edge between two corners of a cell; `hash` is that of all coordinates except the first.
 #[inline(always)]
 fn row_2(lower: u32, upper: u32, hash: u32, [x, y]: [f32; 2]) -> f32 {
     lerp(gradient_dot_2(hash_first(hash, lower), x, y), gradient_dot_2(hash_first(hash, upper), x - 1.0, y), fade(x))
@@ -147,7 +148,7 @@ fn row_4(lower: u32, upper: u32, hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     )
 }
 
-/// Noise in a face between two rows.
+/// Noise in the face between two rows.
 #[inline(always)]
 fn face_3(lower: [u32; 3], upper: [u32; 3], hash: u32, [x, y, z]: [f32; 3]) -> f32 {
     let near = row_3(lower[0], upper[0], hash_coordinate(hash, 1, lower[1]), [x, y, z]);
@@ -160,7 +161,7 @@ fn face_4(lower: [u32; 4], upper: [u32; 4], hash: u32, [x, y, z, w]: [f32; 4]) -
     lerp(near, row_4(lower[0], upper[0], hash_coordinate(hash, 1, upper[1]), [x, y - 1.0, z, w]), fade(y))
 }
 
-/// Noise in a cube between two faces.
+/// Noise in the cube between two faces.
 #[inline(always)]
 fn cube_4(lower: [u32; 4], upper: [u32; 4], hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     let near = face_4(lower, upper, hash_coordinate(hash, 2, lower[2]), [x, y, z, w]);

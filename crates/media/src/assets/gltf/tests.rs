@@ -99,7 +99,7 @@ fn hostile_files_are_refused_with_a_reason() {
         reason(&glb(&document("", 0, ""), &bytes()), "glb").contains("triangle 1 refers to vertex 1, and there are 0")
     );
     let lines = document("", 3, "").replace(r#""indices":1"#, r#""indices":1,"mode":1"#);
-    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "holds no usable mesh: it has no triangles with an area");
+    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "contains no usable mesh: it has no triangles with an area");
     assert!(reason(b"{", "gltf").starts_with("is damaged"));
     assert!(reason(b"", "obj").contains("allowed: .glb, .gltf"));
 }

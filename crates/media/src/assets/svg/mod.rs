@@ -235,7 +235,7 @@ mod tests {
             assert_eq!(decode_drawing(text), Err(AssetProblem::NoStrokes { instead }), "{text}");
         }
         let shown = decode_drawing("<svg><use/><text>A</text></svg>").unwrap_err().to_string();
-        assert!(shown.starts_with("holds no strokes, only use, text (allowed: an SVG file with path"), "{shown}");
+        assert!(shown.starts_with("contains no strokes, only use, text (allowed: an SVG file with path"), "{shown}");
         for broken in ["", "<html/>", "<svg", "<svg><path d='M1'/></svg>", "<svg transform='x'/>", "</svg></svg>"] {
             assert!(matches!(decode_drawing(broken), Err(AssetProblem::Damaged(_))), "{broken}");
         }
