@@ -1,16 +1,16 @@
-//! Values that change over time.
+//! Animated values: constants or keyframed curves over time.
 
 use crate::math::curve::{Curve, CurveError, Interpolation};
 
-/// A value that can be keyed: made of numbers that are interpolated one by one.
+/// A value that can be keyframed: its components are interpolated independently.
 pub trait Animate: Copy + PartialEq {
-    /// How many numbers it is made of.
+    /// Number of components.
     const COMPONENTS: usize;
 
-    /// The number at `index`, below [`COMPONENTS`](Self::COMPONENTS).
+    /// The component at `index`, below [`COMPONENTS`](Self::COMPONENTS).
     fn component(&self, index: usize) -> f64;
 
-    /// The value made of the number that `component` gives for each index.
+    /// The value with the components `component(index)`.
     fn from_components(component: impl FnMut(usize) -> f64) -> Self;
 }
 
@@ -38,7 +38,7 @@ impl<const N: usize> Animate for [f64; N] {
     }
 }
 
-/// A constant, or a value keyed over time; before the first key and after the last, their values hold, unless it repeats. Times are
+/// A constant, or a value keyframed over time. Before the first and after the last key it is constant, unless it repeats. Times are in
 /// seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Animated<T> {
@@ -49,7 +49,7 @@ pub struct Animated<T> {
 #[derive(Clone, Debug, PartialEq)]
 enum Motion<T> {
     Constant(T),
-    /// One curve a component, all with the same times.
+    /// One curve per component, all with the same times.
     Keyed(Vec<Curve>),
 }
 
@@ -60,10 +60,10 @@ impl<T: Animate> From<T> for Animated<T> {
 }
 
 impl<T: Animate> Animated<T> {
-    /// The value through `keys` (time, value), times ascending.
+    /// A value interpolated between `keys` (time, value), times ascending.
     ///
     /// # Errors
-    /// No key, times not ascending, or a number that is not finite or too steep; see [`Curve::new`].
+    /// There are no keys, the times are not ascending, a number is not finite, or the curve is too steep; see [`Curve::new`].
     pub fn keyed(keys: Vec<(f64, T)>, interpolation: Interpolation) -> Result<Self, CurveError> {
         let curve = |component: usize| {
             let points = keys.iter().map(|(time, value)| [*time, value.component(component)]).collect();
@@ -73,7 +73,7 @@ impl<T: Animate> Animated<T> {
         Ok(Self { motion: Motion::Keyed(curves), period: None })
     }
 
-    /// Makes it repeat what it does between 0 and `period` (s, above 0); says whether it ends there as it began.
+    /// Makes it periodic by repeating the interval from 0 to `period` (s, above 0). Returns whether the values at both ends are equal.
     pub fn close(&mut self, period: f64) -> bool {
         self.period = None;
         let closes = self.at(0.0) == self.at(period);
@@ -87,13 +87,13 @@ impl<T: Animate> Animated<T> {
         self.map_components(|value| value, |curve| curve.eval(t))
     }
 
-    /// Change a second at time `t`; see [`Curve::derivative`].
+    /// Time derivative at time `t`, per second; see [`Curve::derivative`].
     pub fn rate(&self, t: f64) -> T {
         let (_, t) = self.split_period(t);
         self.map_components(|_| 0.0, |curve| curve.derivative(t))
     }
 
-    /// Integral over time from `from` to `to`, exact but for rounding: the way that a keyed speed covers, so that any frame alone is right.
+    /// Integral over time from `from` to `to`, exact up to rounding: the distance covered at a keyframed speed, so that any single frame is correct.
     pub fn integral(&self, from: f64, to: f64) -> T {
         let keyed = |curve: &Curve| {
             let Some(period) = self.period else { return curve.integral(from, to) };
@@ -103,14 +103,14 @@ impl<T: Animate> Animated<T> {
         self.map_components(|value| value * (to - from), keyed)
     }
 
-    /// Whole periods before time `t`, and the time within its period.
+    /// Number of complete periods before time `t`, and the time within the current period.
     fn split_period(&self, t: f64) -> (f64, f64) {
         let Some(period) = self.period else { return (0.0, t) };
-        let turns = (t / period).floor();
-        (turns, t - turns * period)
+        let periods = (t / period).floor();
+        (periods, t - periods * period)
     }
 
-    /// The value, if it never changes: no keys, or keys that all agree.
+    /// The value if it is constant: it has no keys, or all keys have the same value.
     pub fn constant(&self) -> Option<T> {
         match &self.motion {
             Motion::Constant(value) => Some(*value),
@@ -121,12 +121,12 @@ impl<T: Animate> Animated<T> {
         }
     }
 
-    /// Least and greatest value of each component over all time.
+    /// Minimum and maximum of each component over all time.
     pub fn bounds(&self) -> [T; 2] {
-        [0, 1].map(|side| self.map_components(|value| value, |curve| curve.range()[side]))
+        [0, 1].map(|bound| self.map_components(|value| value, |curve| curve.range()[bound]))
     }
 
-    /// Keys (time, value), ascending; none for a constant.
+    /// Keys (time, value), ascending; empty for a constant.
     pub fn keys(&self) -> Vec<(f64, T)> {
         match &self.motion {
             Motion::Keyed(curves) if !curves.is_empty() => {
@@ -140,7 +140,7 @@ impl<T: Animate> Animated<T> {
         }
     }
 
-    /// How values between keys are found; a constant says [`Interpolation::Step`].
+    /// Interpolation between keys; [`Interpolation::Step`] for a constant.
     pub fn interpolation(&self) -> Interpolation {
         match &self.motion {
             Motion::Keyed(curves) if !curves.is_empty() => curves[0].interpolation(),
@@ -148,7 +148,7 @@ impl<T: Animate> Animated<T> {
         }
     }
 
-    /// The value whose components are `constant` of a constant's, or `keyed` of the curves.
+    /// The value with components computed by `constant` from those of a constant, or by `keyed` from the curves.
     fn map_components(&self, constant: impl Fn(f64) -> f64, keyed: impl Fn(&Curve) -> f64) -> T {
         match &self.motion {
             Motion::Constant(value) => T::from_components(|index| constant(value.component(index))),

@@ -1,8 +1,8 @@
-//! The assets that a table names.
+//! Collects the assets that a table refers to.
 
 use super::{Kind, Table, TableDescriptor, Value};
 
-/// Paths of all assets that `table`, described by `descriptor`, names at any depth; in the order of the descriptors.
+/// Paths of all assets that `table`, described by `descriptor`, refers to at any depth, in the order of the descriptors.
 pub fn assets(table: &Table, descriptor: &TableDescriptor) -> Vec<String> {
     let mut paths = Vec::new();
     for parameter in &descriptor.parameters {

@@ -1,4 +1,4 @@
-//! What a parameter is: enough to parse it, to explain it, to edit it and to draw a valid one at random.
+//! Descriptors of parameters: sufficient to parse, document and edit a parameter and to generate random valid values.
 
 use super::Value;
 use crate::host::plural::count_range;
@@ -6,20 +6,20 @@ use crate::host::plural::count_range;
 /// One parameter.
 #[derive(Clone, Debug)]
 pub struct Descriptor {
-    /// Its key in the scene file.
+    /// Key in the scene file.
     pub key: &'static str,
-    /// What it is, in a sentence or two, with the paper's symbol and equation where it has one.
+    /// Description in one or two sentences, with the paper's symbol and equation if it has one.
     pub doc: String,
-    /// Its unit, empty for pure numbers; also written in the key where it is not SI.
+    /// Unit, empty for dimensionless numbers; units that are not SI are also part of the key.
     pub unit: &'static str,
-    /// What it may be.
+    /// Type and bounds.
     pub kind: Kind,
-    /// What it is when the scene does not say; `None` for what may be left out altogether.
+    /// Default value; `None` for an optional parameter without one.
     pub default: Option<Value>,
 }
 
 impl Descriptor {
-    /// Whether it may be keyed over time.
+    /// Whether it may be keyframed over time.
     pub fn animatable(&self) -> bool {
         match &self.kind {
             Kind::Animated(_) => true,
@@ -32,72 +32,72 @@ impl Descriptor {
 /// All parameters of one table.
 #[derive(Clone, Debug)]
 pub struct TableDescriptor {
-    /// What the table is for.
+    /// Description of the table.
     pub doc: String,
-    /// Its parameters, in the order in which a person would want to meet them.
+    /// Its parameters, in the order in which they are documented.
     pub parameters: Vec<Descriptor>,
 }
 
-/// One name that a choice allows.
+/// One of the allowed names of a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
     /// The name in the file.
     pub name: &'static str,
-    /// What it chooses.
+    /// Description of the choice.
     pub doc: &'static str,
 }
 
-/// What a parameter may be. Bounds are inclusive.
+/// Type of a parameter with its bounds, which are inclusive.
 #[derive(Clone, Debug)]
 pub enum Kind {
     /// `true` or `false`.
     Bool,
-    /// A whole number.
+    /// An integer.
     Integer {
-        /// Least value.
+        /// Minimum.
         min: i64,
-        /// Greatest value.
+        /// Maximum.
         max: i64,
     },
     /// A finite number.
     Number {
-        /// Least value.
+        /// Minimum.
         min: f64,
-        /// Greatest value.
+        /// Maximum.
         max: f64,
     },
-    /// A positive number, or a fraction of whole numbers as a string.
+    /// A positive number, or a fraction of integers as a string.
     Rational {
-        /// Least value.
+        /// Minimum.
         min: f64,
-        /// Greatest value.
+        /// Maximum.
         max: f64,
     },
-    /// A list of so many finite numbers.
+    /// A list of a fixed number of finite numbers.
     Vector {
-        /// How many.
+        /// Number of components.
         length: usize,
-        /// Least value of each.
+        /// Minimum of each.
         min: f64,
-        /// Greatest value of each.
+        /// Maximum of each.
         max: f64,
     },
     /// Any text.
     Text,
     /// The path of an asset.
     Asset,
-    /// One of some names.
+    /// One of a set of names.
     Choice(&'static [Choice]),
     /// Control points of a curve.
     Curve {
-        /// Least and greatest x.
+        /// Minimum and maximum x.
         x: [f64; 2],
-        /// Least and greatest y.
+        /// Minimum and maximum y.
         y: [f64; 2],
-        /// Whether it must not fall.
+        /// Whether y must not decrease.
         rising: bool,
     },
-    /// The inner kind, or keys of it over time.
+    /// The inner kind, or keyframes of it.
     Animated(Box<Kind>),
     /// The inner kind, or absent.
     Optional(Box<Kind>),
@@ -105,11 +105,11 @@ pub enum Kind {
     Auto(Box<Kind>),
     /// A list.
     List {
-        /// What each item is.
+        /// Kind of each item.
         item: Box<Kind>,
-        /// Fewest items.
+        /// Minimum number of items.
         min: usize,
-        /// Most items.
+        /// Maximum number of items.
         max: usize,
     },
     /// A table.
@@ -117,7 +117,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What is expected, as an error message says it.
+    /// Description of the expected value for error messages.
     pub fn expectation(&self) -> String {
         match self {
             Self::Bool => "true or false".into(),

@@ -1,4 +1,4 @@
-//! Parameters made of points: curves, and values keyed over time.
+//! Parameters made of points: curves and keyframed values.
 
 use super::{
     Kind, Node, Parameter, ProblemKind, Range, Reader, Table, Value,
@@ -38,16 +38,17 @@ fn interpolation_name(interpolation: Interpolation) -> InterpolationName {
     }
 }
 
-/// Most control points of a curve or keys of a value: those of half an hour of frames, each keyed. Every copy of a curve holds them all.
+/// Maximum number of control points of a curve or keys of a value: enough for half an hour with a key at every frame. Every copy of a curve contains
+/// all of them.
 pub const MAX_POINTS: usize = 100_000;
 
-/// Whether there are not too many control points or keys.
+/// Whether the number of control points or keys is allowed; reports a problem if not.
 fn check_point_count(items: &[Node], node: &Node, reader: &mut Reader) -> bool {
-    let fits = items.len() <= MAX_POINTS;
-    if !fits {
+    let is_allowed = items.len() <= MAX_POINTS;
+    if !is_allowed {
         reader.report(node, ProblemKind::ListLength { found: items.len(), min: 1, max: MAX_POINTS });
     }
-    fits
+    is_allowed
 }
 
 /// Splits `{ <list_key> = [...], interpolation = "..." }` into its list and its interpolation.
@@ -90,17 +91,17 @@ pub struct CurveLimits {
     pub x: Range,
     /// Bounds of y.
     pub y: Range,
-    /// Whether it must not fall.
+    /// Whether y must not decrease.
     pub rising: bool,
 }
 
 impl CurveLimits {
-    /// A curve from the unit interval into `y`.
+    /// A curve from the unit interval to values from `min` to `max`.
     pub const fn unit_to(min: f64, max: f64) -> Self {
         Self { x: Range::new(0.0, 1.0), y: Range::new(min, max), rising: false }
     }
 
-    /// The same, but it must not fall.
+    /// The same for a curve that must not decrease.
     pub const fn rising(self) -> Self {
         Self { rising: true, ..self }
     }

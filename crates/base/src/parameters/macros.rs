@@ -1,6 +1,6 @@
-//! The macros in which a module lists its parameters and choices.
+//! The macros that declare parameter tables and choices.
 
-/// Declares a table of parameters: a plain struct with its defaults, and the descriptors from which all else derives.
+/// Declares a table of parameters: a plain struct with its defaults, and the descriptors from which everything else is derived.
 ///
 /// ```
 /// bansho_base::parameters! {
@@ -110,7 +110,7 @@ macro_rules! parameters {
     (@limits $type:ty, $limits:expr) => { <<$type as $crate::parameters::Parameter>::Limits>::from($limits) };
 }
 
-/// Declares a choice: an enum whose names stand in scene files. The first is the default.
+/// Declares a choice: an enum whose variants have names in scene files. The first is the default.
 ///
 /// ```
 /// bansho_base::choice! {

@@ -1,7 +1,7 @@
-//! One descriptor for each parameter.
+//! Parameters and their descriptors.
 //!
-//! A phenomenon lists its parameters once, with [`parameters!`](crate::parameters!): type, default, range, unit and
-//! documentation. Parser, located errors, schema, book, inspector and random scenes all read that one list.
+//! A phenomenon declares its parameters once, with [`parameters!`](crate::parameters!): type, default, range, unit and
+//! documentation. The parser, error locations, the schema, the book, the inspector and random scenes are all derived from that declaration.
 
 pub mod animated;
 mod assets;

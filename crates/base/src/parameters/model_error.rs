@@ -1,18 +1,18 @@
-//! A fault that only a model can state, kept as what it is.
+//! An error of a model, type-erased.
 
 use std::{error::Error, fmt, sync::Arc};
 
-/// A model's own error of any type. Two are equal where they say the same.
+/// An error of any type from a model. Two are equal if their messages are equal.
 #[derive(Clone, Debug)]
 pub struct ModelError(Arc<dyn Error + Send + Sync>);
 
 impl ModelError {
-    /// Keeps `error`.
+    /// Wraps `error`.
     pub fn new(error: impl Error + Send + Sync + 'static) -> Self {
         Self(Arc::new(error))
     }
 
-    /// The error, where it is an `E`.
+    /// The error, if it is of type `E`.
     pub fn downcast<E: Error + 'static>(&self) -> Option<&E> {
         self.0.downcast_ref()
     }

@@ -1,25 +1,25 @@
-//! Faults that no single parameter can see by itself.
+//! Errors in combinations of parameters.
 
-/// A parameter, or a pair of them, from which no phenomenon can be made.
+/// A parameter, or a combination of parameters, that no phenomenon can be built from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: {kind}")]
 pub struct ParameterError {
-    /// The parameter, sub-tables separated by dots, as in `shape.fringe_width`.
+    /// Key of the parameter, with sub-tables separated by dots, as in `shape.fringe_width`.
     pub key: &'static str,
     /// What is wrong.
     pub kind: ParameterErrorKind,
 }
 
-/// What can be wrong with parameters that are each within their own bounds.
+/// What is wrong with parameters that are each within their bounds.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ParameterErrorKind {
-    /// A curve that must begin at the origin begins elsewhere.
+    /// A curve that must start at the origin starts elsewhere.
     #[error("must be 0 at x = 0, but is {value}")]
     NotZeroAtOrigin {
         /// Its value at x = 0.
         value: f64,
     },
-    /// Core and fringe together are wider than the sheet.
+    /// The core and the fringe together are wider than the sheet.
     #[error("together with `shape.core_width` it reaches {sum} at height {at}; allowed: up to 1")]
     WiderThanSheet {
         /// Height w at which they are widest.
@@ -32,13 +32,13 @@ pub enum ParameterErrorKind {
     NotAscending {
         /// A value of the list.
         value: f64,
-        /// The one after it.
+        /// The next value.
         next: f64,
     },
-    /// A loop that is no length of time.
+    /// The length of a loop is not above 0.
     #[error("a loop of {seconds} s; allowed: more than 0")]
     LoopLength {
-        /// The length asked for, s.
+        /// The requested length, s.
         seconds: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! Faults in what a file says, each with its place, what is wrong and what is allowed.
+//! Problems in a scene file, each with its location, what is wrong and what is allowed.
 
 use super::{ModelError, Span};
 use crate::host::{
@@ -6,12 +6,12 @@ use crate::host::{
     plural::{count_range, counted},
 };
 
-/// One fault.
+/// A problem in a scene file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// Where in the source; `None` where the fault is not in the text.
+    /// Location in the source; `None` if the problem is not in the text.
     pub span: Option<Span>,
-    /// The parameter as an edit of a scene calls it, such as `flame_sheet.0.speed`; items of lists count from 0.
+    /// Path of the parameter in the syntax of scene edits, such as `flame_sheet.0.speed`; items of lists count from 0.
     pub path: String,
     /// What is wrong.
     pub kind: ProblemKind,
@@ -26,61 +26,61 @@ impl std::fmt::Display for Problem {
     }
 }
 
-/// What can be wrong.
+/// Kinds of problems.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProblemKind {
-    /// The text is not TOML.
+    /// The text is not valid TOML.
     #[error("{0}")]
     Syntax(String),
-    /// The text says more than is read: what it comes to in memory is a hundred times its own length.
+    /// The text contains too many values: in memory they take a hundred times its length.
     #[error(
         "the text holds more than {limit} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {limit}"
     )]
     TooManyValues {
-        /// Most that are read.
+        /// Maximum number that is read.
         limit: usize,
     },
-    /// The key means nothing here.
+    /// The key is unknown here.
     #[error("unknown key `{}`{}; allowed: {}", excerpt(.key), did_you_mean(.nearest), .allowed.join(", "))]
     UnknownKey {
         /// The key.
         key: String,
-        /// The allowed key most like it, if one is.
+        /// The most similar allowed key, if any.
         nearest: Option<String>,
         /// All allowed keys.
         allowed: Vec<String>,
     },
-    /// A value of another type.
+    /// A value has the wrong type.
     #[error("expected {expected}, found {found}")]
     WrongType {
-        /// What is allowed.
+        /// The expected type.
         expected: String,
-        /// What stands there.
+        /// The type found.
         found: &'static str,
     },
-    /// A number beyond its bounds, or not finite.
+    /// A number is out of bounds or not finite.
     #[error("{} is out of range; allowed: {min} to {max}{}", short(*.value), unit_suffix(.unit))]
     OutOfRange {
         /// The number.
         value: f64,
-        /// Least allowed.
+        /// Minimum allowed.
         min: f64,
-        /// Greatest allowed.
+        /// Maximum allowed.
         max: f64,
         /// Its unit.
         unit: &'static str,
     },
-    /// A name that is none of those allowed.
+    /// A name is not one of those allowed.
     #[error("`{}` is not known{}; allowed: {}", excerpt(.value), did_you_mean(.nearest), .allowed.join(", "))]
     NotOneOf {
         /// The name.
         value: String,
-        /// The allowed name most like it, if one is.
+        /// The most similar allowed name, if any.
         nearest: Option<String>,
         /// All allowed names.
         allowed: Vec<String>,
     },
-    /// A keyed value that does not end a seamless loop as it begins it.
+    /// A keyframed value differs at the start and the end of a seamless loop.
     #[error(
         "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
     )]
@@ -88,40 +88,40 @@ pub enum ProblemKind {
         /// Length of the loop, s.
         seconds: f64,
     },
-    /// A list too short or too long.
+    /// A list is too short or too long.
     #[error("has {}; allowed: {}", counted(*.found, "item"), count_range(*.min, *.max, "item"))]
     ListLength {
-        /// How many it has.
+        /// Number of items.
         found: usize,
-        /// Fewest allowed.
+        /// Minimum allowed.
         min: usize,
-        /// Most allowed.
+        /// Maximum allowed.
         max: usize,
     },
-    /// Control points or keys that make no curve.
+    /// Control points or keys do not define a curve.
     #[error("{0}")]
     Curve(#[from] crate::math::curve::CurveError),
-    /// A curve that falls where it must rise.
+    /// A curve decreases although it must not.
     #[error("falls between x = {from} and x = {to}; it must rise or stay level from point to point")]
     NotRising {
-        /// Where the fall begins.
+        /// x where the decrease starts.
         from: f64,
-        /// Where it ends.
+        /// x where it ends.
         to: f64,
     },
-    /// Two things of one name.
+    /// Two phenomena have the same name.
     #[error("the name \"{name}\" is taken by another phenomenon; each needs its own")]
     DuplicateName {
         /// The name.
         name: String,
     },
-    /// Two parameters that do not go together.
+    /// Two parameters contradict each other.
     #[error("{0}")]
     Conflict(String),
-    /// What a model says of parameters that are each within their own bounds.
+    /// An error of a model in parameters that are each within their bounds.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The file is of a newer format.
+    /// The file has a newer format.
     #[error("format {found} is newer than this program knows; known: up to {known}")]
     NewerFormat {
         /// The file's format.
@@ -129,7 +129,7 @@ pub enum ProblemKind {
         /// The newest known one.
         known: i64,
     },
-    /// The file is of an older format.
+    /// The file has an older format.
     #[error("format {found} is old; `bansho upgrade` rewrites the file for format {known}")]
     OlderFormat {
         /// The file's format.
@@ -137,16 +137,16 @@ pub enum ProblemKind {
         /// The newest known one.
         known: i64,
     },
-    /// Something the scene refers to cannot be had.
+    /// An asset that the scene refers to could not be loaded.
     #[error("{0}")]
     Asset(#[from] AssetError),
 }
 
-/// The items of lists on a path as people count them, from 1 on: ` (shape 2, sheet 1)`. The first table of its kind needs no number.
+/// The list items on a path, counted from 1: ` (shape 2, sheet 1)`. The first table of its kind needs no number.
 fn items(path: &str) -> String {
     let segments: Vec<&str> = path.split('.').collect();
-    let item = |(at, pair): (usize, &[&str])| {
-        let index: usize = pair[1].parse().ok().filter(|index| at > 0 || *index > 0)?;
+    let item = |(depth, pair): (usize, &[&str])| {
+        let index: usize = pair[1].parse().ok().filter(|index| depth > 0 || *index > 0)?;
         Some(format!("{} {}", pair[0].strip_suffix('s').unwrap_or(pair[0]), index + 1))
     };
     let items: Vec<String> = segments.windows(2).enumerate().filter_map(item).collect();
@@ -157,17 +157,17 @@ fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|name| format!(", did you mean `{name}`?")).unwrap_or_default()
 }
 
-/// A number as people write it: powers of ten where plain digits would fill lines.
+/// A number in plain notation, or in scientific notation if it would be long.
 fn short(value: f64) -> String {
-    let plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
-    if plain { value.to_string() } else { format!("{value:e}") }
+    let is_plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
+    if is_plain { value.to_string() } else { format!("{value:e}") }
 }
 
-/// Text that a file states as a message repeats it: its beginning, where it is long.
+/// Text from a file for use in messages; only its beginning if it is long.
 fn excerpt(text: &str) -> std::borrow::Cow<'_, str> {
-    /// Characters; no name that a scene may state is as long.
-    const LONGEST: usize = 80;
-    match text.char_indices().nth(LONGEST) {
+    /// Maximum number of characters; no valid name in a scene is as long.
+    const MAX_CHARACTERS: usize = 80;
+    match text.char_indices().nth(MAX_CHARACTERS) {
         Some((end, _)) => format!("{}...", &text[..end]).into(),
         None => text.into(),
     }
@@ -177,17 +177,17 @@ fn unit_suffix(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
-/// The candidate most like `word`, if one is alike enough to be a slip of the hand.
+/// The candidate most similar to `word`, if one is similar enough for `word` to be a typo.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    /// Bytes. Longer words are no slip of the hand, and comparing them takes the square of their length.
-    const LONGEST: usize = 100;
-    if word.len() > LONGEST {
+    /// Maximum length in bytes. Longer words are not typos, and the time of the comparison is quadratic in their length.
+    const MAX_BYTES: usize = 100;
+    if word.len() > MAX_BYTES {
         return None;
     }
     candidates
         .into_iter()
         .map(|candidate| (strsim::jaro_winkler(word, candidate), candidate))
-        .filter(|(likeness, _)| *likeness > 0.8)
+        .filter(|(similarity, _)| *similarity > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
 }

@@ -1,36 +1,36 @@
-//! What reads a file's values: it knows where it is, and gathers what is wrong.
+//! Reads the values of a scene file: tracks the current path and collects problems.
 
 use super::{Choice, Kind, Node, Problem, ProblemKind, Span, nearest};
 
-/// Most problems of a file that are kept: the first ones. Nobody reads more of them, and a file can hold a million.
+/// Maximum number of problems of a file that are kept: the first ones. Nobody reads more of them, and a file can contain a million.
 pub const MAX_PROBLEMS: usize = 100;
 
-/// What is wrong with a file.
+/// The problems of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Problems {
-    /// The first of them in the order of the file, [`MAX_PROBLEMS`] at most; those without a place come last.
+    /// The first problems in the order of the file, at most [`MAX_PROBLEMS`]; those without a location come last.
     pub listed: Vec<Problem>,
-    /// How many there are beyond those.
+    /// Number of further problems.
     pub omitted: usize,
 }
 
-/// Gathers problems while values are read; knows the path that is being read.
+/// Collects problems while values are read, with the path of the current value.
 #[derive(Debug, Default)]
 pub struct Reader {
     path: Vec<String>,
     problems: Vec<Problem>,
     omitted: usize,
-    /// The last place that is still listed, once there are more problems than are kept.
+    /// Location of the last problem that is still listed, once there are more problems than are kept.
     last_listed: Option<usize>,
 }
 
 impl Reader {
-    /// A reader of a file's root.
+    /// A reader at the root of a file.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Runs `read` with `segment` added to the path.
+    /// Runs `read` with `segment` appended to the path.
     pub fn within<T>(&mut self, segment: impl Into<String>, read: impl FnOnce(&mut Self) -> T) -> T {
         self.path.push(segment.into());
         let result = read(self);
@@ -38,30 +38,30 @@ impl Reader {
         result
     }
 
-    /// Notes a problem at `node`.
+    /// Reports a problem at `node`.
     pub fn report(&mut self, node: &Node, kind: ProblemKind) {
         self.report_at(Some(node.span.clone()), kind);
     }
 
-    /// Notes a problem at `span`.
+    /// Reports a problem at `span`.
     pub fn report_at(&mut self, span: Option<Span>, kind: ProblemKind) {
         self.report_with(span, || kind);
     }
 
-    /// Notes a problem at `span`; what it says is only made where it is to be listed.
+    /// Reports a problem at `span`; `kind` is called only if the problem will be listed.
     pub fn report_with(&mut self, span: Option<Span>, kind: impl FnOnce() -> ProblemKind) {
         if self.last_listed.is_some_and(|last| start(span.as_ref()) >= last) {
             self.omitted += 1;
             return;
         }
         self.problems.push(Problem { span, path: self.path.join("."), kind: kind() });
-        // Sorting as many again each time keeps the cost of a problem the same however many there are.
+        // Sorting only at twice the limit keeps the amortized cost per problem constant.
         if self.problems.len() >= 2 * MAX_PROBLEMS {
             self.keep_first();
         }
     }
 
-    /// Sorts the problems and leaves out those after the most that are kept.
+    /// Sorts the problems and drops those beyond [`MAX_PROBLEMS`].
     fn keep_first(&mut self) {
         self.problems.sort_by_key(|problem| start(problem.span.as_ref()));
         if self.problems.len() > MAX_PROBLEMS {
@@ -71,13 +71,13 @@ impl Reader {
         }
     }
 
-    /// Notes that `node` is not of the wanted kind.
+    /// Reports that `node` is not of the expected kind.
     pub fn wrong_type(&mut self, node: &Node, expected: &Kind) {
         let kind = ProblemKind::WrongType { expected: expected.expectation(), found: node.value.type_name() };
         self.report(node, kind);
     }
 
-    /// Notes that `name` is none of `choices`.
+    /// Reports that `name` is none of `choices`.
     pub fn not_one_of(&mut self, node: &Node, name: &str, choices: &[Choice]) {
         let kind = ProblemKind::NotOneOf {
             value: name.to_owned(),
@@ -87,19 +87,19 @@ impl Reader {
         self.report(node, kind);
     }
 
-    /// Whether no problem was met so far.
+    /// Whether no problem has been reported so far.
     pub fn is_clean(&self) -> bool {
         self.problems.is_empty()
     }
 
-    /// Takes all problems, in the order of the file.
+    /// Returns the problems in the order of the file.
     pub fn into_problems(mut self) -> Problems {
         self.keep_first();
         Problems { listed: self.problems, omitted: self.omitted }
     }
 }
 
-/// Where a problem stands in the order of the file.
+/// Sort key of a problem: its position in the file.
 fn start(span: Option<&Span>) -> usize {
     span.map_or(usize::MAX, |span| span.start)
 }

@@ -1,8 +1,8 @@
-//! Valid values drawn at random, for tests that throw thousands of scenes at the renderer.
+//! Random valid values, for tests that render thousands of scenes.
 
 use super::{Descriptor, Kind, Node, Table, TableDescriptor, Value};
 
-/// A random valid table; `uniform` gives numbers in [0, 1). Assets are left out, since they name files.
+/// A random valid table; `uniform` returns numbers in [0, 1). Assets are omitted, since they refer to files.
 pub fn sample(table: &TableDescriptor, uniform: &mut dyn FnMut() -> f64) -> Table {
     let mut result = Table::default();
     for parameter in &table.parameters {
@@ -20,7 +20,7 @@ fn sample_parameter(parameter: &Descriptor, uniform: &mut dyn FnMut() -> f64) ->
     sample_kind(&parameter.kind, around, uniform)
 }
 
-/// Bounds themselves come up often, since faults live there; else near the default, or anywhere.
+/// Often one of the bounds, where errors are likely; otherwise near the default, or anywhere.
 fn sample_number(min: f64, max: f64, around: Option<f64>, uniform: &mut dyn FnMut() -> f64) -> f64 {
     let pick = uniform();
     let spread = uniform();

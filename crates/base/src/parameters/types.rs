@@ -1,37 +1,37 @@
-//! The types a parameter may have, and how each is read from a file and written back.
+//! The types of parameters, and how each is read from a file and written back.
 
 use super::{Kind, Node, ProblemKind, Reader, Table, TableDescriptor, Value, nearest};
 
 /// A type that a parameter can have.
 pub trait Parameter: Sized {
-    /// What bounds its values.
+    /// Bounds of its values.
     type Limits: Default;
 
-    /// What it may be, within `limits`.
+    /// Its kind within `limits`.
     fn kind(limits: &Self::Limits) -> Kind;
 
-    /// Reads it from a file; reports and returns `None` where the file is wrong.
+    /// Reads it from a file; reports a problem and returns `None` if the value is invalid.
     fn read(node: &Node, limits: &Self::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self>;
 
-    /// Writes it as a file would say it; `None` where a file would leave it out.
+    /// The value as in a file; `None` if a file would omit it.
     fn to_value(&self) -> Option<Value>;
 
-    /// Makes what is keyed over time repeat what it does between 0 and `period` (s, above 0); gives the path of the first that does not end
-    /// there as it began, empty for the value itself.
+    /// Makes keyframed values periodic by repeating the interval from 0 to `period` (s, above 0). Returns the path of the first value that differs at
+    /// both ends, empty for the value itself.
     fn close_loop(&mut self, _period: f64) -> Option<String> {
         None
     }
 }
 
-/// A table of parameters; made by [`parameters!`](crate::parameters!).
+/// A table of parameters; implemented by [`parameters!`](crate::parameters!).
 pub trait Parameters: Sized + Default {
-    /// All its descriptors.
+    /// Its descriptors.
     fn table() -> &'static TableDescriptor;
 
-    /// Reads it; what the file leaves out keeps its default. Keys in `ignored` are somebody else's.
+    /// Reads it; parameters missing in the file keep their defaults. Keys in `ignored` belong to other readers.
     fn read_table(table: &Table, reader: &mut Reader, ignored: &[&str]) -> Self;
 
-    /// Writes every parameter.
+    /// The table with every parameter.
     fn to_table(&self) -> Table;
 
     /// Reports keys that are neither parameters nor `ignored`.
@@ -52,9 +52,9 @@ pub trait Parameters: Sized + Default {
 /// Inclusive bounds of a number, or of each component of a vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Least value.
+    /// Minimum.
     pub min: f64,
-    /// Greatest value.
+    /// Maximum.
     pub max: f64,
 }
 
@@ -66,7 +66,7 @@ impl Range {
 }
 
 impl Default for Range {
-    /// As far as a length, a speed or a time in a picture can sensibly go.
+    /// Bounds that are plausible for any length, speed or time in a picture.
     fn default() -> Self {
         Self::new(-1e6, 1e6)
     }
@@ -255,13 +255,13 @@ impl<const N: usize> Parameter for [i64; N] {
     }
 }
 
-/// `"auto"`, or a value of one's own.
+/// `"auto"` or an explicit value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Auto<T> {
     /// Chosen by Bansho.
     #[default]
     Auto,
-    /// Chosen by the scene.
+    /// Set by the scene.
     Set(T),
 }
 
@@ -318,12 +318,12 @@ impl<T: Parameter> Parameter for Option<T> {
     }
 }
 
-/// How many items a list may have, and what bounds each.
+/// Bounds of the length of a list, and limits of its items.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Length<L> {
-    /// Fewest items.
+    /// Minimum number of items.
     pub min: usize,
-    /// Most items.
+    /// Maximum number of items.
     pub max: usize,
     /// Limits of each item.
     pub item: L,
@@ -367,7 +367,7 @@ impl<T: Parameter> Parameter for Vec<T> {
     }
 }
 
-/// The path of something at `rest` within what `key` names.
+/// The path `rest` below `key`.
 #[must_use]
 pub fn path(key: &str, rest: &str) -> String {
     if rest.is_empty() { key.to_owned() } else { format!("{key}.{rest}") }

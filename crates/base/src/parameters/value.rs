@@ -1,25 +1,25 @@
-//! Values as a file says them, each with where it stands.
+//! Values of a scene file with their locations in the source.
 
-/// Bytes of the source text.
+/// Byte range in the source text.
 pub type Span = std::ops::Range<usize>;
 
-/// A value and its place in the source.
+/// A value and its location in the source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// What it says.
+    /// The value.
     pub value: Value,
-    /// Where it says so; empty for values that no file holds.
+    /// Its location; empty for values that are not from a file.
     pub span: Span,
 }
 
-/// What a file can say.
+/// A value in a scene file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// `true` or `false`.
     Bool(bool),
-    /// A whole number.
+    /// An integer.
     Integer(i64),
-    /// A number with a fraction.
+    /// A floating-point number.
     Number(f64),
     /// A string.
     Text(String),
@@ -41,7 +41,7 @@ pub struct Table {
 pub struct Entry {
     /// The key.
     pub key: String,
-    /// Where the key stands.
+    /// Location of the key.
     pub key_span: Span,
     /// Its value.
     pub node: Node,
@@ -53,7 +53,7 @@ impl Table {
         self.entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node)
     }
 
-    /// Adds a key without a place in a source.
+    /// Appends a key without a source location.
     pub fn push(&mut self, key: impl Into<String>, value: Value) {
         self.entries.push(Entry { key: key.into(), key_span: 0..0, node: Node::from(value) });
     }
@@ -71,7 +71,7 @@ impl Value {
         Self::List(numbers.into_iter().map(|number| Self::Number(number).into()).collect())
     }
 
-    /// What it is, for messages.
+    /// Name of its type, for messages.
     pub fn type_name(&self) -> &'static str {
         match self {
             Self::Bool(_) => "a boolean",
@@ -83,7 +83,7 @@ impl Value {
         }
     }
 
-    /// Its number, where it is one.
+    /// Its number, if it is one.
     pub fn as_number(&self) -> Option<f64> {
         match *self {
             Self::Integer(integer) => Some(integer as f64),
@@ -106,7 +106,7 @@ fn write_text(f: &mut std::fmt::Formatter<'_>, text: &str) -> std::fmt::Result {
     f.write_str("\"")
 }
 
-/// Writes the value as it would stand in a scene file, tables inline.
+/// Writes the value in the syntax of a scene file, with tables inline.
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
