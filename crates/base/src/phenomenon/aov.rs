@@ -1,48 +1,48 @@
-//! Quantities beside light: how their samples become one number a pixel.
+//! Arbitrary output variables (AOVs): how samples are combined to one value per pixel.
 
 use super::strip::{blend, reset};
 use crate::math::MulAdd;
 
-/// How the samples of an AOV become one number.
+/// How the samples of an AOV are combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AovRule {
-    /// Their sum; 0 where there is nothing.
+    /// Their sum; 0 without samples.
     Sum,
-    /// Their mean, weighted as the AOV says; 0 where there is nothing.
+    /// Their weighted mean, with weights defined by the AOV; 0 without samples.
     WeightedMean,
-    /// That of the nearest; 0 where there is nothing.
+    /// The value of the nearest sample; 0 without samples.
     Nearest,
 }
 
-/// A measured quantity that a phenomenon can write beside its light.
+/// A quantity that a phenomenon can output besides its light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AovDescriptor {
-    /// Name behind the phenomenon's, such as `temperature_k` or `motion.X`.
+    /// Name, appended to that of the phenomenon, such as `temperature_k` or `motion.X`.
     pub name: &'static str,
     /// Unit.
     pub unit: &'static str,
-    /// What it is, how it is weighted, and its empty value.
+    /// Description: the quantity, its weights and its value without samples.
     pub doc: &'static str,
-    /// How samples combine.
+    /// How samples are combined.
     pub rule: AovRule,
 }
 
-/// The plane of one AOV within a strip.
+/// The values of one AOV in a strip.
 #[derive(Clone, Debug, Default)]
 pub struct AovPlane {
     values: Vec<f32>,
-    /// Sums of weights; of the nearest sample 1/depth, so that no sample is 0 too.
+    /// Sums of weights; for [`AovRule::Nearest`] 1/depth of the nearest sample, so that 0 means no sample.
     weights: Vec<f32>,
 }
 
 impl AovPlane {
-    /// Adds a sample of `value` that counts `weight` at pixel `index` of the strip.
+    /// Adds a sample with `value` and `weight` at pixel `index` of the strip.
     pub fn add(&mut self, index: usize, value: f32, weight: f32) {
         self.values[index] = value.fma(weight, self.values[index]);
         self.weights[index] += weight;
     }
 
-    /// Keeps a sample of `value` at `depth` (m, above 0) if it is nearer than what pixel `index` of the strip has, for
+    /// Stores a sample with `value` at `depth` (m, above 0) if it is nearer than the current sample of pixel `index` of the strip, for
     /// [`AovRule::Nearest`].
     pub fn keep_nearest(&mut self, index: usize, value: f32, depth: f32) {
         self.keep(index, value, 1.0 / depth);
@@ -54,7 +54,7 @@ impl AovPlane {
         }
     }
 
-    /// What the samples at pixel `index` come to.
+    /// The combined value of the samples at pixel `index`.
     pub fn resolve(&self, index: usize, rule: AovRule) -> f32 {
         match rule {
             AovRule::Sum | AovRule::Nearest => self.values[index],
@@ -75,16 +75,16 @@ impl AovPlane {
         add(&mut self.weights, &other.weights);
     }
 
-    /// Its samples count `share`, those of another plane of the same size and AOV the rest.
-    pub(super) fn crossfade(&mut self, other: &Self, share: f32, rule: AovRule) {
+    /// Blends with another plane of the same size and AOV: its own samples have the weight `own_weight`, the others the rest.
+    pub(super) fn crossfade(&mut self, other: &Self, own_weight: f32, rule: AovRule) {
         if rule == AovRule::Nearest {
             return self.add_plane(other, rule);
         }
-        blend(&mut self.values, &other.values, share);
-        blend(&mut self.weights, &other.weights, share);
+        blend(&mut self.values, &other.values, own_weight);
+        blend(&mut self.weights, &other.weights, own_weight);
     }
 
-    /// Makes it an empty plane of so many pixels.
+    /// Resets it to an empty plane of `pixels` pixels.
     pub fn reset(&mut self, pixels: usize) {
         reset(&mut self.values, pixels, 0.0);
         reset(&mut self.weights, pixels, 0.0);

@@ -1,4 +1,4 @@
-//! Kinds of phenomena: how each is read from its table of a scene, and built.
+//! Kinds of phenomena: how each is read from its table in a scene, and built.
 
 use std::{error::Error, sync::Arc};
 
@@ -9,38 +9,38 @@ use crate::{
 
 use super::Phenomenon;
 
-/// What a phenomenon is built with, beside its own parameters.
+/// What a phenomenon is built with, besides its own parameters.
 #[derive(Clone, Copy)]
 pub struct BuildContext<'a> {
     /// Its name in the scene.
     pub name: &'a str,
-    /// Seed of everything random in the shot.
+    /// Seed of all random numbers of the shot.
     pub seed: u64,
     /// Length of a seamless loop, s.
     pub loop_s: Option<f64>,
-    /// Where pictures and texts come from.
+    /// Loader of assets.
     pub assets: &'a dyn Assets,
 }
 
-/// A fault that only building shows.
+/// An error that is only detected when a phenomenon is built.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildError {
-    /// The parameter at fault, with dots where it lies deeper.
+    /// Key of the invalid parameter, with sub-tables separated by dots.
     pub key: String,
     /// What is wrong.
     pub kind: ProblemKind,
 }
 
 impl BuildError {
-    /// A phenomenon's own fault, at the parameter that it names.
+    /// An error of the phenomenon's model, at the parameter `key`.
     pub fn new(key: impl Into<String>, fault: impl Error + Send + Sync + 'static) -> Self {
         Self { key: key.into(), kind: ModelError::new(fault).into() }
     }
 }
 
-/// A phenomenon's checked parameters.
+/// The checked parameters of a phenomenon.
 pub trait CheckedParameters: Send + Sync {
-    /// Every parameter with its value, defaults too: equal tables make equal phenomena.
+    /// All parameters with their values, including defaults: equal tables give equal phenomena.
     fn canonical(&self) -> Table;
 
     /// Paths of the assets it reads, for fingerprints.
@@ -52,7 +52,7 @@ pub trait CheckedParameters: Send + Sync {
     /// Builds the phenomenon.
     ///
     /// # Errors
-    /// Parameters that do not go together, or an asset that cannot be had.
+    /// The parameters contradict each other, or an asset could not be loaded.
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError>;
 }
 
@@ -63,19 +63,19 @@ pub struct PhenomenonKind {
     pub key: &'static str,
     /// Its parameters.
     pub table: fn() -> &'static TableDescriptor,
-    /// Reads its parameters; reports faults and falls back to defaults there.
+    /// Reads its parameters; reports problems and uses defaults for invalid values.
     pub read: fn(&Table, &mut Reader) -> Box<dyn CheckedParameters>,
-    /// Whether it is in the sky: where all is, a camera that is told nothing looks up.
+    /// Whether it is in the sky: if all phenomena of a scene are, the default camera looks up.
     pub in_the_sky: bool,
-    /// What a new scene of it states so that it is seen well, as a scene file says it; the default of a scene of it alone.
+    /// Lines of a new scene that show it well (camera, sky, ...), in the syntax of scene files; also the default of a scene with this kind alone.
     pub setting: &'static str,
-    /// Its own keys that say where it is or how large, so that the setting's camera may not fit.
+    /// Its own keys that determine its position or size: if one is set, the camera of `setting` may not fit.
     pub placement_keys: &'static [&'static str],
-    /// Keys that one changes first, in tables and lists of tables within it with dots.
+    /// The most important keys; those in sub-tables and lists of tables are separated by dots.
     pub first_keys: &'static [&'static str],
 }
 
-/// Keys that every phenomenon has beside its own.
+/// Keys that every phenomenon has besides its own.
 pub const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
 
 /// Makes a [`PhenomenonKind`] from a parameter table and a constructor.
@@ -84,17 +84,18 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const KEY: &'static str;
     /// See [`PhenomenonKind::in_the_sky`].
     const IN_THE_SKY: bool = false;
-    /// What a new scene of it states so that it is seen well, as a scene file says it; nothing where all defaults do.
+    /// See [`PhenomenonKind::setting`]; empty if the defaults suffice.
     const SETTING: &'static str = "";
     /// See [`PhenomenonKind::placement_keys`].
     const PLACEMENT_KEYS: &'static [&'static str] = &[];
-    /// Keys that one changes first, with which a short new scene begins; dots lead into tables and lists of tables (`burners.diameter`).
+    /// The most important keys, with which a short new scene begins; dots separate tables and lists of tables (`burners.diameter`).
     const FIRST_KEYS: &'static [&'static str] = &[];
 
-    /// How many particles live in memory with the `others` of the scene, of which all phenomena together may have so many.
+    /// Checks the number of its particles together with the `others` of the scene, since the number of all phenomena together is limited by memory, and
+    /// returns the total.
     ///
     /// # Errors
-    /// More than fit.
+    /// There are more than fit.
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
         Ok(others)
     }
@@ -102,10 +103,10 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// Builds the phenomenon.
     ///
     /// # Errors
-    /// Parameters that do not go together, or an asset that cannot be had.
+    /// The parameters contradict each other, or an asset could not be loaded.
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError>;
 
-    /// The kind that scene files call by [`KEY`](Self::KEY).
+    /// The kind that scene files refer to by [`KEY`](Self::KEY).
     const KIND: PhenomenonKind = PhenomenonKind {
         key: Self::KEY,
         table: <Self as Parameters>::table,

@@ -1,4 +1,4 @@
-//! What fire, rain, aurora and whatever comes next have in common for the renderer.
+//! The interface between phenomena (fire, rain, aurora, ...) and the renderer.
 
 pub(crate) mod aov;
 pub mod kind;
@@ -15,19 +15,19 @@ use crate::{
 use strip::{AovDescriptor, DepthInterval, Shutter, Strip, View};
 use surroundings::{OtherPhenomena, Publication, Surroundings};
 
-/// How a stepped phenomenon moves: in steps that are fixed in seconds, whatever the frame rate, size or shutter.
+/// Time steps of a stepped phenomenon: fixed in seconds, independent of frame rate, picture size and shutter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepping {
     /// Length of a step, s.
     pub step: f64,
-    /// How long it runs before time 0, so that it begins developed, s.
+    /// Duration of the simulation before time 0, so that it starts fully developed, s.
     pub preroll: f64,
-    /// In a loop: for how long one run of it passes into the next, s. The preroll is then longer by half of that.
+    /// In a loop: duration of the crossfade from one run to the next, s. The preroll is longer by half of that.
     pub crossfade: f64,
 }
 
 impl Stepping {
-    /// Steps that make up the preroll.
+    /// Number of steps of the preroll.
     #[must_use]
     pub fn preroll_steps(&self) -> u64 {
         (self.preroll.max(0.0) / self.step).round() as u64
@@ -39,59 +39,58 @@ impl Stepping {
         (taken as f64 - self.preroll_steps() as f64) * self.step
     }
 
-    /// Steps after which the state is the last one not after time `t`. A millionth of a step forgives rounding.
+    /// Number of steps to the last state not after time `t`, with a tolerance of a millionth of a step for rounding.
     #[must_use]
     pub fn steps_until(&self, t: f64) -> u64 {
         ((t / self.step + 1e-6).floor() + self.preroll_steps() as f64).max(0.0) as u64
     }
 
-    /// Steps that lead to the time at which `other` is after `taken`; none where no step does, or a loop passes otherwise into its next
-    /// run.
+    /// Number of steps to the time at which `other` is after `taken` steps; `None` if there is no such step, or if step or crossfade differ.
     #[must_use]
     pub fn steps_for(&self, other: &Self, taken: u64) -> Option<u64> {
-        let alike = self.step == other.step && self.crossfade == other.crossfade;
-        (taken + self.preroll_steps()).checked_sub(other.preroll_steps()).filter(|_| alike)
+        let is_compatible = self.step == other.step && self.crossfade == other.crossfade;
+        (taken + self.preroll_steps()).checked_sub(other.preroll_steps()).filter(|_| is_compatible)
     }
 }
 
 /// Why a snapshot cannot be restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SnapshotError {
-    /// Closed-form phenomena keep no state.
-    #[error("the phenomenon keeps no state")]
+    /// Closed-form phenomena have no state.
+    #[error("the phenomenon has no state")]
     NoState,
-    /// It is of another version of the state.
+    /// The snapshot has another version.
     #[error("the snapshot is of version {found}; this program reads {known}")]
     Version {
-        /// The snapshot's.
+        /// Version of the snapshot.
         found: u32,
-        /// This program's.
+        /// Version of this program.
         known: u32,
     },
-    /// It is shorter or longer than its contents say, or does not match its checksum.
+    /// Its length is wrong, or its checksum does not match.
     #[error("the snapshot is damaged")]
     Damaged,
 }
 
-/// What a user should know of how a phenomenon will look, and that stops nothing.
+/// A note for the user about how a phenomenon will look; it does not stop the work.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remark {
-    /// The parameter of the phenomenon's own table that it speaks of, as in `shapes.1` (counting from 0); none where it is all of it.
+    /// The parameter of the phenomenon's own table that it refers to, as in `shapes.1` (counting from 0); `None` for the phenomenon as a whole.
     pub key: Option<String>,
-    /// What to know, and what would change it.
+    /// The note, and what would change it.
     pub message: String,
-    /// Whether it only holds while nothing else shines: what is simulated may shine later than the frames that were looked at.
+    /// Whether it only holds while nothing else emits light: a simulated phenomenon may emit light later than in the frames that were examined.
     pub unless_lit_later: bool,
 }
 
 impl Remark {
-    /// A remark on a phenomenon as a whole.
+    /// A remark about a phenomenon as a whole.
     #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self { key: None, message: message.into(), unless_lit_later: false }
     }
 
-    /// A remark on what stands at `key` in the phenomenon's own table.
+    /// A remark about the parameter `key` of the phenomenon's own table.
     #[must_use]
     pub fn at(key: impl Into<String>, message: impl Into<String>) -> Self {
         Self { key: Some(key.into()), ..Self::new(message) }
@@ -104,40 +103,40 @@ impl fmt::Display for Remark {
     }
 }
 
-/// A level mirror, as wet ground and lakes are.
+/// A horizontal mirror, such as wet ground or a lake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelMirror {
     /// Its height, m.
     pub height: f64,
-    /// How far above or below that height what a plate shows still is the mirror itself, m.
+    /// Points that a plate shows within this height above or below the mirror belong to the mirror, m.
     pub plate_tolerance: f64,
 }
 
 impl LevelMirror {
-    /// That tolerance at a depth in m where a pixel tells no less: one of `focal_pixels` to the unit of depth looks along the mirror.
+    /// The tolerance at a depth in m, at least the size of a pixel there: its resolution is `focal_pixels` pixels per unit of depth.
     #[must_use]
     pub fn tolerance_at(&self, depth: f64, focal_pixels: f64) -> f64 {
         self.plate_tolerance.max(depth / focal_pixels)
     }
 }
 
-/// What is fixed when a phenomenon is built.
+/// Static properties of a phenomenon, known once it is built.
 #[derive(Clone, Copy, Debug)]
 pub struct PhenomenonInfo<'a> {
-    /// Its name in the scene, which also names its layers.
+    /// Its name in the scene, also used for its layers.
     pub name: &'a str,
-    /// The quantities it can write beside its light.
+    /// The AOVs that it can output.
     pub aovs: &'static [AovDescriptor],
-    /// How it steps; `None` for a closed form, which is drawn at any time without steps.
+    /// Its time steps; `None` for a closed form, which can be drawn at any time.
     pub stepping: Option<Stepping>,
-    /// The level mirror that it is. It then gets a picture of everything else seen in that mirror.
+    /// The horizontal mirror, if it is one. It then receives a picture of everything else as seen in that mirror.
     pub mirror: Option<LevelMirror>,
-    /// What to do to make it stronger, as a remark says it.
+    /// How to make it stronger, as worded in a remark.
     pub strengthened_by: &'static str,
 }
 
 impl<'a> PhenomenonInfo<'a> {
-    /// A closed form without AOVs, which is no mirror.
+    /// A closed form without AOVs that is not a mirror.
     #[must_use]
     pub fn new(name: &'a str) -> Self {
         let strengthened_by = "make it larger or brighter";
@@ -145,32 +144,32 @@ impl<'a> PhenomenonInfo<'a> {
     }
 }
 
-/// One phenomenon of a scene, built once from its parameters and shared by all that looks at it: checks, remarks, exposure, shots.
+/// One phenomenon of a scene, built once from its parameters and shared by all of its users: checks, remarks, exposure, shots.
 ///
-/// What changes from step to step lives in a [`Run`]. Everything is a function of the parameters, the seed, the name and the time: never of
-/// the threads, of the frames drawn before, or of the size of the picture.
+/// State that changes from step to step is in a [`Run`]. Everything is a function of the parameters, the seed, the name and the time, independent of
+/// threads, of frames drawn before and of the picture size.
 pub trait Phenomenon: Send + Sync {
-    /// What is fixed.
+    /// Its static properties.
     fn info(&self) -> PhenomenonInfo<'_>;
 
-    /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is chosen once a shot.
+    /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is determined once per shot.
     fn luminance(&self) -> f64;
 
-    /// What a user should know of how it will look among others.
+    /// A note for the user about how it will look among the other phenomena.
     fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
         None
     }
 
-    /// A run of it, at its beginning: before the preroll of what is stepped. Takes no construction; any number of runs may live at once.
+    /// A new run at its initial state, which for a stepped phenomenon is before the preroll. Nothing is built; any number of runs may exist at a time.
     fn start(self: Arc<Self>) -> Box<dyn Run>;
 }
 
-/// A phenomenon in the course of a shot: drawn at any time where it is a closed form, at the time that it was stepped to where it is not.
+/// A phenomenon during a shot. A closed form can be drawn at any time, a stepped one at the time to which it was stepped.
 pub trait Run: Send + Sync {
-    /// What the others see of it while the shutter is open.
+    /// What it publishes to the other phenomena for an exposure.
     fn publish(&self, shutter: Shutter) -> Publication;
 
-    /// The intervals of depth that it fills, in any order. Slices are cut at their ends.
+    /// The depth intervals that it occupies, in any order. Slices are cut at their ends.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
 
     /// Prepares one frame, so that strips of it can be drawn in any order by any thread.
@@ -184,23 +183,23 @@ pub trait Run: Send + Sync {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled>;
 
-    /// Its particles at time `t`, while the shutter is open, for exports; `None` where it has none.
+    /// Its particles at time `t`, within the exposure, for export; `None` if it has none.
     fn export(&self, _t: f64) -> Option<PointCloud> {
         None
     }
 
-    /// Its state, where it is stepped.
+    /// Its state, if it is stepped.
     fn as_stepped(&self) -> Option<&dyn Stepped> {
         None
     }
 
-    /// Its state to step, where it is stepped.
+    /// Its mutable state, if it is stepped.
     fn as_stepped_mut(&mut self) -> Option<&mut dyn Stepped> {
         None
     }
 }
 
-/// Runs of a closed form are the phenomenon itself.
+/// The run of a closed form is the phenomenon itself.
 impl<P: Run + ?Sized> Run for Arc<P> {
     fn publish(&self, shutter: Shutter) -> Publication {
         (**self).publish(shutter)
@@ -228,61 +227,61 @@ impl<P: Run + ?Sized> Run for Arc<P> {
     }
 }
 
-/// What a run that is simulated adds: a state that moves in fixed steps.
+/// The state of a simulated run, which advances in fixed steps.
 pub trait Stepped: Send + Sync {
-    /// Steps from `time` to one step later.
+    /// Advances the state from `time` by one step.
     fn step(&mut self, time: f64, surroundings: &Surroundings);
 
-    /// Time of the state that an exposure is drawn from: it is stepped until then. What happens after that while the shutter is open,
-    /// it finds out itself.
+    /// Time of the state from which an exposure is drawn: the run is stepped until then. Motion after that time while the shutter is open is
+    /// computed by the run itself.
     fn time_for(&self, shutter: Shutter) -> f64 {
         shutter.middle()
     }
 
-    /// Its state.
+    /// Serializes the state.
     fn snapshot(&self) -> Vec<u8>;
 
-    /// Returns to a state that [`snapshot`](Self::snapshot) gave.
+    /// Restores a state from [`snapshot`](Self::snapshot).
     ///
     /// # Errors
-    /// The bytes are not such a state; it is then unchanged.
+    /// The bytes are not a valid snapshot; the state is then unchanged.
     fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError>;
 }
 
-/// One frame of a phenomenon, ready to draw.
+/// One frame of a phenomenon, prepared for drawing.
 pub trait Prepared: Send + Sync {
-    /// The pixels that it can touch within a slice of depth.
+    /// Bounding rectangle of the pixels that it can affect within a depth slice.
     fn bounds(&self, slice: &DepthInterval) -> Rect;
 
     /// Draws what lies in `slice` into `strip`, nearest first, blurred over the shutter.
     ///
-    /// Must give each pixel the same value whatever strip it comes in.
+    /// The value of a pixel must not depend on the strip in which it is drawn.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
 
-    /// Numbers that this frame is known by, each name once.
+    /// Figures of this frame, with unique names.
     fn figures(&self) -> Vec<Figure> {
         Vec::new()
     }
 
-    /// Whether it may bend light anywhere in the picture, also where the window that it was prepared for does not show it.
+    /// Whether it may refract light anywhere in the picture, including outside the window for which it was prepared.
     fn may_bend(&self) -> bool {
         self.deflection().is_some()
     }
 
-    /// How it bends the light of what lies behind it.
+    /// How it refracts the light from behind it.
     fn deflection(&self) -> Option<Deflection<'_>> {
         None
     }
 }
 
-/// A field of small angles that displaces what lies behind it.
+/// A field of small angles by which light from behind is deflected.
 #[derive(Clone, Copy, Debug)]
 pub struct Deflection<'a> {
-    /// Depth at which the light is bent, m: what begins behind it is bent.
+    /// Depth of the deflection, m: slices that begin behind it are displaced.
     pub depth: f64,
-    /// The pixels that the field covers.
+    /// The pixels covered by the field.
     pub rect: Rect,
-    /// Angle to the right and upward, radians.
+    /// Angles to the right and upward, radians.
     pub angle: &'a Image<2>,
 }
 

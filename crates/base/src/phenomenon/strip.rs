@@ -1,4 +1,4 @@
-//! What phenomena draw into: strips of a picture that no two threads share.
+//! Drawing targets of phenomena: strips of a picture, each owned by one thread.
 
 use std::sync::Arc;
 
@@ -23,47 +23,47 @@ pub struct Shutter {
 }
 
 impl Shutter {
-    /// Half way between.
+    /// Middle of the exposure.
     pub fn middle(&self) -> f64 {
         0.5 * (self.open + self.close)
     }
 
-    /// How long it is open.
+    /// Exposure time.
     pub fn duration(&self) -> f64 {
         self.close - self.open
     }
 
-    /// The middle of part `index` of `count` equal parts.
+    /// Midpoint of interval `index` of `count` equal intervals.
     pub fn instant(&self, index: usize, count: usize) -> f64 {
         self.open + self.duration() * (index as f64 + 0.5) / count as f64
     }
 }
 
-/// A stretch of depth, m; a thing at depth z lies in it when `near <= z < far`.
+/// A half-open interval of depth, m: it contains depth z if `near <= z < far`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthInterval {
     /// Nearest depth.
     pub near: f64,
-    /// First depth beyond it.
+    /// Depth at which it ends.
     pub far: f64,
 }
 
 impl DepthInterval {
-    /// Everything before the camera.
+    /// Everything in front of the camera.
     pub const ALL: Self = Self { near: 0.0, far: f64::INFINITY };
 
-    /// Whether a thing at `depth` lies in it.
+    /// Whether it contains `depth`.
     pub fn contains(&self, depth: f64) -> bool {
         self.near <= depth && depth < self.far
     }
 
-    /// Whether the two share any depth.
+    /// Whether the two intervals overlap.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.near < other.far && other.near < self.far
     }
 }
 
-/// Motion of the picture while the shutter is open that one instant stands for, pixels, and the most instants.
+/// Motion blur: motion per time sample, pixels, and the maximum number of time samples.
 const PIXELS_PER_INSTANT: f64 = 1.0;
 const MAX_INSTANTS: f64 = 16.0;
 
@@ -72,30 +72,30 @@ const MAX_INSTANTS: f64 = 16.0;
 pub struct View {
     /// Camera at the middle of the exposure.
     pub camera: Camera,
-    /// Camera over time.
+    /// Parameters of the camera over time.
     pub path: CameraParameters,
     /// When the shutter is open.
     pub shutter: Shutter,
-    /// When the next frame's exposure has its middle, for motion vectors; s.
+    /// Middle of the next frame's exposure, for motion vectors, s.
     pub next_middle: f64,
-    /// Size of the whole picture with its overscan, pixels.
+    /// Size of the whole picture including overscan, pixels.
     pub size: [usize; 2],
     /// Overscan on every side, pixels.
     pub overscan: usize,
-    /// The part of the picture that is drawn.
+    /// The region of the picture that is drawn.
     pub window: Rect,
-    /// Height of the level mirror that the picture is seen in, m.
+    /// Height of the horizontal mirror in which the picture is seen, m.
     pub mirror: Option<f64>,
-    /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
+    /// Luminance of display white, cd/m^2, if known: light far below it need not be drawn.
     pub white_luminance: Option<f64>,
-    /// Whether AOVs are asked for; strips then have planes for them.
+    /// Whether AOVs are requested; strips then have planes for them.
     pub aovs_requested: bool,
-    /// In a loop: the same at the time of the turn before or after, whichever is nearer, for runs that pass from one turn to the next.
+    /// In a loop: the same view one loop period earlier or later, whichever is nearer, for the crossfade between runs.
     pub adjacent_loop_view: Option<Arc<Self>>,
 }
 
 impl View {
-    /// The view over `shutter` of a picture of `size` pixels with `overscan` pixels more on every side.
+    /// The view for `shutter` of a picture of `size` pixels plus `overscan` pixels on every side.
     pub fn new(path: CameraParameters, shutter: Shutter, next_middle: f64, size: [usize; 2], overscan: usize) -> Self {
         let camera = path.at(shutter.middle(), size).with_overscan(overscan);
         let size = size.map(|side| side + 2 * overscan);
@@ -114,20 +114,20 @@ impl View {
         }
     }
 
-    /// The view of another part of the picture.
+    /// The view of another region of the picture.
     pub fn with_window(self, window: Rect) -> Self {
         self.with_adjacent_loop_view(|view| view.window = window)
     }
 
-    /// The view within a loop of `turn` seconds.
-    pub fn in_loop(self, turn: f64) -> Self {
-        let by = if self.shutter.middle() < 0.5 * turn { turn } else { -turn };
-        let shutter = Shutter { open: self.shutter.open + by, close: self.shutter.close + by };
-        let other = Self { shutter, next_middle: self.next_middle + by, ..self.clone() };
-        Self { adjacent_loop_view: Some(Arc::new(other)), ..self }
+    /// The view within a loop of `period` seconds.
+    pub fn in_loop(self, period: f64) -> Self {
+        let offset = if self.shutter.middle() < 0.5 * period { period } else { -period };
+        let shutter = Shutter { open: self.shutter.open + offset, close: self.shutter.close + offset };
+        let adjacent = Self { shutter, next_middle: self.next_middle + offset, ..self.clone() };
+        Self { adjacent_loop_view: Some(Arc::new(adjacent)), ..self }
     }
 
-    /// The view after `change`, made at the other time too.
+    /// Applies `change` to this view and to the adjacent one.
     fn with_adjacent_loop_view(mut self, change: impl Fn(&mut Self)) -> Self {
         change(&mut self);
         if let Some(other) = &mut self.adjacent_loop_view {
@@ -136,7 +136,7 @@ impl View {
         self
     }
 
-    /// The whole picture as it is seen in a level mirror at `height`, m.
+    /// The view of the whole picture as seen in a horizontal mirror at `height`, m.
     pub fn mirrored(&self, height: f64) -> Self {
         let mirrored = self.clone().with_adjacent_loop_view(|view| {
             view.camera = view.camera.mirrored(height);
@@ -146,10 +146,10 @@ impl View {
         mirrored.with_window(Rect::of_size(self.size[0], self.size[1]))
     }
 
-    /// How far the sky moves in the picture while the shutter is open, at most, pixels.
+    /// Largest motion of the sky in the picture during the exposure, pixels.
     pub fn motion_pixels(&self) -> f64 {
-        // In the corners and the middle, and where a dome's circle comes near the edges: its corners see nothing.
-        const PLACES: [[f64; 2]; 9] = [
+        // Sampled at the corners, the middle, and near the middles of the edges, since the corners of a dome lie outside its circle.
+        const SAMPLE_POSITIONS: [[f64; 2]; 9] = [
             [0.0, 0.0],
             [1.0, 0.0],
             [0.0, 1.0],
@@ -161,23 +161,23 @@ impl View {
             [0.5, 0.98],
         ];
         let [open, close] = [self.shutter.open, self.shutter.close].map(|t| self.camera_at(t));
-        let moved = |[x, y]: [f64; 2]| {
-            let place = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
-            let pair = place(&open).zip(place(&close));
+        let motion = |[x, y]: [f64; 2]| {
+            let direction_at = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
+            let pair = direction_at(&open).zip(direction_at(&close));
             pair.map_or(0.0, |(a, b)| math::acos(a.normalize().dot(b.normalize()).clamp(-1.0, 1.0)) * open.focal_pixels)
         };
-        PLACES.map(moved).into_iter().fold(0.0, f64::max)
+        SAMPLE_POSITIONS.map(motion).into_iter().fold(0.0, f64::max)
     }
 
-    /// Cameras at as many instants, each for an equal part of the exposure, as the motion of what is far away needs in the picture: one
-    /// where it stands still.
+    /// Cameras at the time samples of the exposure, with equal weights. Their number follows from the motion of distant objects in the picture; it is
+    /// one for a static camera.
     pub fn cameras(&self) -> Vec<Camera> {
         self.cameras_at_most(MAX_INSTANTS)
     }
 
-    /// The same for what is small and sharp, which needs more of them.
-    pub fn cameras_at_most(&self, most: f64) -> Vec<Camera> {
-        let count = (self.motion_pixels() / PIXELS_PER_INSTANT).ceil().clamp(1.0, most) as usize;
+    /// Like [`cameras`](Self::cameras) with up to `max_count` time samples, for small sharp objects, which need more of them.
+    pub fn cameras_at_most(&self, max_count: f64) -> Vec<Camera> {
+        let count = (self.motion_pixels() / PIXELS_PER_INSTANT).ceil().clamp(1.0, max_count) as usize;
         if count == 1 {
             return vec![self.camera];
         }
@@ -192,27 +192,27 @@ impl View {
     }
 }
 
-/// A part of the picture that one thread draws: radiance L and transmittance T of one slice of depth.
+/// A region of the picture that one thread draws: radiance L and transmittance T of one depth slice.
 ///
-/// Planes hold `rect.width * rect.height` values, row after row. L is premultiplied ACEScg, luminance in cd/m^2.
+/// Planes contain `rect.width * rect.height` values, row by row. L is premultiplied ACEScg, luminance in cd/m^2.
 #[derive(Clone, Debug, Default)]
 pub struct Strip {
-    /// Which pixels of the whole picture.
+    /// The pixels in the whole picture.
     pub rect: Rect,
     /// Red, green and blue of L.
     pub radiance: [Vec<f32>; 3],
-    /// Red, green and blue of T; holds nothing until something absorbs.
+    /// Red, green and blue of T; unused until something absorbs.
     transmittance: [Vec<f32>; 3],
-    /// Depth of the nearest sample, m; infinite where there is none.
+    /// Depth of the nearest sample, m; infinite without samples.
     pub depth: Vec<f32>,
-    /// Depth of the plate, m; empty where there is none. Samples at or behind it are hidden.
+    /// Depth of the plate, m; empty without a plate. Samples at or behind it are hidden.
     plate_depth: Vec<f32>,
-    /// The phenomenon's AOVs in the order of its descriptors; empty when nobody asked for them.
+    /// The phenomenon's AOVs in the order of its descriptors; empty if not requested.
     pub aovs: Vec<AovPlane>,
     absorption: Absorption,
 }
 
-/// Planes of a strip that takes all colours alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
+/// Planes of a strip with gray transmittance, for compositing samples front to back, one pixel at a time: `L += T l; T *= t`.
 #[derive(Debug)]
 pub struct GrayPlanes<'a> {
     /// Red, green and blue of L.
@@ -221,17 +221,17 @@ pub struct GrayPlanes<'a> {
     pub transmittance: &'a mut [f32],
     /// Depth of the nearest sample, m.
     pub depth: &'a mut [f32],
-    /// Depth of the plate, m; empty where there is none.
+    /// Depth of the plate, m; empty without a plate.
     pub plate_depth: &'a [f32],
 }
 
-/// How many planes of T hold something.
+/// The planes of T that are in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 enum Absorption {
     /// None: T is 1.
     #[default]
     None,
-    /// The first, which stands for all three: soot takes all colours alike.
+    /// The first, used for all three colors: soot absorbs all colors equally.
     Gray,
     /// All three.
     Colored,
@@ -247,9 +247,9 @@ impl Absorption {
     }
 }
 
-/// Of each value `share`, and the rest of the other.
-pub(crate) fn blend(values: &mut [f32], others: &[f32], share: f32) {
-    values.iter_mut().zip(others).for_each(|(value, other)| *value = share.fma(*value - other, *other));
+/// Weighted mean: `weight` of each value and `1 - weight` of the other.
+pub(crate) fn blend(values: &mut [f32], others: &[f32], weight: f32) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value = weight.fma(*value - other, *other));
 }
 
 pub(crate) fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
@@ -258,9 +258,9 @@ pub(crate) fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
 }
 
 impl Strip {
-    /// Makes it an empty strip over `rect`.
+    /// Resets it to an empty strip over `rect`.
     ///
-    /// `plate_depth` gives the plate's row `y` over the whole picture's width; `aovs` is how many are wanted.
+    /// `plate_depth` returns row `y` of the plate's depth over the width of the whole picture; `aovs` is the number of AOVs.
     pub fn reset<'a>(&mut self, rect: Rect, plate_depth: Option<&dyn Fn(usize) -> &'a [f32]>, aovs: usize) {
         let pixels = rect.width * rect.height;
         self.rect = rect;
@@ -277,17 +277,17 @@ impl Strip {
         self.aovs.iter_mut().for_each(|plane| plane.reset(pixels));
     }
 
-    /// Pixels in the strip.
+    /// Number of pixels in the strip.
     pub fn len(&self) -> usize {
         self.rect.width * self.rect.height
     }
 
-    /// Whether the strip holds no pixel.
+    /// Whether the strip contains no pixel.
     pub fn is_empty(&self) -> bool {
         self.rect.is_empty()
     }
 
-    /// Depth at which the plate hides what lies behind, m.
+    /// Depth of the plate, m; infinite without a plate.
     pub fn plate_depth(&self, index: usize) -> f32 {
         self.plate_depth.get(index).copied().unwrap_or(f32::INFINITY)
     }
@@ -297,7 +297,7 @@ impl Strip {
         !self.plate_depth.is_empty()
     }
 
-    /// Whether a sample at `depth` is before the plate.
+    /// Whether a sample at `depth` is in front of the plate.
     pub fn visible(&self, index: usize, depth: f32) -> bool {
         depth < self.plate_depth(index)
     }
@@ -311,7 +311,7 @@ impl Strip {
         }
     }
 
-    /// Planes of T where anything absorbs; all the same one where T is gray.
+    /// Planes of T, `None` if nothing absorbs; three times the same plane if T is gray.
     pub fn transmittance_planes(&self) -> Option<[&[f32]; 3]> {
         let [red, green, blue] = &self.transmittance;
         match self.absorption {
@@ -321,7 +321,7 @@ impl Strip {
         }
     }
 
-    /// Planes of T to write to; all ones at first.
+    /// Mutable planes of T, initially 1.
     pub fn transmittance_planes_mut(&mut self) -> &mut [Vec<f32>; 3] {
         self.begin_gray();
         if self.absorption == Absorption::Gray {
@@ -333,7 +333,7 @@ impl Strip {
         &mut self.transmittance
     }
 
-    /// Planes to write to where nothing coloured absorbs; `None` once something does.
+    /// Mutable planes with gray transmittance; `None` once T is colored.
     pub fn gray_planes_mut(&mut self) -> Option<GrayPlanes<'_>> {
         self.begin_gray();
         let [red, green, blue] = &mut self.radiance;
@@ -361,7 +361,7 @@ impl Strip {
         }
     }
 
-    /// An empty strip over the same pixels before the same plate.
+    /// An empty strip over the same pixels with the same plate.
     pub fn empty_like(&self) -> Self {
         let mut empty = Self::default();
         empty.reset(self.rect, None, self.aovs.len());
@@ -369,23 +369,23 @@ impl Strip {
         empty
     }
 
-    /// Makes it the mean of itself, which counts `share`, and another strip over the same pixels: as one take dissolves into the next.
-    pub fn crossfade(&mut self, mut other: Self, share: f32, aovs: &[AovDescriptor]) {
+    /// Crossfades with another strip over the same pixels: this strip has the weight `own_weight`, the other one the rest.
+    pub fn crossfade(&mut self, mut other: Self, own_weight: f32, aovs: &[AovDescriptor]) {
         for (own, other) in self.radiance.iter_mut().zip(&other.radiance) {
-            blend(own, other, share);
+            blend(own, other, own_weight);
         }
         let absorption = self.absorption.max(other.absorption);
         self.upgrade_absorption(absorption);
         other.upgrade_absorption(absorption);
         let planes = self.transmittance.iter_mut().zip(&other.transmittance);
-        planes.take(absorption.planes()).for_each(|(own, other)| blend(own, other, share));
+        planes.take(absorption.planes()).for_each(|(own, other)| blend(own, other, own_weight));
         self.depth.iter_mut().zip(&other.depth).for_each(|(own, other)| *own = own.min(*other));
         for ((own, other), aov) in self.aovs.iter_mut().zip(&other.aovs).zip(aovs) {
-            own.crossfade(other, share, aov.rule);
+            own.crossfade(other, own_weight, aov.rule);
         }
     }
 
-    /// Adds light that neither hides nor is hidden by what this strip holds so far, except by its absorption.
+    /// Adds light behind the current contents: it is attenuated by their transmittance and absorbs nothing.
     pub fn emit(&mut self, index: usize, radiance: [f32; 3], depth: f32) {
         let transmittance = self.transmittance(index);
         for c in 0..3 {
@@ -394,7 +394,7 @@ impl Strip {
         self.depth[index] = self.depth[index].min(depth);
     }
 
-    /// Adds a sample behind all that was drawn before: `L += T l; T *= t`.
+    /// Adds a sample behind the current contents: `L += T l; T *= t`.
     pub fn add_behind(&mut self, index: usize, radiance: [f32; 3], transmittance: [f32; 3], depth: f32) {
         self.emit(index, radiance, depth);
         if transmittance != [1.0; 3] {
@@ -405,7 +405,7 @@ impl Strip {
         }
     }
 
-    /// [`add_row_behind`](Self::add_row_behind) for exactly sixteen pixels held in vectors; the strip must hold them.
+    /// [`add_row_behind`](Self::add_row_behind) for exactly sixteen pixels in vectors, which must all be in the strip.
     #[inline(always)]
     pub fn add_sixteen_behind<S: Simd>(
         &mut self,
@@ -421,26 +421,26 @@ impl Strip {
         for c in 0..3 {
             let sum = &mut self.radiance[c][pixels.clone()];
             let before = f32x16::from_slice(simd, sum);
-            let left = match self.absorption {
+            let transmittance = match self.absorption {
                 Absorption::None => f32x16::splat(simd, 1.0),
                 Absorption::Gray => f32x16::from_slice(simd, &self.transmittance[0][pixels.clone()]),
                 Absorption::Colored => f32x16::from_slice(simd, &self.transmittance[c][pixels.clone()]),
             };
-            (before + radiance[c] * left).store_slice(sum);
+            (before + radiance[c] * transmittance).store_slice(sum);
         }
         if let Some(opacity) = opacity {
             for plane in &mut self.transmittance[..if self.absorption == Absorption::Gray { 1 } else { 3 }] {
                 let plane = &mut plane[pixels.clone()];
-                let left = f32x16::from_slice(simd, plane);
-                (left - left * opacity).store_slice(plane);
+                let transmittance = f32x16::from_slice(simd, plane);
+                (transmittance - transmittance * opacity).store_slice(plane);
             }
         }
         let nearest = &mut self.depth[pixels];
         f32x16::from_slice(simd, nearest).min(depth).store_slice(nearest);
     }
 
-    /// [`add_behind`](Self::add_behind) for pixels that follow each other from `first` on: planes of light, and of gray opacity where
-    /// anything absorbs. Samples of infinite depth leave the depth as it is.
+    /// [`add_behind`](Self::add_behind) for consecutive pixels from `first` on: planes of light, and of gray opacity if
+    /// anything absorbs. Samples of infinite depth do not change the depth.
     #[inline(always)]
     pub fn add_row_behind(&mut self, first: usize, radiance: [&[f32]; 3], opacity: Option<&[f32]>, depth: &[f32]) {
         if opacity.is_some() {
@@ -449,28 +449,28 @@ impl Strip {
         let count = depth.len();
         for c in 0..3 {
             let (sum, light) = (&mut self.radiance[c][first..first + count], &radiance[c][..count]);
-            let left = match self.absorption {
+            let transmittance = match self.absorption {
                 Absorption::None => None,
                 Absorption::Gray => Some(&self.transmittance[0]),
                 Absorption::Colored => Some(&self.transmittance[c]),
             };
-            match left {
+            match transmittance {
                 None => {
                     for (sum, light) in sum.iter_mut().zip(light) {
                         *sum += light;
                     }
                 }
-                Some(left) => {
-                    for ((sum, light), left) in sum.iter_mut().zip(light).zip(&left[first..]) {
-                        *sum += light * left;
+                Some(transmittance) => {
+                    for ((sum, light), transmittance) in sum.iter_mut().zip(light).zip(&transmittance[first..]) {
+                        *sum += light * transmittance;
                     }
                 }
             }
         }
         if let Some(opacity) = opacity {
             for plane in &mut self.transmittance[..if self.absorption == Absorption::Gray { 1 } else { 3 }] {
-                for (left, opacity) in plane[first..first + count].iter_mut().zip(opacity) {
-                    *left -= *left * opacity;
+                for (transmittance, opacity) in plane[first..first + count].iter_mut().zip(opacity) {
+                    *transmittance -= *transmittance * opacity;
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! What phenomena know of each other: light, absorption and obstacles, but never names.
+//! What phenomena know of each other: lights, extinction and occluders, but not names.
 
 use std::sync::LazyLock;
 
@@ -11,56 +11,56 @@ use crate::{
 
 pub use crate::world::occluder::Occluder;
 
-/// How a light sends its light out.
+/// Geometry of a light source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Emitter {
-    /// From a small sphere in all directions.
+    /// A small sphere that emits in all directions.
     Point {
         /// Its middle, m.
         position: DVec3,
-        /// Its radius, m; nearer than this the light no longer grows.
+        /// Its radius, m; within it the illuminance is constant.
         radius: f64,
     },
-    /// From infinitely far away.
+    /// A light at infinity.
     Directional {
         /// Unit vector toward the light.
         toward: DVec3,
     },
-    /// From a point within a cone.
+    /// A point that emits within a cone.
     Spot {
         /// Its apex, m.
         position: DVec3,
         /// Unit vector along its axis.
         axis: DVec3,
-        /// Cosine of the angle up to which it is full.
+        /// Cosine of the angle up to which it has its full intensity.
         cos_inner: f64,
-        /// Cosine of the angle beyond which it is dark.
+        /// Cosine of the angle beyond which it emits nothing.
         cos_outer: f64,
     },
 }
 
-/// A light as every phenomenon sees it.
+/// A light source that illuminates all phenomena.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// Where it comes from.
+    /// Its geometry.
     pub emitter: Emitter,
-    /// ACEScg, its luminance in candela for points and spots, in lux on a facing plane for directional lights.
+    /// ACEScg; its luminance is in candela for points and spots, and in lux on a perpendicular plane for directional lights.
     pub intensity: [f32; 3],
 }
 
-/// What arrives from a light at a point.
+/// Light from one source that arrives at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncidentLight {
-    /// Illuminance on a plane that faces the light, lux, ACEScg.
+    /// Illuminance on a plane perpendicular to the direction of the light, lux, ACEScg.
     pub illuminance: [f32; 3],
-    /// Unit vector toward the light; 0 where it stands.
+    /// Unit vector toward the light; 0 at its position.
     pub toward: DVec3,
-    /// Way from the light, m; 0 for one that is infinitely far, whose light is given where it arrives.
+    /// Distance from the light, m; 0 for a light at infinity, whose illuminance is given at the receiver.
     pub distance: f64,
 }
 
 impl Light {
-    /// What arrives at `point`.
+    /// The light that arrives at `point`.
     #[inline]
     pub fn incident_light(&self, point: DVec3) -> IncidentLight {
         let (position, radius) = match self.emitter {
@@ -78,7 +78,7 @@ impl Light {
         IncidentLight { illuminance: self.intensity.map(|value| value * factor as f32), toward, distance }
     }
 
-    /// Illuminance on a plane at `point` that faces the light (lux, ACEScg), and the unit vector toward it.
+    /// Illuminance on a plane at `point` perpendicular to the light (lux, ACEScg), and the unit vector toward the light.
     #[inline]
     pub fn illuminance(&self, point: DVec3) -> ([f32; 3], DVec3) {
         let IncidentLight { illuminance, toward, .. } = self.incident_light(point);
@@ -87,28 +87,28 @@ impl Light {
 }
 
 impl Emitter {
-    /// Share of its intensity that it sends in a direction (unit vector): all, but for a cone.
+    /// Fraction of its intensity in a direction (unit vector): a smoothstep between the two cones of a spot, otherwise 1.
     #[inline]
     fn spot_falloff(&self, direction: DVec3) -> f64 {
         let Self::Spot { axis, cos_inner, cos_outer, .. } = *self else { return 1.0 };
-        let cone = ((direction.dot(axis) - cos_outer) / (cos_inner - cos_outer).max(1e-9)).clamp(0.0, 1.0);
-        cone * cone * (3.0 - 2.0 * cone)
+        let fraction = ((direction.dot(axis) - cos_outer) / (cos_inner - cos_outer).max(1e-9)).clamp(0.0, 1.0);
+        fraction * fraction * (3.0 - 2.0 * fraction)
     }
 }
 
 /// What one phenomenon publishes to the others at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Publication {
-    /// Lights that stand for its emission.
+    /// Lights that approximate its emission.
     pub lights: Vec<Light>,
-    /// How much light it takes away everywhere, 1/m.
+    /// Homogeneous extinction coefficient, 1/m.
     pub extinction: f64,
-    /// Solids it puts in the way.
+    /// Solid obstacles.
     pub occluders: Vec<Occluder>,
 }
 
 impl Publication {
-    /// Adds what another phenomenon publishes.
+    /// Adds the publication of another phenomenon.
     pub fn extend(&mut self, other: &Self) {
         self.lights.extend_from_slice(&other.lights);
         self.extinction += other.extinction;
@@ -116,17 +116,17 @@ impl Publication {
     }
 }
 
-/// What one phenomenon of a scene is among, to look at before anything is drawn: nothing is copied, so that of many phenomena each can be
-/// asked.
+/// The other phenomena of a scene as seen by one of them, before anything is drawn. Nothing is copied, so that it is cheap for each of many
+/// phenomena.
 #[derive(Clone, Copy)]
 pub struct OtherPhenomena<'a> {
-    /// The scene's own lights and obstacles.
+    /// Lights and obstacles of the scene itself.
     pub scene: &'a Publication,
-    /// How many phenomena there are.
+    /// Number of phenomena.
     pub count: usize,
-    /// What the phenomenon of a number publishes; only asked for where it matters.
+    /// Returns the publication of the phenomenon with an index; called only when needed.
     pub published: &'a dyn Fn(usize) -> &'a Publication,
-    /// Its own number.
+    /// Index of the phenomenon itself.
     pub own_index: usize,
     /// The light of the sky.
     pub sky: &'a Sky,
@@ -150,38 +150,38 @@ impl<'a> OtherPhenomena<'a> {
     }
 }
 
-/// Radiance (ACEScg, cd/m^2) and alpha of a whole picture in fewer pixels.
+/// Radiance (ACEScg, cd/m^2) and alpha of a whole picture at reduced resolution.
 #[derive(Clone, Debug)]
 pub struct Backdrop {
-    /// The pixels, from the picture's upper left corner on; the last ones may reach over its edges.
+    /// The pixels, from the upper left corner of the picture; the last ones may extend beyond its edges.
     pub image: Image<4>,
-    /// Pixels of the picture in one of these, along each side.
+    /// Side of one of these pixels in pixels of the picture.
     pub side: usize,
 }
 
-/// What a phenomenon is drawn among: wind and sky, and what all others published.
+/// The surroundings in which a phenomenon is drawn: wind, air, sky, and what all others published.
 #[derive(Clone, Debug)]
 pub struct Surroundings<'a> {
-    /// The one wind of the scene.
+    /// The wind of the scene.
     pub wind: &'a Wind,
-    /// The one air of the scene.
+    /// The air of the scene.
     pub air: &'a Air,
     /// The light of the sky.
     pub sky: Sky,
-    /// What is seen in the phenomenon's own [mirror](crate::phenomenon::PhenomenonInfo::mirror): radiance (ACEScg, cd/m^2) and alpha of
+    /// The picture in the phenomenon's own [mirror](crate::phenomenon::PhenomenonInfo::mirror): radiance (ACEScg, cd/m^2) and alpha of
     /// the whole picture.
     pub reflection: Option<&'a Image<4>>,
-    /// Where there is a plate: what stands behind all phenomena in that mirror, plate and sky.
+    /// With a plate: the background of all phenomena in that mirror, plate and sky.
     pub backdrop: Option<&'a Backdrop>,
-    /// Everybody else's lights, extinction and occluders, and the scene's own.
+    /// Lights, extinction and occluders of the other phenomena and of the scene itself.
     pub others: Publication,
 }
 
-/// Air of the usual temperature and pressure.
+/// Air with default temperature and pressure.
 static STANDARD_AIR: LazyLock<Air> = LazyLock::new(Air::default);
 
 impl<'a> Surroundings<'a> {
-    /// Nothing but a wind in ordinary air.
+    /// Surroundings with only a wind, in default air.
     pub fn of_wind(wind: &'a Wind) -> Self {
         Self {
             wind,

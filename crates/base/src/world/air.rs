@@ -21,7 +21,7 @@ impl Air {
         self.density_at(self.temperature_k)
     }
 
-    /// Density of air, or of a flame's gas, which is nearly air, heated to `temperature_k` at this pressure, kg/m^3.
+    /// Density of air heated to `temperature_k` at this pressure, kg/m^3; also used for the gas of a flame, which is mostly air.
     pub fn density_at(&self, temperature_k: f64) -> f64 {
         self.pressure_pa / (GAS_CONSTANT * temperature_k)
     }

@@ -1,4 +1,4 @@
-//! What all phenomena of a scene share: air, gravity, wind, sky and occluders.
+//! The environment shared by all phenomena of a scene: air, gravity, wind, sky and occluders.
 
 pub mod air;
 pub mod gravity;

@@ -1,4 +1,4 @@
-//! Solids that stand in the way of gas and drops.
+//! Solid obstacles for gas and drops.
 
 use std::sync::Arc;
 
@@ -6,17 +6,17 @@ use glam::{DQuat, DVec3};
 
 use crate::geometry::{distance_field::DistanceField, transform::Transform};
 
-/// Something solid that stands in the way.
+/// A solid obstacle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Occluder {
-    /// A ball.
+    /// A sphere.
     Sphere {
-        /// Its middle, m.
+        /// Its center, m.
         center: DVec3,
         /// Its radius, m.
         radius: f64,
     },
-    /// All below a plane.
+    /// Everything below a plane.
     HalfSpace {
         /// A point on the plane, m.
         point: DVec3,
@@ -25,18 +25,18 @@ pub enum Occluder {
     },
     /// A box.
     Cuboid {
-        /// Its middle, m.
+        /// Its center, m.
         center: DVec3,
-        /// Half its sides, m.
+        /// Half of its sides, m.
         half_extents: DVec3,
-        /// How it is turned.
+        /// Its rotation.
         rotation: DQuat,
     },
-    /// A closed surface of triangles.
+    /// A closed triangle mesh.
     Mesh {
-        /// Distance to the surface, in the mesh's own coordinates.
+        /// Distance field in the local coordinates of the mesh.
         distance: Arc<DistanceField>,
-        /// Where the mesh stands.
+        /// World-from-local transform of the mesh.
         placement: Transform,
     },
 }
@@ -55,7 +55,7 @@ impl Occluder {
         }
     }
 
-    /// Unit vector out of the solid at `point`, along which the distance grows fastest.
+    /// Outward unit normal at `point`: the gradient of the signed distance.
     pub fn normal(&self, point: DVec3) -> DVec3 {
         match self {
             Self::Sphere { center: centre, .. } => (point - *centre).normalize_or(DVec3::Y),
@@ -70,14 +70,14 @@ impl Occluder {
     }
 }
 
-/// Away from the nearest point of an upright box around the origin.
+/// Outward normal of an axis-aligned box around the origin.
 fn cuboid_normal(point: DVec3, half_extents: DVec3) -> DVec3 {
     let beyond = point.abs() - half_extents;
     let outward = if beyond.max_element() > 0.0 {
         beyond.max(DVec3::ZERO)
     } else {
-        let nearest = beyond.max_element();
-        DVec3::select(beyond.cmpeq(DVec3::splat(nearest)), DVec3::ONE, DVec3::ZERO)
+        let largest = beyond.max_element();
+        DVec3::select(beyond.cmpeq(DVec3::splat(largest)), DVec3::ONE, DVec3::ZERO)
     };
     (outward * point.signum()).normalize_or(DVec3::Y)
 }

@@ -1,4 +1,4 @@
-//! The one wind of a scene: it bends flames, slants rain and drives particles.
+//! The wind of a scene: it bends flames, slants rain and advects particles.
 
 use glam::DVec3;
 
@@ -22,26 +22,26 @@ crate::parameters! {
     }
 }
 
-/// Two octaves, the second half as high.
+/// Two octaves, the second with half the amplitude.
 const FRACTAL: Fractal = Fractal { octaves: 2, lacunarity: 2, gain: 0.5 };
-/// Shares of the octaves squared and summed: (2/3)^2 + (1/3)^2.
+/// Sum of the squared amplitudes of the octaves: (2/3)^2 + (1/3)^2.
 const FRACTAL_VARIANCE: f64 = 5.0 / 9.0;
-/// Gusts rise and fall less than they swing sideways, since the ground is near.
+/// Relative strength of gusts along each axis: weaker vertically, since the ground is near.
 const GUST_SHAPE: DVec3 = DVec3::new(1.0, 0.35, 1.0);
 
 /// The wind of a shot.
 #[derive(Clone, Debug)]
 pub struct Wind {
     parameters: WindParameters,
-    /// Noise of each component over (x, y, z, t).
+    /// Noise over (x, y, z, t) for each component.
     gusts: Option<[Noise<4>; 3]>,
-    /// Where in the noise the shot lies, so that seeds differ even at the origin.
+    /// Offset in the noise domain, so that seeds differ even at the origin.
     origin: DVec3,
     loop_s: Option<f64>,
 }
 
 impl Wind {
-    /// The wind with these parameters; in a loop it blows the same every `loop_s` seconds.
+    /// The wind with these parameters; in a loop it is periodic with `loop_s` seconds.
     pub fn new(mut parameters: WindParameters, seed: u64, loop_s: Option<f64>) -> Self {
         let key = Key::new(seed, "wind");
         let words = key.words(0, 0, Purpose::named("gusts"));
@@ -65,37 +65,37 @@ impl Wind {
         DVec3::from(self.parameters.velocity.at(t))
     }
 
-    /// How far the mean wind travels from one time to another, m.
+    /// Displacement by the mean wind from one time to another, m.
     pub fn travel(&self, from: f64, to: f64) -> DVec3 {
         DVec3::from(self.parameters.velocity.integral(from, to))
     }
 
-    /// Size of the gusts, m; `None` where there never are any.
+    /// Size of the gusts, m; `None` if there are never any.
     pub fn gust_length(&self) -> Option<f64> {
         let [low, high] = self.parameters.velocity.bounds();
         let gusty = self.parameters.gust > 0.0 && [low, high].into_iter().flatten().any(|speed| speed != 0.0);
         gusty.then_some(self.parameters.gust_length)
     }
 
-    /// Velocity at a point at time `t`, gusts included, m/s.
+    /// Velocity at a point at time `t`, including gusts, m/s.
     pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
         let mean = self.mean(t);
         let strength = self.parameters.gust * mean.length();
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
         let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
-        let (drift, turns) = match self.loop_s {
+        let (drift, noise_time) = match self.loop_s {
             None => (self.travel(0.0, t), t / gust_period_s),
             Some(seconds) => (DVec3::ZERO, t / seconds * f64::from(loop_cells(seconds, *gust_period_s))),
         };
-        let place = (point - drift) / *gust_length + self.origin;
-        let coordinates = [place.x, place.y, place.z, turns].map(Coordinate::from_f64);
+        let noise_position = (point - drift) / *gust_length + self.origin;
+        let coordinates = [noise_position.x, noise_position.y, noise_position.z, noise_time].map(Coordinate::from_f64);
         let noise = DVec3::from([0, 1, 2].map(|axis| f64::from(gusts[axis].at(coordinates))));
         let deviation = crate::math::sqrt(VARIANCE[2] * FRACTAL_VARIANCE);
         mean + GUST_SHAPE * noise * (strength / deviation)
     }
 }
 
-/// Whole gusts in a loop.
+/// Number of gust periods in a loop, an integer.
 fn loop_cells(seconds: f64, gust_period_s: f64) -> u32 {
     (seconds / gust_period_s).round().clamp(1.0, 1e6) as u32
 }

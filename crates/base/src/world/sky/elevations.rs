@@ -1,35 +1,35 @@
-//! Light that was measured by elevation alone, as a photograph shows it.
+//! Radiance that was measured as a function of elevation alone, from a photograph.
 
 use std::f64::consts::PI;
 
 use crate::math::{self, MulAdd};
 
-/// Bands of elevation, each as wide in its sine.
+/// Number of elevation bands, of equal width in the sine of the elevation.
 const BANDS: usize = 24;
 /// Steps of the integral over the upper hemisphere.
 const STEPS: usize = 96;
 
-/// Radiance (ACEScg) by elevation, the same all around: straight between the middles of bands of equal solid angle.
+/// Radiance (ACEScg) as a function of elevation, independent of azimuth: linear between the centers of bands of equal solid angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElevationProfile {
     bands: [[f32; 3]; BANDS],
-    /// Illuminance of open, level ground.
+    /// Illuminance of open, horizontal ground.
     horizontal: [f32; 3],
 }
 
-/// Light from one direction.
+/// A sample of the radiance from one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElevationSample {
     /// Sine of the direction's elevation.
     pub sine: f64,
-    /// Solid angle that it stands for, in any unit.
+    /// Solid angle that it represents, in any unit.
     pub weight: f64,
     /// Radiance, ACEScg.
     pub radiance: [f32; 3],
 }
 
 impl ElevationProfile {
-    /// The mean of `samples` in each band; a band without any has that of the nearest with some. `None` where there is none at all.
+    /// The mean of `samples` in each band; a band without samples takes the mean of the nearest band that has some. `None` without samples.
     pub fn from_samples(samples: impl IntoIterator<Item = ElevationSample>) -> Option<Self> {
         let mut sums = [[0.0_f64; 4]; BANDS];
         for ElevationSample { sine, weight, radiance } in samples {
@@ -51,45 +51,45 @@ impl ElevationProfile {
         let mut horizontal = [0.0_f64; 3];
         for step in 0..STEPS {
             let sine = (step as f64 + 0.5) / STEPS as f64;
-            let radiance = between(&bands, sine);
+            let radiance = interpolate(&bands, sine);
             (0..3).for_each(|c| horizontal[c] += f64::from(radiance[c]) * 2.0 * PI * sine / STEPS as f64);
         }
         Self { bands, horizontal: horizontal.map(|value| value as f32) }
     }
 
-    /// The same light, so many times as bright.
+    /// The same light, scaled by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
         let scaled = |colour: [f32; 3]| colour.map(|value| value * factor);
         Self { bands: self.bands.map(scaled), horizontal: scaled(self.horizontal) }
     }
 
-    /// Radiance from directions whose elevation has this sine.
+    /// Radiance from directions with this sine of the elevation.
     pub(super) fn radiance(&self, sine: f64) -> [f32; 3] {
-        between(&self.bands, sine)
+        interpolate(&self.bands, sine)
     }
 
-    /// Illuminance of open, level ground.
+    /// Illuminance of open, horizontal ground.
     pub(super) fn horizontal_illuminance(&self) -> [f32; 3] {
         self.horizontal
     }
 
-    /// Whether it gives no light.
+    /// Whether it emits no light.
     pub(super) fn is_dark(&self) -> bool {
         self.bands.as_flattened().iter().all(|value| *value <= 0.0)
     }
 }
 
-/// Where between the middles of bands a sine of elevation lies, counted from the lowest.
+/// Position of a sine of elevation in units of bands, relative to the center of the lowest.
 fn position(sine: f64) -> f64 {
     (0.5 * (sine + 1.0) * BANDS as f64 - 0.5).clamp(0.0, (BANDS - 1) as f64)
 }
 
-fn between(bands: &[[f32; 3]; BANDS], sine: f64) -> [f32; 3] {
+fn interpolate(bands: &[[f32; 3]; BANDS], sine: f64) -> [f32; 3] {
     let position = position(sine);
     let lower = (position as usize).min(BANDS - 2);
-    let share = position - lower as f64;
-    std::array::from_fn(|c| math::lerp(f64::from(bands[lower][c]), f64::from(bands[lower + 1][c]), share) as f32)
+    let fraction = position - lower as f64;
+    std::array::from_fn(|c| math::lerp(f64::from(bands[lower][c]), f64::from(bands[lower + 1][c]), fraction) as f32)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The sky as a light: what it shines from each direction.
+//! The sky as a light source: its radiance from each direction.
 
 mod elevations;
 mod night;
@@ -16,8 +16,8 @@ use crate::{
 pub use elevations::{ElevationProfile, ElevationSample};
 pub use night::{Almucantar, EARTH_RADIUS_KM, Night, NightParameters};
 
-/// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
-/// below the horizon has the horizon's.
+/// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). Below
+/// the horizon it is that of the horizon.
 #[must_use]
 pub fn air_mass(elevation: f64) -> f64 {
     let degrees = elevation.to_degrees().clamp(0.0, 90.0);
@@ -72,7 +72,7 @@ impl SkyParameters {
     }
 }
 
-/// Share of its light that the ground, as far as the sky knows it, throws back: seen from below the horizon.
+/// Albedo of the ground, for the radiance from below the horizon.
 const GROUND_ALBEDO: f64 = 0.15;
 
 /// The sky at one time.
@@ -88,7 +88,7 @@ impl Sky {
     /// No light from anywhere.
     pub const DARK: Self = Self { kind: SkyKind::Uniform, zenith: [0.0; 3], night: None, measured: None };
 
-    /// Light that was measured, from above and from below (ACEScg, cd/m^2).
+    /// Measured light from above and below (ACEScg, cd/m^2).
     #[must_use]
     pub fn measured(profile: ElevationProfile) -> Self {
         Self { zenith: profile.radiance(1.0), measured: Some(profile), ..Self::DARK }
@@ -98,8 +98,8 @@ impl Sky {
         Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night), measured: None }
     }
 
-    /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon comes what a dull ground throws back, unless it
-    /// was measured.
+    /// Radiance from a direction, a unit vector (ACEScg, cd/m^2). From below the horizon it is the light reflected by a diffuse ground, unless
+    /// it was measured.
     pub fn radiance(&self, direction: DVec3) -> [f32; 3] {
         if let Some(measured) = &self.measured {
             return measured.radiance(direction.y);
@@ -110,15 +110,15 @@ impl Sky {
         if let Some(night) = &self.night {
             return night.radiance(direction);
         }
-        let share = match self.kind {
+        let relative_luminance = match self.kind {
             SkyKind::Overcast => overcast(direction.y),
             SkyKind::Uniform | SkyKind::Night => 1.0,
         };
-        self.zenith.map(|value| value * share as f32)
+        self.zenith.map(|value| value * relative_luminance as f32)
     }
 
-    /// [`radiance`](Self::radiance) from directions whose sines of elevation these are, by component; `None` of a night, which is not the
-    /// same all around.
+    /// [`radiance`](Self::radiance) for sines of elevation, as one array per component; `None` for a night, whose radiance depends on the
+    /// azimuth.
     #[inline(always)]
     pub fn radiance_at_elevations<const N: usize>(&self, sines: &[f32; N]) -> Option<[[f32; N]; 3]> {
         if self.night.is_some() {
@@ -129,46 +129,46 @@ impl Sky {
             return Some(std::array::from_fn(|c| each.map(|radiance| radiance[c])));
         }
         let ground = self.radiance(-DVec3::Y);
-        let mut shares = [1.0; N];
+        let mut relative_luminances = [1.0; N];
         if self.kind == SkyKind::Overcast {
             for i in 0..N {
-                shares[i] = overcast(f64::from(sines[i])) as f32;
+                relative_luminances[i] = overcast(f64::from(sines[i])) as f32;
             }
         }
         let mut planes = [[0.0; N]; 3];
         for c in 0..3 {
             for i in 0..N {
-                planes[c][i] = if sines[i] < 0.0 { ground[c] } else { self.zenith[c] * shares[i] };
+                planes[c][i] = if sines[i] < 0.0 { ground[c] } else { self.zenith[c] * relative_luminances[i] };
             }
         }
         Some(planes)
     }
 
-    /// Illuminance of open, level ground (ACEScg, lux).
+    /// Illuminance of open, horizontal ground (ACEScg, lux).
     pub fn horizontal_illuminance(&self) -> [f32; 3] {
         if let Some(measured) = &self.measured {
             return measured.horizontal_illuminance();
         }
         let hemisphere = match self.kind {
             SkyKind::Overcast => 7.0 / 9.0 * PI,
-            // Nearly even: what the horizon has more of airglow the air takes.
+            // Nearly uniform: near the horizon extinction cancels the stronger airglow.
             SkyKind::Uniform | SkyKind::Night => PI,
         };
         self.zenith.map(|value| value * hemisphere as f32)
     }
 
-    /// The night, if that is what it is.
+    /// The night sky, if it is one.
     pub fn night(&self) -> Option<&Night> {
         self.night.as_ref()
     }
 
-    /// Whether it gives no light.
+    /// Whether it emits no light.
     pub fn is_dark(&self) -> bool {
         self.measured.map_or(self.zenith == [0.0; 3], |measured| measured.is_dark())
     }
 }
 
-/// Luminance of an overcast sky beside that of its zenith, by the sine of the elevation: CIE S 011, `L = Lz (1 + 2 sin elevation) / 3`.
+/// Luminance of an overcast sky relative to its zenith, by the sine of the elevation: CIE S 011, `L = Lz (1 + 2 sin elevation) / 3`.
 #[inline(always)]
 fn overcast(sine: f64) -> f64 {
     (1.0 + 2.0 * sine) / 3.0

@@ -1,4 +1,4 @@
-//! The sky at night: airglow, unresolved stars, and what is left of the day.
+//! The sky at night: airglow, unresolved stars and twilight.
 
 use glam::DVec3;
 
@@ -30,13 +30,13 @@ crate::parameters! {
 }
 
 /// Lines of the airglow: wavelength in nm, brightness overhead in kR, altitude of the layer in km (Roach & Gordon 1973; Leinert et
-/// al. 1998). The last stands for the hydroxyl bands that the eye sees.
+/// al. 1998). The last represents the visible hydroxyl bands.
 const AIRGLOW: [(f64, f64, f64); 4] =
     [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
 /// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
 const BACKGROUND: f64 = 1.2e-4;
 const BACKGROUND_K: f32 = 9500.0;
-/// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et
+/// Base-10 logarithm of the luminance overhead, cd/m^2, in steps of 3 degrees of solar depression from 0 on (Koomen et
 /// al. 1952).
 const TWILIGHT: [f64; 7] = [2.3, 1.2, -0.2, -1.7, -3.0, -4.1, -5.6];
 /// Height of the twilight arch, radians.
@@ -46,11 +46,11 @@ pub const EARTH_RADIUS_KM: f64 = 6371.0;
 /// h c / (4 pi) for a kilorayleigh, W m^-2 sr^-1 nm.
 const KILORAYLEIGH: f64 = 1e13 / (4.0 * std::f64::consts::PI) * 6.626_070_15e-34 * 299_792_458.0 * 1e9;
 
-/// The night at one time.
+/// The night sky at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Night {
     airglow: f64,
-    /// Luminance overhead that the sun leaves, cd/m^2.
+    /// Luminance of the twilight overhead, cd/m^2.
     twilight: f64,
     /// Unit vector to where the sun stands below the horizon.
     sunward: DVec3,
@@ -58,48 +58,48 @@ pub struct Night {
 }
 
 impl NightParameters {
-    /// The night at time `t`.
+    /// The night sky at time `t`.
     pub(super) fn at(&self, t: f64) -> Night {
         let depression = -self.sun_elevation_deg.at(t) / 3.0;
-        let last = TWILIGHT.len() - 1;
-        let place = (depression as usize).min(last - 1);
-        let log = math::lerp(TWILIGHT[place], TWILIGHT[place + 1], depression - place as f64);
+        let last_index = TWILIGHT.len() - 1;
+        let interval = (depression as usize).min(last_index - 1);
+        let log = math::lerp(TWILIGHT[interval], TWILIGHT[interval + 1], depression - interval as f64);
         let (east, north) = math::sin_cos(self.sun_azimuth_deg.to_radians());
         Night {
             airglow: self.airglow,
-            twilight: if depression < last as f64 + 1.0 { math::pow(10.0, log) } else { 0.0 },
+            twilight: if depression < last_index as f64 + 1.0 { math::pow(10.0, log) } else { 0.0 },
             sunward: DVec3::new(east, 0.0, -north),
             extinction: self.extinction,
         }
     }
 }
 
-/// The night along a circle of one elevation.
+/// The night sky along an almucantar, a circle of constant elevation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Almucantar {
-    /// What is there all around: ACEScg, cd/m^2.
+    /// Radiance independent of azimuth: ACEScg, cd/m^2.
     uniform: [f32; 3],
-    /// What is added over the sun, by the fourth power of how far a direction turns to it.
+    /// Radiance added in proportion to the fourth power of the sunwardness (see `Night::sunwardness`) of a direction.
     glow: [f32; 3],
-    /// What is added in proportion to that.
+    /// Radiance added in proportion to the sunwardness.
     blue: [f32; 3],
 }
 
 impl Almucantar {
-    /// What radiance is made of: all around, over the sun by the fourth power of how far a direction turns to it, and in proportion
-    /// to that.
+    /// The terms of the radiance: independent of azimuth, proportional to the fourth power of the sunwardness, and proportional to the
+    /// sunwardness.
     #[must_use]
     pub fn terms(&self) -> [[f32; 3]; 3] {
         [self.uniform, self.glow, self.blue]
     }
 
-    /// Radiance where a direction turns toward the sun by `toward`: 1 over it, 0 opposite.
+    /// Radiance for a sunwardness: 1 at the azimuth of the sun, 0 opposite.
     #[inline(always)]
     #[must_use]
-    pub fn radiance(&self, toward: f32) -> [f32; 3] {
-        let squared = toward * toward;
+    pub fn radiance(&self, sunwardness: f32) -> [f32; 3] {
+        let squared = sunwardness * sunwardness;
         let fourth = squared * squared;
-        std::array::from_fn(|c| self.glow[c].mul_add(fourth, self.blue[c].mul_add(toward, self.uniform[c])))
+        std::array::from_fn(|c| self.glow[c].mul_add(fourth, self.blue[c].mul_add(sunwardness, self.uniform[c])))
     }
 }
 
@@ -107,7 +107,7 @@ impl Night {
     /// Radiance from a direction above the horizon (ACEScg, cd/m^2).
     pub(super) fn radiance(&self, direction: DVec3) -> [f32; 3] {
         let elevation = math::asin(direction.y.clamp(0.0, 1.0));
-        self.almucantar(elevation).radiance(self.toward(direction) as f32)
+        self.almucantar(elevation).radiance(self.sunwardness(direction) as f32)
     }
 
     /// Unit vector to where the sun stands below the horizon.
@@ -116,22 +116,22 @@ impl Night {
         self.sunward
     }
 
-    /// How far a direction turns toward the sun: 1 over it, 0 opposite.
-    fn toward(&self, direction: DVec3) -> f64 {
+    /// How far the azimuth of a direction is toward the sun: 1 at the azimuth of the sun, 0 opposite, linear in the cosine.
+    fn sunwardness(&self, direction: DVec3) -> f64 {
         0.5 + 0.5 * DVec3::new(direction.x, 0.0, direction.z).normalize_or_zero().dot(self.sunward)
     }
 
-    /// Share of a star's light that arrives from an elevation in radians.
+    /// Transmittance of the atmosphere for starlight from an elevation in radians.
     #[must_use]
     pub fn transmittance(&self, elevation: f64) -> f64 {
         math::pow(10.0, -0.4 * self.extinction * air_mass(elevation))
     }
 
-    /// All directions of an elevation in radians.
+    /// The almucantar of an elevation in radians.
     #[must_use]
     pub fn almucantar(&self, elevation: f64) -> Almucantar {
         let overhead = self.transmittance(std::f64::consts::FRAC_PI_2);
-        // Scattered light fills up a third of what the air takes.
+        // Scattering replaces 30 % of the light lost by extinction.
         let diffuse = 0.3 + 0.7 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
         let mut even = blackbody_light(BACKGROUND_K, BACKGROUND * diffuse);
         for (wavelength_nm, kilorayleigh, altitude_km) in AIRGLOW {
@@ -139,7 +139,7 @@ impl Night {
             let brightness = self.airglow * kilorayleigh * van_rhijn(elevation, altitude_km) * diffuse * scale;
             even += DVec3::from(ACESCG_FROM_XYZ.apply(line_xyz(wavelength_nm))) * brightness;
         }
-        // What is left of the day: blue overhead, brighter and yellow low over the sun.
+        // Twilight: blue overhead, brighter and yellow low above the sun.
         let low = math::exp(-elevation / TWILIGHT_ARCH);
         let blue = blackbody_light(10_000.0, self.twilight);
         let single = |colour: DVec3| colour.to_array().map(|value| value as f32);
@@ -151,13 +151,13 @@ impl Night {
     }
 }
 
-/// How much longer the way through a thin layer is at an elevation than overhead (van Rhijn 1921).
+/// Path length through a thin layer at an elevation relative to overhead (van Rhijn 1921).
 fn van_rhijn(elevation: f64, altitude_km: f64) -> f64 {
-    let share = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + altitude_km) * math::cos(elevation);
-    1.0 / math::sqrt(1.0 - share * share)
+    let sine = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + altitude_km) * math::cos(elevation);
+    1.0 / math::sqrt(1.0 - sine * sine)
 }
 
-/// Light of a black body's colour and of that luminance.
+/// Light with the color of a black body and the luminance `brightness`.
 fn blackbody_light(temperature_k: f32, brightness: f64) -> DVec3 {
     let colour = black_body().radiance(temperature_k);
     let scale = brightness / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
