@@ -1,4 +1,4 @@
-//! Rows of fractal noise: 16 lanes under run-time dispatch, beside one point at a time and the textbook's permutation table.
+//! Rows of fractal noise: 16 lanes under run-time dispatch, compared with one point at a time and the textbook permutation table.
 #![allow(missing_docs)]
 
 use std::{hint::black_box, time::Duration};

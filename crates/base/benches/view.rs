@@ -1,5 +1,5 @@
-//! A picture of 1920 x 1080 through the view to 8-bit pixels on one core, and the colours of black bodies: the library's way and a plain
-//! one in f64.
+//! A picture of 1920 x 1080 through the view to 8-bit pixels on one core, and the colors of black bodies: the library and a straightforward
+//! implementation in f64.
 
 use std::hint::black_box;
 
@@ -13,7 +13,7 @@ use fearless_simd::Level;
 const WIDTH: usize = 1920;
 const HEIGHT: usize = 1080;
 
-/// Flames of 1000 to 2000 K over the given share of the width, the rest empty.
+/// Flames of 1000 to 2000 K over the given fraction of the width, the rest empty.
 fn picture(lit: f32) -> Vec<[f32; 4]> {
     let pixel = |index: usize| {
         let (x, y) = (index % WIDTH, index / WIDTH);

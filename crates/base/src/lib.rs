@@ -1,6 +1,6 @@
-//! Bansho's vocabulary: what every phenomenon, the renderer and the program share.
+//! Types and functions shared by all phenomena, the renderer and the program.
 //!
-//! SI units inside; a unit stands in the name where it is not SI. Right-handed, y up. Time is `f64` seconds.
+//! Units are SI; a unit that is not SI is part of the name. Coordinates are right-handed with y up. Times are `f64` in seconds.
 
 pub mod camera;
 pub mod color;

@@ -21,7 +21,7 @@ const MAX_CELL_COORDINATE: i32 = 1 << 18;
 const CELL_SIZE_MARGIN: f32 = 1.001;
 /// Cells along x per support radius. Short cells keep the candidate ranges of a row short.
 const CELLS_PER_RADIUS_X: i32 = 4;
-/// Greatest length of a group, in cells along x: all particles within that length become candidates of the group.
+/// Maximum length of a group, in cells along x: all particles within that length become candidates of the group.
 const MAX_GROUP_LENGTH: u64 = 8 * CELLS_PER_RADIUS_X as u64;
 /// Particles farther away than this, or at NaN, are placed here. The square of such a distance is still finite.
 pub(super) const OUT_OF_RANGE: f32 = 1e12;
@@ -38,7 +38,7 @@ pub struct Cells<const D: usize> {
     ids: Vec<u64>,
     /// Positions in sorted order, padded with one batch that is out of range.
     positions: [Vec<f32>; D],
-    /// Occupied cells; the last [`SEARCH_WIDTH`] are sentinels with the greatest key.
+    /// Occupied cells; the last [`SEARCH_WIDTH`] are sentinels with the largest key.
     occupied: Vec<Cell>,
     row_chunks: Vec<RowChunk>,
     batches: Vec<GroupBatch>,
@@ -158,7 +158,7 @@ impl<const D: usize> Cells<D> {
     /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
         assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
-        assert!(positions.iter().all(|component| component.len() == ids.len()), "one position an id");
+        assert!(positions.iter().all(|component| component.len() == ids.len()), "one position per id");
         let scale = 1.0 / (self.support_radius * CELL_SIZE_MARGIN);
         let mut bounds = [[0; 2]; D];
         let axes = self.coordinates.par_iter_mut().zip(positions).zip(&mut bounds);
@@ -232,7 +232,7 @@ impl<const D: usize> Cells<D> {
     /// # Panics
     /// If there is not one value per particle.
     pub fn reorder<T: Copy + Send + Sync>(&self, values: &mut Vec<T>) {
-        assert_eq!(values.len(), self.order.len(), "one value a particle");
+        assert_eq!(values.len(), self.order.len(), "one value per particle");
         *values = self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| values[*i as usize]).collect();
     }
 
@@ -248,7 +248,7 @@ impl<const D: usize> Cells<D> {
         let arrays_per_thread = arrays.len().div_ceil(threads).max(1);
         arrays.par_chunks_mut(arrays_per_thread).zip(scratch).for_each(|(arrays, scratch)| {
             for values in arrays {
-                assert_eq!(values.len(), order.len(), "one value a particle");
+                assert_eq!(values.len(), order.len(), "one value per particle");
                 scratch.clear();
                 scratch.extend(order.iter().map(|i| values[*i as usize]));
                 std::mem::swap(*values, scratch);
@@ -280,12 +280,12 @@ impl<const D: usize> Cells<D> {
 }
 
 impl RowChunk {
-    /// Least key of cells within the support radius in the row at the key offset `row`.
+    /// Smallest key of cells within the support radius in the row at the key offset `row`.
     fn min_key(&self, row: u64) -> u64 {
         self.first.wrapping_add(row) - CELLS_PER_RADIUS_X as u64
     }
 
-    /// Greatest such key.
+    /// Largest such key.
     fn max_key(&self, row: u64) -> u64 {
         self.last.wrapping_add(row) + CELLS_PER_RADIUS_X as u64
     }
@@ -326,7 +326,7 @@ fn first_cell_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
     start
 }
 
-/// Cell coordinates of one component, `scale` cells per unit; returns the least and the greatest. `floor` is avoided: without
+/// Cell coordinates of one component, `scale` cells per unit; returns the minimum and the maximum. `floor` is avoided: without
 /// SSE4.1 it is a function call.
 #[inline(always)]
 fn cell_coordinates(component: &[f32], scale: f32, max_coordinate: f32, cells: &mut Vec<i32>) -> [i32; 2] {

@@ -61,9 +61,9 @@ impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K
 
     #[inline(always)]
     fn add<R: Real>(&self, pair: &Pair<R, D>, own: &[R; 2], other: &[R; 2], sums: &mut [R; D]) {
-        let pull = (own[0] + other[0]) * other[1] * self.0.gradient_factor(pair.distance_squared);
+        let factor = (own[0] + other[0]) * other[1] * self.0.gradient_factor(pair.distance_squared);
         for c in 0..D {
-            sums[c] = pair.offset[c].fma(pull, sums[c]);
+            sums[c] = pair.offset[c].fma(factor, sums[c]);
         }
     }
 }
@@ -98,7 +98,7 @@ impl PressureForce {
         pressures: &[f32],
         accelerations: &mut [Vec<f32>; D],
     ) {
-        assert!(masses.len() == densities.len() && densities.len() == pressures.len(), "one value a particle");
+        assert!(masses.len() == densities.len() && densities.len() == pressures.len(), "one value per particle");
         let volume = |(mass, density): (&f32, &f32)| mass / density;
         masses
             .par_iter()
@@ -134,11 +134,11 @@ const COURANT_NUMBER: f32 = 0.4;
 
 /// Longest stable time step, s (Courant, Friedrichs and Lewy 1928; Monaghan 1992).
 ///
-/// The speed of sound of `p = k (rho - rho_0)` is `sqrt(k)`; `stiffness` is the greatest k. `greatest_speed` is relative to the
+/// The speed of sound of `p = k (rho - rho_0)` is `sqrt(k)`; `stiffness` is the largest k. `max_speed` is relative to the
 /// neighboring gas.
 #[must_use]
-pub fn max_stable_step(support_radius: f32, stiffness: f32, greatest_speed: f32) -> f32 {
-    COURANT_NUMBER * 0.5 * support_radius / (stiffness.max(0.0).sqrt() + greatest_speed)
+pub fn max_stable_step(support_radius: f32, stiffness: f32, max_speed: f32) -> f32 {
+    COURANT_NUMBER * 0.5 * support_radius / (stiffness.max(0.0).sqrt() + max_speed)
 }
 
 /// Number of equal sub-steps of `seconds` such that none is longer than `max_step`; at least 1, at most `limit`.

@@ -64,7 +64,7 @@ impl<const D: usize> Cells<D> {
     ) where
         T: PairTerm<D, IN, OUT>,
     {
-        assert!(fields.iter().all(|field| field.len() == self.len()), "one value a particle");
+        assert!(fields.iter().all(|field| field.len() == self.len()), "one value per particle");
         let level = Level::new();
         let results = results.map(|values| {
             values.resize(self.len(), 0.0);

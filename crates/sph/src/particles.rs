@@ -74,7 +74,7 @@ impl<const D: usize> Particles<D> {
     pub fn advance(&mut self, accelerations: &[Vec<f32>; D], seconds: f32) {
         let level = Level::new();
         for c in 0..D {
-            assert_eq!(accelerations[c].len(), self.len(), "one acceleration a particle");
+            assert_eq!(accelerations[c].len(), self.len(), "one acceleration per particle");
             let positions = self.positions[c].par_chunks_mut(MIN_PARTICLES_PER_TASK);
             let moving = positions.zip(self.velocities[c].par_chunks_mut(MIN_PARTICLES_PER_TASK));
             moving.zip(accelerations[c].par_chunks(MIN_PARTICLES_PER_TASK)).for_each(

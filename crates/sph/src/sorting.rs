@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Least number of particles per task of the thread pool.
+/// Minimum number of particles per task of the thread pool.
 pub(super) const MIN_PARTICLES_PER_TASK: usize = 4096;
-/// Most key bits per radix pass.
+/// Maximum number of key bits per radix pass.
 const DIGIT_BITS: u32 = 11;
 /// Sampled keys per range. Their quantiles split the keys into ranges of about equal size.
 const SAMPLES: usize = 64;
@@ -70,7 +70,7 @@ impl SampleSort {
         self.ranges.iter().for_each(|range| cells.extend_from_slice(&range.cells));
     }
 
-    /// Least key of each range.
+    /// Smallest key of each range.
     fn starts_of_ranges(&mut self) -> Vec<u64> {
         let count = self.ranges.len();
         self.sample.clear();
@@ -140,15 +140,15 @@ mod tests {
 
     use super::*;
 
-    /// Keys of some particles, the same as a plain sort gives, with any number of threads.
+    /// The order is the same as that of a standard sort, for any number of threads.
     #[test]
     fn ranges_put_together_are_all_in_order() {
         let random = Key::new(4, "sorting");
-        // As many keys as particles, few keys, and one for all: ranges may be empty.
-        for most in [1 << 20, 50, 1] {
+        // More keys than particles, few keys, and a single key: ranges may be empty.
+        for key_count in [1 << 20, 50, 1] {
             let words: Vec<_> = (0..50_000).map(|index| random.words(index, 0, Purpose::named("key"))).collect();
-            let key = |index: usize| u64::from(words[index][0]) % most;
-            // No two are the same.
+            let key = |index: usize| u64::from(words[index][0]) % key_count;
+            // All ids are different.
             let ids: Vec<u64> = (0..).zip(&words).map(|(index, words)| u64::from(words[1]) << 32 | index).collect();
             let mut expected: Vec<u32> = (0..50_000).collect();
             expected.sort_by_key(|index| (key(*index as usize), ids[*index as usize]));
@@ -156,12 +156,12 @@ mod tests {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("few threads");
                 let (mut order, mut cells) = (Vec::new(), Vec::new());
                 pool.install(|| SampleSort::default().sort(key, 21, &ids, (&mut order, &mut cells)));
-                assert!(order == expected, "{most} keys, {threads} threads");
+                assert!(order == expected, "{key_count} keys, {threads} threads");
                 let firsts = (0..50_000).filter(|offset| {
                     let key = |offset: u32| key(expected[offset as usize] as usize);
                     *offset == 0 || key(*offset) != key(offset - 1)
                 });
-                assert!(cells.iter().map(|cell| cell.start).eq(firsts), "{most} keys, {threads} threads");
+                assert!(cells.iter().map(|cell| cell.start).eq(firsts), "{key_count} keys, {threads} threads");
                 assert!(cells.iter().all(|cell| cell.key == key(expected[cell.start as usize] as usize)));
             }
         }

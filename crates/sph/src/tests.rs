@@ -1,4 +1,4 @@
-//! What the whole must show: the same as all pairs in double precision, nothing that depends on order or threads, momentum kept.
+//! Tests of the whole crate: agreement with sums over all pairs in double precision, independence of order and threads, conservation of momentum.
 
 use bansho_base::math::random::{Key, Purpose};
 
@@ -6,7 +6,7 @@ use super::*;
 
 const SHAPES: [KernelShape; 3] = [KernelShape::Poly6, KernelShape::Spiky, KernelShape::CubicSpline];
 
-/// Random particles in a box of that half width with speeds up to 1, about a fifth of them in a small clump.
+/// Random particles in a box of that half width with velocity components up to 1, about a fifth of them in a small clump.
 fn cloud<const D: usize>(count: u64, half_width: f32) -> Particles<D> {
     let key = Key::new(7, "cloud");
     let mut particles = Particles::default();
@@ -21,7 +21,7 @@ fn cloud<const D: usize>(count: u64, half_width: f32) -> Particles<D> {
     particles
 }
 
-/// A square or cubic lattice of that many a side, spacing 1, mass 1.
+/// A square or cubic lattice with `side` particles per side, spacing 1, mass 1.
 fn lattice<const D: usize>(side: usize) -> Particles<D> {
     let mut particles = Particles::default();
     for index in 0..side.pow(D as u32) {
@@ -45,7 +45,7 @@ fn evaluate<const D: usize>(
     (density, acceleration)
 }
 
-/// The same from all pairs, in double precision.
+/// The same as [`evaluate`], summed over all pairs in double precision.
 fn all_pairs<const D: usize>(
     particles: &Particles<D>,
     support: f32,
@@ -78,12 +78,12 @@ fn agrees_with_all_pairs<const D: usize>(count: u64, support: f32) {
     for shapes in [[SHAPES[0], SHAPES[1]], [SHAPES[2], SHAPES[2]], [SHAPES[1], SHAPES[0]]] {
         let (density, acceleration) = evaluate(&particles, &cells, shapes);
         let (true_density, true_acceleration) = all_pairs(&particles, support, shapes);
-        let greatest = true_acceleration.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let max_acceleration = true_acceleration.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
         for i in 0..particles.len() {
             assert!((f64::from(density[i]) / true_density[i] - 1.0).abs() < 1e-5, "{shapes:?} density of {i}");
             for c in 0..D {
                 let error = (f64::from(acceleration[c][i]) - true_acceleration[i][c]).abs();
-                assert!(error < 1e-5 * greatest, "{shapes:?} acceleration of {i}: {error}");
+                assert!(error < 1e-5 * max_acceleration, "{shapes:?} acceleration of {i}: {error}");
             }
         }
     }
@@ -95,7 +95,7 @@ fn sums_are_those_of_all_pairs() {
     agrees_with_all_pairs::<3>(400, 0.45);
 }
 
-/// A thin line of particles across empty space, dense clumps beside it: groups end where they would be too long.
+/// A thin line of particles across empty space next to dense clumps: groups end where they would be too long.
 #[test]
 fn sparse_rows_and_clumps_are_summed_like_all_pairs() {
     let mut particles = cloud::<3>(120, 0.2);
@@ -107,11 +107,11 @@ fn sparse_rows_and_clumps_are_summed_like_all_pairs() {
     particles.sort(&mut cells);
     let (density, acceleration) = evaluate(&particles, &cells, [SHAPES[0], SHAPES[1]]);
     let (true_density, true_acceleration) = all_pairs(&particles, 0.4, [SHAPES[0], SHAPES[1]]);
-    let greatest = true_acceleration.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let max_acceleration = true_acceleration.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
     for i in 0..particles.len() {
         assert!((f64::from(density[i]) / true_density[i] - 1.0).abs() < 1e-5, "density of {i}");
         let error = (0..3).map(|c| (f64::from(acceleration[c][i]) - true_acceleration[i][c]).abs()).fold(0.0, f64::max);
-        assert!(error < 1e-5 * greatest, "acceleration of {i}: {error}");
+        assert!(error < 1e-5 * max_acceleration, "acceleration of {i}: {error}");
     }
 }
 
@@ -120,7 +120,7 @@ fn crowds_are_summed_like_all_pairs() {
     agrees_with_all_pairs::<2>(700, 1.1);
 }
 
-/// Bits of everything that a step computes, by id.
+/// Bits of all results of a step, by id.
 fn bits(mut particles: Particles<3>) -> Vec<[u32; 4]> {
     let mut cells = Cells::new(0.3);
     particles.sort(&mut cells);
@@ -204,7 +204,7 @@ fn a_compressed_lattice_pushes_outward_at_its_surface_and_nowhere_else() {
             let (x, push) = (particles.positions[c][i], acceleration[c][i]);
             if surface(x) {
                 assert!(push * (x - 5.0) > 0.1 * strength, "surface {i}");
-            // The force sees densities one support radius away, and these as far again.
+            // The force depends on densities up to one support radius away, and those on particles one support radius further.
             } else if particles.positions.iter().all(|x| (4.0..=6.0).contains(&x[i])) {
                 assert!(push.abs() < 1e-6 * strength, "middle {i}: {push} of {strength}");
             }
@@ -212,7 +212,7 @@ fn a_compressed_lattice_pushes_outward_at_its_surface_and_nowhere_else() {
     }
 }
 
-/// One step without external force; gas thinner than at rest does not pull.
+/// One step without external force; the pressure is not negative.
 fn step<const D: usize>(
     particles: &mut Particles<D>,
     cells: &mut Cells<D>,
@@ -233,7 +233,7 @@ fn a_pressed_lattice_moves_from_its_surface_inward_and_not_before() {
     let before = particles.positions.clone();
     let mut force = PressureForce::new(KernelShape::Spiky);
     let state = StateEquation { rest_density: 0.0, negative_pressure: false };
-    // A step carries news by less than two support radii: after two the middle has heard nothing.
+    // A step propagates changes by less than two support radii: after two steps the middle is unaffected.
     (0..2).for_each(|_| step(&mut particles, &mut cells, &mut force, state));
     for i in 0..particles.len() {
         let id = particles.ids[i] as usize;
@@ -251,13 +251,13 @@ fn the_middle_of_a_lattice_under_pressure_rests_until_sound_arrives() {
     let side = 25;
     let (mut particles, mut cells) = (lattice::<2>(side), Cells::new(2.5));
     let mut force = PressureForce::new(KernelShape::Spiky);
-    // Denser than at rest by a tenth: every particle is pushed from all sides, and only the surface has nobody on the other.
+    // Denser than at rest by a tenth: inner particles are pushed equally from all sides, those at the surface only from one.
     let state = StateEquation { rest_density: 0.9, negative_pressure: false };
     let center = 0.5 * (side - 1) as f32;
     let mut arrived = 0.0_f32;
     for steps in 1..=600 {
         step(&mut particles, &mut cells, &mut force, state);
-        // Sound of the speed sqrt(2) over half of the lattice, less the support radius from which the surface is felt.
+        // Distance that sound of speed sqrt(2) has traveled, plus the support radius within which the surface acts.
         let reached = 2.0_f32.sqrt() * 2e-3 * steps as f32 + 2.5;
         for i in 0..particles.len() {
             let id = particles.ids[i] as usize;
@@ -348,7 +348,7 @@ fn particles_may_be_anywhere() {
     let alone = Kernel::<3>::new(KernelShape::Poly6, 1.0).value(0.0);
     let of = |id: u64| density[particles.ids.iter().position(|other| *other == id).unwrap()];
     assert_eq!((of(0), of(8)), (alone, alone));
-    assert!(of(1) > alone && of(1) == of(2), "neighbours farther out than the farthest cell");
+    assert!(of(1) > alone && of(1) == of(2), "neighbors farther out than the farthest cell");
 }
 
 #[test]
@@ -361,7 +361,7 @@ fn nothing_at_all_is_fine_too() {
     assert!(density.is_empty() && acceleration.iter().all(Vec::is_empty) && cells.is_empty());
 }
 
-/// `sum_j m_j / rho_j (v_j - v_i) x grad W`: what a model may want that is not built in.
+/// `sum_j m_j / rho_j (v_j - v_i) x grad W`: an example of a pair term that is not built in.
 struct Curl(Spiky<2>);
 
 impl PairTerm<2, 3, 1> for Curl {
@@ -370,7 +370,7 @@ impl PairTerm<2, 3, 1> for Curl {
     fn add<R: Real>(&self, pair: &Pair<R, 2>, own: &[R; 3], other: &[R; 3], sums: &mut [R; 1]) {
         let gradient = pair.offset.map(|x| x * self.0.gradient_factor(pair.distance_squared) * other[0]);
         let [u, v] = [other[1] - own[1], other[2] - own[2]];
-        // A gradient by x_i: v_j - v_i falls as the kernel's other argument x_j does.
+        // The gradient is with respect to x_i, hence the sign.
         sums[0] = sums[0] + gradient[0] * v - gradient[1] * u;
     }
 }
@@ -392,7 +392,7 @@ fn curl_of_a_rigid_rotation_is_twice_its_rate() {
 #[test]
 fn sums_change_nothing_of_the_sums_after_them() {
     let (mut particles, mut cells) = (cloud::<3>(700, 1.0), Cells::new(0.25));
-    // Two at one place, which push each other.
+    // Two coincident particles, which repel each other.
     for c in 0..3 {
         particles.positions[c][5] = particles.positions[c][400];
     }

@@ -27,33 +27,33 @@ crate::choice! {
 const EYE_HEIGHT: f64 = 1.7;
 
 crate::parameters! {
-    /// Where the picture is taken from. A dome looks at `target` with the center of its circle. Without `position` and `target`, a scene whose
-    /// phenomena are all of one kind and as they are by default in place and size, without obstacles and plate, is seen from where such a phenomenon is
-    /// seen well: a flame from near, rain along its lamps. Auroras are seen from the ground, looking up to the north; a dome's middle is then the zenith.
+    /// The camera. In a dome, `target` is at the center of the circle. Without `position` and `target` a scene has a camera that shows its phenomena
+    /// well, if they are all of one kind with default positions and sizes and there are no obstacles and no plate: a flame is seen from near, rain along
+    /// its lamps. Auroras are seen from the ground, looking up to the north; the center of a dome is then the zenith.
     pub struct CameraParameters {
-        /// Where the camera stands.
+        /// Position of the camera.
         position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");
-        /// What it looks at.
+        /// Point that the camera looks at.
         target: Animated<[f64; 3]> = Animated::from([0.0, 0.9, 0.0]), unit("m");
-        /// Turn about the line of sight; positive tilts the camera to its left.
+        /// Rotation about the line of sight; positive tilts the camera to its left.
         roll_deg: Animated<f64> = Animated::from(0.0), limits(Range::new(-3600.0, 3600.0)), unit("degrees");
-        /// What the lens does: straight lines, a dome, or all around.
+        /// Projection of the lens: perspective, dome or panorama.
         lens: Lens = Lens::Perspective;
         /// Vertical field of view of a perspective lens, unless `focal_length_mm` is given.
         vertical_fov_deg: Animated<f64> = Animated::from(32.0), limits(VERTICAL_FOV_DEG), unit("degrees");
-        /// Focal length; with `sensor_height_mm` it gives the field of view.
+        /// Focal length; together with `sensor_height_mm` it determines the field of view.
         focal_length_mm: Option<Animated<f64>> = None, limits(Range::new(0.1, 10_000.0)), unit("mm");
-        /// Height of the sensor that `focal_length_mm` refers to.
+        /// Sensor height for `focal_length_mm`.
         sensor_height_mm: f64 = 24.0, limits(Range::new(0.1, 1000.0)), unit("mm");
-        /// Whole angle of a fisheye's circle.
+        /// Full angle of a fisheye's circle.
         fisheye_fov_deg: f64 = 180.0, limits(Range::new(1.0, 360.0)), unit("degrees");
-        /// Nothing nearer is drawn.
+        /// Near clipping distance: nothing nearer is drawn.
         near: f64 = 0.05, limits(Range::new(1e-4, 1e4)), unit("m");
         /// Shift of the principal point to the right and up, in picture heights.
         shift: [f64; 2] = [0.0, 0.0], limits(Range::new(-10.0, 10.0)), unit("picture heights");
-        /// Time the shutter is open; half a frame when left out.
+        /// Exposure time; half a frame if omitted.
         shutter_s: Option<f64> = None, limits(Range::new(0.0, 10.0)), unit("s");
-        /// When the shutter opens, from the frame's time.
+        /// Time at which the shutter opens, relative to the time of the frame.
         shutter_offset_s: f64 = 0.0, limits(Range::new(-10.0, 10.0)), unit("s");
     }
 }

@@ -192,10 +192,10 @@ mod tests {
 
     #[test]
     fn round_trips() {
-        for colour in [[0.2, 0.5, 0.9], [1.0, 0.0, 0.0], [16.0, -2.0, -3.0], [-0.1, 0.4, 3.0]] {
-            assert_near(SRGB_FROM_ACESCG.apply(ACESCG_FROM_SRGB.apply(colour)), colour, 1e-13);
-            assert_near(ACESCG_FROM_XYZ.apply(XYZ_FROM_ACESCG.apply(colour)), colour, 1e-13);
-            let single = narrow(colour);
+        for color in [[0.2, 0.5, 0.9], [1.0, 0.0, 0.0], [16.0, -2.0, -3.0], [-0.1, 0.4, 3.0]] {
+            assert_near(SRGB_FROM_ACESCG.apply(ACESCG_FROM_SRGB.apply(color)), color, 1e-13);
+            assert_near(ACESCG_FROM_XYZ.apply(XYZ_FROM_ACESCG.apply(color)), color, 1e-13);
+            let single = narrow(color);
             let back = srgb_from_acescg(acescg_from_srgb(single));
             let worst = single.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(worst <= 1e-6 * single[0].abs().max(1.0), "{single:?} -> {back:?}");

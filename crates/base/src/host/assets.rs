@@ -60,7 +60,9 @@ pub enum AssetProblem {
     #[error("no such file")]
     Missing,
     /// The file name has more than one placeholder for the frame number, or one with too many digits.
-    #[error("has no one place for the frame number; allowed: one run of up to 20 `#` in the file's name")]
+    #[error(
+        "must have exactly one placeholder for the frame number; allowed: one run of up to 20 `#` in the file name"
+    )]
     FrameNumber,
     /// It exists but cannot be read.
     #[error("cannot be read: {0}")]
@@ -90,7 +92,7 @@ pub enum AssetProblem {
         others: u64,
     },
     /// It would need more memory than the system has.
-    #[error("takes {} of memory once it is read, more than there is", memory::format_bytes(*.bytes))]
+    #[error("takes {} of memory once it is read, more than is available", memory::format_bytes(*.bytes))]
     NoMemory {
         /// Upper bound of the memory that reading it takes, bytes.
         bytes: u64,
@@ -163,13 +165,13 @@ pub trait Assets: Send + Sync {
     /// All triangles of the scene at `path`, in its own coordinates.
     ///
     /// # Errors
-    /// The asset is missing, too large, damaged, or holds no triangles.
+    /// The asset is missing, too large, damaged, or contains no triangles.
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError>;
 
     /// The strokes of the line drawing at `path`.
     ///
     /// # Errors
-    /// The asset is missing, damaged, too large, or holds no strokes.
+    /// The asset is missing, damaged, too large, or contains no strokes.
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError>;
 
     /// The text at `path`.

@@ -22,7 +22,7 @@ mod tests {
     #[test]
     fn a_value_may_be_asked_for_while_it_is_made() {
         let cell = OnceLock::new();
-        // What a thread does that takes up other work while it waits within `make`.
+        // As when a thread steals a task while it waits within `compute`.
         assert_eq!(*get_or_compute(&cell, || *get_or_compute(&cell, || 7)), 7);
         assert_eq!(*get_or_compute(&cell, || unreachable!("it is there")), 7);
     }

@@ -89,7 +89,7 @@ pub fn ln(x: f32) -> f32 {
     log2(x) * std::f32::consts::LN_2
 }
 
-/// `x` to the power `y` for `x >= 0`; relative error below `1.6e-7 + 3e-7 |y log2 x|`. A negative `x` gives NaN; `y` is not 0 where
+/// `x` to the power `y` for `x >= 0`; relative error below `1.6e-7 + 3e-7 |y log2 x|`. A negative `x` gives NaN; `y` must not be 0 if
 /// `x` is 0 or infinite.
 #[inline(always)]
 pub fn pow(x: f32, y: f32) -> f32 {

@@ -3,7 +3,7 @@
 //! The platform's `sin`, `exp` or `pow` differ in their last bits between systems, so a picture made with them is not
 //! reproducible. Here every function is computed by `libm`, which is written in Rust with IEEE operations only. Of glam only functions are used that
 //! need no more than these operations and a square root.
-//! The free functions take `f64`; [`f32`](mod@f32) holds the same for `f32`; [`approximations`] holds branch-free approximations for hot loops.
+//! The free functions take `f64`; [`f32`](mod@f32) contains the same for `f32`, and [`approximations`] branch-free approximations for hot loops.
 
 pub mod approximations;
 pub mod curve;
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn elementary_functions_give_known_bits() {
-        // Pinned bits: the correctly rounded values, but for exp(1), which libm gives one unit in the last place higher.
+        // Pinned bits: the correctly rounded values, except for exp(1), which libm computes one unit in the last place higher.
         assert_eq!(exp(1.0).to_bits(), std::f64::consts::E.to_bits() + 1);
         assert_eq!(ln(2.0), std::f64::consts::LN_2);
         assert_eq!(4.0 * atan(1.0), std::f64::consts::PI);

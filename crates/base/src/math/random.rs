@@ -346,19 +346,19 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_in_every_direction_are_uniform_and_uncorrelated() {
+    fn neighbors_in_every_direction_are_uniform_and_uncorrelated() {
         let key = Key::new(42, "rain");
         let at = |key: Key, birth: u64, step: u32, purpose: u32| key.uniforms(birth, step, Purpose(purpose))[0] as f64;
-        type Neighbour<'a> = &'a dyn Fn(u64) -> (f64, f64);
-        let neighbours: [Neighbour; 5] = [
+        type Neighbor<'a> = &'a dyn Fn(u64) -> (f64, f64);
+        let neighbors: [Neighbor; 5] = [
             &|i| (at(key, i, 0, 0), at(key, i + 1, 0, 0)),
             &|i| (at(key, 9, i as u32, 0), at(key, 9, i as u32 + 1, 0)),
             &|i| (at(key, 9, 0, i as u32), at(key, 9, 0, i as u32 + 1)),
             &|i| (at(Key::new(i, "rain"), 0, 0, 0), at(Key::new(i + 1, "rain"), 0, 0, 0)),
             &|i| (key.uniforms(i, 0, POSITION)[1] as f64, key.uniforms(i, 0, POSITION)[2] as f64),
         ];
-        for neighbour in neighbours {
-            let (mean, variance, correlation) = moments((0..COUNT).map(neighbour));
+        for neighbor in neighbors {
+            let (mean, variance, correlation) = moments((0..COUNT).map(neighbor));
             // Four standard errors: 0.289 / sqrt(n), 1 / sqrt(180 n), 1 / sqrt(n).
             let root = (COUNT as f64).sqrt();
             assert!((mean - 0.5).abs() < 4.0 * 0.289 / root, "mean {mean}");

@@ -292,19 +292,19 @@ mod tests {
 
     #[test]
     fn whole_and_fraction_make_the_number_again_and_wrap() {
-        let place = [0.0, 0.25, 1.0, 1.75, 7.999, 8.0, 9.5, -0.25, -7.5, 511.3, 512.7, 3.0, 2.0, 1000.125, -1.0, 6.5];
-        let (whole, part) = crate::dispatch_baseline!(simd => {
-            let (whole, part) = wrap_split(Lanes::from_slice(simd, &place), 7);
-            let (mut wholes, mut parts) = ([0; LANES], [0.0; LANES]);
-            whole.store_slice(&mut wholes);
-            part.store_slice(&mut parts);
-            (wholes, parts)
+        let input = [0.0, 0.25, 1.0, 1.75, 7.999, 8.0, 9.5, -0.25, -7.5, 511.3, 512.7, 3.0, 2.0, 1000.125, -1.0, 6.5];
+        let (integer, fraction) = crate::dispatch_baseline!(simd => {
+            let (integer, fraction) = wrap_split(Lanes::from_slice(simd, &input), 7);
+            let (mut integers, mut fractions) = ([0; LANES], [0.0; LANES]);
+            integer.store_slice(&mut integers);
+            fraction.store_slice(&mut fractions);
+            (integers, fractions)
         });
         for i in 0..LANES {
-            let value = whole[i] as f32 + part[i];
-            assert!((0.0..=1.0).contains(&part[i]) && whole[i] < 8);
-            let difference = (value - place[i]).rem_euclid(8.0);
-            assert!(difference.min(8.0 - difference) < 1e-3, "{} {} {}", place[i], whole[i], part[i]);
+            let value = integer[i] as f32 + fraction[i];
+            assert!((0.0..=1.0).contains(&fraction[i]) && integer[i] < 8);
+            let difference = (value - input[i]).rem_euclid(8.0);
+            assert!(difference.min(8.0 - difference) < 1e-3, "{} {} {}", input[i], integer[i], fraction[i]);
         }
     }
 

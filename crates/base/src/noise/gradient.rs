@@ -233,12 +233,12 @@ mod tests {
         bits.sort_unstable();
         let counts: Vec<usize> = bits.chunk_by(|a, b| a == b).map(<[_]>::len).collect();
         assert_eq!(counts.len(), distinct);
-        let share = gradients.len() / distinct;
-        assert!(counts.iter().all(|&count| count.abs_diff(share) < share / 8));
+        let expected = gradients.len() / distinct;
+        assert!(counts.iter().all(|&count| count.abs_diff(expected) < expected / 8));
     }
 
     #[test]
-    fn gradients_favour_no_direction_up_to_fourth_order() {
+    fn gradients_favor_no_direction_up_to_fourth_order() {
         assert_even(&gradients::<2>(|hash, [x, y]| gradient_dot_2(hash, x, y)), 8);
         assert_even(&gradients::<3>(|hash, [x, y, z]| gradient_dot_3(hash, x, y, z)), 12);
         assert_even(&gradients::<4>(|hash, [x, y, z, w]| gradient_dot_4(hash, x, y, z, w)), 24);
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn one_cell_has_hand_worked_values() {
-        // On a corner every slope is 0; beside it the noise is that corner's slope alone, as the fade begins with f^3.
+        // At a corner the noise is 0; next to it the noise is the dot product of that corner alone, since the fade starts with f^3.
         assert_eq!([0.0, 0.0].gradient_noise([3, 5], [4, 6], 9), 0.0);
         let hash = hash_first(hash_coordinate(9, 1, 5), 3);
         let (near, alone) = (

@@ -245,12 +245,12 @@ mod tests {
         Value::List((0..count).map(|index| Value::numbers([index as f64, 0.5]).into()).collect())
     }
 
-    fn fault<P: Parameter<Limits = L>, L>(value: Value, limits: &L) -> Option<ProblemKind> {
+    fn read_problem<P: Parameter<Limits = L>, L>(value: Value, limits: &L) -> Option<ProblemKind> {
         let mut reader = Reader::new();
         let read = P::read(&Node { value, span: 3..4 }, limits, "", &mut reader);
-        let fault = reader.into_problems().listed.pop();
-        assert_eq!(read.is_none(), fault.is_some());
-        fault.map(|problem| problem.kind)
+        let problem = reader.into_problems().listed.pop();
+        assert_eq!(read.is_none(), problem.is_some());
+        problem.map(|problem| problem.kind)
     }
 
     #[test]
@@ -260,11 +260,11 @@ mod tests {
             table.push("keys", points(count));
             Value::Table(table)
         };
-        let told = ProblemKind::ListLength { found: MAX_POINTS + 1, min: 1, max: MAX_POINTS };
-        assert_eq!(fault::<Animated<f64>, _>(keyed(MAX_POINTS), &Range::default()), None);
-        assert_eq!(fault::<Animated<f64>, _>(keyed(MAX_POINTS + 1), &Range::default()), Some(told.clone()));
+        let expected = ProblemKind::ListLength { found: MAX_POINTS + 1, min: 1, max: MAX_POINTS };
+        assert_eq!(read_problem::<Animated<f64>, _>(keyed(MAX_POINTS), &Range::default()), None);
+        assert_eq!(read_problem::<Animated<f64>, _>(keyed(MAX_POINTS + 1), &Range::default()), Some(expected.clone()));
         let limits = CurveLimits { x: Range::default(), ..CurveLimits::default() };
-        assert_eq!(fault::<Curve, _>(points(MAX_POINTS), &limits), None);
-        assert_eq!(fault::<Curve, _>(points(MAX_POINTS + 1), &limits), Some(told));
+        assert_eq!(read_problem::<Curve, _>(points(MAX_POINTS), &limits), None);
+        assert_eq!(read_problem::<Curve, _>(points(MAX_POINTS + 1), &limits), Some(expected));
     }
 }

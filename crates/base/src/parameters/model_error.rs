@@ -43,10 +43,10 @@ mod tests {
 
     #[test]
     fn a_fault_stays_what_it_is() {
-        let fault = ModelError::new(CurveError::Empty);
-        assert_eq!(fault.to_string(), CurveError::Empty.to_string());
-        assert_eq!(fault.downcast::<CurveError>(), Some(&CurveError::Empty));
-        assert!(fault.downcast::<fmt::Error>().is_none());
-        assert_eq!((fault == ModelError::new(CurveError::Empty), fault == ModelError::new(fmt::Error)), (true, false));
+        let error = ModelError::new(CurveError::Empty);
+        assert_eq!(error.to_string(), CurveError::Empty.to_string());
+        assert_eq!(error.downcast::<CurveError>(), Some(&CurveError::Empty));
+        assert!(error.downcast::<fmt::Error>().is_none());
+        assert_eq!((error == ModelError::new(CurveError::Empty), error == ModelError::new(fmt::Error)), (true, false));
     }
 }

@@ -200,36 +200,36 @@ mod tests {
     fn numbers_are_as_short_as_people_write_them() {
         let shown = [0.0, -1.0, 2.5e-6, 1e6, 1e14, 1e300, -3.5e-9, f64::INFINITY].map(short);
         assert_eq!(shown, ["0", "-1", "0.0000025", "1000000", "100000000000000", "1e300", "-3.5e-9", "inf"]);
-        let fault = ProblemKind::OutOfRange { value: 1e300, min: 0.0, max: 2.0, unit: "m" };
-        assert_eq!(fault.to_string(), "1e300 is out of range; allowed: 0 to 2 m");
+        let problem = ProblemKind::OutOfRange { value: 1e300, min: 0.0, max: 2.0, unit: "m" };
+        assert_eq!(problem.to_string(), "1e300 is out of range; allowed: 0 to 2 m");
     }
 
     #[test]
     fn lists_say_how_many_items_in_the_right_number() {
-        let told = |found, min, max| ProblemKind::ListLength { found, min, max }.to_string();
-        assert_eq!(told(1, 2, 2), "has 1 item; allowed: exactly 2 items");
-        assert_eq!(told(0, 1, 1), "has 0 items; allowed: exactly 1 item");
-        assert_eq!(told(13, 1, 12), "has 13 items; allowed: 1 to 12 items");
+        let message = |found, min, max| ProblemKind::ListLength { found, min, max }.to_string();
+        assert_eq!(message(1, 2, 2), "has 1 item; allowed: exactly 2 items");
+        assert_eq!(message(0, 1, 1), "has 0 items; allowed: exactly 1 item");
+        assert_eq!(message(13, 1, 12), "has 13 items; allowed: 1 to 12 items");
     }
 
     #[test]
     fn of_long_words_the_beginning_is_told() {
         let key = "\u{e9}".repeat(1_000_000);
         let nearest = nearest(&key, ["speed"]).map(str::to_owned);
-        let told = ProblemKind::UnknownKey { key, nearest, allowed: vec!["speed".into()] }.to_string();
-        assert_eq!(told, format!("unknown key `{}...`; allowed: speed", "\u{e9}".repeat(80)));
+        let message = ProblemKind::UnknownKey { key, nearest, allowed: vec!["speed".into()] }.to_string();
+        assert_eq!(message, format!("unknown key `{}...`; allowed: speed", "\u{e9}".repeat(80)));
         let value = "x".repeat(81);
-        let told = ProblemKind::NotOneOf { value, nearest: None, allowed: vec!["a".into()] }.to_string();
-        assert!(told.len() < 120, "{told}");
+        let message = ProblemKind::NotOneOf { value, nearest: None, allowed: vec!["a".into()] }.to_string();
+        assert!(message.len() < 120, "{message}");
     }
 
     #[test]
     fn paths_are_what_one_types_and_their_items_count_from_one_beside_them() {
-        let told =
+        let message =
             |path: &str| Problem { span: None, path: path.into(), kind: ProblemKind::Syntax("x".into()) }.to_string();
-        assert_eq!(told("picture.size"), "picture.size: x");
-        assert_eq!(told("rain.0.rate_mm_per_h"), "rain.0.rate_mm_per_h: x");
-        assert_eq!(told("rain.1.rate_mm_per_h"), "rain.1.rate_mm_per_h (rain 2): x");
-        assert_eq!(told("aurora.0.shapes.1.sheets.0"), "aurora.0.shapes.1.sheets.0 (shape 2, sheet 1): x");
+        assert_eq!(message("picture.size"), "picture.size: x");
+        assert_eq!(message("rain.0.rate_mm_per_h"), "rain.0.rate_mm_per_h: x");
+        assert_eq!(message("rain.1.rate_mm_per_h"), "rain.1.rate_mm_per_h (rain 2): x");
+        assert_eq!(message("aurora.0.shapes.1.sheets.0"), "aurora.0.shapes.1.sheets.0 (shape 2, sheet 1): x");
     }
 }

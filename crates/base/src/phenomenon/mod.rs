@@ -253,7 +253,7 @@ pub trait Prepared: Send + Sync {
     /// Bounding rectangle of the pixels that it can affect within a depth slice.
     fn bounds(&self, slice: &DepthInterval) -> Rect;
 
-    /// Draws what lies in `slice` into `strip`, nearest first, blurred over the shutter.
+    /// Draws the contents of `slice` into `strip`, front to back, with motion blur over the exposure.
     ///
     /// The value of a pixel must not depend on the strip in which it is drawn.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);

@@ -207,17 +207,17 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_are_all_but_oneself() {
+    fn neighbors_are_all_but_oneself() {
         let shining = |intensity: f32| {
             let emitter = Emitter::Directional { toward: DVec3::Y };
             Publication { lights: vec![Light { emitter, intensity: [intensity; 3] }], ..Publication::default() }
         };
         let (scene, published) = (shining(1.0), [shining(2.0), shining(3.0), shining(4.0)]);
         let published = |index: usize| &published[index];
-        let neighbours =
+        let neighbors =
             OtherPhenomena { scene: &scene, count: 3, published: &published, own_index: 1, sky: &Sky::DARK };
-        let intensities: Vec<f32> = neighbours.lights().map(|light| light.intensity[0]).collect();
-        assert_eq!((intensities, neighbours.occluders().count()), (vec![1.0, 2.0, 4.0], 0));
+        let intensities: Vec<f32> = neighbors.lights().map(|light| light.intensity[0]).collect();
+        assert_eq!((intensities, neighbors.occluders().count()), (vec![1.0, 2.0, 4.0], 0));
     }
 
     #[test]

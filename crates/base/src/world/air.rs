@@ -3,7 +3,7 @@
 use crate::parameters::Range;
 
 crate::parameters! {
-    /// The still, dry air that everything stands in.
+    /// The still, dry air around all phenomena.
     pub struct Air {
         /// Its temperature.
         temperature_k: f64 = 293.15, limits(Range::new(150.0, 400.0)), unit("K");

@@ -45,10 +45,10 @@ impl Occluder {
     /// Distance from `point` to the surface, m; negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         match self {
-            Self::Sphere { center: centre, radius } => (point - *centre).length() - radius,
+            Self::Sphere { center, radius } => (point - *center).length() - radius,
             Self::HalfSpace { point: on_plane, normal } => (point - *on_plane).dot(*normal),
-            Self::Cuboid { center: centre, half_extents, rotation } => {
-                let beyond = (rotation.inverse() * (point - *centre)).abs() - *half_extents;
+            Self::Cuboid { center, half_extents, rotation } => {
+                let beyond = (rotation.inverse() * (point - *center)).abs() - *half_extents;
                 beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0)
             }
             Self::Mesh { distance, placement } => distance.at(placement.to_local(point)) * placement.scale,
@@ -58,10 +58,10 @@ impl Occluder {
     /// Outward unit normal at `point`: the gradient of the signed distance.
     pub fn normal(&self, point: DVec3) -> DVec3 {
         match self {
-            Self::Sphere { center: centre, .. } => (point - *centre).normalize_or(DVec3::Y),
+            Self::Sphere { center, .. } => (point - *center).normalize_or(DVec3::Y),
             Self::HalfSpace { normal, .. } => *normal,
-            Self::Cuboid { center: centre, half_extents, rotation } => {
-                *rotation * cuboid_normal(rotation.inverse() * (point - *centre), *half_extents)
+            Self::Cuboid { center, half_extents, rotation } => {
+                *rotation * cuboid_normal(rotation.inverse() * (point - *center), *half_extents)
             }
             Self::Mesh { distance, placement } => {
                 placement.transform_direction(distance.normal(placement.to_local(point)))

@@ -11,13 +11,13 @@ use crate::{
 crate::parameters! {
     /// The wind, the same for everything in the scene.
     pub struct WindParameters {
-        /// Mean velocity: x to the right, y up, z toward the viewer of an unturned camera.
+        /// Mean velocity: x to the right, y up, z toward the viewer for a camera that is not rotated.
         velocity: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), limits(Range::new(-100.0, 100.0)), unit("m/s");
-        /// Turbulence intensity: standard deviation of the speed, as a share of the mean speed.
+        /// Turbulence intensity: standard deviation of the speed divided by the mean speed.
         gust: f64 = 0.3, limits(Range::new(0.0, 2.0));
-        /// Size of gusts; they drift with the mean wind (in a seamless loop they stay and only change).
+        /// Size of gusts. They drift with the mean wind; in a seamless loop they do not drift and only change over time.
         gust_length: f64 = 6.0, limits(Range::new(0.1, 1000.0)), unit("m");
-        /// How long a gust lasts where it is.
+        /// Duration of a gust at a fixed point in the mean wind.
         gust_period_s: f64 = 2.0, limits(Range::new(0.05, 600.0)), unit("s");
     }
 }

@@ -144,9 +144,9 @@ mod tests {
 
     const CURVE: ToneCurve = ToneCurve::with_shoulder(0.6, 16.0);
 
-    fn place_in_sector(rgb: [f32; 3]) -> f32 {
-        let [most, mid, least] = sort_components(rgb);
-        (mid - least) / (most - least)
+    fn hue_position(rgb: [f32; 3]) -> f32 {
+        let [largest, middle, smallest] = sort_components(rgb);
+        (middle - smallest) / (largest - smallest)
     }
 
     #[test]
@@ -156,7 +156,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-7, "{rgb:?}");
             }
         }
-        // One part of white in a colour outside: (0.5, -0.1, 0.2) has s = 1.2, t = 0.5; s' = 1 gives (0.5, 0, 0.25).
+        // A color outside sRGB mixed with white: (0.5, -0.1, 0.2) has s = 1.2, t = 0.5; s' = 1 gives (0.5, 0, 0.25).
         let mapped = to_cube(&CURVE, [0.5, -0.1, 0.2]);
         assert!((mapped[2] - 0.25).abs() < 1e-6 && mapped[1] == 0.0 && mapped[0] == 0.5, "{mapped:?}");
     }
@@ -175,19 +175,19 @@ mod tests {
 
     #[test]
     fn more_exposure_never_darkens_any_component() {
-        let colours = [[1.0, 0.3, 0.0], [1.0, 0.03, -0.02], [0.2, 1.0, -0.13], [0.15, -0.13, 1.0], [1.0, 0.9, 0.8]];
-        for colour in colours {
+        let colors = [[1.0, 0.3, 0.0], [1.0, 0.03, -0.02], [0.2, 1.0, -0.13], [0.15, -0.13, 1.0], [1.0, 0.9, 0.8]];
+        for color in colors {
             let mut before = [0.0; 3];
             for step in -400..=1200 {
                 let scale = libm::exp2f(step as f32 / 50.0);
-                let display = to_cube(&CURVE, colour.map(|v| v * scale));
+                let display = to_cube(&CURVE, color.map(|v| v * scale));
                 for (now, then) in display.iter().zip(before) {
-                    assert!((0.0..=1.0).contains(now) && *now >= then - 2e-6, "{colour:?} at {scale}");
+                    assert!((0.0..=1.0).contains(now) && *now >= then - 2e-6, "{color:?} at {scale}");
                     assert!(now - then < 0.05, "step at {scale}");
                 }
                 before = display;
             }
-            assert!(before.iter().all(|v| *v > 0.99), "{colour:?} ends at {before:?}, not at white");
+            assert!(before.iter().all(|v| *v > 0.99), "{color:?} ends at {before:?}, not at white");
         }
     }
 
@@ -199,7 +199,7 @@ mod tests {
             for scale in [0.1, 0.8, 2.0, 7.0, 15.0, 60.0] {
                 let mut rgb = [0.0; 3];
                 (rgb[order[0]], rgb[order[1]], rgb[order[2]]) = (scale, scale * (0.1 + 0.9 * t), scale * 0.1);
-                let after = place_in_sector(to_cube(&CURVE, rgb));
+                let after = hue_position(to_cube(&CURVE, rgb));
                 let shift = after - t;
                 let limit = if index / 20 == 0 { 34.0 / 60.0 } else { 2e-5 };
                 assert!((-2e-5..=limit).contains(&shift), "{rgb:?}: {t} to {after}");
@@ -208,8 +208,8 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_stay_neighbours() {
-        // Across every border of sectors and the grey axis, at brightness below, in and beyond the shoulder.
+    fn neighbors_stay_neighbors() {
+        // Across every border of sectors and the gray axis, at brightness below, in and beyond the shoulder.
         let seeds =
             [[1.0, 1.0, 0.2], [1.0, 0.2, 0.2], [0.5, 0.5, 0.5], [0.2, 1.0, 1.0], [1.0, 0.2, 1.0], [1.0, 0.3, 0.0]];
         for (seed, scale) in seeds.iter().flat_map(|seed| [0.4, 0.6, 1.0, 4.0, 16.0].map(|scale| (seed, scale))) {
@@ -227,9 +227,9 @@ mod tests {
         let light = crate::color::black_body().radiance(1900.0);
         let unit = light.map(|v| v / luminance(light));
         let shown = |exposure: f32| to_cube(&CURVE, space::srgb_from_acescg(unit.map(|v| v * exposure)));
-        let place = |exposure: f32| place_in_sector(shown(exposure));
-        assert!(place(0.2) < 0.35 && place(0.8) < 0.55, "orange while dim: {} {}", place(0.2), place(0.8));
-        assert!(place(4.0) > 0.7, "toward yellow: {}", place(4.0));
+        let hue_at = |exposure: f32| hue_position(shown(exposure));
+        assert!(hue_at(0.2) < 0.35 && hue_at(0.8) < 0.55, "orange while dim: {} {}", hue_at(0.2), hue_at(0.8));
+        assert!(hue_at(4.0) > 0.7, "toward yellow: {}", hue_at(4.0));
         let bright = shown(6.0);
         assert!(bright[2] > 0.2 && bright[1] > 0.75, "yellow-white, neither flat yellow nor salmon: {bright:?}");
         let deep = crate::color::black_body().radiance(1000.0);

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn colour_times_alpha_is_exact_over_black() {
+    fn color_times_alpha_is_exact_over_black() {
         for step in 0..2000 {
             let light = [1.0, 0.4, 0.1].map(|v| v * libm::powf(step as f32 / 2000.0, 3.0));
             for phase in phases().step_by(997) {
@@ -186,7 +186,7 @@ mod tests {
         }
     }
 
-    /// Numbers at and beyond the ends of the range, and what is not a number.
+    /// Numbers at and beyond the ends of the range, and NaN.
     const EXTREMES: [f32; 12] =
         [0.0, -0.0, 1e-40, 1e-6, 0.003_130_8, 0.5, 0.999_999_94, 1.0, 1.000_000_1, 7.0, f32::INFINITY, f32::NAN];
 
@@ -262,9 +262,9 @@ mod tests {
                 (0..3).map(|c| over_black[c] + gray - truth[c]).map(|difference| difference * difference).sum::<f32>()
             };
             let alpha = encoded_alpha_codes::<u16>(light, coverage, 0)[3] as f32;
-            let least = over_black[0].max(over_black[1]).max(over_black[2]);
-            for other in [alpha - 400.0, alpha + 400.0, least, 65_535.0] {
-                if (least..=65_535.0).contains(&other) {
+            let min_alpha = over_black[0].max(over_black[1]).max(over_black[2]);
+            for other in [alpha - 400.0, alpha + 400.0, min_alpha, 65_535.0] {
+                if (min_alpha..=65_535.0).contains(&other) {
                     assert!(error(alpha) <= error(other) * 1.001 + 10.0, "{light:?} {coverage}: {alpha} {other}");
                 }
             }

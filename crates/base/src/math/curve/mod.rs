@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn every_interpolation_passes_through_its_points_and_stays_between_neighbours() {
+    fn every_interpolation_passes_through_its_points_and_stays_between_neighbors() {
         for trial in 0..300 {
             let points = random_points(trial);
             for interpolation in [Interpolation::Linear, Interpolation::Step, Interpolation::Monotone] {
@@ -260,7 +260,7 @@ mod tests {
                         .collect();
                     let (low, high) = (pair[0][1].min(pair[1][1]), pair[0][1].max(pair[1][1]));
                     assert!(values.iter().all(|y| (low..=high).contains(y)));
-                    // Rounding of the cubic may turn neighbours around by a few units in the last place.
+                    // Rounding of the cubic may swap neighbors that differ by a few units in the last place.
                     let rising = if pair[1][1] >= pair[0][1] { 1.0 } else { -1.0 };
                     assert!(values.windows(2).all(|y| (y[1] - y[0]) * rising >= -1e-14));
                 }

@@ -15,16 +15,16 @@ fn what_is_drawn_later_lies_behind() {
 }
 
 #[test]
-fn gray_and_coloured_absorption_come_to_the_same() {
+fn gray_and_colored_absorption_come_to_the_same() {
     let mut gray = Strip::default();
     gray.reset(Rect::of_size(2, 1), None, 0);
-    let mut coloured = gray.clone();
-    coloured.transmittance_planes_mut();
-    for strip in [&mut gray, &mut coloured] {
+    let mut colored = gray.clone();
+    colored.transmittance_planes_mut();
+    for strip in [&mut gray, &mut colored] {
         strip.add_row_behind(0, [&[1.0, 2.0]; 3], Some(&[0.25, 0.5]), &[1.0, 1.0]);
         strip.add_row_behind(0, [&[4.0, 4.0]; 3], None, &[2.0, 2.0]);
     }
-    assert_eq!(gray.radiance, coloured.radiance);
+    assert_eq!(gray.radiance, colored.radiance);
     assert_eq!(gray.radiance[2], [4.0, 4.0]);
     assert_eq!((gray.transmittance(0), gray.transmittance(1)), ([0.75; 3], [0.5; 3]));
     gray.add_behind(1, [0.0; 3], [1.0, 0.5, 0.0], 3.0);

@@ -60,7 +60,7 @@ impl ElevationProfile {
     /// The same light, scaled by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
-        let scaled = |colour: [f32; 3]| colour.map(|value| value * factor);
+        let scaled = |color: [f32; 3]| color.map(|value| value * factor);
         Self { bands: self.bands.map(scaled), horizontal: scaled(self.horizontal) }
     }
 

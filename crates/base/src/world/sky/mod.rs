@@ -25,35 +25,35 @@ pub fn air_mass(elevation: f64) -> f64 {
 }
 
 crate::choice! {
-    /// How the sky's luminance is spread.
+    /// Distribution of the sky's luminance.
     pub enum SkyKind {
         /// The CIE overcast sky: three times as bright overhead as at the horizon.
         Overcast = "overcast",
-        /// The same from everywhere.
+        /// The same in all directions.
         Uniform = "uniform",
-        /// Airglow, stars and twilight, as `night` says.
+        /// Airglow, stars and twilight, as set in `night`.
         Night = "night",
     }
 }
 
 crate::parameters! {
-    /// The sky behind everything. It lights the scene; where there is a plate, the plate is seen in its place. A scene that states neither a
-    /// sky nor a light has one all the same where all its phenomena are of one kind that needs it: auroras stand in a night, rain falls at dusk. Such
-    /// a sky is seen too, unless the picture shall be transparent; one that is stated is always opaque.
+    /// The sky behind everything. It lights the scene. In pictures with a plate, the plate is visible instead. A scene that states neither a
+    /// sky nor a light has a default sky if all its phenomena are of one kind that needs it: night for auroras, dusk for rain. A default sky is visible
+    /// unless the picture is transparent; a stated sky is always opaque.
     pub struct SkyParameters {
-        /// How its luminance is spread.
+        /// Distribution of its luminance.
         kind: SkyKind = SkyKind::Overcast;
-        /// Luminance overhead: a rainy day has 500 to 5000, late dusk 1.
+        /// Luminance overhead: 500 to 5000 on a rainy day, 1 at late dusk.
         luminance: Animated<f64> = Animated::from(2000.0), limits(Range::new(0.0, 1e6)), unit("cd/m^2");
-        /// Temperature of a black body of its colour; by day, for at night each of its lights has its own.
+        /// Color, as the temperature of a black body. Ignored at night, when each light source has its own color.
         temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
-        /// Whether it is seen, or only lights.
+        /// Whether it is visible; otherwise it only lights the scene.
         visible: bool = true;
-        /// Height of the hills all around, before the sky; 0 for none.
+        /// Elevation of the hills all around, in front of the sky; 0 for none.
         hills_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
         /// Height of the trees on them; 0 for none.
         trees_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
-        /// How far away hills and trees stand.
+        /// Distance of the hills and trees.
         hills_distance: f64 = 8000.0, limits(Range::new(1.0, 1e5)), unit("m");
         /// The sky at night.
         night: NightParameters = NightParameters::default();
@@ -66,9 +66,9 @@ impl SkyParameters {
         if self.kind == SkyKind::Night {
             return Sky::from_night(self.night.at(t));
         }
-        let colour = black_body().radiance(self.temperature_k as f32);
-        let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
-        Sky { kind: self.kind, zenith: colour.map(|value| (f64::from(value) * scale) as f32), ..Sky::DARK }
+        let color = black_body().radiance(self.temperature_k as f32);
+        let scale = self.luminance.at(t) / f64::from(luminance(color)).max(f64::MIN_POSITIVE);
+        Sky { kind: self.kind, zenith: color.map(|value| (f64::from(value) * scale) as f32), ..Sky::DARK }
     }
 }
 

@@ -12,19 +12,19 @@ use crate::{
 const BRIGHTNESS_RANGE: Range = Range::new(0.0, 100.0);
 
 crate::parameters! {
-    /// What is seen at night, with `kind = "night"`; brightness is absolute, so that the sky's own `luminance` plays no part.
+    /// The night sky, for `kind = "night"`. Its brightness is absolute, so the `luminance` of the sky is ignored.
     pub struct NightParameters {
-        /// How high the sun stands: below -18 no light of it is left, from -6 on the brightest stars appear.
+        /// Elevation of the sun: below -18 there is no twilight, below -6 the brightest stars appear.
         sun_elevation_deg: Animated<f64> = Animated::from(-30.0), limits(Range::new(-90.0, 0.0)), unit("degrees");
-        /// Where the sun stands, from north over east.
+        /// Azimuth of the sun, from north toward east.
         sun_azimuth_deg: f64 = 0.0, limits(Range::new(-360.0, 360.0)), unit("degrees");
-        /// Brightness of the airglow beside a usual night's.
+        /// Brightness of the airglow relative to a typical night.
         airglow: f64 = 1.0, limits(BRIGHTNESS_RANGE);
-        /// Brightness of the stars beside the real sky's; 0 for none.
+        /// Brightness of the stars relative to the real sky; 0 for none.
         stars: f64 = 1.0, limits(BRIGHTNESS_RANGE);
-        /// Brightness of the Milky Way beside the real one's.
+        /// Brightness of the Milky Way relative to the real one.
         milky_way: f64 = 1.0, limits(BRIGHTNESS_RANGE);
-        /// Magnitudes that the air takes overhead.
+        /// Atmospheric extinction overhead, magnitudes.
         extinction: f64 = 0.22, limits(Range::new(0.0, 5.0)), unit("mag");
     }
 }
@@ -33,7 +33,7 @@ crate::parameters! {
 /// al. 1998). The last represents the visible hydroxyl bands.
 const AIRGLOW: [(f64, f64, f64); 4] =
     [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
-/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
+/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its color, K.
 const BACKGROUND: f64 = 1.2e-4;
 const BACKGROUND_K: f32 = 9500.0;
 /// Base-10 logarithm of the luminance overhead, cd/m^2, in steps of 3 degrees of solar depression from 0 on (Koomen et
@@ -142,7 +142,7 @@ impl Night {
         // Twilight: blue overhead, brighter and yellow low above the sun.
         let low = math::exp(-elevation / TWILIGHT_ARCH);
         let blue = blackbody_light(10_000.0, self.twilight);
-        let single = |colour: DVec3| colour.to_array().map(|value| value as f32);
+        let single = |color: DVec3| color.to_array().map(|value| value as f32);
         Almucantar {
             uniform: single(even + blue),
             glow: single(blackbody_light(3200.0, self.twilight * 9.0 * low * low)),
@@ -159,9 +159,9 @@ fn van_rhijn(elevation: f64, altitude_km: f64) -> f64 {
 
 /// Light with the color of a black body and the luminance `brightness`.
 fn blackbody_light(temperature_k: f32, brightness: f64) -> DVec3 {
-    let colour = black_body().radiance(temperature_k);
-    let scale = brightness / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
-    DVec3::from(colour.map(f64::from)) * scale
+    let color = black_body().radiance(temperature_k);
+    let scale = brightness / f64::from(luminance(color)).max(f64::MIN_POSITIVE);
+    DVec3::from(color.map(f64::from)) * scale
 }
 
 #[cfg(test)]
