@@ -58,8 +58,8 @@ fn check_animated(mut animated: Animated<f64>, times: &[f64]) {
         for &t in times.iter().filter(|t| pass == 0 || t.is_finite()) {
             let value = animated.at(t);
             assert!(value >= low && value <= high, "{value} at {t}");
-            assert!(animated.rate(t).is_finite(), "the rate at {t}");
+            assert!(animated.derivative(t).is_finite(), "the derivative at {t}");
         }
-        animated.close(4.0);
+        animated.make_periodic(4.0);
     }
 }

@@ -125,7 +125,7 @@ pub fn read_plate(bytes: &[u8], extension: &str) {
 }
 
 fn check_plate(picture: Picture) {
-    let (width, height) = (picture.colour.width(), picture.colour.height());
+    let (width, height) = (picture.color.width(), picture.color.height());
     assert!(width > 0 && height > 0 && width.max(height) as u64 <= limits::SIDE, "{width} x {height}");
     if let Some(depth) = &picture.depth {
         assert_eq!(depth.len(), width * height);

@@ -57,7 +57,7 @@ fn view(lens: Lens, target: [f64; 3], size: [usize; 2]) -> View {
 fn frame(aurora: &Aurora, view: &View) -> f32 {
     use rayon::prelude::*;
     let wind = Wind::new(WindParameters::default(), 1, None);
-    let surroundings = Surroundings::of_wind(&wind);
+    let surroundings = Surroundings::from_wind(&wind);
     let prepared = aurora.prepare(view, &surroundings, &Unobserved).expect("nobody asks to stop");
     let strips = (0..view.size[1]).into_par_iter().step_by(STRIP_ROWS);
     let sums = strips.map_init(Strip::default, |strip, y| {

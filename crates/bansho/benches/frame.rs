@@ -152,10 +152,10 @@ impl Planned {
 fn plan(text: &str) -> Planned {
     let mut assets = MemoryAssets::default();
     let pixels = (0..SIZE[0] * SIZE[1]).map(|index| plate(index % SIZE[0], index / SIZE[0])).collect();
-    let colour = Image::from_pixels(SIZE[0], SIZE[1], pixels).expect("as many pixels as the size says");
+    let color = Image::from_pixels(SIZE[0], SIZE[1], pixels).expect("as many pixels as the size says");
     assets.insert_picture(
         "plate.png",
-        Picture { color: colour, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
+        Picture { color, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
     );
     let assets = Arc::new(assets);
     let text = format!("bansho = 1\n[picture]\nsize = [1920, 1080]\n{text}");

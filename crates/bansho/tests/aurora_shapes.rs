@@ -336,7 +336,7 @@ fn a_camera_looks_up_where_all_is_in_the_sky_unless_it_is_told() {
     let camera = |text: &str| {
         let scene = Scene::parse("test.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
         let camera = scene.camera.at(0.0, [160, 90]);
-        (camera.position, -camera.orientation.z_axis)
+        (camera.position, -camera.world_from_camera.z_axis)
     };
     let (place, up) = camera("bansho = 1\n[[aurora]]\n");
     assert!(place.y == 1.7 && (0.4..0.6).contains(&up.y) && up.z < -0.8, "{place} {up}");

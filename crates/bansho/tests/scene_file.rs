@@ -393,10 +393,10 @@ fn a_plate_of_another_depth_size_is_refused() {
         image::Image,
     };
     let mut assets = checkerboard(16, 12, None);
-    let colour = Image::filled(8, 6, [1.0; 4]);
+    let color = Image::filled(8, 6, [1.0; 4]);
     assets.insert_picture(
         "depth.exr",
-        Picture { color: colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
+        Picture { color, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
     );
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
     let error = compiled("scene.toml", &text, &kinds(), assets.clone()).err().unwrap().to_string();

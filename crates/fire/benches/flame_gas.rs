@@ -72,7 +72,7 @@ struct Subject {
 /// Prepares the gas and hands it to `each`.
 fn prepared(subject: &Subject, look: &LookParameters, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
-    let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+    let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let gas = gas(&subject.particles, &subject.scratch);
     if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
         each(&prepared);

@@ -23,7 +23,7 @@ fn step(criterion: &mut Criterion) {
     let velocity = Animated::from([1.0, 0.0, 0.3]);
     let wind = Wind::new(WindParameters { velocity, ..WindParameters::default() }, 1, None);
     let air = Air::default();
-    let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+    let around = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let mut group = criterion.benchmark_group("flame particles step");
     group.sample_size(10);
     let pool = pinned_pool(2);

@@ -38,7 +38,7 @@ fn view(parameters: &FlameSheetParameters) -> View {
 /// Draws one frame; each thread takes every so manieth strip.
 fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     let wind = Wind::new(WindParameters::default(), 1, None);
-    let surroundings = Surroundings::of_wind(&wind);
+    let surroundings = Surroundings::from_wind(&wind);
     let Ok(prepared) = sheet.prepare(view, &surroundings, &Unobserved) else { return };
     let threads = strips.len();
     let draw = |thread: usize, strip: &mut Strip| {

@@ -163,7 +163,7 @@ impl DetailFactors {
 
     fn step(&mut self) {
         let Some(stepping) = self.flame.info().stepping else { return };
-        self.flame.step(stepping.time_after(self.steps), &Surroundings::of_wind(&self.wind));
+        self.flame.step(stepping.time_after(self.steps), &Surroundings::from_wind(&self.wind));
         self.steps += 1;
     }
 }

@@ -71,7 +71,7 @@ fn frame() -> Frame {
         (0..WIDTH * HEIGHT).map(|i| [3.0, 1.2, 0.3, 1.0].map(|c| c * heat(i) * (1.0 + 0.01 * noise(i)))).collect();
     let depth = (0..WIDTH * HEIGHT).map(|i| if heat(i) > 0.0 { 4.0 } else { f32::INFINITY }).collect();
     let beauty = Image::from_pixels(WIDTH, HEIGHT, pixels).expect("as many pixels as the size says");
-    let content = Rect::of_size(beauty.width(), beauty.height());
+    let content = Rect::from_size(beauty.width(), beauty.height());
     Frame { header, beauty, depth: Some(depth), channels: Vec::new(), opaque: false, content, figures: Vec::new() }
 }
 

@@ -20,7 +20,7 @@ pub(crate) fn frame(width: usize, height: usize) -> Frame {
         ],
         opaque: false,
         figures: Vec::new(),
-        content: Rect::of_size(width, height),
+        content: Rect::from_size(width, height),
     }
 }
 

@@ -55,7 +55,7 @@ fn frame() -> Frame {
         channels: layer(LAYER).into_iter().chain(layer("plate")).chain(aovs).collect(),
         opaque: false,
         figures: Vec::new(),
-        content: Rect::of_size(SIZE[0], SIZE[1]),
+        content: Rect::from_size(SIZE[0], SIZE[1]),
     }
 }
 

@@ -46,7 +46,7 @@ fn frame() -> Frame {
         channels,
         opaque: false,
         figures: Vec::new(),
-        content: Rect::of_size(width, height),
+        content: Rect::from_size(width, height),
     }
 }
 

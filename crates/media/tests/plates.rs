@@ -47,7 +47,7 @@ fn frame(width: usize, height: usize) -> Frame {
     let depth = (0..count).map(|i| if i % 3 == 0 { f32::INFINITY } else { i as f32 * 1.5 }).collect();
     let channel = Channel { name: "fire.kelvin".to_owned(), precision: Precision::Single, values: vec![1500.0; count] };
     let beauty = Image::from_pixels(width, height, pixels).unwrap();
-    let content = Rect::of_size(beauty.width(), beauty.height());
+    let content = Rect::from_size(beauty.width(), beauty.height());
     Frame { header, beauty, depth: Some(depth), channels: vec![channel], opaque: false, content, figures: Vec::new() }
 }
 

@@ -50,7 +50,7 @@ fn surroundings(wind: &Wind) -> Surroundings<'_> {
         cos_outer: 0.4,
     };
     let lights = vec![Light { emitter, intensity: [3000.0, 2500.0, 1800.0] }];
-    Surroundings { others: Publication { lights, ..Publication::default() }, ..Surroundings::of_wind(wind) }
+    Surroundings { others: Publication { lights, ..Publication::default() }, ..Surroundings::from_wind(wind) }
 }
 
 /// Prepares and draws one frame with the threads of the pool.

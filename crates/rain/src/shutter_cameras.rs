@@ -62,10 +62,10 @@ pub(crate) struct ProjectedPoints {
 
 impl Projector {
     fn new(camera: Camera, origin: DVec3) -> Self {
-        let axes = [0, 1, 2].map(|axis| camera.orientation.col(axis).as_vec3().to_array());
+        let axes = [0, 1, 2].map(|axis| camera.world_from_camera.col(axis).as_vec3().to_array());
         Self {
             axes,
-            offset: camera.to_camera(origin).as_vec3().to_array(),
+            offset: camera.point_in_camera(origin).as_vec3().to_array(),
             center: camera.principal_point.as_vec2().to_array(),
             focal: camera.focal_pixels as f32,
             near: camera.near as f32,
@@ -135,7 +135,7 @@ const PLANE_COUNT: usize = 8;
 impl Frustum {
     /// `None` for a lens without planar sides.
     fn new(camera: &Camera, window: &Rect) -> Option<Self> {
-        let [across, up, back] = [0, 1, 2].map(|axis| camera.orientation.col(axis));
+        let [across, up, back] = [0, 1, 2].map(|axis| camera.world_from_camera.col(axis));
         let tangent = |pixels: usize, center: f64| (pixels as f64 - center) / camera.focal_pixels;
         let [left, right] =
             [window.x, window.right()].map(|side| across + back * tangent(side, camera.principal_point.x));

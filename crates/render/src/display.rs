@@ -39,7 +39,7 @@ pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View, al
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;
     // An empty pixel is code 0, unless it is opaque black.
-    let shown = if frame.opaque { Rect::of_size(width, height) } else { frame.content };
+    let shown = if frame.opaque { Rect::from_size(width, height) } else { frame.content };
     let mut pixels = vec![[C::default(); 4]; width * height];
     pixels.par_chunks_mut(width * TASK_ROWS).enumerate().for_each(|(task, chunk)| {
         for (row, out) in chunk.chunks_mut(width).enumerate() {

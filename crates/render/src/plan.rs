@@ -116,7 +116,7 @@ impl Plan {
     /// The same shot in another size, whole and without overscan.
     #[must_use]
     pub fn at_size(&self, size: [usize; 2]) -> Self {
-        let window = Rect::of_size(size[0], size[1]);
+        let window = Rect::from_size(size[0], size[1]);
         Self { size, window, overscan: 0, ..self.clone() }
     }
 
@@ -242,7 +242,7 @@ fn window(size: [usize; 2], overscan: usize, crop: Option<Rect>) -> Result<Rect,
         return Err(PlanError::Size { width, height, most });
     }
     let Some(crop) = crop else {
-        return Ok(Rect::of_size(width + 2 * overscan, height + 2 * overscan));
+        return Ok(Rect::from_size(width + 2 * overscan, height + 2 * overscan));
     };
     let inside = |start: usize, length: usize, side: usize| length > 0 && start < side && length <= side - start;
     if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {

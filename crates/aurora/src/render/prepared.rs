@@ -395,7 +395,7 @@ fn mask_occluded(
 impl Prepared for PreparedAurora<'_> {
     fn bounds(&self, depths_shown: &DepthInterval) -> Rect {
         if depths_shown.overlaps(&DEPTHS) {
-            Rect::of_size(self.view.size[0], self.view.size[1])
+            Rect::from_size(self.view.size[0], self.view.size[1])
         } else {
             Rect::default()
         }

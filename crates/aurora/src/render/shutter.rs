@@ -126,13 +126,13 @@ mod tests {
         let mut camera = CameraParameters::default();
         camera.look_up();
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let surroundings = Surroundings::of_wind(&wind);
+        let surroundings = Surroundings::from_wind(&wind);
         let from = aurora.time_for(shutter);
         step_until(aurora.simulation_mut().unwrap(), from);
         let view = View::new(camera, shutter, 0.0, SIZE, 0);
         let prepared = aurora.prepare(&view, &surroundings, &Unobserved).unwrap();
         let mut strip = Strip::default();
-        strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+        strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
         prepared.draw(&DepthInterval::ALL, &mut strip);
         strip.radiance[1].iter().map(|value| f64::from(*value)).collect()
     }

@@ -106,7 +106,7 @@ mod tests {
         frame.header.white_balance_k = kelvin;
         frame.beauty = Image::from_pixels(light.len(), 1, light.to_vec()).unwrap();
         // Nothing of it counts as content, as where all is empty.
-        frame.content = Rect::of_size(0, 0);
+        frame.content = Rect::from_size(0, 0);
         frame.opaque = opaque;
         lay_over(&mut frame, background, view);
         let picture = display(&frame, view, BitDepth::Sixteen, AlphaConvention::Linear);

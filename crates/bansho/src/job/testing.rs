@@ -99,7 +99,7 @@ pub(super) fn frame(number: i64) -> Frame {
 pub(super) fn blank(plan: &Plan, number: i64) -> Frame {
     let beauty = Image::filled(1, 1, [number as f32; 4]);
     let header = plan.header(number, [7; 32]);
-    let content = Rect::of_size(1, 1);
+    let content = Rect::from_size(1, 1);
     Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new(), content }
 }
 

@@ -70,7 +70,7 @@ pub(crate) fn of_pixels(width: usize, height: usize, opaque: bool, pixel: impl F
         channels,
         opaque,
         figures: Vec::new(),
-        content: Rect::of_size(width, height),
+        content: Rect::from_size(width, height),
     }
 }
 

@@ -59,7 +59,7 @@ fn gas_comes_evenly_from_the_whole_surface_of_a_gltf_mesh() {
     let parameters = FlameParticlesParameters { burners: vec![burner], particles: 60_000, ..Default::default() };
     let mut flame = FlameParticles::new(parameters, "mesh", 1, None, &assets).unwrap();
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
-    let around = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+    let around = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let stepping = flame.info().stepping.unwrap();
     (0..6).for_each(|taken| flame.step(stepping.time_after(taken), &around));
     let [x, y, z] = flame.particles().positions();

@@ -94,7 +94,7 @@ struct PreparedAbsorber<'a> {
 
 impl Prepared for PreparedAbsorber<'_> {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
-        Rect::of_size(self.view.size[0], self.view.size[1])
+        Rect::from_size(self.view.size[0], self.view.size[1])
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

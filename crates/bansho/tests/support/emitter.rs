@@ -190,7 +190,7 @@ impl PreparedEmitter<'_> {
 
 impl Prepared for PreparedEmitter<'_> {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
-        Rect::of_size(self.view.size[0], self.view.size[1])
+        Rect::from_size(self.view.size[0], self.view.size[1])
     }
 
     fn figures(&self) -> Vec<Figure> {
@@ -216,7 +216,7 @@ impl Prepared for PreparedEmitter<'_> {
         let bends = self.emitter.parameters.bend != 0.0;
         bends.then(|| Deflection {
             depth: self.view.camera.depth(self.emitter.at(self.view.shutter.middle())),
-            rect: Rect::of_size(self.view.size[0], self.view.size[1]),
+            rect: Rect::from_size(self.view.size[0], self.view.size[1]),
             angle: &self.angle,
         })
     }

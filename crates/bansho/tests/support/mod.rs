@@ -102,11 +102,8 @@ pub(crate) fn checkerboard_at(width: usize, height: usize, depth: Option<Vec<f32
         let code = if (x / 8 + y / 8) % 2 == 0 { 200 + (x * 7 + y) % 56 } else { (x + y * 5) % 60 };
         [code, code / 2, 255 - code, 255].map(|code| code as f32 / 255.0)
     };
-    let colour = Image::from_pixels(width, height, (0..width * height).map(shade).collect()).unwrap();
+    let color = Image::from_pixels(width, height, (0..width * height).map(shade).collect()).unwrap();
     let mut assets = MemoryAssets::default();
-    assets.insert_picture(
-        "plate.png",
-        Picture { color: colour, depth, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
-    );
+    assets.insert_picture("plate.png", Picture { color, depth, encoding: Encoding::DisplaySrgb, exposure_ev100: None });
     assets
 }

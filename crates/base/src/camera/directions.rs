@@ -56,8 +56,9 @@ impl Directions {
         let per_pixel = 1.0 / camera.focal_pixels;
         let first_x = ((x as f64 + 0.5 - camera.principal_point.x) * per_pixel) as f32;
         let y_offset = ((camera.principal_point.y - y as f64 - 0.5) * per_pixel) as f32;
-        let [right, upward, back] = [camera.orientation.x_axis, camera.orientation.y_axis, camera.orientation.z_axis]
-            .map(|axis| axis.as_vec3().to_array());
+        let [right, upward, back] =
+            [camera.world_from_camera.x_axis, camera.world_from_camera.y_axis, camera.world_from_camera.z_axis]
+                .map(|axis| axis.as_vec3().to_array());
         let (step, max_angle) = (per_pixel as f32, camera.half_angle() as f32);
         let (mut components, mut visible) = ([[0.0; LANES]; 3], [true; LANES]);
         let (mut sinc, mut cosines) = ([0.0; LANES], [0.0; LANES]);

@@ -96,7 +96,7 @@ impl CameraParameters {
         Camera {
             lens: self.lens,
             position: DVec3::from(self.position.at(t)),
-            orientation,
+            world_from_camera: orientation,
             near: self.near,
             principal_point: DVec2::new(
                 0.5 * size[0] as f64 - self.shift[0] * height,
@@ -138,7 +138,7 @@ pub struct Camera {
     /// Position, m.
     pub position: DVec3,
     /// World-from-camera rotation; its columns are right, up and backward.
-    pub orientation: DMat3,
+    pub world_from_camera: DMat3,
     /// Near clipping distance, m.
     pub near: f64,
     /// Principal point, pixels.
@@ -174,21 +174,21 @@ impl Camera {
     /// Its frame is left-handed.
     pub fn mirrored(mut self, height: f64) -> Self {
         self.position.y = 2.0 * height - self.position.y;
-        self.orientation = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0)) * self.orientation;
+        self.world_from_camera = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0)) * self.world_from_camera;
         self
     }
 
     /// `point` in camera space: right, up, backward, m.
     #[inline(always)]
-    pub fn to_camera(&self, point: DVec3) -> DVec3 {
-        self.orientation.transpose() * (point - self.position)
+    pub fn point_in_camera(&self, point: DVec3) -> DVec3 {
+        self.world_from_camera.transpose() * (point - self.position)
     }
 
     /// Depth of `point` in the convention of this lens (see [`Projection::depth`]), m; negative behind a perspective camera.
     #[inline(always)]
     pub fn depth(&self, point: DVec3) -> f64 {
         match self.lens {
-            Lens::Perspective => -self.to_camera(point).z,
+            Lens::Perspective => -self.point_in_camera(point).z,
             Lens::Fisheye | Lens::Panorama => (point - self.position).length(),
         }
     }
@@ -196,7 +196,7 @@ impl Camera {
     /// Projects `point` into the picture; `None` if it lies outside the field of view or nearer than `near`.
     #[inline(always)]
     pub fn project(&self, point: DVec3) -> Option<Projection> {
-        let local = self.to_camera(point);
+        let local = self.point_in_camera(point);
         let depth = self.depth(point);
         if depth.is_nan() || depth < self.near {
             return None;
@@ -246,7 +246,7 @@ impl Camera {
                 DVec3::new(sin_longitude * cos_latitude, sin_latitude, -cos_longitude * cos_latitude)
             }
         };
-        Some(self.orientation * local)
+        Some(self.world_from_camera * local)
     }
 
     /// Half of the field of view of a fisheye lens, radians.
@@ -257,7 +257,7 @@ impl Camera {
 
     /// The camera metadata written to EXR headers.
     pub fn header(&self) -> CameraHeader {
-        let rotation = self.orientation.transpose();
+        let rotation = self.world_from_camera.transpose();
         let translation = -(rotation * self.position);
         let mut world_to_camera = [[0.0_f64; 4]; 4];
         for row in 0..3 {

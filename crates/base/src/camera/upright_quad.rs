@@ -20,7 +20,7 @@ pub struct UprightQuad {
 pub fn right_facing(camera: &Camera, base: DVec3) -> DVec3 {
     let toward = camera.position - base;
     let level = DVec3::new(toward.x, 0.0, toward.z);
-    let own_right = camera.orientation.col(0);
+    let own_right = camera.world_from_camera.col(0);
     // Seen from straight above or below there is no horizontal direction to the camera: use the camera's own right vector.
     let fallback = DVec3::new(own_right.x, 0.0, own_right.z).try_normalize().unwrap_or(DVec3::X);
     level.try_normalize().map_or(fallback, |toward| DVec3::Y.cross(toward))

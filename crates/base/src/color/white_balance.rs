@@ -15,7 +15,7 @@ pub struct WhiteBalance {
 impl WhiteBalance {
     /// The white balance for a black body of that temperature, K.
     #[must_use]
-    pub fn of_black_body(temperature_k: f64) -> Self {
+    pub fn from_black_body(temperature_k: f64) -> Self {
         let balanced = ACESCG_FROM_XYZ.times(&adaptation(chromaticity(temperature_k), D65).times(&XYZ_FROM_ACESCG));
         Self { forward: balanced.single(), inverse: balanced.inverse().single() }
     }
@@ -60,14 +60,14 @@ mod tests {
         for temperature in [1500.0, 2856.0, 4000.0, 6504.0, 20_000.0] {
             let [x, y] = chromaticity(temperature);
             let light = acescg_from_xyz([x / y, 1.0, (1.0 - x - y) / y]);
-            let balance = WhiteBalance::of_black_body(temperature);
+            let balance = WhiteBalance::from_black_body(temperature);
             let shown = srgb_from_acescg(balance.apply(light));
             assert!(shown.iter().all(|value| (value - 1.0).abs() < 1e-4), "{temperature} K: {shown:?}");
             let back = balance.invert(balance.apply(light));
             assert!(light.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-5), "{temperature} K: {back:?}");
             assert!((luminance(balance.apply(light)) - 1.0).abs() < 1e-4);
         }
-        let [r, g, b] = srgb_from_acescg(WhiteBalance::of_black_body(4000.0).apply([1.0; 3]));
+        let [r, g, b] = srgb_from_acescg(WhiteBalance::from_black_body(4000.0).apply([1.0; 3]));
         assert!(r < 0.8 && b > 1.3 && (0.8..1.1).contains(&g), "{r} {g} {b}");
     }
 

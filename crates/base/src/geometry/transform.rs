@@ -22,17 +22,17 @@ impl Transform {
     }
 
     /// World-space point of a local point.
-    pub fn to_world(&self, point: DVec3) -> DVec3 {
+    pub fn point_in_world(&self, point: DVec3) -> DVec3 {
         self.position + self.rotation * (point * self.scale)
     }
 
     /// Local point of a world-space point.
-    pub fn to_local(&self, point: DVec3) -> DVec3 {
+    pub fn point_in_local(&self, point: DVec3) -> DVec3 {
         self.rotation.inverse() * (point - self.position) / self.scale
     }
 
     /// World-space direction of a local direction; the length is unchanged.
-    pub fn transform_direction(&self, direction: DVec3) -> DVec3 {
+    pub fn direction_in_world(&self, direction: DVec3) -> DVec3 {
         self.rotation * direction
     }
 }
@@ -52,14 +52,14 @@ mod tests {
     fn turns_are_about_x_then_y_then_z() {
         let placement = Transform::new([1.0, 0.0, 0.0], [90.0, 0.0, 90.0], 2.0);
         // y turns to z about x, and z stays when turned about z; x turns to y.
-        assert!((placement.to_world(DVec3::Y) - DVec3::new(1.0, 0.0, 2.0)).length() < 1e-12);
-        assert!((placement.transform_direction(DVec3::X) - DVec3::Y).length() < 1e-12);
+        assert!((placement.point_in_world(DVec3::Y) - DVec3::new(1.0, 0.0, 2.0)).length() < 1e-12);
+        assert!((placement.direction_in_world(DVec3::X) - DVec3::Y).length() < 1e-12);
     }
 
     #[test]
     fn there_and_back_is_the_same_point() {
         let placement = Transform::new([1.0, -2.0, 3.0], [10.0, 20.0, 30.0], 0.3);
         let point = DVec3::new(0.4, 5.0, -6.0);
-        assert!((placement.to_local(placement.to_world(point)) - point).length() < 1e-12);
+        assert!((placement.point_in_local(placement.point_in_world(point)) - point).length() < 1e-12);
     }
 }

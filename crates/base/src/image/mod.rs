@@ -100,7 +100,7 @@ pub struct Rect {
 
 impl Rect {
     /// The rectangle of a whole picture.
-    pub fn of_size(width: usize, height: usize) -> Self {
+    pub fn from_size(width: usize, height: usize) -> Self {
         Self { x: 0, y: 0, width, height }
     }
 

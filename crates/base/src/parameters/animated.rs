@@ -74,7 +74,7 @@ impl<T: Animate> Animated<T> {
     }
 
     /// Makes it periodic by repeating the interval from 0 to `period` (s, above 0). Returns whether the values at both ends are equal.
-    pub fn close(&mut self, period: f64) -> bool {
+    pub fn make_periodic(&mut self, period: f64) -> bool {
         self.period = None;
         let closes = self.at(0.0) == self.at(period);
         self.period = Some(period);
@@ -88,7 +88,7 @@ impl<T: Animate> Animated<T> {
     }
 
     /// Time derivative at time `t`, per second; see [`Curve::derivative`].
-    pub fn rate(&self, t: f64) -> T {
+    pub fn derivative(&self, t: f64) -> T {
         let (_, t) = self.split_period(t);
         self.map_components(|_| 0.0, |curve| curve.derivative(t))
     }
@@ -165,7 +165,7 @@ mod tests {
     fn constants_hold_for_all_time() {
         let constant = Animated::from([1.0, 2.0, 3.0]);
         assert_eq!(constant.at(-7.0), [1.0, 2.0, 3.0]);
-        assert_eq!(constant.rate(1.0), [0.0; 3]);
+        assert_eq!(constant.derivative(1.0), [0.0; 3]);
         assert_eq!(constant.integral(1.0, 3.0), [2.0, 4.0, 6.0]);
         assert_eq!(constant.constant(), Some([1.0, 2.0, 3.0]));
         assert_eq!(constant.bounds(), [[1.0, 2.0, 3.0]; 2]);
@@ -176,10 +176,10 @@ mod tests {
     fn what_repeats_has_the_same_values_and_integrals_in_every_period() {
         let once = Animated::keyed(vec![(0.0, 1.0), (1.0, 3.0), (4.0, 1.0)], Interpolation::Linear).unwrap();
         let mut repeating = once.clone();
-        assert!(!repeating.close(3.0) && repeating.close(4.0));
+        assert!(!repeating.make_periodic(3.0) && repeating.make_periodic(4.0));
         for t in [0.0, 0.5, 1.0, 2.75] {
             assert_eq!([-8.0, -4.0, 0.0, 4.0].map(|turn| repeating.at(t + turn)), [once.at(t); 4]);
-            assert_eq!(repeating.rate(t + 4.0), once.rate(t));
+            assert_eq!(repeating.derivative(t + 4.0), once.derivative(t));
         }
         // The mean is 2: 3 s from the second half of a period into the next but one.
         assert_eq!(repeating.integral(2.0, 2.0 + 12.0), 24.0);
@@ -191,7 +191,7 @@ mod tests {
         let keys = vec![(0.0, [0.5, 0.0, 0.0]), (4.0, [2.0, 0.0, -8.0])];
         let wind = Animated::keyed(keys.clone(), Interpolation::Linear).unwrap();
         assert_eq!(wind.at(2.0), [1.25, 0.0, -4.0]);
-        assert_eq!(wind.rate(2.0), [0.375, 0.0, -2.0]);
+        assert_eq!(wind.derivative(2.0), [0.375, 0.0, -2.0]);
         assert_eq!(wind.integral(-1.0, 5.0), [0.5 + 5.0 + 2.0, 0.0, -24.0]);
         assert_eq!(wind.bounds(), [[0.5, 0.0, -8.0], [2.0, 0.0, 0.0]]);
         assert_eq!((wind.constant(), wind.keys(), wind.interpolation()), (None, keys, Interpolation::Linear));

@@ -233,7 +233,7 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
     }
 
     fn close_loop(&mut self, period: f64) -> Option<String> {
-        (!self.close(period)).then(String::new)
+        (!self.make_periodic(period)).then(String::new)
     }
 }
 

@@ -73,7 +73,7 @@ pub struct View {
     /// Camera at the middle of the exposure.
     pub camera: Camera,
     /// Parameters of the camera over time.
-    pub path: CameraParameters,
+    pub camera_parameters: CameraParameters,
     /// When the shutter is open.
     pub shutter: Shutter,
     /// Middle of the next frame's exposure, for motion vectors, s.
@@ -96,17 +96,23 @@ pub struct View {
 
 impl View {
     /// The view for `shutter` of a picture of `size` pixels plus `overscan` pixels on every side.
-    pub fn new(path: CameraParameters, shutter: Shutter, next_middle: f64, size: [usize; 2], overscan: usize) -> Self {
-        let camera = path.at(shutter.middle(), size).with_overscan(overscan);
+    pub fn new(
+        camera_parameters: CameraParameters,
+        shutter: Shutter,
+        next_middle: f64,
+        size: [usize; 2],
+        overscan: usize,
+    ) -> Self {
+        let camera = camera_parameters.at(shutter.middle(), size).with_overscan(overscan);
         let size = size.map(|side| side + 2 * overscan);
         Self {
             camera,
-            path,
+            camera_parameters,
             shutter,
             next_middle,
             size,
             overscan,
-            window: Rect::of_size(size[0], size[1]),
+            window: Rect::from_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
             aovs_requested: false,
@@ -143,7 +149,7 @@ impl View {
             view.mirror = Some(height);
             view.aovs_requested = false;
         });
-        mirrored.with_window(Rect::of_size(self.size[0], self.size[1]))
+        mirrored.with_window(Rect::from_size(self.size[0], self.size[1]))
     }
 
     /// Largest motion of the sky in the picture during the exposure, pixels.
@@ -187,7 +193,7 @@ impl View {
     /// The camera at time `t`.
     pub fn camera_at(&self, t: f64) -> Camera {
         let display = self.size.map(|side| side - 2 * self.overscan);
-        let camera = self.path.at(t, display).with_overscan(self.overscan);
+        let camera = self.camera_parameters.at(t, display).with_overscan(self.overscan);
         self.mirror.map_or(camera, |height| camera.mirrored(height))
     }
 }

@@ -156,7 +156,7 @@ pub struct Backdrop {
     /// The pixels, from the upper left corner of the picture; the last ones may extend beyond its edges.
     pub image: Image<4>,
     /// Side of one of these pixels in pixels of the picture.
-    pub side: usize,
+    pub pixel_size: usize,
 }
 
 /// The surroundings in which a phenomenon is drawn: wind, air, sky, and what all others published.
@@ -182,7 +182,7 @@ static STANDARD_AIR: LazyLock<Air> = LazyLock::new(Air::default);
 
 impl<'a> Surroundings<'a> {
     /// Surroundings with only a wind, in default air.
-    pub fn of_wind(wind: &'a Wind) -> Self {
+    pub fn from_wind(wind: &'a Wind) -> Self {
         Self {
             wind,
             air: &STANDARD_AIR,

@@ -51,7 +51,7 @@ impl Occluder {
                 let beyond = (rotation.inverse() * (point - *center)).abs() - *half_extents;
                 beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0)
             }
-            Self::Mesh { distance, placement } => distance.at(placement.to_local(point)) * placement.scale,
+            Self::Mesh { distance, placement } => distance.at(placement.point_in_local(point)) * placement.scale,
         }
     }
 
@@ -64,7 +64,7 @@ impl Occluder {
                 *rotation * cuboid_normal(rotation.inverse() * (point - *center), *half_extents)
             }
             Self::Mesh { distance, placement } => {
-                placement.transform_direction(distance.normal(placement.to_local(point)))
+                placement.direction_in_world(distance.normal(placement.point_in_local(point)))
             }
         }
     }
@@ -105,7 +105,7 @@ mod tests {
     fn a_mesh_is_measured_where_it_stands() {
         let placement = Transform::new([10.0, 0.0, 0.0], [0.0, 30.0, 0.0], 2.0);
         let mesh = Occluder::Mesh { distance: Arc::new(DistanceField::new(&mesh::cube())), placement };
-        let above = placement.to_world(DVec3::new(0.5, 1.02, 0.5));
+        let above = placement.point_in_world(DVec3::new(0.5, 1.02, 0.5));
         assert!((mesh.signed_distance(above) - 0.04).abs() < 1e-3);
         assert!((mesh.normal(above) - DVec3::Y).length() < 1e-3);
     }

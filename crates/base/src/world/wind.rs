@@ -55,7 +55,7 @@ impl Wind {
             key.uniforms(1, 0, Purpose::named("gusts")).first_chunk().map_or([0.0; 3], |u: &[f32; 3]| u.map(f64::from)),
         );
         if let Some(seconds) = loop_s {
-            parameters.velocity.close(seconds);
+            parameters.velocity.make_periodic(seconds);
         }
         Self { parameters, gusts, origin: origin * 64.0, loop_s }
     }

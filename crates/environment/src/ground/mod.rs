@@ -141,8 +141,13 @@ impl Run for Ground {
             wetness,
             lake: self.lake(view, surroundings),
             backdrop: surroundings.backdrop.map(|sharp| Backdrop {
-                image: lake_reflection::blurred_reflection(&sharp.image, sharp.side, view, self.surface.mean_slope()),
-                side: sharp.side,
+                image: lake_reflection::blurred_reflection(
+                    &sharp.image,
+                    sharp.pixel_size,
+                    view,
+                    self.surface.mean_slope(),
+                ),
+                pixel_size: sharp.pixel_size,
             }),
         }))
     }

@@ -120,7 +120,7 @@ impl PreparedGround<'_> {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
         let position = DVec2::new(hit.point.x, hit.point.z);
         let microfacets = self.surface.microfacets(position, hit.footprint, sample.film);
-        let backdrop = self.backdrop.as_ref().map(|Backdrop { image, side }| {
+        let backdrop = self.backdrop.as_ref().map(|Backdrop { image, pixel_size: side }| {
             let [red, green, blue, _] = image.sample_bilinear(hit.pixel / *side as f64);
             [red, green, blue]
         });
@@ -179,7 +179,7 @@ impl PreparedGround<'_> {
 impl Prepared for PreparedGround<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let all = DepthInterval { near: 0.0, far: HORIZON };
-        if slice.overlaps(&all) { Rect::of_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
+        if slice.overlaps(&all) { Rect::from_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

@@ -27,10 +27,10 @@ fn view() -> View {
 fn drawn(parameters: GroundParameters, lights: Vec<Light>, reflection: Option<&Image<4>>) -> Strip {
     let ground = Ground::new(parameters, 1, None);
     let (view, wind) = (view(), Wind::new(WindParameters::default(), 1, None));
-    let mut surroundings = Surroundings { reflection, ..Surroundings::of_wind(&wind) };
+    let mut surroundings = Surroundings { reflection, ..Surroundings::from_wind(&wind) };
     surroundings.others.lights = lights;
     let mut strip = Strip::default();
-    strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+    strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
     ground.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
     strip
 }
@@ -75,9 +75,9 @@ fn nothing_is_drawn_above_the_horizon_or_from_below() {
     let ground = Ground::new(plain(), 1, None);
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, SIZE, 0);
     let wind = Wind::new(WindParameters::default(), 1, None);
-    let surroundings = Surroundings::of_wind(&wind);
+    let surroundings = Surroundings::from_wind(&wind);
     let mut strip = Strip::default();
-    strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+    strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
     ground.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
     assert!(strip.transmittance_planes().is_none());
 }
@@ -117,7 +117,7 @@ fn a_wall_stays_dry_three_centimetres_above_the_ground() {
     let camera = CameraParameters { position: [0.0, 1.6, 6.0].into(), ..CameraParameters::default() };
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, size, 0);
     let wind = Wind::new(WindParameters::default(), 1, None);
-    let surroundings = Surroundings::of_wind(&wind);
+    let surroundings = Surroundings::from_wind(&wind);
     // What the ground lets through of a plate that stands everywhere this high above the ground, in a row 6 m away.
     let transmittance = |above: f64, plate_tolerance: f64| {
         let wet =

@@ -308,9 +308,9 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [64, 64], 0);
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let surroundings = Surroundings::of_wind(&wind);
+        let surroundings = Surroundings::from_wind(&wind);
         let mut strip = Strip::default();
-        strip.reset(Rect::of_size(64, 64), None, 0);
+        strip.reset(Rect::from_size(64, 64), None, 0);
         lamps.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
         let pixel = distance / view.camera.focal_pixels;
         strip.radiance[1].iter().map(|value| f64::from(*value)).sum::<f64>() * pixel * pixel

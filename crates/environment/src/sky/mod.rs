@@ -367,7 +367,7 @@ impl Prepared for PreparedSky<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let hills = self.skyline.is_some() && slice.overlaps(&self.hills);
         if hills || slice.overlaps(&FAR) {
-            Rect::of_size(self.view.size[0], self.view.size[1])
+            Rect::from_size(self.view.size[0], self.view.size[1])
         } else {
             Rect::default()
         }
@@ -411,10 +411,10 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 0.0, close: 1.0 }, 0.0, [240, 160], 0);
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let surroundings = Surroundings { sky: parameters.at(0.5), ..Surroundings::of_wind(&wind) };
+        let surroundings = Surroundings { sky: parameters.at(0.5), ..Surroundings::from_wind(&wind) };
         let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
         let mut strip = Strip::default();
-        strip.reset(Rect::of_size(240, 160), None, 0);
+        strip.reset(Rect::from_size(240, 160), None, 0);
         prepared.draw(&DepthInterval::ALL, &mut strip);
         assert!((0..strip.len()).all(|pixel| strip.transmittance(pixel)[1] < 1e-5), "the sky is opaque");
         strip.radiance[1].clone()
@@ -452,7 +452,7 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [150, 90], 0);
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let surroundings = Surroundings { sky: backdrop.parameters.at(0.0), ..Surroundings::of_wind(&wind) };
+        let surroundings = Surroundings { sky: backdrop.parameters.at(0.0), ..Surroundings::from_wind(&wind) };
         let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).expect("nobody asks to stop");
         let depths: Vec<f32> = (0..150 * 90).map(|pixel| if pixel % 3 == 0 { 5.0 } else { f32::INFINITY }).collect();
         let mut strip = Strip::default();
@@ -466,7 +466,7 @@ mod tests {
     fn a_sky_that_is_shown_again_is_the_same() {
         let parameters = SkyParameters { kind: SkyKind::Night, ..SkyParameters::default() };
         let shown = SkyBackdrop::new(parameters.clone(), 3);
-        let whole = Rect::of_size(150, 90);
+        let whole = Rect::from_size(150, 90);
         for (rect, has_plate) in [
             (whole, false),
             (whole, false),
@@ -490,10 +490,10 @@ mod tests {
         let shutter = Shutter { open: 0.0, close: 0.0 };
         let view = View::new(CameraParameters::default(), shutter, 0.0, [16, 8], 0);
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let surroundings = Surroundings { sky: parameters.at(0.0), ..Surroundings::of_wind(&wind) };
+        let surroundings = Surroundings { sky: parameters.at(0.0), ..Surroundings::from_wind(&wind) };
         let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
         let mut strip = Strip::default();
-        strip.reset(Rect::of_size(16, 8), None, 0);
+        strip.reset(Rect::from_size(16, 8), None, 0);
         prepared.draw(&FAR, &mut strip);
         assert!(strip.radiance[1].iter().all(|value| *value > 0.0));
         assert_eq!(strip.transmittance(77), [0.0; 3]);

@@ -42,7 +42,7 @@ fn view(lens: Lens, t: f64) -> View {
 fn with_wind<T>(velocity: [f64; 3], use_it: impl FnOnce(&Surroundings) -> T) -> T {
     let parameters = WindParameters { velocity: Animated::from(velocity), ..WindParameters::default() };
     let wind = Wind::new(parameters, 3, None);
-    use_it(&Surroundings::of_wind(&wind))
+    use_it(&Surroundings::from_wind(&wind))
 }
 
 /// All planes of a picture drawn in strips of `height` rows, with AOVs.
@@ -194,10 +194,10 @@ fn a_seamless_loop_ends_where_it_began() {
     let sheet = sheet(rich(), Some(3.0));
     let planes = |t| {
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let calm = Surroundings::of_wind(&wind);
+        let calm = Surroundings::from_wind(&wind);
         let view = view(Lens::Perspective, t);
         let mut strip = Strip::default();
-        strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+        strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
         sheet.prepare(&view, &calm, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
         strip.radiance[0].clone()
     };
@@ -240,7 +240,7 @@ fn the_wind_bends_the_flame_the_way_it_blows() {
     let centroid = |velocity| {
         with_wind(velocity, |surroundings| {
             let mut strip = Strip::default();
-            strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+            strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
             let view = view(Lens::Perspective, 2.0);
             sheet.prepare(&view, surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
             let weight: f32 = strip.radiance[0].iter().sum();
@@ -295,7 +295,7 @@ fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
             row_band: rows,
             minification: f32::INFINITY,
         };
-        let rect = Rect::of_size(320, 480);
+        let rect = Rect::from_size(320, 480);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
         dispatch!(Level::new(), simd => draw_rows(simd, &context, rect, &mut strip));
@@ -352,7 +352,7 @@ fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
             row_band: 2,
             minification,
         };
-        let rect = Rect::of_size(size[0], size[1]);
+        let rect = Rect::from_size(size[0], size[1]);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
         dispatch!(Level::new(), simd => draw_rows(simd, &context, rect, &mut strip));

@@ -109,7 +109,7 @@ mod tests {
         {
             let streak = Streak::new(DVec2::new(20.3, 20.9), to, radius, [3.0, 2.0, 1.0], 0.37, 2.0).unwrap();
             let mut strip = Strip::default();
-            strip.reset(Rect::of_size(64, 64), None, 0);
+            strip.reset(Rect::from_size(64, 64), None, 0);
             streak.draw([64, 64], &mut strip);
             let sum: f32 = strip.radiance[0].iter().sum();
             assert!((sum - 3.0 * 0.37).abs() < 1e-4, "{sum}");

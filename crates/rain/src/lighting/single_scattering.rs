@@ -92,7 +92,7 @@ fn halo_rect(lamp: DVec2, size: [usize; 2]) -> Rect {
     let [left, top] = [lamp.x - HALO_RADIUS, lamp.y - HALO_RADIUS].map(|side| side.max(0.0) as usize);
     let [right, bottom] = [lamp.x + HALO_RADIUS, lamp.y + HALO_RADIUS].map(|side| side.max(0.0) as usize);
     let rect = Rect { x: left, y: top, width: right - left, height: bottom - top };
-    rect.intersection(&Rect::of_size(size[0], size[1]))
+    rect.intersection(&Rect::from_size(size[0], size[1]))
 }
 
 /// Distance of a ray transmittance the camera from the point at `offset` from the camera, m.

@@ -31,7 +31,7 @@ pub(crate) struct TileGrid {
 
 impl TileGrid {
     pub(crate) fn new(view: &View, side: usize) -> Self {
-        Self::over(view, side, Rect::of_size(view.size[0], view.size[1]))
+        Self::over(view, side, Rect::from_size(view.size[0], view.size[1]))
     }
 
     /// The grid over a rectangle of the picture.

@@ -184,7 +184,7 @@ impl Prepared for PreparedRain<'_> {
     }
 
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
-        Rect::of_size(self.view.size[0], self.view.size[1])
+        Rect::from_size(self.view.size[0], self.view.size[1])
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

@@ -14,7 +14,7 @@ fn statistics(method: super::Method, rate: f64, frames: u64) -> [[f64; 2]; BANDS
     let mut sums = [[0.0; 2]; BANDS];
     for frame in 0..frames {
         let rain = rain(streaks(method, rate), 100 + frame / 4);
-        let strip = draw(&rain, &view_at(1.7 * (frame % 4) as f64, 1.0 / 60.0, SIZE), &Surroundings::of_wind(&calm));
+        let strip = draw(&rain, &view_at(1.7 * (frame % 4) as f64, 1.0 / 60.0, SIZE), &Surroundings::from_wind(&calm));
         for (index, opacity) in opacity(&strip).into_iter().enumerate() {
             let band = index / SIZE[0] * BANDS / SIZE[1];
             sums[band][0] += f64::from(opacity);
@@ -62,7 +62,7 @@ fn correlation(picture: &[f32], shifted: &[f32], width: usize, lag: usize) -> f6
 fn nothing_repeats_at_the_distance_of_cells() {
     const LARGE: [usize; 2] = [1920, 1080];
     let calm = wind([0.0; 3], 0.0);
-    let surroundings = Surroundings::of_wind(&calm);
+    let surroundings = Surroundings::from_wind(&calm);
     let rain = rain(streaks(super::Method::Billboards, 20.0), 3);
     let picture = opacity(&draw(&rain, &view_at(0.7, 1.0 / 60.0, LARGE), &surroundings));
     // A cell is 1883 / depth pixels wide: from the end of the region at 5.5 m up to 1.2 m.
@@ -73,7 +73,7 @@ fn nothing_repeats_at_the_distance_of_cells() {
 #[test]
 fn a_cell_that_has_fallen_by_its_height_holds_other_drops() {
     let calm = wind([0.0; 3], 0.0);
-    let surroundings = Surroundings::of_wind(&calm);
+    let surroundings = Surroundings::from_wind(&calm);
     let parameters = super::RainParameters { diameters_mm: vec![1.4], ..streaks(super::Method::Billboards, 50.0) };
     let rain = rain(parameters, 3);
     let speed = rain.classes(0.0, &calm, 0.0, 0.0..=1.0)[0].speed;

@@ -23,7 +23,7 @@ const SIZE: [usize; 2] = [160, 90];
 fn lit_by(parameters: RainParameters, lights: Vec<Light>, white: Option<f64>) -> Strip {
     let calm = wind([0.0; 3], 0.0);
     let others = Publication { lights, ..Publication::default() };
-    let surroundings = Surroundings { others, ..Surroundings::of_wind(&calm) };
+    let surroundings = Surroundings { others, ..Surroundings::from_wind(&calm) };
     let mut view = view_at(1.0, 1.0 / 60.0, SIZE);
     view.white_luminance = white;
     draw(&rain(parameters, 1), &view, &surroundings)
@@ -95,10 +95,10 @@ fn the_thickest_veil_around_lamps_stays_finite() {
     };
     let (view, calm) = (view_at(1.0, 1.0 / 60.0, [48, 27]), wind([0.0; 3], 0.0));
     let others = Publication { lights: vec![light], ..Publication::default() };
-    let surroundings = Surroundings { others, ..Surroundings::of_wind(&calm) };
+    let surroundings = Surroundings { others, ..Surroundings::from_wind(&calm) };
     for slice in [[0.0, 1e5], [800.0, 1600.0], [4000.0, 1e5]] {
         let slice = DepthInterval { near: slice[0], far: slice[1] };
-        let strip = draw_part(&rain(thick.clone(), 1), &view, &surroundings, Rect::of_size(48, 27), &slice);
+        let strip = draw_part(&rain(thick.clone(), 1), &view, &surroundings, Rect::from_size(48, 27), &slice);
         assert!(strip.radiance.iter().flatten().all(|value| value.is_finite()), "{slice:?}");
     }
 }

@@ -59,7 +59,7 @@ pub(super) fn lamp(position: [f64; 3], intensity: f32) -> Light {
 
 /// A whole picture in one strip.
 pub(super) fn draw(rain: &Rain, view: &View, surroundings: &Surroundings) -> Strip {
-    draw_part(rain, view, surroundings, Rect::of_size(view.size[0], view.size[1]), &DepthInterval::ALL)
+    draw_part(rain, view, surroundings, Rect::from_size(view.size[0], view.size[1]), &DepthInterval::ALL)
 }
 
 pub(super) fn draw_part(
@@ -84,7 +84,7 @@ pub(super) fn opacity(strip: &Strip) -> Vec<f32> {
 fn lit(wind: &Wind) -> Surroundings<'_> {
     let lights = vec![lamp([0.8, 3.0, -3.0], 500.0)];
     let sky = SkyParameters { luminance: 20.0.into(), ..SkyParameters::default() }.at(0.0);
-    Surroundings { sky, others: Publication { lights, ..Publication::default() }, ..Surroundings::of_wind(wind) }
+    Surroundings { sky, others: Publication { lights, ..Publication::default() }, ..Surroundings::from_wind(wind) }
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn slices_of_depth_come_to_the_whole() {
     let wind = wind([0.0; 3], 0.0);
     let surroundings = lit(&wind);
     let view = view_at(1.0, 0.02, [96, 54]);
-    let rect = Rect::of_size(96, 54);
+    let rect = Rect::from_size(96, 54);
     for method in METHODS {
         let rain = rain(RainParameters { method, ..RainParameters::default() }, 1);
         let whole = draw(&rain, &view, &surroundings);
@@ -193,12 +193,12 @@ fn depth_and_diameter_are_those_of_the_nearest_streak() {
 fn splashes_stay_near_the_ground_and_grow_with_the_rain() {
     let calm = wind([0.0; 3], 0.0);
     let mut view = view_at(1.0, 0.02, [160, 90]);
-    view.path.target = Animated::from([0.0, 0.6, -4.0]);
-    let view = View::new(view.path, view.shutter, 1.1, view.size, 0);
+    view.camera_parameters.target = Animated::from([0.0, 0.6, -4.0]);
+    let view = View::new(view.camera_parameters, view.shutter, 1.1, view.size, 0);
     let picture = |rate: f64, amount: f64| {
         let mut parameters = streaks(Method::Drops, rate);
         parameters.splashes.amount = amount;
-        opacity(&draw(&rain(parameters, 1), &view, &Surroundings::of_wind(&calm)))
+        opacity(&draw(&rain(parameters, 1), &view, &Surroundings::from_wind(&calm)))
     };
     // How much splashes add to the rows above and below the one that shows 0.3 m above the ground at the end of their reach.
     let end = bansho_base::math::DVec3::new(0.0, 0.3, -8.0);
@@ -224,7 +224,7 @@ fn the_plate_hides_all_rain_behind_it() {
         let draw = |depth: f32| {
             let plate = vec![depth; 96];
             let mut strip = Strip::default();
-            strip.reset(Rect::of_size(96, 54), Some(&|_| &plate), 0);
+            strip.reset(Rect::from_size(96, 54), Some(&|_| &plate), 0);
             prepared.draw(&DepthInterval::ALL, &mut strip);
             strip
         };
@@ -250,8 +250,8 @@ fn any_rain_gives_finite_pictures() {
                 let wind = wind([speed, 0.0, -0.5 * speed], 0.5);
                 let rain = rain(RainParameters { rate_mm_per_h: 300.0.into(), method, ..RainParameters::default() }, 2);
                 let mut view = view_at(2.0, exposure, [48, 27]);
-                view.path.lens = lens;
-                let view = View::new(view.path, view.shutter, 2.1, view.size, 0);
+                view.camera_parameters.lens = lens;
+                let view = View::new(view.camera_parameters, view.shutter, 2.1, view.size, 0);
                 let strip = draw(&rain, &view, &lit(&wind));
                 assert!(strip.radiance.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
                 assert!((0..strip.len()).all(|index| (0.0..=1.0).contains(&strip.transmittance(index)[0])));
@@ -274,11 +274,11 @@ fn diameters_must_ascend() {
 fn rain_shows_against_dark_and_vanishes_against_an_even_sky() {
     let wind = wind([0.0; 3], 0.0);
     let sky = SkyParameters { kind: SkyKind::Uniform, luminance: 100.0.into(), ..SkyParameters::default() }.at(0.0);
-    let surroundings = Surroundings { sky, ..Surroundings::of_wind(&wind) };
+    let surroundings = Surroundings { sky, ..Surroundings::from_wind(&wind) };
     let mut view = view_at(1.0, 0.02, [96, 54]);
     // Half way up, where hardly any drop shows the ground.
-    view.path.target = Animated::from([0.0, 5.0, -4.0]);
-    let view = View::new(view.path, view.shutter, 2.1, view.size, 0);
+    view.camera_parameters.target = Animated::from([0.0, 5.0, -4.0]);
+    let view = View::new(view.camera_parameters, view.shutter, 2.1, view.size, 0);
     for method in METHODS {
         let rain = rain(RainParameters { method, rate_mm_per_h: 50.0.into(), ..RainParameters::default() }, 1);
         let strip = draw(&rain, &view, &surroundings);

@@ -40,7 +40,7 @@ fn streaks_lean_with_the_wind_and_with_the_camera() {
     for (speed, expected) in [(0.0, 0), (2.6, 4), (-5.17, -8), (10.3, 16)] {
         for method in METHODS {
             let wind = wind([speed, 0.0, 0.0], 0.0);
-            let surroundings = Surroundings::of_wind(&wind);
+            let surroundings = Surroundings::from_wind(&wind);
             let strip = draw(&rain(one_size(method), 1), &view_at(1.0, 1.0 / 30.0, SIZE), &surroundings);
             let found = slant(&opacity(&strip), 8);
             assert!((found - expected).abs() <= 1, "{method:?}, wind {speed}: {found} {expected}");
@@ -51,10 +51,10 @@ fn streaks_lean_with_the_wind_and_with_the_camera() {
                 let at = |t: f64| [start[0] - speed * (t - 1.0), start[1], start[2]];
                 Animated::keyed(vec![(0.0, at(0.0)), (2.0, at(2.0))], Interpolation::Linear).unwrap()
             };
-            view.path.position = moving([0.0, 1.6, 0.0]);
-            view.path.target = moving([0.0, 1.9, -4.0]);
-            let view = View::new(view.path, view.shutter, 1.1, SIZE, 0);
-            let strip = draw(&rain(one_size(method), 1), &view, &Surroundings::of_wind(&calm));
+            view.camera_parameters.position = moving([0.0, 1.6, 0.0]);
+            view.camera_parameters.target = moving([0.0, 1.9, -4.0]);
+            let view = View::new(view.camera_parameters, view.shutter, 1.1, SIZE, 0);
+            let strip = draw(&rain(one_size(method), 1), &view, &Surroundings::from_wind(&calm));
             let found = slant(&opacity(&strip), 8);
             assert!((found - expected).abs() <= 1, "{method:?}, camera {speed}: {found} {expected}");
         }
@@ -96,14 +96,14 @@ fn lengths(strip: &Strip, focal_pixels: f64, fall: f64) -> Vec<[f64; 2]> {
 #[test]
 fn streaks_are_as_long_as_drops_fall_while_the_shutter_is_open() {
     let calm = wind([0.0; 3], 0.0);
-    let surroundings = Surroundings::of_wind(&calm);
+    let surroundings = Surroundings::from_wind(&calm);
     for method in METHODS {
         let (mut measured, mut whole) = (0, 0);
         for seed in 0..12 {
             let parameters = RainParameters { diameters_mm: vec![2.0], ..streaks(method, 1.0) };
             let mut view = view_at(1.0, 1.0 / 60.0, SIZE);
-            view.path.target = Animated::from([0.0, 1.6, -4.0]);
-            let view = View::new(view.path, view.shutter, 1.1, SIZE, 0);
+            view.camera_parameters.target = Animated::from([0.0, 1.6, -4.0]);
+            let view = View::new(view.camera_parameters, view.shutter, 1.1, SIZE, 0);
             let strip = draw(&rain(parameters, seed), &view, &surroundings);
             for [found, expected] in lengths(&strip, view.camera.focal_pixels, 6.49 / 60.0) {
                 assert!(found < expected + 1.0, "{method:?}: {found} {expected}");
@@ -118,7 +118,7 @@ fn streaks_are_as_long_as_drops_fall_while_the_shutter_is_open() {
 #[test]
 fn a_loop_closes_and_a_rate_rises_without_a_jump() {
     let gusty = wind([0.0; 3], 0.0);
-    let surroundings = Surroundings::of_wind(&gusty);
+    let surroundings = Surroundings::from_wind(&gusty);
     for method in METHODS {
         let rain = Rain::new(streaks(method, 20.0), "rain", 1, Some(2.0)).unwrap();
         let [first, last] = [0.3, 2.3].map(|t| opacity(&draw(&rain, &view_at(t, 1.0 / 60.0, SIZE), &surroundings)));

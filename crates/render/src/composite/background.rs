@@ -256,7 +256,7 @@ mod tests {
     fn read(angle: [f32; 2], depth: Option<&[f32]>, x: usize, y: usize) -> f32 {
         let values = [0.0, 1.0, 2.0, 10.0, 11.0, 12.0];
         let angles = Image::filled(3, 2, angle);
-        let air = Deflection { depth: 2.0, rect: Rect::of_size(3, 2), angle: &angles };
+        let air = Deflection { depth: 2.0, rect: Rect::from_size(3, 2), angle: &angles };
         let mut row = [Source::default(); 3];
         Bend { air, focal_pixels: 1.0 }.trace_row(0, y, [3, 2], depth, &mut row);
         row[x].read(&values, 3 * y + x, 3)
@@ -274,13 +274,13 @@ mod tests {
     fn pictures_of_one_column_or_row_bend_along_it() {
         for (size, angle) in [([1, 3], [0.0, -0.5]), ([3, 1], [0.5, 0.0])] {
             let angles = Image::filled(size[0], size[1], angle);
-            let air = Deflection { depth: 2.0, rect: Rect::of_size(size[0], size[1]), angle: &angles };
+            let air = Deflection { depth: 2.0, rect: Rect::from_size(size[0], size[1]), angle: &angles };
             let mut sources = Sources::default();
             let colour = Image::from_pixels(size[0], size[1], [1.0, 2.0, 4.0].map(|v| [v; 4]).to_vec()).unwrap();
             let bend = Some(Bend { air, focal_pixels: 1.0 });
             let behind = Behind { colour: Some(&colour), depth: None, channels: &[], bend };
-            behind.trace(Rect::of_size(size[0], size[1]), &mut sources);
-            let seen = behind.plane(&[1.0, 2.0, 4.0], Rect::of_size(size[0], size[1]), &sources, size[0]);
+            behind.trace(Rect::from_size(size[0], size[1]), &mut sources);
+            let seen = behind.plane(&[1.0, 2.0, 4.0], Rect::from_size(size[0], size[1]), &sources, size[0]);
             assert_eq!(seen, [1.5, 3.0, 4.0], "{size:?}");
         }
     }

@@ -101,7 +101,7 @@ pub(crate) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<
         }
     });
     lay_sky(&mut coarse, view, sky, COARSE);
-    Some(Backdrop { image: coarse, side: COARSE })
+    Some(Backdrop { image: coarse, pixel_size: COARSE })
 }
 
 /// Fine pixels in a coarse one.
@@ -179,7 +179,7 @@ impl March<'_> {
 
     /// The line of sight that leaves the mirror at `from`, `depth` away.
     fn sight(&self, from: DVec3, depth: f64, toward: DVec3) -> Sight {
-        let along = -(self.camera.orientation.transpose() * toward).z;
+        let along = -(self.camera.world_from_camera.transpose() * toward).z;
         if self.camera.lens != Lens::Perspective || along <= 1e-3 {
             return Sight { from, toward, scale: depth, trace: None };
         }

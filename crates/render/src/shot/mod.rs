@@ -113,7 +113,7 @@ impl Shot {
         let frame = match self.compose(&view, &plate, &mirrored, spent, observer)? {
             Some(frame) => frame,
             None => {
-                let all = Rect::of_size(view.size[0], view.size[1]);
+                let all = Rect::from_size(view.size[0], view.size[1]);
                 view = view.with_window(all);
                 let whole = self.compose(&view, &plate, &mirrored, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.context.plan.window)).ok_or(Cancelled)?
@@ -203,7 +203,7 @@ impl Shot {
         observer::check(observer)?;
         // Where nothing lies behind, nothing is bent.
         let behind = plate.colour.is_some() || self.runs.len() > 1;
-        let is_whole = view.window == Rect::of_size(view.size[0], view.size[1]);
+        let is_whole = view.window == Rect::from_size(view.size[0], view.size[1]);
         // Also where the window itself sees nothing bent: a picture before which light is bent is rounded otherwise everywhere.
         if !is_whole && behind && prepared.iter().any(|prepared| prepared.may_bend()) {
             return Ok(None);
@@ -344,6 +344,6 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         header: whole.header,
         opaque: whole.opaque,
         figures: whole.figures,
-        content: Rect::of_size(window.width, window.height),
+        content: Rect::from_size(window.width, window.height),
     })
 }

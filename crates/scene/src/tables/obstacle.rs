@@ -62,7 +62,7 @@ impl ObstacleParameters {
                 rotation: placement.rotation,
             },
             ObstacleShape::Plane => {
-                Occluder::HalfSpace { point: placement.position, normal: placement.transform_direction(DVec3::Y) }
+                Occluder::HalfSpace { point: placement.position, normal: placement.direction_in_world(DVec3::Y) }
             }
             ObstacleShape::Mesh => {
                 let fault = |kind| BuildError { key: "file".into(), kind };

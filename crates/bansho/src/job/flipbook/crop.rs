@@ -142,7 +142,7 @@ impl Finish for LitRegionProbe {
 fn bounds(frame: &Frame, view: &View, least: u16) -> Rect {
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     if frame.opaque {
-        return Rect::of_size(width, height);
+        return Rect::from_size(width, height);
     }
     let DisplayPixels::Sixteen(pixels) = display(frame, view, BitDepth::Sixteen, AlphaConvention::Linear).pixels else {
         return Rect::default();
@@ -168,14 +168,14 @@ mod tests {
     fn what_is_lit_or_hides_something_is_found() {
         let mut frame = testing::blank(&testing::plan(), 0);
         frame.beauty = Image::filled(9, 7, [0.0; 4]);
-        frame.content = Rect::of_size(9, 7);
+        frame.content = Rect::from_size(9, 7);
         let found = |frame: &Frame| bounds(frame, &View::DISPLAY, 1);
         assert!(found(&frame).is_empty());
         frame.beauty.pixels_mut()[2 * 9 + 3] = [0.5, 0.1, 0.0, 0.0];
         frame.beauty.pixels_mut()[4 * 9 + 6] = [0.0, 0.0, 0.0, 0.3];
         assert_eq!(found(&frame), Rect { x: 3, y: 2, width: 4, height: 3 });
         frame.opaque = true;
-        assert_eq!(found(&frame), Rect::of_size(9, 7));
+        assert_eq!(found(&frame), Rect::from_size(9, 7));
     }
 
     #[test]
@@ -185,7 +185,7 @@ mod tests {
         // A small pixel is four, and two are left free: 29 * 4 - 2 = 114, 9 * 4 - 2 = 34.
         assert_eq!(part, Rect { x: 114, y: 34, width: 92, height: 172 });
         let region = Region::of(&Rect { x: 0, y: 0, width: 128, height: 72 }, [128, 72]);
-        assert_eq!(region.within([511, 287]), Rect::of_size(511, 287));
+        assert_eq!(region.within([511, 287]), Rect::from_size(511, 287));
         for size in [[511, 287], [77, 33], [3, 3], [1, 1]] {
             let part = Region::of(&Rect { x: 60, y: 0, width: 9, height: 30 }, [128, 72]).within(size);
             assert!(part.right() <= size[0] && part.bottom() <= size[1] && !part.is_empty(), "{part:?}");

@@ -124,7 +124,7 @@ impl Files {
         for (what, beauty) in [("colour", tile(&colours, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
             let path = self.sheet_path(what);
             let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
-            let content = Rect::of_size(beauty.width(), beauty.height());
+            let content = Rect::from_size(beauty.width(), beauty.height());
             let frame = Frame {
                 header,
                 beauty,

@@ -211,7 +211,7 @@ impl PreparedFlipbook {
             let size = if self.own_size { self.plan.size() } else { region.picture(whole, most)? };
             let part = region.within(size);
             // All of it is drawn as it is without a crop.
-            (part != Rect::of_size(size[0], size[1])).then_some((size, part))
+            (part != Rect::from_size(size[0], size[1])).then_some((size, part))
         };
         let Some((size, part)) = region.and_then(fitting) else { return all() };
         let plan = Arc::new(self.plan.cropped(size, part)?);

@@ -132,7 +132,7 @@ impl Writer {
         let channel =
             |name: &str, values: Vec<f32>| Channel { name: name.to_owned(), precision: Precision::Single, values };
         let channels = vec![channel("opacity", values.to_vec())];
-        let (header, content) = (self.header(file, opacity), Rect::of_size(width, height));
+        let (header, content) = (self.header(file, opacity), Rect::from_size(width, height));
         let frame = Frame { header, beauty, depth: None, channels, opaque: false, figures: Vec::new(), content };
         let path = self.folder.join(file);
         self.keep(&path, &exr::encode(&frame, &path)?)?;

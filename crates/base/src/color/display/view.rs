@@ -78,7 +78,7 @@ impl View {
     /// balance.
     #[must_use]
     pub fn with_white_balance(mut self, temperature_k: Option<f64>) -> Self {
-        self.balance = temperature_k.filter(|_| self.tone.is_some()).map(WhiteBalance::of_black_body);
+        self.balance = temperature_k.filter(|_| self.tone.is_some()).map(WhiteBalance::from_black_body);
         self
     }
 

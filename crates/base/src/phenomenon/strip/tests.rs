@@ -6,7 +6,7 @@ use crate::{camera::Lens, math::curve::Interpolation, parameters::animated::Anim
 #[test]
 fn what_is_drawn_later_lies_behind() {
     let mut strip = Strip::default();
-    strip.reset(Rect::of_size(1, 1), None, 0);
+    strip.reset(Rect::from_size(1, 1), None, 0);
     strip.add_behind(0, [1.0; 3], [0.5; 3], 2.0);
     strip.add_behind(0, [4.0; 3], [0.25; 3], 3.0);
     assert_eq!(strip.radiance[0][0], 3.0);
@@ -17,7 +17,7 @@ fn what_is_drawn_later_lies_behind() {
 #[test]
 fn gray_and_colored_absorption_come_to_the_same() {
     let mut gray = Strip::default();
-    gray.reset(Rect::of_size(2, 1), None, 0);
+    gray.reset(Rect::from_size(2, 1), None, 0);
     let mut colored = gray.clone();
     colored.transmittance_planes_mut();
     for strip in [&mut gray, &mut colored] {
@@ -34,7 +34,7 @@ fn gray_and_colored_absorption_come_to_the_same() {
 #[test]
 fn dissolves_mix_light_and_transmittance_and_keep_what_is_nearest() {
     let mut strip = Strip::default();
-    strip.reset(Rect::of_size(1, 1), Some(&|_| &[9.0]), 2);
+    strip.reset(Rect::from_size(1, 1), Some(&|_| &[9.0]), 2);
     let mut other = strip.empty_like();
     assert_eq!((other.rect, other.plate_depth(0), other.aovs.len()), (strip.rect, 9.0, 2));
     strip.add_behind(0, [8.0; 3], [1.0; 3], 2.0);
@@ -62,7 +62,7 @@ fn the_plate_hides_what_is_not_before_it() {
 #[test]
 fn weighted_means_ignore_the_order_of_samples() {
     let mut strip = Strip::default();
-    strip.reset(Rect::of_size(1, 1), None, 1);
+    strip.reset(Rect::from_size(1, 1), None, 1);
     strip.aovs[0].add(0, 1000.0, 1.0);
     strip.aovs[0].add(0, 2000.0, 3.0);
     assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), 1750.0);

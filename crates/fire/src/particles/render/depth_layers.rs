@@ -183,8 +183,8 @@ impl GasStatistics {
 /// Apparent motion of a static point at the flame while the shutter is open, m in world axes.
 fn camera_motion(position: DVec3, view: &View) -> [f64; 3] {
     let (opened, closed) = (view.camera_at(view.shutter.open), view.camera_at(view.shutter.close));
-    let local = closed.to_camera(position) - opened.to_camera(position);
-    (view.camera.orientation * local).to_array().map(|value| -value)
+    let local = closed.point_in_camera(position) - opened.point_in_camera(position);
+    (view.camera.world_from_camera * local).to_array().map(|value| -value)
 }
 
 #[cfg(test)]

@@ -138,8 +138,8 @@ impl Burner {
         };
         let placement = Transform { position: self.position(t), ..self.placement };
         SpawnPoint {
-            position: placement.to_world(position),
-            direction: placement.transform_direction(direction),
+            position: placement.point_in_world(position),
+            direction: placement.direction_in_world(direction),
             radial_fraction,
         }
     }
@@ -181,7 +181,7 @@ struct Size {
 
 /// Corners of the bounding box of a rotated mesh.
 fn extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
-    let corners = mesh.triangles().flatten().map(|corner| placement.to_world(corner));
+    let corners = mesh.triangles().flatten().map(|corner| placement.point_in_world(corner));
     let primitive_extent = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
     corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent)
 }
@@ -190,7 +190,7 @@ fn extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
 fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
-    let axis = |unit: DVec3, half: f64| placement.transform_direction(unit) * half;
+    let axis = |unit: DVec3, half: f64| placement.direction_in_world(unit) * half;
     let half = match parameters.shape {
         BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
         BurnerShape::Disc => {

@@ -248,7 +248,7 @@ mod tests {
             let (key, wind_field) = (Key::new(1, "flame"), Wind::new(WindParameters::default(), 1, None));
             let turbulence = TurbulenceTile::new(key);
             let step = StepConstants { parameters: &parameters, constants: &constants, turbulence: &turbulence, key };
-            let around = Surroundings::of_wind(&wind_field);
+            let around = Surroundings::from_wind(&wind_field);
             let forces = ExternalForces::new(step, &Particles::default(), &around, 0.0);
             let motion = IntegrationStep {
                 forces: &forces,

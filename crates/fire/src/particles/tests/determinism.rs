@@ -35,10 +35,10 @@ fn any_number_of_threads_gives_the_same_bits() {
         pool.install(|| {
             World::default().run_steps(&mut simulation, -40, 0, |_, _| {});
             let gas = gas(&simulation, &scratch);
-            let around = Surroundings::of_wind(&wind);
+            let around = Surroundings::from_wind(&wind);
             let prepared = PreparedGas::new(gas, &look, &view, &around, &Unobserved).unwrap();
             let mut strip = Strip::default();
-            strip.reset(Rect::of_size(256, 192), None, 0);
+            strip.reset(Rect::from_size(256, 192), None, 0);
             prepared.draw(&DepthInterval::ALL, &mut strip);
             (simulation.particles.len(), snapshot::write(&simulation.particles), strip.radiance)
         })

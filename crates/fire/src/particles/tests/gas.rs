@@ -165,8 +165,8 @@ fn a_thin_plate_lets_nothing_through() {
         let mut parameters = FlameParticlesParameters { particles: 2200, ..Default::default() };
         parameters.preroll_s = Auto::Set(0.0);
         let half_extents = DVec3::new(3.0, 0.5 * thickness, 3.0);
-        let centre = DVec3::Y * 0.6;
-        let plate = Occluder::Cuboid { center: centre, half_extents, rotation: bansho_base::math::DQuat::IDENTITY };
+        let center = DVec3::Y * 0.6;
+        let plate = Occluder::Cuboid { center, half_extents, rotation: bansho_base::math::DQuat::IDENTITY };
         let world = World { occluders: vec![plate], ..World::default() };
         let mut simulation = simulation(&parameters);
         let mut reached = 0;

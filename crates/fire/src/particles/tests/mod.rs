@@ -44,7 +44,7 @@ impl World {
     fn run_steps(&self, simulation: &mut Simulation, first: i64, last: i64, mut each: impl FnMut(&Simulation, f64)) {
         let (wind, air) = (Wind::new(self.wind.clone(), 1, None), Air::default());
         let others = Publication { occluders: self.occluders.clone(), ..Publication::default() };
-        let around = Surroundings { air: &air, others, ..Surroundings::of_wind(&wind) };
+        let around = Surroundings { air: &air, others, ..Surroundings::from_wind(&wind) };
         let seconds = simulation.step_s();
         for step in first..last {
             simulation.step(step as f64 * seconds, &around);

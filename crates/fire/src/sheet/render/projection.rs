@@ -67,9 +67,10 @@ impl PixelToSheet {
         }
         // direction = constant + column px + row py, with a component of 1 along the optical axis.
         let scale = 1.0 / camera.focal_pixels;
-        let column = camera.orientation.col(0) * scale;
-        let row = -camera.orientation.col(1) * scale;
-        let constant = -camera.orientation.col(2) - column * camera.principal_point.x - row * camera.principal_point.y;
+        let column = camera.world_from_camera.col(0) * scale;
+        let row = -camera.world_from_camera.col(1) * scale;
+        let constant =
+            -camera.world_from_camera.col(2) - column * camera.principal_point.x - row * camera.principal_point.y;
         let form = |axis: DVec3| [constant, column, row].map(|direction| axis.dot(direction));
         let inverse_depth = form(normal / offset);
         let on_sheet = |axis: DVec3, size: f64, shift: f64| {
@@ -202,7 +203,7 @@ pub(crate) fn bounds(
     picture: [usize; 2],
 ) -> Rect {
     const STEPS: usize = 12;
-    let whole = Rect::of_size(picture[0], picture[1]);
+    let whole = Rect::from_size(picture[0], picture[1]);
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for i in 0..=STEPS {
         for j in 0..=STEPS {
@@ -270,7 +271,7 @@ mod tests {
         assert!(quad.right.y.abs() < 1e-12 && (quad.right.length() - 1.0).abs() < 1e-12);
         let toward = camera.position - quad.base;
         assert!(quad.right.dot(DVec3::new(toward.x, 0.0, toward.z)).abs() < 1e-12);
-        assert!(quad.right.dot(camera.orientation.col(0)) > 0.9);
+        assert!(quad.right.dot(camera.world_from_camera.col(0)) > 0.9);
     }
 
     #[test]
@@ -309,7 +310,7 @@ mod tests {
     #[test]
     fn what_lies_behind_the_camera_or_nearer_than_near_is_nowhere() {
         let camera = camera(Lens::Perspective);
-        let base = camera.position + camera.orientation.col(2) * 2.0 - DVec3::Y;
+        let base = camera.position + camera.world_from_camera.col(2) * 2.0 - DVec3::Y;
         let behind = UprightQuad::new(base, right_facing(&camera, base), DVec2::ONE, 0.0);
         let batch = seen_batch(&PixelToSheet::new(&camera, &behind).unwrap(), 320, 240);
         assert!(batch.y.iter().all(|y| *y == OUTSIDE));

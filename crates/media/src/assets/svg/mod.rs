@@ -118,8 +118,8 @@ impl SvgReader {
         }
         let points = || self.strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
         let bounds = || [points().fold(DVec2::INFINITY, DVec2::min), points().fold(DVec2::NEG_INFINITY, DVec2::max)];
-        let [low, high] = self.sheet.unwrap_or_else(bounds);
-        Ok(Drawing { strokes: self.strokes, min: low, max: high })
+        let [min, max] = self.sheet.unwrap_or_else(bounds);
+        Ok(Drawing { strokes: self.strokes, min, max })
     }
 }
 

@@ -66,7 +66,7 @@ impl CameraPose {
             return self.looked_around(drag, camera);
         }
         let meters = camera.size[1] / camera.focal_pixels * distance;
-        let shift = (camera.orientation.y_axis * drag.y - camera.orientation.x_axis * drag.x) * meters;
+        let shift = (camera.world_from_camera.y_axis * drag.y - camera.world_from_camera.x_axis * drag.x) * meters;
         Self { position: self.position + shift, target: self.target + shift }.above_ground(self)
     }
 
@@ -102,7 +102,7 @@ fn turned(offset: DVec3, [around, up]: [f64; 2]) -> DVec3 {
 pub(super) fn wind(drag: DVec2, camera: &Camera) -> DVec3 {
     /// Wind of a drag over the whole height, m/s.
     const STRONGEST: f64 = 8.0;
-    let along = camera.orientation.x_axis * drag.x - camera.orientation.y_axis * drag.y;
+    let along = camera.world_from_camera.x_axis * drag.x - camera.world_from_camera.y_axis * drag.y;
     along * STRONGEST
 }
 

@@ -158,10 +158,10 @@ struct PinholeCamera {
 
 impl PinholeCamera {
     fn new(camera: &Camera, origin: DVec3, since: f64) -> Self {
-        let axis = |i: usize| camera.orientation.col(i).as_vec3().to_array();
+        let axis = |i: usize| camera.world_from_camera.col(i).as_vec3().to_array();
         Self {
             axes: [axis(0), axis(1), axis(2)],
-            origin: camera.to_camera(origin).as_vec3().to_array(),
+            origin: camera.point_in_camera(origin).as_vec3().to_array(),
             focal_pixels: camera.focal_pixels as f32,
             center: camera.principal_point.as_vec2().to_array(),
             near: camera.near as f32,

@@ -96,7 +96,7 @@ fn smooth() -> LookParameters {
 /// Prepares the gas and hands it to `each`.
 fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas) -> T) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
-    let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+    let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let scratch = ScratchPool::default();
     each(&PreparedGas::new(gas(particles, &scratch), look, view, &surroundings, &Unobserved).unwrap())
 }
@@ -105,7 +105,7 @@ fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: 
 fn drawn(particles: &Particles, look: &LookParameters, view: &View, aovs: usize, plate: Option<f32>) -> Strip {
     let depths = plate.map(|depth| vec![depth; SIZE[0]]);
     let mut strip = Strip::default();
-    let rect = Rect::of_size(SIZE[0], SIZE[1]);
+    let rect = Rect::from_size(SIZE[0], SIZE[1]);
     match &depths {
         Some(depths) => strip.reset(rect, Some(&|_| depths.as_slice()), aovs),
         None => strip.reset(rect, None, aovs),
@@ -430,11 +430,11 @@ fn lit_ball(ball: Particle, look: &LookParameters, illuminance: f32) -> ([f64; 3
         (view(camera()), ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
     let others = Publication { lights: vec![sun], ..Publication::default() };
-    let surroundings = Surroundings { air: &air, others, ..Surroundings::of_wind(&wind) };
+    let surroundings = Surroundings { air: &air, others, ..Surroundings::from_wind(&wind) };
     let particles = cloud([ball]);
     let prepared = PreparedGas::new(gas(&particles, &scratch), look, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
-    strip.reset(Rect::of_size(SIZE[0], SIZE[1]), None, 0);
+    strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
     prepared.draw(&DepthInterval::ALL, &mut strip);
     let middle = 60 * SIZE[0] + 80;
     ([0, 1, 2].map(|c| f64::from(strip.radiance[c][middle])), 1.0 - f64::from(strip.transmittance(middle)[0]))

@@ -246,7 +246,7 @@ mod tests {
         let mut simulation = Simulation::new(&parameters, constants, Key::new(1, "flame"));
         let gusty = WindParameters { velocity: [2.0, 0.0, 0.0].into(), gust: 1.5, ..WindParameters::default() };
         let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
-        let surroundings = Surroundings { air: &air, ..Surroundings::of_wind(&wind) };
+        let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
         (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &surroundings));
         let Simulation { parameters, constants, turbulence, key, .. } = &simulation;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
