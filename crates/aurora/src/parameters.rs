@@ -1,15 +1,19 @@
 //! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
 use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
-use crate::physics::atmosphere::atmosphere;
-use crate::physics::emission::Emission;
-use crate::physics::extinction::Extinction;
-use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
-use crate::physics::precipitation::spectrum::ARC;
-use crate::physics::precipitation::{Spectrum, TrackModel};
-use bansho_base::host::once::get_or_make;
-use bansho_base::parameters::animated::Animated;
-use bansho_base::parameters::{Auto, Length, Range};
+use crate::{
+    physics::atmosphere::atmosphere,
+    physics::emission::Emission,
+    physics::extinction::Extinction,
+    physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV},
+    physics::precipitation::spectrum::ARC,
+    physics::precipitation::{Spectrum, TrackModel},
+};
+use bansho_base::{
+    host::once::get_or_make,
+    parameters::animated::Animated,
+    parameters::{Auto, Length, Range},
+};
 use std::sync::OnceLock;
 
 /// Range of a fraction.

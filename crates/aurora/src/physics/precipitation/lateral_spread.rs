@@ -4,9 +4,8 @@ use std::sync::OnceLock;
 
 use bansho_base::{host::once::get_or_make, math, math::random::Key};
 
-use super::TrackModel;
 use super::{
-    Deposition,
+    Deposition, TrackModel,
     electron_track::{Collision, TrackSampler, collision_count},
     energy_grid::{self, NODES, node_energy_ev},
     hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},

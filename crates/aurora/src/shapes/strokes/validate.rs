@@ -1,13 +1,17 @@
 //! Converts parameters to drawn sheets and validates them.
 
 use super::intersection::first_crossing;
-use crate::shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch};
-use crate::shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing};
-use bansho_base::geometry::strokes::Drawing;
-use bansho_base::host::assets::{AssetError, AssetProblem, Assets};
-use bansho_base::math::curve::Curve;
-use bansho_base::math::{self, DVec2, smoothstep};
-use bansho_base::parameters::Auto;
+use crate::{
+    shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
+    shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing},
+};
+use bansho_base::{
+    geometry::strokes::Drawing,
+    host::assets::{AssetError, AssetProblem, Assets},
+    math::curve::Curve,
+    math::{self, DVec2, smoothstep},
+    parameters::Auto,
+};
 use std::sync::Arc;
 
 /// Points closer than this are merged, km.

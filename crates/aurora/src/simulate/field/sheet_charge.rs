@@ -1,10 +1,11 @@
 //! Charge on the sheets: scattered particles (thesis, 2.2.3) and their charge as on conductors.
 
 use super::Grid2;
-use crate::simulate::sheets::nodes::split;
-use crate::simulate::sheets::refined_shape::RefinedShape;
-use bansho_base::math::DVec2;
-use bansho_base::math::random::{Key, Purpose, uniform};
+use crate::{simulate::sheets::nodes::split, simulate::sheets::refined_shape::RefinedShape};
+use bansho_base::{
+    math::DVec2,
+    math::random::{Key, Purpose, uniform},
+};
 use rayon::prelude::*;
 
 /// Limits of the change per iteration, and of the charge relative to a long, straight, isolated sheet.

@@ -6,19 +6,21 @@ use bansho_base::{
 };
 
 use super::gas::Gas;
-use crate::particles::render::{
-    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-    resolve::spline,
-    splat::{
-        grid::{Grid, weighted_sum},
-        kernel::Profile,
+use crate::{
+    particles::render::{
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::spline,
+        splat::{
+            grid::{Grid, weighted_sum},
+            kernel::Profile,
+        },
     },
-};
-use crate::particles::{
-    parameters::LookParameters,
-    render::{
-        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
-        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+    particles::{
+        parameters::LookParameters,
+        render::{
+            resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
+            splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+        },
     },
 };
 

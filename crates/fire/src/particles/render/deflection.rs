@@ -9,20 +9,22 @@ use bansho_base::{
 };
 
 use super::{aovs::DEFLECTION, gas::Gas};
-use crate::particles::render::depth_layers::is_visible;
-use crate::particles::render::{
-    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-    resolve::spline,
-    splat::{
-        grid::{Grid, weighted_sum},
-        kernel::Profile,
+use crate::{
+    particles::render::depth_layers::is_visible,
+    particles::render::{
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::spline,
+        splat::{
+            grid::{Grid, weighted_sum},
+            kernel::Profile,
+        },
     },
-};
-use crate::particles::{
-    parameters::LookParameters,
-    render::{
-        resolve::{PATH, PLANES},
-        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+    particles::{
+        parameters::LookParameters,
+        render::{
+            resolve::{PATH, PLANES},
+            splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+        },
     },
 };
 use fearless_simd::{Level, dispatch};

@@ -22,23 +22,24 @@ use super::{
     depth_layers::DepthLayers,
     gas::Gas,
 };
-use crate::particles::render::depth_layers::{GasStatistics, is_visible};
-use crate::particles::{
-    paper_squares::Squares,
-    parameters::{LookParameters, SpriteStyle},
-    render::{
-        resolve::{
-            BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES, TAU,
-        },
-        splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
-    },
-};
 use crate::{
     chemiluminescence_color,
+    particles::render::depth_layers::{GasStatistics, is_visible},
     particles::render::{
         project::sprite::{ProjectedParticle, SpriteKind, project_particles},
         resolve::{detail::Detail, spline, strain::Strain, upsample::RowInterpolator},
         splat::{grid::Grid, kernel::Profile},
+    },
+    particles::{
+        paper_squares::Squares,
+        parameters::{LookParameters, SpriteStyle},
+        render::{
+            resolve::{
+                BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES,
+                TAU,
+            },
+            splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
+        },
     },
     sparks::{SparkEmitter, Streak},
 };

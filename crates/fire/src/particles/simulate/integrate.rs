@@ -10,9 +10,11 @@ use super::{
     particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
     particles::Particles,
 };
-use crate::particles::simulate::forces::external_forces::BurnerForces;
-use crate::particles::simulate::particle_lanes::{add_scaled, clamp_length, length, subtract};
-use crate::particles::{parameters::WindForce, simulate::forces::external_forces::ExternalForces};
+use crate::{
+    particles::simulate::forces::external_forces::BurnerForces,
+    particles::simulate::particle_lanes::{add_scaled, clamp_length, length, subtract},
+    particles::{parameters::WindForce, simulate::forces::external_forces::ExternalForces},
+};
 use std::ops::Range;
 
 use fearless_simd::{Simd, prelude::*};

@@ -7,8 +7,10 @@ use bansho_base::{
 };
 
 use super::*;
-use crate::particles::simulate::combustion::INNER_TEMPERATURE;
-use crate::particles::{parameters::WindForce, simulate::burner::Burner};
+use crate::{
+    particles::simulate::combustion::INNER_TEMPERATURE,
+    particles::{parameters::WindForce, simulate::burner::Burner},
+};
 use rayon::prelude::*;
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.

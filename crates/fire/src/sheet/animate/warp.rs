@@ -10,10 +10,12 @@ use bansho_base::{
 };
 
 use super::{clock::Clock, fluctuation::Fluctuation};
-use crate::sheet::render::curve_tables::ShapeTables;
-use crate::sheet::{
-    parameters::{FlameSheetParameters, ShapeParameters},
-    render::curve_tables::{CurvePair, SEGMENTS, lookup_index},
+use crate::{
+    sheet::render::curve_tables::ShapeTables,
+    sheet::{
+        parameters::{FlameSheetParameters, ShapeParameters},
+        render::curve_tables::{CurvePair, SEGMENTS, lookup_index},
+    },
 };
 
 use fearless_simd::Simd;

@@ -8,8 +8,7 @@ use bansho_base::{
 };
 
 use super::shade::{SheetContent, TimeSample, shade_sample};
-use crate::sheet::FlameSheet;
-use crate::sheet::render::flame_instance::FlameInstance;
+use crate::{sheet::FlameSheet, sheet::render::flame_instance::FlameInstance};
 use fearless_simd::Simd;
 
 /// Indices of the planes among a strip's AOVs.

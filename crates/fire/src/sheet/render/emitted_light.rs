@@ -15,10 +15,12 @@ use super::{
     projection::SheetCoordinates,
     shade::{SheetState, shade},
 };
-use crate::sheet::render::flame_instance::FlameInstance;
-use crate::sheet::{
-    FlameSheet,
-    animate::warp::{WarpState, WindLean},
+use crate::{
+    sheet::render::flame_instance::FlameInstance,
+    sheet::{
+        FlameSheet,
+        animate::warp::{WarpState, WindLean},
+    },
 };
 use fearless_simd::{Level, Simd, prelude::*};
 

@@ -16,8 +16,8 @@ use super::{
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FlameInstance, pixels_per_meter};
 use crate::{
+    sheet::render::flame_instance::{FlameInstance, pixels_per_meter},
     sheet::{FlameSheet, parameters::Stage},
     sparks::{SparkEmitter, Streak},
 };

@@ -9,11 +9,13 @@ use super::{
     projection::{PixelToSheet, SheetCoordinates},
     smoke::{SmokeState, shade_smoke},
 };
-use crate::sheet::render::{
-    color_ramp::ColorRamp,
-    curve_tables::{FlameCoordinates, ShapeTables},
+use crate::{
+    sheet::render::{
+        color_ramp::ColorRamp,
+        curve_tables::{FlameCoordinates, ShapeTables},
+    },
+    sheet::{animate::warp::WarpState, equations, texture::Texture},
 };
-use crate::sheet::{animate::warp::WarpState, equations, texture::Texture};
 
 use fearless_simd::Simd;
 

@@ -13,11 +13,13 @@ use super::{
     projection::{PixelToSheet, SheetCoordinates, bounds},
     shade::{ShadedBatch, SheetState, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter};
-use crate::sheet::{
-    FlameSheet,
-    animate::warp::{FlameWaves, WarpState, WindLean},
-    texture::FractalLayers,
+use crate::{
+    sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter},
+    sheet::{
+        FlameSheet,
+        animate::warp::{FlameWaves, WarpState, WindLean},
+        texture::FractalLayers,
+    },
 };
 use fearless_simd::{Simd, prelude::*};
 

@@ -7,11 +7,13 @@ use bansho_base::{
 };
 
 use super::perspective::PerspectiveProjector;
-use crate::particles::render::splat::scratch_pool::PooledVec;
-use crate::particles::render::{
-    gas::Gas,
-    prepared::PARTICLES_PER_TASK,
-    splat::kernel::{LINE_PEAK, VARIANCE},
+use crate::{
+    particles::render::splat::scratch_pool::PooledVec,
+    particles::render::{
+        gas::Gas,
+        prepared::PARTICLES_PER_TASK,
+        splat::kernel::{LINE_PEAK, VARIANCE},
+    },
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;

@@ -9,8 +9,10 @@ use rayon::prelude::*;
 
 use bansho_base::math::simd::LANES;
 
-use crate::particles::render::resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
-use crate::particles::render::splat::grid::Grid;
+use crate::{
+    particles::render::resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU},
+    particles::render::splat::grid::Grid,
+};
 
 /// Strain, relative to undeformed detail, at which detail begins to fade, and at which it has faded out.
 const FADE_RANGE: [f32; 2] = [1.0, 3.0];

@@ -2,8 +2,10 @@
 
 use bansho_base::image::Rect;
 
-use crate::particles::render::resolve::spline;
-use crate::particles::render::splat::scratch_pool::{PooledVec, ScratchPool};
+use crate::{
+    particles::render::resolve::spline,
+    particles::render::splat::scratch_pool::{PooledVec, ScratchPool},
+};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 

@@ -12,8 +12,10 @@ use bansho_base::math::{
 };
 
 use super::entrainment_axis::PlumeAxis;
-use crate::particles::simulate::particle_lanes::dot;
-use crate::particles::{parameters::FlameParticlesParameters, simulate::burner::Burner};
+use crate::{
+    particles::simulate::particle_lanes::dot,
+    particles::{parameters::FlameParticlesParameters, simulate::burner::Burner},
+};
 
 use fearless_simd::Simd;
 
