@@ -1,20 +1,23 @@
 //! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
-use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
-use crate::{
-    physics::atmosphere::atmosphere,
-    physics::emission::Emission,
-    physics::extinction::Extinction,
-    physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV},
-    physics::precipitation::spectrum::ARC,
-    physics::precipitation::{Spectrum, TrackModel},
-};
+use std::sync::OnceLock;
+
 use bansho_base::{
     host::once::get_or_make,
-    parameters::animated::Animated,
-    parameters::{Auto, Length, Range},
+    parameters::{Auto, Length, Range, animated::Animated},
 };
-use std::sync::OnceLock;
+
+use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
+use crate::physics::{
+    atmosphere::atmosphere,
+    emission::Emission,
+    extinction::Extinction,
+    precipitation::{
+        Spectrum, TrackModel,
+        energy_grid::{HIGHEST_EV, LOWEST_EV},
+        spectrum::ARC,
+    },
+};
 
 /// Range of a fraction.
 const FRACTION: Range = Range::new(0.0, 1.0);

@@ -1,17 +1,22 @@
 //! Relocation: births and deaths when the in-between shape is updated (thesis, 2.3.4 and table 3.3).
 
+use bansho_base::math::{
+    DVec2,
+    random::{Key, Purpose, uniform},
+};
+use rayon::prelude::*;
+
 use super::AuroraParticles;
 use crate::{
     AuroraParameters, RelocationParameters,
-    simulate::field::sheet_charge::ScatteredParticle,
-    simulate::field::sheet_field::{ElectricField, full_cell_count},
-    simulate::sheets::refined_shape::RefinedShape,
+    simulate::{
+        field::{
+            sheet_charge::ScatteredParticle,
+            sheet_field::{ElectricField, full_cell_count},
+        },
+        sheets::refined_shape::RefinedShape,
+    },
 };
-use bansho_base::{
-    math::DVec2,
-    math::random::{Key, Purpose, uniform},
-};
-use rayon::prelude::*;
 
 const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use bansho_base::{host::once::get_or_make, math, math::random::Key};
+use rayon::prelude::*;
 
 use super::{
     Deposition, TrackModel,
@@ -12,7 +13,6 @@ use super::{
     spectrum::ARC,
 };
 use crate::physics::atmosphere::atmosphere;
-use rayon::prelude::*;
 
 /// Approximate number of sampled collisions per energy and the minimum number of tracks: a few long tracks dominate the
 /// variance.

@@ -1,18 +1,19 @@
 //! Converts parameters to drawn sheets and validates them.
 
-use super::intersection::first_crossing;
-use crate::{
-    shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
-    shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing},
-};
+use std::sync::Arc;
+
 use bansho_base::{
     geometry::strokes::Drawing,
     host::assets::{AssetError, AssetProblem, Assets},
-    math::curve::Curve,
-    math::{self, DVec2, smoothstep},
+    math::{self, DVec2, curve::Curve, smoothstep},
     parameters::Auto,
 };
-use std::sync::Arc;
+
+use super::intersection::first_crossing;
+use crate::shapes::{
+    SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing,
+    geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
+};
 
 /// Points closer than this are merged, km.
 const SAME_KM: f64 = 1e-6;

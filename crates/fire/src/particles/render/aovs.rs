@@ -6,20 +6,16 @@ use bansho_base::{
 };
 
 use super::gas::Gas;
-use crate::{
-    particles::render::{
+use crate::particles::{
+    parameters::LookParameters,
+    render::{
         project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::spline,
+        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer, spline},
         splat::{
+            MIN_RADIUS_CELLS, SplatSettings, Sprite,
             grid::{Grid, weighted_sum},
             kernel::Profile,
-        },
-    },
-    particles::{
-        parameters::LookParameters,
-        render::{
-            resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
-            splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+            splat,
         },
     },
 };

@@ -5,13 +5,13 @@ use bansho_base::{
     parameters::{Parameters, Reader, sample},
     world::gravity::STANDARD_GRAVITY,
 };
+use rayon::prelude::*;
 
 use super::*;
-use crate::{
-    particles::simulate::combustion::INNER_TEMPERATURE,
-    particles::{parameters::WindForce, simulate::burner::Burner},
+use crate::particles::{
+    parameters::WindForce,
+    simulate::{burner::Burner, combustion::INNER_TEMPERATURE},
 };
-use rayon::prelude::*;
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
