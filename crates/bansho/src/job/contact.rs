@@ -20,14 +20,14 @@ bansho_base::choice! {
     pub enum ContactBackground {
         /// Black: the light of the phenomena alone.
         Black = "black",
-        /// Squares of two greys, which show what hides the background.
+        /// Squares of two grays, which show what hides the background.
         Checkerboard = "checkerboard",
     }
 }
 
 /// Pixels between the frames of a contact sheet.
 pub(super) const GUTTER: usize = 2;
-/// What shows between frames and where the last row is not full: a grey that is told from black.
+/// What shows between frames and where the last row is not full: a gray that is told from black.
 const FILL: [u8; 4] = [38, 38, 38, u8::MAX];
 /// Side of the squares of a checkerboard, pixels.
 const SQUARE: usize = 8;

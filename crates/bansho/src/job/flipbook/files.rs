@@ -70,7 +70,7 @@ impl Files {
         sheets.iter().map(|what| self.sheet_path(what)).chain([self.path(".json")]).collect()
     }
 
-    /// What colour sheets keep of a frame.
+    /// What color sheets keep of a frame.
     pub(super) fn colour(&self, frame: &Frame, observer: &dyn Observer) -> Colour {
         if self.is_linear() {
             return Colour::Linear(frame.beauty.clone());
@@ -288,7 +288,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Alpha as grey.
+/// Alpha as gray.
 fn alpha(pixels: &DisplayPixels) -> DisplayPixels {
     match pixels {
         DisplayPixels::Eight(pixels) => {

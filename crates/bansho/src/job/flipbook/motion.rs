@@ -17,7 +17,7 @@ pub(super) struct Tile {
     pub(super) has_motion: bool,
 }
 
-/// A frame's colours as its format keeps them.
+/// A frame's colors as its format keeps them.
 pub(super) enum Colour {
     Shown(DisplayImage),
     Linear(Image<4>),
