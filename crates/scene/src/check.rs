@@ -1,4 +1,4 @@
-//! What a scene must fulfil beyond the ranges of single parameters.
+//! What a scene must fulfill beyond the ranges of single parameters.
 
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},

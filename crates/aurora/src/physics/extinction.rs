@@ -62,7 +62,7 @@ mod tests {
         let air = Extinction::default();
         let [violet, blue, green, red] = [391.4, 427.8, 557.7, 630.0].map(|nm| air.magnitudes(nm));
         assert!(violet > blue && blue > green && green > red);
-        // Bright-star catalogues use 0.2 to 0.25 in V and about twice that in B.
+        // Bright-star catalogs use 0.2 to 0.25 in V and about twice that in B.
         assert!((0.18..0.26).contains(&green), "{green}");
         assert!((0.36..0.50).contains(&blue), "{blue}");
         assert!(air.transmittance(557.7, 0.1) < air.transmittance(557.7, 1.0));

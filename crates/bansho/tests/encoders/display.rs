@@ -43,7 +43,7 @@ impl Case {
         if self.bits == BitDepth::Eight { 0.97 } else { 0.6 }
     }
 
-    /// Whether `codes` are those of grey light and coverage.
+    /// Whether `codes` are those of gray light and coverage.
     fn check(&self, pixel: [f32; 4], codes: [u16; 4]) {
         let [light, _, _, alpha] = pixel.map(held);
         let full = light::largest(self.bits);
@@ -64,7 +64,7 @@ impl Case {
         assert!(off <= most, "{}, alpha should be {coverage}", self.told(pixel, codes));
     }
 
-    /// Whether a color, and alpha as it was rounded, are what grey `light` gives.
+    /// Whether a color, and alpha as it was rounded, are what gray `light` gives.
     fn color(&self, light: f64, color: [f64; 3], own_alpha: f64) -> bool {
         let (shown, wanted) = match self.alpha {
             None => (color, encoded(light, self.is_raw)),

@@ -16,7 +16,7 @@ crate::choice! {
     pub enum Lens {
         /// Straight lines stay straight.
         Perspective = "perspective",
-        /// Equidistant fisheye: distance from the centre of an inscribed circle grows with the angle (domes).
+        /// Equidistant fisheye: distance from the center of an inscribed circle grows with the angle (domes).
         Fisheye = "fisheye",
         /// Equirectangular panorama: 360 degrees across, 180 degrees down.
         Panorama = "panorama",
@@ -127,7 +127,7 @@ fn look_at(position: DVec3, target: DVec3, roll: f64) -> DMat3 {
     DMat3::from_cols(right * cos + up * sin, up * cos - right * sin, back)
 }
 
-/// A camera at one instant, for a picture of one size. Pixel (0, 0) is the top left one, its centre at (0.5, 0.5).
+/// A camera at one instant, for a picture of one size. Pixel (0, 0) is the top left one, its center at (0.5, 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Lens.
@@ -155,7 +155,7 @@ pub struct Projection {
     pub pixel: DVec2,
     /// Depth, m: along the axis for perspective, distance for fisheye and panorama.
     pub depth: f64,
-    /// Pixels that a metre across the line of sight covers there.
+    /// Pixels that a meter across the line of sight covers there.
     pub pixels_per_metre: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The colour and luminance of black bodies, ready made for hot loops.
+//! The color and luminance of black bodies, ready made for hot loops.
 
 use std::sync::LazyLock;
 
@@ -9,7 +9,7 @@ use super::{
 
 /// Lowest temperature of the table, K; below it a black body is dark.
 pub const LOWEST_K: f32 = 1.0;
-/// Highest temperature of the table, K; hotter bodies are given this colour and luminance.
+/// Highest temperature of the table, K; hotter bodies are given this color and luminance.
 pub const HIGHEST_K: f32 = 10_000.0;
 
 /// Natural logarithm of the luminance given to bodies too cold to have one in single precision (1e-30 cd/m^2).

@@ -1,11 +1,11 @@
-//! From light to colour to display.
+//! From light to color to display.
 //!
 //! 1. [`spectrum`]: a spectrum becomes CIE 1931 XYZ; [`blackbody`] holds the Planckian ones ready made.
 //! 2. [`space`]: XYZ (D65) and linear sRGB enter the working space, ACEScg, by Bradford adaptation D65 -> D60, and leave it
-//!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colours outside AP1; keep them.
+//!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colors outside AP1; keep them.
 //! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
 //! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`display::tone`]) acts on the largest component, highlights take a
-//!    path to white and colours outside sRGB lose saturation ([`display::gamut`]), then sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
+//!    path to white and colors outside sRGB lose saturation ([`display::gamut`]), then sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
 //!    The view can be inverted on the whole sRGB cube ([`View::to_scene`]), so a plate through an empty scene is unchanged.
 
 pub mod blackbody;

@@ -1,4 +1,4 @@
-//! Colour spaces as matrices, all derived from chromaticities at compile time.
+//! Color spaces as matrices, all derived from chromaticities at compile time.
 //!
 //! XYZ here is always relative to D65, as for sRGB. Working values are ACEScg (AP1 primaries, D60 white); Bradford adaptation
 //! D65 -> D60 lies in every matrix that leads into the working space, its inverse in every matrix that leads out.
@@ -121,7 +121,7 @@ pub const SRGB_FROM_ACESCG: Matrix3 = ACESCG_FROM_SRGB.inverse();
 /// adaptation back to D65, because emitted light was adapted on its way in; they sum to 1.
 pub const LUMINANCE_WEIGHTS: [f32; 3] = narrow(XYZ_FROM_ACESCG.0[1]);
 
-/// Luminance of an ACEScg colour: cd/m^2 for scene light, relative to display white when exposed.
+/// Luminance of an ACEScg color: cd/m^2 for scene light, relative to display white when exposed.
 #[inline(always)]
 #[must_use]
 pub fn luminance(acescg: [f32; 3]) -> f32 {
@@ -145,7 +145,7 @@ pub fn acescg_from_srgb(srgb: [f32; 3]) -> [f32; 3] {
     apply_single(&const { ACESCG_FROM_SRGB.single() }, srgb)
 }
 
-/// Linear sRGB of ACEScg; negative where the colour lies outside.
+/// Linear sRGB of ACEScg; negative where the color lies outside.
 #[inline(always)]
 #[must_use]
 pub fn srgb_from_acescg(acescg: [f32; 3]) -> [f32; 3] {

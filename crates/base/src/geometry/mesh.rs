@@ -91,7 +91,7 @@ impl Mesh {
         self.triangles.is_empty()
     }
 
-    /// The corners of every triangle, anticlockwise as seen from outside.
+    /// The corners of every triangle, counterclockwise as seen from outside.
     pub fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         self.triangles.iter().map(|named| named.map(|corner| point(self.corners[corner as usize])))
     }

@@ -29,7 +29,7 @@ pub struct Picture {
     pub colour: Image<4>,
     /// The file's depth channel (`Z`), if it has one; row after row.
     pub depth: Option<Vec<f32>>,
-    /// What the colours mean.
+    /// What the colors mean.
     pub encoding: Encoding,
     /// Exposure value at ISO 100 with which it was taken, as far as the file records it.
     pub exposure_ev100: Option<f64>,

@@ -11,7 +11,7 @@ pub enum Stage {
     Prepare,
     /// Drawing phenomena and compositing them.
     Draw,
-    /// View transform, dither and quantising.
+    /// View transform, dither and quantizing.
     View,
     /// Compressing and writing files.
     Write,

@@ -143,7 +143,7 @@ impl Rect {
 /// How a float channel is stored in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// 16-bit float: colour.
+    /// 16-bit float: color.
     Half,
     /// 32-bit float: measured quantities and depth.
     Single,
@@ -163,7 +163,7 @@ pub struct Channel {
 /// Where the camera stood, for headers that compositing programs read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraHeader {
-    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), metres.
+    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), meters.
     pub world_to_camera: [[f32; 4]; 4],
     /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; no matrix says it of domes and panoramas.
     pub world_to_ndc: Option<[[f32; 4]; 4]>,

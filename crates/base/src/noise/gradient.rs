@@ -71,7 +71,7 @@ fn slope_2(hash: u32, x: f32, y: f32) -> f32 {
     signed(u * COS, hash << 1) + signed(v * SIN, hash << 2)
 }
 
-/// One of the 12 vertices of the icosahedron times (`x`, `y`, `z`): up to fifth order they favour no direction (a spherical
+/// One of the 12 vertices of the icosahedron times (`x`, `y`, `z`): up to fifth order they favor no direction (a spherical
 /// 5-design), and none lies along an axis; the usual 12 edges of the cube manage third order.
 #[inline(always)]
 fn slope_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {

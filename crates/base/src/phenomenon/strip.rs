@@ -212,7 +212,7 @@ pub struct Strip {
     absorption: Absorption,
 }
 
-/// Planes of a strip that takes all colours alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
+/// Planes of a strip that takes all colors alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
 #[derive(Debug)]
 pub struct GrayPlanes<'a> {
     /// Red, green and blue of L.
@@ -231,7 +231,7 @@ enum Absorption {
     /// None: T is 1.
     #[default]
     None,
-    /// The first, which stands for all three: soot takes all colours alike.
+    /// The first, which stands for all three: soot takes all colors alike.
     Gray,
     /// All three.
     Coloured,
@@ -333,7 +333,7 @@ impl Strip {
         &mut self.transmittance
     }
 
-    /// Planes to write to where nothing coloured absorbs; `None` once something does.
+    /// Planes to write to where nothing colored absorbs; `None` once something does.
     pub fn gray_planes_mut(&mut self) -> Option<GrayPlanes<'_>> {
         self.begin_gray();
         let [red, green, blue] = &mut self.radiance;

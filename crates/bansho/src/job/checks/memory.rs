@@ -10,7 +10,7 @@ use crate::job::{
 
 /// Smaller pictures than this many pixels are not asked about.
 const FEW_PIXELS: f64 = 4e6;
-/// Bytes of a pixel of a frame: colour, alpha and depth as they are drawn.
+/// Bytes of a pixel of a frame: color, alpha and depth as they are drawn.
 const FRAME_BYTES: f64 = 20.0;
 
 /// What a job asks of memory, beside its plan.
@@ -42,7 +42,7 @@ impl Need {
         let aovs: usize = infos.iter().filter(|_| plan.aovs).map(|info| info.aovs.len()).sum();
         let channels = layers + aovs;
         let frame = FRAME_BYTES + 4.0 * channels as f64;
-        // A display picture, the samples of the file and the file itself; an EXR holds half colours and single channels.
+        // A display picture, the samples of the file and the file itself; an EXR holds half colors and single channels.
         let written = match request.display {
             Some(BitDepth::Eight) => 3.0 * 4.0,
             Some(BitDepth::Sixteen) => 3.0 * 8.0,

@@ -25,7 +25,7 @@ bansho_base::choice! {
     pub enum ContactBackground {
         /// Black: the light of the phenomena alone.
         Black = "black",
-        /// Squares of two greys, which show what hides the background.
+        /// Squares of two grays, which show what hides the background.
         Checkerboard = "checkerboard",
     }
 }

@@ -1,13 +1,13 @@
 //! From linear sRGB without limits into the displayable cube: tone, the path of highlights to white, and the gamut map.
 //!
-//! A colour is taken apart as in HSV, which holds for negative components too: brightness `m = max`, saturation
+//! A color is taken apart as in HSV, which holds for negative components too: brightness `m = max`, saturation
 //! `s = (max - min) / max` (above 1 outside sRGB) and the place `t = (mid - min) / (max - min)` in its sector of hue. Then
 //!
 //! 1. brightness takes the tone curve, which also tells the compression `c`;
-//! 2. saturation shrinks, `v = s (1 - w)` with `w = c^2 / (c^2 + c0^2)`: bright colours run to white. Inside sRGB `s' = v`; from outside
+//! 2. saturation shrinks, `v = s (1 - w)` with `w = c^2 / (c^2 + c0^2)`: bright colors run to white. Inside sRGB `s' = v`; from outside
 //!    `s' = 1 - (1 - v)^2 / w` up to `v = 1`, a soft onset, and 1 beyond: mixed with just enough white. Mixing with white keeps `t`,
 //!    that is the dominant wavelength;
-//! 3. colours from red to yellow, and no others, are bent toward yellow as they are compressed: `t' = t (1 + a) / (1 + a t)`, the
+//! 3. colors from red to yellow, and no others, are bent toward yellow as they are compressed: `t' = t (1 + a) / (1 + a t)`, the
 //!    change of ratio a Reinhard curve on each channel would make. Without it over-exposed flames turn salmon, with channels that are
 //!    simply clipped they turn flat yellow. `a <= BEND_LIMIT` keeps the shift of hue below 34 degrees of HSV.
 //!
@@ -16,7 +16,7 @@
 use super::tone::ToneCurve;
 use crate::math::MulAdd;
 
-/// Compression at which a colour is half way to white (`c0`): chosen by eye on ramps of black bodies from 1000 to 3000 K.
+/// Compression at which a color is half way to white (`c0`): chosen by eye on ramps of black bodies from 1000 to 3000 K.
 const HALF_WHITE_COMPRESSION: f32 = 17.0;
 const HALF_WHITE_SQUARED: f32 = HALF_WHITE_COMPRESSION * HALF_WHITE_COMPRESSION;
 /// Growth of the bend `a` with compression: `a = BEND c / (1 + BEND c / BEND_LIMIT) min(s, 1)`.
@@ -24,7 +24,7 @@ const BEND: f32 = 1.8;
 /// Largest bend.
 const BEND_LIMIT: f32 = 11.0;
 
-/// Below this a colour is black, so that no quotient underflows. It is taken off again at the end: a test there for black would share its
+/// Below this a color is black, so that no quotient underflows. It is taken off again at the end: a test there for black would share its
 /// condition with the maximum at the start, for which the compiler splits the loop and gives up vectors.
 const BLACK: f32 = 1e-12;
 /// Larger components count as this, so that no product overflows.
@@ -117,7 +117,7 @@ pub(super) fn to_cube(tone: &ToneCurve, rgb: [f32; 3]) -> [f32; 3] {
     placed(rgb, parts, [brightness, chroma.fma(min(t, 1.0) - 1.0, brightness), brightness - chroma])
 }
 
-/// The linear sRGB that [`to_cube`] takes to `display`, whose components lie within 0..=1; reaches outside sRGB for the brightest colours.
+/// The linear sRGB that [`to_cube`] takes to `display`, whose components lie within 0..=1; reaches outside sRGB for the brightest colors.
 #[inline(always)]
 pub(super) fn from_cube(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
     let parts = sorted(display);
@@ -155,7 +155,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-7, "{rgb:?}");
             }
         }
-        // One part of white in a colour outside: (0.5, -0.1, 0.2) has s = 1.2, t = 0.5; s' = 1 gives (0.5, 0, 0.25).
+        // One part of white in a color outside: (0.5, -0.1, 0.2) has s = 1.2, t = 0.5; s' = 1 gives (0.5, 0, 0.25).
         let mapped = to_cube(&CURVE, [0.5, -0.1, 0.2]);
         assert!((mapped[2] - 0.25).abs() < 1e-6 && mapped[1] == 0.0 && mapped[0] == 0.5, "{mapped:?}");
     }
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn neighbours_stay_neighbours() {
-        // Across every border of sectors and the grey axis, at brightness below, in and beyond the shoulder.
+        // Across every border of sectors and the gray axis, at brightness below, in and beyond the shoulder.
         let seeds =
             [[1.0, 1.0, 0.2], [1.0, 0.2, 0.2], [0.5, 0.5, 0.5], [0.2, 1.0, 1.0], [1.0, 0.2, 1.0], [1.0, 0.3, 0.0]];
         for (seed, scale) in seeds.iter().flat_map(|seed| [0.4, 0.6, 1.0, 4.0, 16.0].map(|scale| (seed, scale))) {

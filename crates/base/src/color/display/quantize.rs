@@ -39,11 +39,11 @@ impl DisplayCode for u16 {
     }
 }
 
-/// Fractions of 2^32 that step the dither along x and y: the two-dimensional generalisation of the golden ratio (Roberts 2018, R2
+/// Fractions of 2^32 that step the dither along x and y: the two-dimensional generalization of the golden ratio (Roberts 2018, R2
 /// sequence), whose values spread as evenly as blue noise and need no table.
 const STEP_X: u32 = 0xC13F_A9A9;
 const STEP_Y: u32 = 0x91E1_0DA5;
-/// Places of the four channels in the pattern, far apart so that their errors do not add up to grey.
+/// Places of the four channels in the pattern, far apart so that their errors do not add up to gray.
 const CHANNEL_OFFSETS: [u32; 4] = [0, 0x5555_5555, 0xAAAA_AAAA, 0x8000_0000];
 
 /// The dither's phase at a pixel.

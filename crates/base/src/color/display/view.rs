@@ -24,7 +24,7 @@ const BALANCED: usize = 256;
 
 /// How exposed scene light is shown.
 ///
-/// - `display`: for looking at. Identity for colours inside sRGB below 0.6, a shoulder to 16, highlights run to white, hue kept but for
+/// - `display`: for looking at. Identity for colors inside sRGB below 0.6, a shoulder to 16, highlights run to white, hue kept but for
 ///   warm highlights, which bend toward yellow ([`gamut`](super::gamut)).
 /// - `standard`: identity inside sRGB up to 1.0; only what lies beyond is changed, by the same path.
 /// - `raw`: the ACEScg numbers, clamped to 0..=1 and not encoded.
@@ -100,8 +100,8 @@ impl View {
     }
 
     /// The exposed ACEScg that this view shows as the linear sRGB `display` (clamped to 0..=1): the inverse of
-    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colours come from outside sRGB. `raw` has no sRGB to
-    /// invert; for it the colour is only brought into ACEScg.
+    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colors come from outside sRGB. `raw` has no sRGB to
+    /// invert; for it the color is only brought into ACEScg.
     #[inline(always)]
     #[must_use]
     pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {

@@ -260,7 +260,7 @@ mod tests {
                         .collect();
                     let (low, high) = (pair[0][1].min(pair[1][1]), pair[0][1].max(pair[1][1]));
                     assert!(values.iter().all(|y| (low..=high).contains(y)));
-                    // Rounding of the cubic may turn neighbours around by a few units in the last place.
+                    // Rounding of the cubic may turn neighbors around by a few units in the last place.
                     let rising = if pair[1][1] >= pair[0][1] { 1.0 } else { -1.0 };
                     assert!(values.windows(2).all(|y| (y[1] - y[0]) * rising >= -1e-14));
                 }

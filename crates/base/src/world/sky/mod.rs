@@ -45,7 +45,7 @@ crate::parameters! {
         kind: SkyKind = SkyKind::Overcast;
         /// Luminance overhead: a rainy day has 500 to 5000, late dusk 1.
         luminance: Animated<f64> = Animated::from(2000.0), limits(Range::new(0.0, 1e6)), unit("cd/m^2");
-        /// Temperature of a black body of its colour; by day, for at night each of its lights has its own.
+        /// Temperature of a black body of its color; by day, for at night each of its lights has its own.
         temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
         /// Whether it is seen, or only lights.
         visible: bool = true;

@@ -33,7 +33,7 @@ crate::parameters! {
 /// al. 1998). The last stands for the hydroxyl bands that the eye sees.
 const AIRGLOW: [(f64, f64, f64); 4] =
     [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
-/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
+/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its color, K.
 const BACKGROUND: f64 = 1.2e-4;
 const BACKGROUND_K: f32 = 9500.0;
 /// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et
@@ -157,7 +157,7 @@ fn van_rhijn(elevation: f64, altitude_km: f64) -> f64 {
     1.0 / math::sqrt(1.0 - share * share)
 }
 
-/// Light of a black body's colour and of that luminance.
+/// Light of a black body's color and of that luminance.
 fn of_kind(temperature_k: f32, brightness: f64) -> DVec3 {
     let colour = black_body().radiance(temperature_k);
     let scale = brightness / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
