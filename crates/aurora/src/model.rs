@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     color,
-    host::{assets::Assets, constructions, once::get_or_make},
+    host::{assets::Assets, constructions, once::get_or_compute},
     math::{DVec3, random::Key},
     parameters::Parameter,
 };
@@ -122,7 +122,7 @@ impl Aurora {
     }
 
     pub(super) fn working(&self) -> &Working {
-        get_or_make(&self.working, || get_or_make(&self.beginning, || self.set_to_work()).clone())
+        get_or_compute(&self.working, || get_or_compute(&self.beginning, || self.set_to_work()).clone())
     }
 
     pub(super) fn set_to_work(&self) -> Working {

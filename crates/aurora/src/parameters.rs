@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use bansho_base::{
-    host::once::get_or_make,
+    host::once::get_or_compute,
     parameters::{Auto, Length, Range, animated::Animated},
 };
 
@@ -284,7 +284,7 @@ impl TrackModel {
         static TABLES: [OnceLock<Emission>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
             [const { OnceLock::new() }; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
         let index = self as usize * SpectrumShape::CHOICES.len() + shape as usize;
-        get_or_make(&TABLES[index], || self.emission(shape.spectrum()))
+        get_or_compute(&TABLES[index], || self.emission(shape.spectrum()))
     }
 }
 

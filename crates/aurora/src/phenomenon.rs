@@ -9,7 +9,7 @@ use bansho_base::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
         kind::{BuildContext, BuildError, Describe},
         strip::{DepthInterval, Shutter, View},
-        surroundings::{Neighbours, Publication, Surroundings},
+        surroundings::{OtherPhenomena, Publication, Surroundings},
     },
 };
 
@@ -61,7 +61,7 @@ impl Describe for AuroraParameters {
 impl Phenomenon for Aurora {
     fn info(&self) -> PhenomenonInfo<'_> {
         let preroll = self.parameters.preroll_s;
-        let stepping = Stepping { step: AuroraSimulation::STEP_S, preroll, dissolve: self.dissolve };
+        let stepping = Stepping { step: AuroraSimulation::STEP_S, preroll, crossfade: self.dissolve };
         PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
@@ -69,7 +69,7 @@ impl Phenomenon for Aurora {
         BRIGHT_PER_COLUMN * self.brightest
     }
 
-    fn remark(&self, _neighbors: &Neighbours) -> Option<Remark> {
+    fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
         let shape = self.crossing?;
         let message = format!(
             "its sheets pass through each other on the way to shape {}; another shape between, `link`, or sheets in another order would keep \

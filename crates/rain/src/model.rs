@@ -5,7 +5,7 @@ use std::{ops::RangeInclusive, sync::LazyLock};
 use bansho_base::{
     host::constructions,
     math::random::Key,
-    parameters::parameter_fault::{FaultKind, ParameterFault},
+    parameters::parameter_error::{ParameterError, ParameterErrorKind},
     phenomenon::surroundings::Surroundings,
     world::wind::Wind,
 };
@@ -68,13 +68,13 @@ impl Rain {
     ///
     /// # Errors
     /// Diameters that do not ascend, or a loop that is no length of time.
-    pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterFault> {
+    pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
-            return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
+            return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
         }
         if let Some(pair) = parameters.diameters_mm.windows(2).find(|pair| pair[1] <= pair[0]) {
-            let kind = FaultKind::NotAscending { value: pair[0], next: pair[1] };
-            return Err(ParameterFault { key: "diameters_mm", kind });
+            let kind = ParameterErrorKind::NotAscending { value: pair[0], next: pair[1] };
+            return Err(ParameterError { key: "diameters_mm", kind });
         }
         constructions::count("rain");
         let velocity = TerminalVelocity { law: parameters.velocity, air: Air::default() };

@@ -8,7 +8,7 @@ use bansho_base::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
         kind::{BuildContext, BuildError, Describe},
         strip::{DepthInterval, Shutter, View},
-        surroundings::{Emitter, Light, Neighbours, Publication, Surroundings},
+        surroundings::{Emitter, Light, OtherPhenomena, Publication, Surroundings},
     },
 };
 
@@ -47,7 +47,7 @@ impl Phenomenon for Rain {
         0.0
     }
 
-    fn remark(&self, neighbors: &Neighbours) -> Option<Remark> {
+    fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
         let unlit = neighbors.sky.is_dark() && neighbors.lights().all(dark);
         let message = "nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would";

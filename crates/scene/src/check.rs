@@ -38,7 +38,7 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
         .collect();
     for entry in &root.entries {
         if !known.contains(&entry.key.as_str()) {
-            reader.report_made(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
+            reader.report_with(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                 key: entry.key.clone(),
                 nearest: nearest(&entry.key, known.iter().copied()).map(str::to_owned),
                 allowed: known.iter().map(|&key| key.to_owned()).collect(),

@@ -82,7 +82,7 @@ impl<'a> PreparedAurora<'a> {
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
         let drawing = &aurora.simulation().parameters().drawing;
-        let measured = view.measured.then(|| [sharp.clone(), soft.clone()]);
+        let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);
         let displayed = if drawing.blur == Blur::Pixels {
             let samplers = [sharp.sampler(), soft.sampler()];
             DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &drawing.blur_radii))
@@ -165,8 +165,8 @@ impl PixelBatch {
     #[inline(always)]
     pub(crate) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
         let mut directions = Directions::new(camera, x, y);
-        let mut batch = Self { length: directions.normalize(), in_view: directions.seen, ..Self::default() };
-        let [xs, ys, zs] = directions.axes;
+        let mut batch = Self { length: directions.normalize(), in_view: directions.visible, ..Self::default() };
+        let [xs, ys, zs] = directions.components;
         let [along, first, second] = field.axes_f32();
         for i in 0..PIXEL_BATCH {
             let direction = [xs[i], ys[i], zs[i]];

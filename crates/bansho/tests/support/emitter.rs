@@ -83,7 +83,7 @@ impl Emitter {
 
 impl Phenomenon for Emitter {
     fn info(&self) -> PhenomenonInfo<'_> {
-        let stepping = Stepping { step: STEP, preroll: self.parameters.preroll_s, dissolve: self.dissolve };
+        let stepping = Stepping { step: STEP, preroll: self.parameters.preroll_s, crossfade: self.dissolve };
         PhenomenonInfo { stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
@@ -174,7 +174,7 @@ impl PreparedEmitter<'_> {
             let t = self.view.shutter.instant(*instant, INSTANTS);
             let Some(seen) = self.view.camera_at(t).project(self.emitter.at(t)) else { return false };
             let offset = seen.pixel - bansho_base::math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            offset.length() < self.emitter.parameters.radius * growth * seen.pixels_per_metre
+            offset.length() < self.emitter.parameters.radius * growth * seen.pixels_per_meter
         };
         (0..INSTANTS).filter(covered).count() as f64 / INSTANTS as f64
     }

@@ -104,7 +104,9 @@ pub(crate) fn checkerboard_at(width: usize, height: usize, depth: Option<Vec<f32
     };
     let colour = Image::from_pixels(width, height, (0..width * height).map(shade).collect()).unwrap();
     let mut assets = MemoryAssets::default();
-    assets
-        .insert_picture("plate.png", Picture { colour, depth, encoding: Encoding::DisplaySrgb, exposure_ev100: None });
+    assets.insert_picture(
+        "plate.png",
+        Picture { color: colour, depth, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
+    );
     assets
 }

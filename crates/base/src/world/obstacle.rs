@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::occluder::Occluder;
 use crate::{
-    geometry::{distance_field::DistanceField, transform::Placement},
+    geometry::{distance_field::DistanceField, transform::Transform},
     host::{assets::Assets, constructions},
     parameters::{AssetPath, ProblemKind, Range},
     phenomenon::kind::BuildError,
@@ -53,15 +53,17 @@ impl ObstacleParameters {
     /// A mesh without a file, or a file without a mesh.
     pub fn build(&self, assets: &dyn Assets) -> Result<Occluder, BuildError> {
         constructions::count("obstacle");
-        let placement = Placement::new(self.position, self.rotation_deg, self.scale);
+        let placement = Transform::new(self.position, self.rotation_deg, self.scale);
         Ok(match self.shape {
-            ObstacleShape::Sphere => Occluder::Sphere { centre: placement.position, radius: self.radius },
+            ObstacleShape::Sphere => Occluder::Sphere { center: placement.position, radius: self.radius },
             ObstacleShape::Box => Occluder::Cuboid {
-                centre: placement.position,
+                center: placement.position,
                 half_extents: 0.5 * DVec3::from(self.size),
                 rotation: placement.rotation,
             },
-            ObstacleShape::Plane => Occluder::HalfSpace { point: placement.position, normal: placement.turn(DVec3::Y) },
+            ObstacleShape::Plane => {
+                Occluder::HalfSpace { point: placement.position, normal: placement.transform_direction(DVec3::Y) }
+            }
             ObstacleShape::Mesh => {
                 let fault = |kind| BuildError { key: "file".into(), kind };
                 let missing = || ProblemKind::Conflict("an obstacle of shape \"mesh\" needs a `file`".into());

@@ -69,7 +69,7 @@ pub(super) fn project_lamp(lamp: &Lamp, view: &View) -> Option<Disc> {
         }
     };
     let projection = view.camera.project(position)?;
-    let radius = lamp.radius * projection.pixels_per_metre;
+    let radius = lamp.radius * projection.pixels_per_meter;
     // A disc smaller than a pixel is drawn larger and dimmer.
     let drawn_radius = radius.max(0.75);
     let scale =

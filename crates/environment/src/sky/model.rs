@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use bansho_base::{
     camera::Camera,
-    host::once::get_or_make,
+    host::once::get_or_compute,
     phenomenon::strip::{DepthInterval, View},
     world::sky::{Sky, SkyKind, SkyParameters},
 };
@@ -34,12 +34,12 @@ impl SkyBackdrop {
     /// Its stars; none by day.
     fn stars(&self) -> Option<&Stars> {
         let has_stars = self.parameters.kind == SkyKind::Night && self.parameters.night.stars > 0.0;
-        get_or_make(&self.stars, || has_stars.then(|| Stars::new(self.seed))).as_ref()
+        get_or_compute(&self.stars, || has_stars.then(|| Stars::new(self.seed))).as_ref()
     }
 
     /// Its hills and trees, if they have any height.
     pub(super) fn skyline(&self) -> Option<&Skyline> {
-        get_or_make(&self.skyline, || Skyline::new(&self.parameters, self.seed)).as_ref()
+        get_or_compute(&self.skyline, || Skyline::new(&self.parameters, self.seed)).as_ref()
     }
 
     /// The night that a sky shows in a view; none by day.

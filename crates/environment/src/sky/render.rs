@@ -86,7 +86,7 @@ impl PreparedSky<'_> {
                 directions.normalize();
                 let colors = self.radiance(simd, &directions);
                 for i in pixels.start.max(x) - x..pixels.end.min(x + LANES) - x {
-                    if directions.seen[i] {
+                    if directions.visible[i] {
                         row.add(x + i - pixels.start, colors[i], weight);
                     }
                 }
@@ -103,7 +103,7 @@ impl PreparedSky<'_> {
             return cache.night.radiance(simd, directions);
         }
         let mut colors = [[0.0; 4]; LANES];
-        if let Some(planes) = self.sky.radiance_at_elevations(&directions.axes[1]) {
+        if let Some(planes) = self.sky.radiance_at_elevations(&directions.components[1]) {
             for i in 0..LANES {
                 for c in 0..3 {
                     colors[i][c] = planes[c][i];
@@ -217,7 +217,7 @@ pub(super) fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usi
     let sharpness = camera.focal_pixels as f32;
     let mut directions = Directions::new(camera, x, y);
     directions.normalize();
-    let Directions { axes: [xs, sines, zs], seen } = &directions;
+    let Directions { components: [xs, sines, zs], visible: seen } = &directions;
     let (mut above, mut below) = (true, true);
     for i in 0..LANES {
         above &= sines[i] > skyline.highest + 1.0 / sharpness;

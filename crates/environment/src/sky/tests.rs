@@ -57,7 +57,7 @@ fn stars_draw_trails_where_the_camera_turns() {
 
 #[test]
 fn hills_are_soft_where_the_camera_turns() {
-    // Neighbours along a row differ most at the hills' edges.
+    // OtherPhenomena along a row differ most at the hills' edges.
     let steepest = |light: Vec<f32>| {
         let rows = light.chunks(240).skip(120);
         let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());

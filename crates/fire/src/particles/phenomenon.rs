@@ -11,7 +11,7 @@ use bansho_base::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
         kind::{BuildContext, BuildError, Describe},
         strip::{DepthInterval, Shutter, View},
-        surroundings::{Neighbours, Publication, Surroundings},
+        surroundings::{OtherPhenomena, Publication, Surroundings},
     },
 };
 
@@ -63,7 +63,7 @@ impl Describe for FlameParticlesParameters {
 impl Phenomenon for FlameParticles {
     fn info(&self) -> PhenomenonInfo<'_> {
         let DerivedConstants { preroll, dissolve, .. } = *self.simulation.constants;
-        let stepping = Stepping { step: self.parameters.step_s, preroll, dissolve };
+        let stepping = Stepping { step: self.parameters.step_s, preroll, crossfade: dissolve };
         PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
@@ -83,7 +83,7 @@ impl Phenomenon for FlameParticles {
         BRIGHT * black * emissivity
     }
 
-    fn remark(&self, neighbors: &Neighbours) -> Option<Remark> {
+    fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let burners = &self.simulation.constants.burners;
         let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
         if !burners.iter().any(gives) {

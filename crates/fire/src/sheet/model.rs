@@ -3,8 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
-    host::{constructions, once::get_or_make},
-    parameters::parameter_fault::{FaultKind, ParameterFault},
+    host::{constructions, once::get_or_compute},
+    parameters::parameter_error::{ParameterError, ParameterErrorKind},
 };
 
 use super::{
@@ -39,9 +39,9 @@ impl FlameSheet {
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
-    ) -> Result<Self, ParameterFault> {
+    ) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
-            return Err(ParameterFault { key: "loop", kind: FaultKind::LoopLength { seconds } });
+            return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
         }
         constructions::count("flame_sheet");
         let clock = Clock::new(parameters.speed.clone(), loop_s);
@@ -62,7 +62,7 @@ impl FlameSheet {
             shape: Box::new(ShapeTables::new(shape, texture, colour)),
             ramp: Box::new(ColorRamp::new(texture, colour, *stage)),
         };
-        get_or_make(&self.tables, make)
+        get_or_compute(&self.tables, make)
     }
 
     /// What of the chain does not change with time.

@@ -274,7 +274,7 @@ impl March<'_> {
 
     /// The plate's radiance and coverage at a pixel.
     fn radiance(&self, pixel: DVec2) -> Option<[f32; 4]> {
-        let [red, green, blue, coverage] = self.colour.between(pixel);
+        let [red, green, blue, coverage] = self.colour.sample_bilinear(pixel);
         let scale = 1.0 / self.exposure;
         scale.is_finite().then_some([scale * red, scale * green, scale * blue, coverage])
     }

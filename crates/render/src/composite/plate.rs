@@ -97,8 +97,8 @@ fn load(context: &ShotContext, number: i64, camera: &Camera) -> Result<PlateFram
     let pictures =
         context.plan.scene.plate.read_frame(context.compiled.assets().as_ref(), number).map_err(plate_error)?;
     let Some(PlatePictures { image, depth }) = pictures else { return Ok(PlateFrame::default()) };
-    let width = image.colour.width();
-    let fit = Fit::new(context, [width, image.colour.height()]);
+    let width = image.color.width();
+    let fit = Fit::new(context, [width, image.color.height()]);
     let depths = depth.as_ref().and_then(|picture| picture.depth.as_ref());
     let depth = depths.map(|depths| fit_depth(context, camera, depths, width, &fit));
     Ok(PlateFrame { colour: Some(fit_colour(context, &image, &fit)), depth })
@@ -167,7 +167,7 @@ fn fit_colour(context: &ShotContext, picture: &Picture, fit: &Fit) -> Image<4> {
             let mut sum = [0.0_f32; 3];
             for &(plate_y, weight_y) in &rows {
                 for &(plate_x, weight_x) in &columns[x] {
-                    let colour = picture.colour.at(plate_x, plate_y);
+                    let colour = picture.color.at(plate_x, plate_y);
                     for c in 0..3 {
                         sum[c] += weight_y * weight_x * colour[c];
                     }

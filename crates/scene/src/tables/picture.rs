@@ -1,7 +1,7 @@
 //! What a scene says of its picture, its plate and its lights.
 
 use bansho_base::{
-    color::LARGEST_EV100,
+    color::MAX_EV100,
     math::{self, DVec3},
     parameters::{AssetPath, Auto, Kind, Node, Parameter, ProblemKind, Range, Reader, Value, animated::Animated},
     phenomenon::surroundings::{Emitter, Light},
@@ -129,7 +129,7 @@ bansho_base::parameters! {
         depth_scale: f64 = 1.0, limits(Range::new(1e-6, 1e6)), unit("m");
         /// Exposure value at ISO 100 with which it was taken, so that its white is 1.2 * 2^EV cd/m^2: 15 in sunshine, 12 under heavy clouds, 4 in
         /// a lit street at night. "auto": as the file records it (Exif, EXR), else assumed.
-        exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-LARGEST_EV100, LARGEST_EV100)), unit("EV");
+        exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-MAX_EV100, MAX_EV100)), unit("EV");
     }
 }
 

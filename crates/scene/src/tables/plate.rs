@@ -19,7 +19,7 @@ pub struct PlatePictures {
 }
 
 fn size(picture: &Picture) -> [usize; 2] {
-    [picture.colour.width(), picture.colour.height()]
+    [picture.color.width(), picture.color.height()]
 }
 
 impl PlateParameters {

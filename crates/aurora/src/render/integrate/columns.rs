@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use bansho_base::{
-    host::scratch_pool::Spares,
+    host::scratch_pool::ScratchPool,
     math::{
         approximations,
         simd::{FourLanes, HalfLanes, Real},
@@ -89,10 +89,10 @@ impl ColumnBuffer {
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        let spares = Spares::new(ProfileScratch::default);
+        let spares = ScratchPool::new(ProfileScratch::default);
         strips.with_max_len(1).for_each(|strip| {
             spares
-                .lend(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
+                .with(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
         });
         picture
     }

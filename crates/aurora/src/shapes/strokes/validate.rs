@@ -196,8 +196,8 @@ fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) ->
 }
 
 fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
-    let middle = drawing.low.midpoint(drawing.high);
-    let scale = extent_km / (drawing.high - drawing.low).max_element();
+    let middle = drawing.min.midpoint(drawing.max);
+    let scale = extent_km / (drawing.max - drawing.min).max_element();
     points.iter().map(|&point| (point - middle) * scale).collect()
 }
 

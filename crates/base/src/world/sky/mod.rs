@@ -14,7 +14,7 @@ use crate::{
 };
 
 pub use elevations::{ElevationProfile, ElevationSample};
-pub use night::{EARTH_RADIUS_KM, Night, NightParameters, Parallel};
+pub use night::{Almucantar, EARTH_RADIUS_KM, Night, NightParameters};
 
 /// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
 /// below the horizon has the horizon's.
@@ -64,7 +64,7 @@ impl SkyParameters {
     /// The sky at time `t`.
     pub fn at(&self, t: f64) -> Sky {
         if self.kind == SkyKind::Night {
-            return Sky::of_night(self.night.at(t));
+            return Sky::from_night(self.night.at(t));
         }
         let colour = black_body().radiance(self.temperature_k as f32);
         let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
@@ -94,7 +94,7 @@ impl Sky {
         Self { zenith: profile.radiance(1.0), measured: Some(profile), ..Self::DARK }
     }
 
-    fn of_night(night: Night) -> Self {
+    fn from_night(night: Night) -> Self {
         Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night), measured: None }
     }
 
@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(sky(SkyKind::Night).radiance_at_elevations(&sines), None);
         let samples = [(-0.5, 1.0), (0.5, 9.0)];
         let sample = |(sine, value)| ElevationSample { sine, weight: 1.0, radiance: [value; 3] };
-        let measured = Sky::measured(ElevationProfile::of_samples(samples.map(sample)).unwrap());
+        let measured = Sky::measured(ElevationProfile::from_samples(samples.map(sample)).unwrap());
         let planes = measured.radiance_at_elevations(&sines).unwrap();
         assert_eq!(planes[1].map(|value| value), sines.map(|sine| measured.radiance(DVec3::Y * f64::from(sine))[1]));
     }

@@ -4,9 +4,9 @@ use bansho_base::{
     color,
     math::{
         self,
-        simd::{Lanes, Real, fetch, nearest_whole},
+        simd::{Lanes, Real, gather, round_to_u32},
     },
-    parameters::parameter_fault::ParameterFault,
+    parameters::parameter_error::ParameterError,
 };
 use fearless_simd::Simd;
 
@@ -70,7 +70,7 @@ impl ColorRamp {
     ///
     /// # Errors
     /// The sharpening curve does not begin at the origin.
-    pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterFault> {
+    pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterError> {
         from_origin(&texture.sharpen, "texture.sharpen").map(drop)
     }
 
@@ -116,6 +116,6 @@ impl ColorRamp {
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
         let scaled = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);
-        fetch(t1.simd, &self.light, nearest_whole(scaled))
+        gather(t1.simd, &self.light, round_to_u32(scaled))
     }
 }

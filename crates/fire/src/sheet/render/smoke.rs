@@ -4,7 +4,7 @@ use bansho_base::{
     camera::upright_quad::UprightQuad,
     math::{
         self, DVec2, DVec3, approximations,
-        simd::{LANES, Lanes, Real, any_positive, evenly_spaced},
+        simd::{LANES, Lanes, Real, any_positive, linspace},
     },
     phenomenon::{strip::View, surroundings::Surroundings},
 };
@@ -77,7 +77,7 @@ pub(crate) fn shade_smoke<S: Simd>(
     let opacity = Lanes::from_slice(x.simd, &opacity);
     let (first, last) = (y[0], y[LANES - 1]);
     let (low, high) = (smoke.scattered_at(first), smoke.scattered_at(last));
-    let scattered = |k: usize| evenly_spaced(x.simd, low[k], high[k]) * opacity;
+    let scattered = |k: usize| linspace(x.simd, low[k], high[k]) * opacity;
     let light = [scattered(0), scattered(1), scattered(2), opacity];
     Some(ShadedBatch { t1: density, light })
 }

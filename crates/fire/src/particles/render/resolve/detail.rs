@@ -180,7 +180,7 @@ impl Detail {
         let (mut cells, mut fractions) = ([[0; LANES]; 3], [[0.0; LANES]; 3]);
         for axis in 0..3 {
             for lane in 0..LANES {
-                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, positions[axis][lane]));
+                let at = self.base[axis].offset_by(self.shift[axis].mul_add(moment, positions[axis][lane]));
                 cells[axis][lane] = at.cell;
                 fractions[axis][lane] = at.fraction;
             }

@@ -159,5 +159,5 @@ impl Chords {
 /// Truncated, and clamped to 0 ..= `max`.
 #[inline(always)]
 fn truncate_clamped(value: f32, max: i32) -> i32 {
-    approximations::whole(value.max(0.0).min(max as f32))
+    approximations::round_to_i32(value.max(0.0).min(max as f32))
 }

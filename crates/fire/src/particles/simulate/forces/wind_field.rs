@@ -3,7 +3,7 @@
 use bansho_base::{
     math::{
         DVec3, Vec3,
-        simd::{Lanes, Real, fetch, wrap_split},
+        simd::{Lanes, Real, gather, wrap_split},
     },
     world::wind::Wind,
 };
@@ -63,7 +63,7 @@ impl WindField {
         let starts = [first, first + next_y, first + next_z, first + (next_y + next_z)];
         let mut rows = [[splat(0.0); 4]; 4];
         for k in 0..4 {
-            let [here, next] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
+            let [here, next] = [gather(simd, &self.velocity, starts[k]), gather(simd, &self.velocity, starts[k] + 1)];
             rows[k] = lerp4(&here, &next, across);
         }
         let (near, far) = (lerp4(&rows[0], &rows[1], up), lerp4(&rows[2], &rows[3], up));
