@@ -1,16 +1,23 @@
 //! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
-use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
-use crate::physics::atmosphere::atmosphere;
-use crate::physics::emission::Emission;
-use crate::physics::extinction::Extinction;
-use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
-use crate::physics::precipitation::spectrum::ARC;
-use crate::physics::precipitation::{Spectrum, TrackModel};
-use bansho_base::host::once::get_or_make;
-use bansho_base::parameters::animated::Animated;
-use bansho_base::parameters::{Auto, Length, Range};
 use std::sync::OnceLock;
+
+use bansho_base::{
+    host::once::get_or_make,
+    parameters::{Auto, Length, Range, animated::Animated},
+};
+
+use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
+use crate::physics::{
+    atmosphere::atmosphere,
+    emission::Emission,
+    extinction::Extinction,
+    precipitation::{
+        Spectrum, TrackModel,
+        energy_grid::{HIGHEST_EV, LOWEST_EV},
+        spectrum::ARC,
+    },
+};
 
 /// Range of a fraction.
 const FRACTION: Range = Range::new(0.0, 1.0);

@@ -1,8 +1,7 @@
 //! Extinction in the atmosphere between the observer and the aurora, by wavelength and air mass.
 
-use bansho_base::{math, parameters::Range};
-
 pub use bansho_base::world::sky::air_mass;
+use bansho_base::{math, parameters::Range};
 
 /// Magnitudes of a transmittance of 1/e.
 const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;

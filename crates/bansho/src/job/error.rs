@@ -11,7 +11,7 @@ use bansho_media::{
 use bansho_render::{PlanError, RenderError};
 use bansho_scene::{LoopError, SceneError, edit::EditError};
 
-use super::{ranges::ranges, streaks::StreaksFault};
+use super::{frames::ranges, streaks::StreaksFault};
 
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -295,7 +295,7 @@ pub enum Cause {
 
 impl JobError {
     /// What a wish to stop means where nothing is written before `what` is whole; any other error as it is.
-    pub(super) fn of_whole(self, what: &'static str) -> Self {
+    pub(crate) fn of_whole(self, what: &'static str) -> Self {
         if matches!(self, Self::Cancelled) { Self::WholeCancelled { what } } else { self }
     }
 

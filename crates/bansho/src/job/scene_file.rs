@@ -128,7 +128,7 @@ impl SceneFile {
     }
 
     /// A fault of what stands at the dotted `path`, which only showed when the scene was looked at from outside its text.
-    pub(super) fn fault(&self, path: &str, kind: ProblemKind) -> JobError {
+    pub(crate) fn fault(&self, path: &str, kind: ProblemKind) -> JobError {
         let own = SceneError::at(&self.name, &self.text, path, kind.clone());
         let changed = self.changed().unwrap_or_else(|_| self.text.clone());
         let as_changed = SceneError::at(&format!("{} as changed", self.name), &changed, path, kind);

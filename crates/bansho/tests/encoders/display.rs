@@ -1,10 +1,12 @@
 //! The codes of display pictures, beside what the definitions give in double precision.
 
-use bansho::base::{
-    color::{AlphaConvention, View},
-    math,
+use bansho::{
+    base::{
+        color::{AlphaConvention, View},
+        math,
+    },
+    render::display::BitDepth,
 };
-use bansho::render::display::BitDepth;
 
 use crate::light::{self, ALPHA_KINDS, COUNT, WIDTHS};
 

@@ -1,11 +1,13 @@
 //! Frames of light at and beyond the ends of its range.
 
-use bansho::base::{
-    camera::Lens,
-    color::{AlphaConvention, View},
-    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+use bansho::{
+    base::{
+        camera::Lens,
+        color::{AlphaConvention, View},
+        image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+    },
+    render::display::{BitDepth, display},
 };
-use bansho::render::display::{BitDepth, display};
 
 /// Components of light.
 pub(crate) const LIGHTS: [f32; 18] = [

@@ -6,13 +6,13 @@ mod planned;
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::{Describe, PhenomenonKind};
 use bansho_base::{
     host::{
         assets::{Assets, Encoding, MemoryAssets, Picture},
         observer::Unobserved,
     },
     image::{Frame, Image},
+    phenomenon::kind::{Describe, PhenomenonKind},
 };
 use bansho_render::{CompiledScene, PlanOptions, Shot};
 use bansho_scene::{Scene, SceneError, SceneOptions};

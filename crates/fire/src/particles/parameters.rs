@@ -1,8 +1,9 @@
 //! Parameters of the particle flame. Symbols and equation numbers are those of Inagaki et al.
 
-use crate::sparks::SparkParameters;
 use bansho_base::parameters::{AssetPath, Auto, Length, Range, animated::Animated};
 use bansho_sph::KernelShape;
+
+use crate::sparks::SparkParameters;
 
 const FRACTION: Range = Range::new(0.0, 1.0);
 const LENGTH: Range = Range::new(1e-3, 1e4);

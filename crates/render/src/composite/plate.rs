@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::BuildError;
 use bansho_base::{
     camera::{Camera, Lens},
     color,
@@ -13,6 +12,7 @@ use bansho_base::{
     image::Image,
     math::DVec2,
     phenomenon::LevelMirror,
+    phenomenon::kind::BuildError,
 };
 
 use super::mirror;

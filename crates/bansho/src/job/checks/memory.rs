@@ -3,7 +3,7 @@
 use bansho_base::{host::memory, parameters::ProblemKind};
 use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
-use super::{
+use crate::job::{
     error::{Conflict, JobError},
     scene_file::SceneFile,
 };
@@ -15,15 +15,15 @@ const FRAME_BYTES: f64 = 20.0;
 
 /// What a job asks of memory, beside its plan.
 #[derive(Clone, Copy)]
-pub(super) struct MemoryRequest {
+pub(crate) struct MemoryRequest {
     /// How many frames.
-    pub(super) frames: usize,
+    pub(crate) frames: usize,
     /// How many of them are kept for a sheet.
-    pub(super) tiles: usize,
+    pub(crate) tiles: usize,
     /// Bits of display pixels; none where frames are written as they are.
-    pub(super) display: Option<BitDepth>,
+    pub(crate) display: Option<BitDepth>,
     /// Whether the job asked for the size of the picture, rather than the scene.
-    pub(super) own_size: bool,
+    pub(crate) own_size: bool,
 }
 
 /// Bytes that a job takes, by what they grow with.
@@ -66,7 +66,7 @@ impl Need {
 ///
 /// # Errors
 /// It would not, with the size that it would give it for: at its place in the scene, or as what was asked for.
-pub(super) fn check(
+pub(crate) fn check(
     scene: &SceneFile,
     compiled: &CompiledScene,
     plan: &Plan,
@@ -95,9 +95,9 @@ pub(super) fn check(
             memory::is_granted(need.bytes(pixels, pixels))
         };
         let most = memory::most(overscan, fits);
-        let told =
+        let message =
             format!("{} x {} pixels with this overscan {would}; allowed: up to {most}", window.width, window.height);
-        return Err(scene.fault("picture.overscan", ProblemKind::Conflict(told)));
+        return Err(scene.fault("picture.overscan", ProblemKind::Conflict(message)));
     }
     let share = memory::most(1000, |share| memory::is_granted(0.001 * share as f64 * bytes));
     let most = [window.width, window.height].map(|side| (side as f64 * (0.001 * share as f64).sqrt()).floor() as usize);
