@@ -14,6 +14,7 @@ mod observer;
 mod render;
 mod scene_file;
 mod snapshots;
+#[cfg(feature = "rain")]
 mod streaks;
 #[cfg(test)]
 mod testing;
@@ -35,6 +36,7 @@ pub use render::{
     prepare::{PreparedJob, check_scene, remarks},
 };
 pub use scene_file::{SCENE_BYTES, SceneFile};
+#[cfg(feature = "rain")]
 pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
 
 /// What is to be drawn, and where it goes. Begin with [`Job::new`], which takes everything from the scene.

@@ -267,6 +267,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "fire")]
     fn states_of_the_renderer_bear_the_mark() {
         let assets = Arc::new(MemoryAssets::default());
         let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n";

@@ -1,5 +1,6 @@
 //! Two phenomena that exist only to prove the traits: an absorber in closed form and a stepped emitter.
 
+#[path = "../../examples/own_phenomenon/absorber.rs"]
 mod absorber;
 mod emitter;
 mod planned;
