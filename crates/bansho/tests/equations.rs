@@ -54,7 +54,7 @@ const METHODS: [Method; 4] = [
 enum Implementation {
     /// Paths within the crate, or from the root of another crate of the workspace (`bansho_sph::Poly6`).
     By(BTreeSet<String>),
-    /// The cell begins with "not used".
+    /// The cell is "not used: " and the reason.
     NotUsed,
 }
 
@@ -80,8 +80,9 @@ fn named_functions_exist() {
 fn the_table_of_smoothed_particles_agrees_with_the_methods_that_use_them() {
     let documentation = documentation(&crate_source("sph").join("lib.rs"));
     let [_, particles, _, aurora] = &METHODS;
-    let mut faults = Vec::new();
-    for row in table_rows(&documentation) {
+    let (rows, mut faults) = (table_rows(&documentation), Vec::new());
+    assert!(!rows.is_empty(), "bansho_sph: no table under the heading `Equations`");
+    for row in rows {
         let [_, of_particles, of_aurora, function, ..] = row.as_slice() else { panic!("too few columns: {row:?}") };
         let function = in_sph(functions(function, ""));
         faults.extend(sph_row_faults(particles, of_particles, &function));
@@ -97,21 +98,23 @@ fn report(faults: Vec<String>) {
 /// Equations that one table lacks, or for which the tables name other functions.
 fn differences(method: &Method) -> Vec<String> {
     let Method { page, .. } = method;
-    let (book, code, file) = (book_table(method), crate_table(method), module_file(method).display().to_string());
+    let (book, code, module) = (book_table(method), crate_table(method), module_name(method));
     let mut faults = Vec::new();
     for (equation, implementation) in &book {
         match (implementation, code.get(equation)) {
             (Implementation::NotUsed, None) => {}
-            (Implementation::NotUsed, Some(_)) => faults.push(format!("{equation}: not used by {page}, but in {file}")),
-            (Implementation::By(_), None) => faults.push(format!("{equation}: in {page}, but not in {file}")),
+            (Implementation::NotUsed, Some(_)) => {
+                faults.push(format!("{equation}: not used by {page}, but in {module}"))
+            }
+            (Implementation::By(_), None) => faults.push(format!("{equation}: in {page}, but not in {module}")),
             (_, Some(found)) if found != implementation => {
-                faults.push(format!("{equation}: {implementation:?} in {page}, but {found:?} in {file}"));
+                faults.push(format!("{equation}: {implementation:?} in {page}, but {found:?} in {module}"));
             }
             _ => {}
         }
     }
     let absent = code.keys().filter(|equation| !book.contains_key(*equation));
-    faults.extend(absent.map(|equation| format!("{equation}: in {file}, but not in {page}")));
+    faults.extend(absent.map(|equation| format!("{equation}: in {module}, but not in {page}")));
     faults
 }
 
@@ -163,8 +166,13 @@ fn book_table(method: &Method) -> Equations {
 
 /// The table under `# Equations` of a module's documentation; paths are relative to the module.
 fn crate_table(method: &Method) -> Equations {
-    let file = module_file(method);
-    table_of(&file.display().to_string(), &documentation(&file), method.module)
+    table_of(&module_name(method), &documentation(&module_file(method)), method.module)
+}
+
+/// The name of that module, as in `bansho_fire::sheet`.
+fn module_name(method: &Method) -> String {
+    let path = ["bansho_", method.in_crate, if method.module.is_empty() { "" } else { "::" }, method.module];
+    path.concat()
 }
 
 /// The file whose documentation holds a method's table.
@@ -192,6 +200,7 @@ fn table_of(name: &str, text: &str, module: &str) -> Equations {
     for row in table_rows(text) {
         let [equation_cell, _, function_cell, ..] = row.as_slice() else { panic!("{name}: too few columns: {row:?}") };
         let implementation = if function_cell.starts_with("not used") {
+            assert!(function_cell.starts_with("not used: "), "{name}: no reason why {equation_cell} is not used");
             Implementation::NotUsed
         } else {
             Implementation::By(functions(function_cell, module))
