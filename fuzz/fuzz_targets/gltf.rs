@@ -2,7 +2,7 @@
 #![no_main]
 
 use bansho_base::{
-    geometry::mesh::{MOST_TRIANGLES, Mesh},
+    geometry::mesh::{MAX_TRIANGLES, Mesh},
     host::assets::AssetProblem,
 };
 use bansho_media::assets::{gltf::decode_mesh, limits::MemoryLimit};
@@ -18,7 +18,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
 });
 
 fn check(mesh: &Mesh) {
-    assert!(!mesh.is_empty() && mesh.len() <= MOST_TRIANGLES);
+    assert!(!mesh.is_empty() && mesh.len() <= MAX_TRIANGLES);
     let [low, high] = mesh.bounds();
     assert!(low.is_finite() && high.is_finite() && low.cmple(high).all());
     for triangle in mesh.triangles() {

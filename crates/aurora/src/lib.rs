@@ -60,16 +60,18 @@
 //! 8. integrates the emission along each line of sight (`integrate`), or rasterizes single collisions instead ([`single_collisions`]),
 //! 9. applies the extinction and converts to color (`shade`); pixels of any lens sample the chart (`prepared`).
 
+pub(crate) mod model;
 mod parameters;
-pub(crate) mod phenomenon;
+mod phenomenon;
 pub mod physics;
 pub mod render;
 pub mod shapes;
 pub mod simulate;
 pub mod single_collisions;
 
+pub use model::Aurora;
 pub use parameters::{
     AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, ParticleParameters,
     PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
 };
-pub use render::{Aurora, Blur, BlurParameters, DrawingParameters, Sampling, TrackModel};
+pub use render::{Blur, BlurParameters, DrawingParameters, Sampling, TrackModel};

@@ -155,7 +155,7 @@ fn plan(text: &str) -> Planned {
     let colour = Image::from_pixels(SIZE[0], SIZE[1], pixels).expect("as many pixels as the size says");
     assets.insert_picture(
         "plate.png",
-        Picture { colour, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
+        Picture { color: colour, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
     );
     let assets = Arc::new(assets);
     let text = format!("bansho = 1\n[picture]\nsize = [1920, 1080]\n{text}");

@@ -5,14 +5,12 @@ use std::fmt::Write;
 use bansho_base::{
     camera::CameraParameters,
     parameters::{Parameters, Table, Value},
-    world::{air::Air, sky::SkyParameters, wind::WindParameters},
+    phenomenon::kind::Describe,
+    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
-use bansho_scene::{
-    FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters, Scene, SceneError,
-};
+use bansho_scene::{FORMAT, LightParameters, PictureParameters, PlateParameters, Scene, SceneError};
 
 use crate::KINDS;
-use bansho_base::phenomenon::kind::Describe;
 use bansho_environment::ground::GroundParameters;
 
 /// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.

@@ -396,7 +396,7 @@ fn a_plate_of_another_depth_size_is_refused() {
     let colour = Image::filled(8, 6, [1.0; 4]);
     assets.insert_picture(
         "depth.exr",
-        Picture { colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
+        Picture { color: colour, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
     );
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
     let error = compiled("scene.toml", &text, &kinds(), assets.clone()).err().unwrap().to_string();

@@ -95,7 +95,7 @@ where
         bencher.iter(|| {
             for (along, out) in along.iter().zip(&mut out) {
                 let mut point = black_box(origin);
-                point[0] = point[0].advanced(*along);
+                point[0] = point[0].offset_by(*along);
                 *out = noise.at(point);
             }
         })

@@ -1,4 +1,4 @@
-//! A picture of 1920 x 1080 through the view to 8-bit pixels on one core, and the colours of black bodies: the library's way and a plain
+//! A picture of 1920 x 1080 through the view to 8-bit pixels on one core, and the colors of black bodies: the library's way and a plain
 //! one in f64.
 
 use std::hint::black_box;

@@ -21,7 +21,7 @@ pub(crate) fn heard(written: io::Result<()>) -> io::Result<()> {
 
 /// Tells the user one thing in one line, as `error: ...` or `warning: ...`: names of files and values of scenes in it may hold anything.
 pub(crate) fn tell(what: &str, message: &str) {
-    to_stderr(&format!("{what}: {}", printable::message(message)));
+    to_stderr(&format!("{what}: {}", printable::printable_excerpt(message)));
 }
 
 /// Writes lines to stderr; where that fails, nobody is left to be told.

@@ -99,12 +99,12 @@ fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(
         let position = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
         let Some(seen) = view.camera.project(position) else { continue };
         let radius = f64::from(particles.support_radii()[index]);
-        let reach = radius * seen.pixels_per_metre;
+        let reach = radius * seen.pixels_per_meter;
         let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
         for y in clip(seen.pixel.y - reach, SIZE[1])..clip(seen.pixel.y + reach + 1.0, SIZE[1]) {
             for x in clip(seen.pixel.x - reach, SIZE[0])..clip(seen.pixel.x + reach + 1.0, SIZE[0]) {
                 let offset = [x as f64 + 0.5 - seen.pixel.x, y as f64 + 0.5 - seen.pixel.y];
-                let offset = offset.map(|pixels| pixels / seen.pixels_per_metre);
+                let offset = offset.map(|pixels| pixels / seen.pixels_per_meter);
                 let sums = &mut picture[y * SIZE[0] + x];
                 sums.iter_mut().zip(value(index, offset, radius)).for_each(|(sum, value)| *sum += value);
             }

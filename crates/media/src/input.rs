@@ -21,7 +21,7 @@ pub enum InputError {
         found: &'static str,
     },
     /// More bytes than the limit.
-    #[error("has {}; allowed: up to {}", size(.bytes), memory::shown(*.limit))]
+    #[error("has {}; allowed: up to {}", size(.bytes), memory::format_bytes(*.limit))]
     Size {
         /// Its length; `None` for a stream, which is not read to its end.
         bytes: Option<u64>,
@@ -34,7 +34,7 @@ pub enum InputError {
 }
 
 fn size(bytes: &Option<u64>) -> String {
-    bytes.map_or_else(|| "more bytes than are read".to_owned(), memory::shown)
+    bytes.map_or_else(|| "more bytes than are read".to_owned(), memory::format_bytes)
 }
 
 impl From<InputError> for AssetProblem {

@@ -78,7 +78,7 @@ fn raw_png(width: u32, height: u32, kind: ::png::ColorType, depth: ::png::BitDep
 #[test]
 fn png_plates_of_every_kind() {
     use ::png::{BitDepth::*, ColorType::*};
-    let first = |bytes: Vec<u8>| decode_picture(&bytes, "PNG").unwrap().colour.at(1, 0);
+    let first = |bytes: Vec<u8>| decode_picture(&bytes, "PNG").unwrap().color.at(1, 0);
     assert_eq!(first(raw_png(2, 1, Grayscale, Eight, &[0, 51])), [0.2, 0.2, 0.2, 1.0]);
     assert_eq!(first(raw_png(2, 1, Grayscale, One, &[0b0100_0000])), [1.0; 4]);
     assert_eq!(first(raw_png(2, 1, GrayscaleAlpha, Eight, &[0, 0, 255, 51])), [1.0, 1.0, 1.0, 0.2]);
@@ -92,14 +92,14 @@ fn png_plates_of_every_kind() {
 fn what_bansho_writes_it_reads() {
     let picture = decode_picture(&png_bytes(&display(9, 5)), "png").unwrap();
     assert_eq!(picture.encoding, Encoding::DisplaySrgb);
-    assert_eq!(picture.colour.at(2, 1), [55, 33, 200, 251].map(|code| code as f32 / 255.0));
+    assert_eq!(picture.color.at(2, 1), [55, 33, 200, 251].map(|code| code as f32 / 255.0));
 
     let original = frame(21, 35);
     let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
     assert_eq!(picture.encoding, Encoding::LinearAcescg);
     assert_eq!(picture.depth, original.depth);
     // Straight color from premultiplied.
-    assert_eq!(picture.colour.at(4, 0), [4.0, 0.5, -1.0, 0.5]);
+    assert_eq!(picture.color.at(4, 0), [4.0, 0.5, -1.0, 0.5]);
 }
 
 #[test]
@@ -108,11 +108,11 @@ fn an_exr_with_another_data_window_is_laid_into_its_display_window() {
     original.header.display_size = [4, 4];
     original.header.data_origin = [-1, 2];
     let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
-    assert_eq!((picture.colour.width(), picture.colour.height()), (4, 4));
-    assert_eq!(picture.colour.at(0, 2)[0], 1.0);
-    assert_eq!(picture.colour.at(2, 3)[0], 7.0);
-    assert_eq!(picture.colour.at(3, 3), [0.0; 4]);
-    assert_eq!(picture.colour.at(0, 0), [0.0; 4]);
+    assert_eq!((picture.color.width(), picture.color.height()), (4, 4));
+    assert_eq!(picture.color.at(0, 2)[0], 1.0);
+    assert_eq!(picture.color.at(2, 3)[0], 7.0);
+    assert_eq!(picture.color.at(3, 3), [0.0; 4]);
+    assert_eq!(picture.color.at(0, 0), [0.0; 4]);
     assert_eq!(picture.depth.unwrap()[0], f32::INFINITY);
 }
 
@@ -145,18 +145,18 @@ fn tiled_float_and_depth_only_exr_files_are_read() {
     for compression in [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::PIZ] {
         let picture = decode_picture(&tiled_exr(&["R", "G", "B", "depth.Z"], compression), "exr").unwrap();
         assert_eq!(picture.encoding, Encoding::LinearSrgb);
-        assert_eq!(picture.colour.at(69, 49), [3499.0, 3500.0, 3501.0, 1.0], "{compression:?}");
+        assert_eq!(picture.color.at(69, 49), [3499.0, 3500.0, 3501.0, 1.0], "{compression:?}");
         assert_eq!(picture.depth.unwrap()[70], 73.0);
     }
     let depth_only = decode_picture(&tiled_exr(&["distance"], Compression::ZIP16), "exr").unwrap();
     assert_eq!(depth_only.depth.unwrap()[71], 71.0);
     let lossy = decode_picture(&tiled_exr(&["R", "G", "B"], Compression::DWAA(None)), "exr").unwrap();
-    assert!((lossy.colour.at(40, 30)[0] / 2140.0 - 1.0).abs() < 0.01);
+    assert!((lossy.color.at(40, 30)[0] / 2140.0 - 1.0).abs() < 0.01);
     for kind in ["half", "uint"] {
         assert_eq!(decode_picture(&tiled_exr(&[kind], Compression::ZIP1), "exr").unwrap().depth.unwrap()[71], 71.0);
     }
     let layered = decode_picture(&tiled_exr(&["plate.R", "plate.G", "plate.B"], Compression::ZIP16), "exr").unwrap();
-    assert_eq!(layered.colour.at(0, 0), [0.0, 1.0, 2.0, 1.0]);
+    assert_eq!(layered.color.at(0, 0), [0.0, 1.0, 2.0, 1.0]);
     let useless = decode_picture(&tiled_exr(&["a", "b"], Compression::ZIP16), "exr");
     assert!(matches!(useless, Err(AssetProblem::NoChannel(_))));
 }
@@ -179,8 +179,8 @@ fn grey_jpeg() -> Vec<u8> {
 #[test]
 fn a_jpeg_is_read() {
     let picture = decode_picture(&grey_jpeg(), "JPG").unwrap();
-    assert_eq!((picture.colour.width(), picture.colour.height()), (8, 8));
-    let [r, g, b, alpha] = picture.colour.at(3, 3);
+    assert_eq!((picture.color.width(), picture.color.height()), (8, 8));
+    let [r, g, b, alpha] = picture.color.at(3, 3);
     assert!((r - 128.0 / 255.0).abs() < 0.01 && r == g && g == b && alpha == 1.0);
 }
 
@@ -296,9 +296,9 @@ fn files_are_found_numbered_digested_and_remembered() {
     fs::write(&path, png_bytes(&display(5, 2))).unwrap();
     assert_eq!(assets.picture("p/street.0012.png", 0).unwrap(), first);
     assets.forget();
-    assert_eq!(assets.picture("p/street.####.png", 12).unwrap().colour.width(), 5);
+    assert_eq!(assets.picture("p/street.####.png", 12).unwrap().color.width(), 5);
     assert_eq!(&*assets.text("note.txt").unwrap(), "火");
-    assert_eq!(assets.picture(path.to_str().unwrap(), 0).unwrap().colour.width(), 5);
+    assert_eq!(assets.picture(path.to_str().unwrap(), 0).unwrap().color.width(), 5);
 }
 
 #[test]

@@ -49,14 +49,15 @@ pub mod billboards;
 pub mod drops;
 pub(crate) mod lanes;
 pub mod lighting;
+mod model;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;
 pub(crate) mod shutter_cameras;
 pub mod streaks;
 
+pub use model::Rain;
 pub use parameters::{Method, RainParameters, SplashParameters};
-pub use phenomenon::Rain;
 
 #[cfg(test)]
 mod tests;

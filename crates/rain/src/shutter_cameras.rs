@@ -66,7 +66,7 @@ impl Projector {
         Self {
             axes,
             offset: camera.to_camera(origin).as_vec3().to_array(),
-            center: camera.centre.as_vec2().to_array(),
+            center: camera.principal_point.as_vec2().to_array(),
             focal: camera.focal_pixels as f32,
             near: camera.near as f32,
             camera,
@@ -114,7 +114,7 @@ impl Projector {
             if let Some(projection) = self.camera.project(point) {
                 let DVec2 { x, y } = projection.pixel;
                 (points.x[i], points.y[i]) = (x as f32, y as f32);
-                (points.depth[i], points.scale[i]) = (projection.depth as f32, projection.pixels_per_metre as f32);
+                (points.depth[i], points.scale[i]) = (projection.depth as f32, projection.pixels_per_meter as f32);
             }
         }
         points
@@ -137,8 +137,10 @@ impl Frustum {
     fn new(camera: &Camera, window: &Rect) -> Option<Self> {
         let [across, up, back] = [0, 1, 2].map(|axis| camera.orientation.col(axis));
         let tangent = |pixels: usize, center: f64| (pixels as f64 - center) / camera.focal_pixels;
-        let [left, right] = [window.x, window.right()].map(|side| across + back * tangent(side, camera.centre.x));
-        let [top, bottom] = [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.centre.y));
+        let [left, right] =
+            [window.x, window.right()].map(|side| across + back * tangent(side, camera.principal_point.x));
+        let [top, bottom] =
+            [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.principal_point.y));
         let mut planes = [[0.0; PLANE_COUNT]; 3];
         for (side, outward) in [right, -left, bottom, -top, back].map(DVec3::normalize).into_iter().enumerate() {
             (0..3).for_each(|axis| planes[axis][side] = outward[axis]);

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
-    host::once::get_or_make,
+    host::once::get_or_compute,
     image::FrameHeader,
     world::sky::{ElevationProfile, Sky},
 };
@@ -34,7 +34,7 @@ impl ShotContext {
         if let Some(sky) = &self.scene().sky {
             return sky.at(t);
         }
-        let light = get_or_make(&self.plate_light, || plate_light(self));
+        let light = get_or_compute(&self.plate_light, || plate_light(self));
         light.map_or(Sky::DARK, |light| Sky::measured(light.scaled(1.0 / self.plan.exposure_scale())))
     }
 

@@ -76,7 +76,7 @@ impl CrossfadeRun {
 
     /// Steps after which runs begin to come in.
     fn begun(&self) -> u64 {
-        self.stepping.steps_until(-0.5 * self.stepping.dissolve)
+        self.stepping.steps_until(-0.5 * self.stepping.crossfade)
     }
 
     /// The run before the first turn: leaves its state where later ones begin, and where the first turn's does.
@@ -107,7 +107,7 @@ impl CrossfadeRun {
                 self.comes = true;
             }
             self.passing.advance(stepping.steps_until(t - self.turn), stepping, surroundings);
-        } else if t <= 0.5 * stepping.dissolve {
+        } else if t <= 0.5 * stepping.crossfade {
             self.passing.advance(stepping.steps_until(t + self.turn), stepping, surroundings);
         }
         Ok(())
@@ -116,7 +116,7 @@ impl CrossfadeRun {
     /// How much the present run counts at time `t` of the turn, in [1/2, 1].
     fn share(&self, t: f64) -> f32 {
         // States lag behind by up to two steps.
-        let half = 0.5 * self.stepping.dissolve - 2.0 * self.stepping.step;
+        let half = 0.5 * self.stepping.crossfade - 2.0 * self.stepping.step;
         let way = t.min(self.turn - t);
         if way < half { (0.5 + 0.5 * way / half).max(0.5) as f32 } else { 1.0 }
     }
@@ -203,7 +203,7 @@ impl Stepped for CrossfadeRun {
 impl CrossfadeRun {
     /// The view that the passing run is seen in, where it counts.
     fn other_view<'a>(&self, view: &'a View) -> Option<&'a View> {
-        view.other_turn.as_deref().filter(|_| self.share(view.shutter.middle()) < 1.0)
+        view.adjacent_loop_view.as_deref().filter(|_| self.share(view.shutter.middle()) < 1.0)
     }
 }
 
@@ -260,10 +260,10 @@ impl Prepared for Mixed<'_> {
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let mut other = strip.emptied();
+        let mut other = strip.empty_like();
         self.present.draw(slice, strip);
         self.passing.draw(slice, &mut other);
-        strip.dissolve(other, self.share, self.aovs);
+        strip.crossfade(other, self.share, self.aovs);
     }
 
     fn figures(&self) -> Vec<Figure> {

@@ -35,7 +35,7 @@ pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConventi
 /// Pixels as display codes, row after row. Dither goes by the place in the whole picture, so that a crop shows the same pixels.
 pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View, alpha: AlphaConvention) -> Vec<[C; 4]> {
     let alpha = (!frame.opaque).then_some(alpha);
-    let (level, view) = (Level::new(), view.balanced(frame.header.white_balance_k.map(f64::from)));
+    let (level, view) = (Level::new(), view.with_white_balance(frame.header.white_balance_k.map(f64::from)));
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let [x0, y0] = frame.header.data_origin;
     // An empty pixel is code 0, unless it is opaque black.

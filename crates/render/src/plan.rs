@@ -198,8 +198,8 @@ impl Plan {
         let next = shutter.middle() + self.fps().frame_s();
         let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
         view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
-        view.measured = self.aovs;
-        let view = view.through(self.window);
+        view.aovs_requested = self.aovs;
+        let view = view.with_window(self.window);
         match self.loop_s() {
             Some(turn) => view.in_loop(turn),
             None => view,
@@ -230,7 +230,7 @@ impl Plan {
 
     /// How display formats show the picture, with the camera's white balance.
     pub fn shown(&self) -> color::View {
-        self.display.balanced(self.scene.picture.white_balance_k)
+        self.display.with_white_balance(self.scene.picture.white_balance_k)
     }
 }
 

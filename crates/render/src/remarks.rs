@@ -4,11 +4,11 @@ use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     color,
-    host::once::get_or_make,
+    host::once::get_or_compute,
     phenomenon::{
         Remark,
         strip::Shutter,
-        surroundings::{Neighbours, Publication},
+        surroundings::{OtherPhenomena, Publication},
     },
     world::sky::Sky,
 };
@@ -46,9 +46,10 @@ impl<'a> Moment<'a> {
 
     fn remark(&self, index: usize) -> Option<Remark> {
         let published =
-            |other: usize| get_or_make(&self.published[other], || self.runs[other].run.publish(self.shutter));
+            |other: usize| get_or_compute(&self.published[other], || self.runs[other].run.publish(self.shutter));
         let count = self.runs.len();
-        let neighbours = Neighbours { scene: &self.scene, count, published: &published, own: index, sky: &self.sky };
+        let neighbours =
+            OtherPhenomena { scene: &self.scene, count, published: &published, own_index: index, sky: &self.sky };
         self.runs[index].participant.phenomenon.remark(&neighbours)
     }
 }

@@ -1,12 +1,11 @@
-//! What a scene must fulfil beyond the ranges of single parameters.
+//! What a scene must fulfill beyond the ranges of single parameters.
 
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},
     math,
     parameters::{Auto, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
+    phenomenon::kind::{BuildError, PhenomenonKind},
 };
-
-use bansho_base::phenomenon::kind::{BuildError, PhenomenonKind};
 
 use super::{FORMAT, Place, SHARED_TABLES, Scene, tables::picture::LightKind};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
@@ -39,7 +38,7 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
         .collect();
     for entry in &root.entries {
         if !known.contains(&entry.key.as_str()) {
-            reader.report_made(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
+            reader.report_with(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                 key: entry.key.clone(),
                 nearest: nearest(&entry.key, known.iter().copied()).map(str::to_owned),
                 allowed: known.iter().map(|&key| key.to_owned()).collect(),

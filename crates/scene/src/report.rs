@@ -5,7 +5,7 @@ use std::fmt;
 use bansho_base::{
     host::{
         plural::counted,
-        printable::{message, pictured, printable},
+        printable::{printable, printable_excerpt, with_control_pictures},
     },
     parameters::{Problem, ProblemKind},
 };
@@ -27,7 +27,7 @@ pub struct SceneError {
     pub text: String,
     /// What is wrong, in the order of the file; never empty.
     pub problems: Vec<Problem>,
-    /// How many problems there are beyond those: the first [`MOST_PROBLEMS`](bansho_base::parameters::MOST_PROBLEMS) are kept.
+    /// How many problems there are beyond those: the first [`MAX_PROBLEMS`](bansho_base::parameters::MAX_PROBLEMS) are kept.
     pub omitted: usize,
 }
 
@@ -66,7 +66,7 @@ impl SceneError {
 
     fn told(&self, problem: &Problem, lines: &mut Lines) -> String {
         let (file, told) = (printable(&self.file), problem.to_string());
-        let told = message(&told);
+        let told = printable_excerpt(&told);
         let Some(span) = &problem.span else {
             return format!("{file}: {told}");
         };
@@ -74,7 +74,7 @@ impl SceneError {
         let Excerpt { shown, before, marked } = lines.excerpt(span.clone());
         let gutter = " ".repeat(line.to_string().len());
         let (before, marked) = (" ".repeat(before), "^".repeat(marked));
-        let shown = pictured(&shown);
+        let shown = with_control_pictures(&shown);
         format!("{file}:{line}:{column}: {told}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}")
     }
 }

@@ -10,9 +10,9 @@ use bansho_base::math::simd::Real;
 bansho_base::choice! {
     /// A smoothing kernel.
     pub enum KernelShape {
-        /// Smooth at the centre, where its gradient vanishes (Mueller et al. 2003).
+        /// Smooth at the center, where its gradient vanishes (Mueller et al. 2003).
         Poly6 = "poly6",
-        /// Pointed at the centre, so that near particles repel most (Mueller et al. 2003, after Desbrun and Gascuel 1996).
+        /// Pointed at the center, so that near particles repel most (Mueller et al. 2003, after Desbrun and Gascuel 1996).
         Spiky = "spiky",
         /// Cubic spline (Monaghan and Lattanzio 1985).
         CubicSpline = "cubic_spline",

@@ -348,7 +348,7 @@ fn particles_may_be_anywhere() {
     let alone = Kernel::<3>::new(KernelShape::Poly6, 1.0).value(0.0);
     let of = |id: u64| density[particles.ids.iter().position(|other| *other == id).unwrap()];
     assert_eq!((of(0), of(8)), (alone, alone));
-    assert!(of(1) > alone && of(1) == of(2), "neighbours farther out than the farthest cell");
+    assert!(of(1) > alone && of(1) == of(2), "neighbors farther out than the farthest cell");
 }
 
 #[test]

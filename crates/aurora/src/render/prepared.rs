@@ -12,12 +12,14 @@ use bansho_base::{
         strip::{DepthInterval, Strip, View},
     },
 };
+use fearless_simd::{Level, Simd, dispatch};
 
-use super::{Aurora, Blur, maps::CellMaps};
+use super::{Blur, maps::CellMaps};
 use crate::{
-    phenomenon::{BRIGHTNESSES, brightnesses},
+    Aurora,
     physics::emission::{Emitter, PerEmitter},
     render::{
+        aovs::{BRIGHTNESSES, brightnesses},
         bin::{source_bins::SourceBins, sources::Sources},
         integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer},
         project::{
@@ -29,7 +31,6 @@ use crate::{
     simulate::AuroraSimulation,
     single_collisions::blur::BlurredImage,
 };
-use fearless_simd::{Level, Simd, dispatch};
 
 /// Pixels per batch.
 pub(crate) const PIXEL_BATCH: usize = 16;
@@ -81,7 +82,7 @@ impl<'a> PreparedAurora<'a> {
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
         let drawing = &aurora.simulation().parameters().drawing;
-        let measured = view.measured.then(|| [sharp.clone(), soft.clone()]);
+        let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);
         let displayed = if drawing.blur == Blur::Pixels {
             let samplers = [sharp.sampler(), soft.sampler()];
             DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &drawing.blur_radii))
@@ -164,8 +165,8 @@ impl PixelBatch {
     #[inline(always)]
     pub(crate) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
         let mut directions = Directions::new(camera, x, y);
-        let mut batch = Self { length: directions.normalize(), in_view: directions.seen, ..Self::default() };
-        let [xs, ys, zs] = directions.axes;
+        let mut batch = Self { length: directions.normalize(), in_view: directions.visible, ..Self::default() };
+        let [xs, ys, zs] = directions.components;
         let [along, first, second] = field.axes_f32();
         for i in 0..PIXEL_BATCH {
             let direction = [xs[i], ys[i], zs[i]];

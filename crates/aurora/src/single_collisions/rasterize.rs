@@ -3,10 +3,10 @@
 //! A track has about a hundred collisions in hundreds of rows, so the touched rows are recorded: only those are added
 //! and cleared.
 
+use bansho_base::math::simd::{FourLanes, HalfLanes, LANES, Lanes, Real, ramp, round_to_u32};
+use fearless_simd::{Simd, prelude::*, u8x32, u16x16, u64x4, u64x8};
+
 use crate::physics::emission::PerEmitter;
-use bansho_base::math::simd::{FourLanes, HalfLanes, LANES, Lanes, Real, nearest_whole, ramp};
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, u8x32, u16x16, u64x4, u64x8};
 
 /// Rows that are added to a column at once, two pairs.
 pub(crate) const QUAD_ROWS: usize = 4;
@@ -248,7 +248,7 @@ impl SplatBatch {
         let (least, greatest) = (rows.broadcast(f32::INFINITY), rows.broadcast(-1.0));
         row_range.least = row_range.least.simd_min(inside(rows, end, [whole, least]));
         row_range.greatest = row_range.greatest.simd_max(inside(rows, end, [whole, greatest]));
-        let row = nearest_whole(inside(rows, end, [whole, outside]));
+        let row = round_to_u32(inside(rows, end, [whole, outside]));
         (((row + 1) >> 1) + (row & 1) * odd_pairs).store_slice(&mut self.pairs);
         let weights = inside(rows, end, [brightness, zero]);
         let lower = weights * (rows - whole);

@@ -137,7 +137,7 @@ impl Film {
         pair.map(|(a, b)| (luminance(*a) - luminance(*b)).abs()).sum::<f64>() / (self.width * self.height) as f64
     }
 
-    /// Centre of the light in the upper half of what is lit, in pixels, over all frames.
+    /// Center of the light in the upper half of what is lit, in pixels, over all frames.
     pub(crate) fn centroid_of_upper_half(&self) -> [f64; 2] {
         let lit_row =
             |row: usize| (0..self.frames.len()).any(|f| self.row(f, row).iter().any(|p| luminance(*p) > 0.02));
@@ -229,7 +229,7 @@ pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String
     }
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let known = decode_picture(&bytes, "png", MemoryLimit::default()).unwrap();
-    let known: Vec<[f32; 3]> = known.colour.pixels().iter().map(|pixel| over_black(*pixel)).collect();
+    let known: Vec<[f32; 3]> = known.color.pixels().iter().map(|pixel| over_black(*pixel)).collect();
     let drawn = encoded(image);
     let (mean, worst) = blurred_difference(&known, &drawn, size);
     if known.len() == drawn.len() && mean < 0.5 && worst < 10.0 {

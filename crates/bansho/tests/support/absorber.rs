@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::{BuildContext, BuildError, Describe};
 use bansho_base::{
     host::observer::{Cancelled, Observer},
     image::Rect,
     math::{self, DVec2},
     parameters::Range,
+    phenomenon::kind::{BuildContext, BuildError, Describe},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
         strip::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::{BuildContext, BuildError, Describe};
 use bansho_base::{
     host::observer::{Cancelled, Observer},
     image::{Figure, Image, Rect},
@@ -11,6 +10,7 @@ use bansho_base::{
         random::{Key, Purpose, uniform},
     },
     parameters::Range,
+    phenomenon::kind::{BuildContext, BuildError, Describe},
     phenomenon::{
         Deflection, Phenomenon, PhenomenonInfo, Prepared, Run, SnapshotError, Stepped, Stepping,
         strip::{DepthInterval, Shutter, Strip, View},
@@ -83,7 +83,7 @@ impl Emitter {
 
 impl Phenomenon for Emitter {
     fn info(&self) -> PhenomenonInfo<'_> {
-        let stepping = Stepping { step: STEP, preroll: self.parameters.preroll_s, dissolve: self.dissolve };
+        let stepping = Stepping { step: STEP, preroll: self.parameters.preroll_s, crossfade: self.dissolve };
         PhenomenonInfo { stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
@@ -174,7 +174,7 @@ impl PreparedEmitter<'_> {
             let t = self.view.shutter.instant(*instant, INSTANTS);
             let Some(seen) = self.view.camera_at(t).project(self.emitter.at(t)) else { return false };
             let offset = seen.pixel - bansho_base::math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            offset.length() < self.emitter.parameters.radius * growth * seen.pixels_per_metre
+            offset.length() < self.emitter.parameters.radius * growth * seen.pixels_per_meter
         };
         (0..INSTANTS).filter(covered).count() as f64 / INSTANTS as f64
     }

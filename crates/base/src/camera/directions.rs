@@ -1,86 +1,88 @@
-//! Directions of pixels that follow each other in a row.
+//! View directions of consecutive pixels of a row.
 
 use super::{Camera, Lens};
 use crate::math::{DVec2, MulAdd, approximations, simd::LANES};
 
-/// Angle, in radians, over which a row of a panorama is taken for straight: its chord lies within an eighth of a pixel of it.
-const MOST_STRAIGHT: f64 = 0.1;
+/// Largest angle, in radians, over which the directions along a row of a panorama are interpolated linearly: the chord lies within an eighth of a
+/// pixel of the arc.
+const MAX_STRAIGHT_ANGLE: f64 = 0.1;
 
-/// What a row of sixteen pixels looks at.
+/// View directions of sixteen consecutive pixels of a row.
 pub struct Directions {
-    /// x, y and z, of the length that [`Camera::direction`] gives.
-    pub axes: [[f32; LANES]; 3],
-    /// Whether the lens sees anything there.
-    pub seen: [bool; LANES],
+    /// x, y and z, scaled as by [`Camera::direction`].
+    pub components: [[f32; LANES]; 3],
+    /// Whether the pixel lies within the field of view of the lens.
+    pub visible: [bool; LANES],
 }
 
 impl Directions {
-    /// Pixels from `x` on in row `y`.
+    /// The directions of the pixels from column `x` on in row `y`.
     #[inline(always)]
     pub fn new(camera: &Camera, x: usize, y: usize) -> Self {
         if camera.lens == Lens::Fisheye {
-            return Self::of_dome(camera, x, y);
+            return Self::fisheye(camera, x, y);
         }
-        let at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-        let (mut axes, mut seen) = ([[0.0; LANES], [1.0; LANES], [0.0; LANES]], [true; LANES]);
-        let is_straight = camera.lens == Lens::Perspective || LANES as f64 / camera.focal_pixels < MOST_STRAIGHT;
-        let ends = if is_straight { at(x).zip(at(x + LANES)) } else { None };
-        if let Some((first, last)) = ends {
-            // Exact for a perspective lens; elsewhere within an eighth of a pixel, and within a fiftieth where pictures are large.
+        let direction_at = |x: usize| camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let (mut components, mut visible) = ([[0.0; LANES], [1.0; LANES], [0.0; LANES]], [true; LANES]);
+        let is_straight = camera.lens == Lens::Perspective || LANES as f64 / camera.focal_pixels < MAX_STRAIGHT_ANGLE;
+        let endpoints = if is_straight { direction_at(x).zip(direction_at(x + LANES)) } else { None };
+        if let Some((first, last)) = endpoints {
+            // Exact for a perspective lens. For a panorama the error is at most an eighth of a pixel,
+            // and at most a fiftieth in large pictures.
             let (first, step) = (first.as_vec3().to_array(), ((last - first) / LANES as f64).as_vec3().to_array());
             for axis in 0..3 {
                 for i in 0..LANES {
-                    axes[axis][i] = step[axis].fma(i as f32, first[axis]);
+                    components[axis][i] = step[axis].fma(i as f32, first[axis]);
                 }
             }
-            return Self { axes, seen };
+            return Self { components, visible };
         }
         for i in 0..LANES {
-            let direction = at(x + i);
-            seen[i] = direction.is_some();
+            let direction = direction_at(x + i);
+            visible[i] = direction.is_some();
             if let Some(direction) = direction {
-                for (axis, part) in direction.as_vec3().to_array().into_iter().enumerate() {
-                    axes[axis][i] = part;
+                for (axis, component) in direction.as_vec3().to_array().into_iter().enumerate() {
+                    components[axis][i] = component;
                 }
             }
         }
-        Self { axes, seen }
+        Self { components, visible }
     }
 
-    /// Those of a fisheye lens, each by itself: in single precision that is a thousandth of a pixel.
+    /// The directions of a fisheye lens, each computed on its own in single precision: the error is a thousandth of a pixel.
     #[inline(always)]
-    fn of_dome(camera: &Camera, x: usize, y: usize) -> Self {
+    fn fisheye(camera: &Camera, x: usize, y: usize) -> Self {
         const TURNS: f32 = (1.0 / std::f64::consts::TAU) as f32;
         let per_pixel = 1.0 / camera.focal_pixels;
-        let first = ((x as f64 + 0.5 - camera.centre.x) * per_pixel) as f32;
-        let up = ((camera.centre.y - y as f64 - 0.5) * per_pixel) as f32;
+        let first_x = ((x as f64 + 0.5 - camera.principal_point.x) * per_pixel) as f32;
+        let y_offset = ((camera.principal_point.y - y as f64 - 0.5) * per_pixel) as f32;
         let [right, upward, back] = [camera.orientation.x_axis, camera.orientation.y_axis, camera.orientation.z_axis]
             .map(|axis| axis.as_vec3().to_array());
-        let (step, most) = (per_pixel as f32, camera.half_angle() as f32);
-        let (mut axes, mut seen) = ([[0.0; LANES]; 3], [true; LANES]);
-        let (mut across, mut cosines) = ([0.0; LANES], [0.0; LANES]);
+        let (step, max_angle) = (per_pixel as f32, camera.half_angle() as f32);
+        let (mut components, mut visible) = ([[0.0; LANES]; 3], [true; LANES]);
+        let (mut sinc, mut cosines) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            let side = step.fma(i as f32, first);
-            let angle = side.fma(side, up * up).sqrt();
+            let x_offset = step.fma(i as f32, first_x);
+            let angle = x_offset.fma(x_offset, y_offset * y_offset).sqrt();
             let turns = angle * TURNS;
-            across[i] = if angle > 1e-6 { approximations::sin_turns(turns) / angle } else { 1.0 };
+            sinc[i] = if angle > 1e-6 { approximations::sin_turns(turns) / angle } else { 1.0 };
             cosines[i] = approximations::cos_turns(turns);
-            seen[i] = angle <= most;
+            visible[i] = angle <= max_angle;
         }
         for axis in 0..3 {
             for i in 0..LANES {
-                let side = step.fma(i as f32, first);
-                let level = side.fma(right[axis], up * upward[axis]);
-                axes[axis][i] = across[i].fma(level, -(cosines[i] * back[axis]));
+                let x_offset = step.fma(i as f32, first_x);
+                let sideways = x_offset.fma(right[axis], y_offset * upward[axis]);
+                components[axis][i] = sinc[i].fma(sideways, -(cosines[i] * back[axis]));
             }
         }
-        Self { axes, seen }
+        Self { components, visible }
     }
 
-    /// Scales them to length 1 where they are seen, and gives the lengths that they had.
+    /// Normalizes the directions and returns the lengths that they had before.
     #[inline(always)]
     pub fn normalize(&mut self) -> [f32; LANES] {
-        let [x, y, z] = &mut self.axes;
+        let [x, y, z] = &mut self.components;
         let mut lengths = [0.0; LANES];
         for i in 0..LANES {
             lengths[i] = x[i].fma(x[i], y[i].fma(y[i], z[i] * z[i])).sqrt();
@@ -110,8 +112,8 @@ mod tests {
                     let (x, y) = (column * size[0] / 16 / LANES * LANES, row * height / 40);
                     let mut directions = Directions::new(&camera, x, y);
                     directions.normalize();
-                    let [xs, ys, zs] = directions.axes;
-                    for i in (0..LANES).filter(|i| directions.seen[*i]) {
+                    let [xs, ys, zs] = directions.components;
+                    for i in (0..LANES).filter(|i| directions.visible[*i]) {
                         let exact = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
                         let found = DVec3::new(f64::from(xs[i]), f64::from(ys[i]), f64::from(zs[i]));
                         worst = worst.max(exact.map_or(f64::NAN, |exact| exact.normalize().distance(found)));

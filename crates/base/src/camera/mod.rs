@@ -1,4 +1,4 @@
-//! Cameras: where they stand, what their lens does, and how world and picture meet.
+//! Cameras: pose, lens, and projection between world and picture.
 
 pub mod directions;
 pub mod upright_quad;
@@ -12,11 +12,11 @@ use crate::{
 };
 
 crate::choice! {
-    /// How directions become places in the picture.
+    /// How directions are projected into the picture.
     pub enum Lens {
         /// Straight lines stay straight.
         Perspective = "perspective",
-        /// Equidistant fisheye: distance from the centre of an inscribed circle grows with the angle (domes).
+        /// Equidistant fisheye: the distance from the center of the inscribed circle is proportional to the angle (domes).
         Fisheye = "fisheye",
         /// Equirectangular panorama: 360 degrees across, 180 degrees down.
         Panorama = "panorama",
@@ -58,17 +58,17 @@ crate::parameters! {
     }
 }
 
-/// Least and greatest vertical field of view of a perspective lens, whether it is stated or follows from focal length and sensor, degrees.
+/// Smallest and largest vertical field of view of a perspective lens, degrees, whether it is stated or follows from the focal length and the sensor.
 pub const VERTICAL_FOV_DEG: Range = Range::new(0.1, 170.0);
 
-/// Vertical field of view of a lens of 14 mm, with which auroras are photographed, degrees.
+/// Vertical field of view of a 14 mm lens, as used to photograph auroras, degrees.
 pub const SKY_FOV_DEG: f64 = 81.0;
 
 impl CameraParameters {
-    /// Stands at the origin and looks up at the sky: to the north with a lens that has an up, to the zenith with a dome.
+    /// Places the camera at the origin, looking up at the sky: toward the north with a perspective lens or a panorama, toward the zenith with a dome.
     pub fn look_up(&mut self) {
         let target = match self.lens {
-            // From the horizon nearly to the zenith.
+            // The picture covers the sky from the horizon nearly to the zenith.
             Lens::Perspective => [0.0, 60.0, -60.0],
             Lens::Fisheye => [0.0, 100.0, 0.0],
             Lens::Panorama => [0.0, EYE_HEIGHT, -60.0],
@@ -76,10 +76,10 @@ impl CameraParameters {
         (self.position, self.target) = (Animated::from([0.0, EYE_HEIGHT, 0.0]), Animated::from(target));
     }
 
-    /// Least and greatest vertical field of view of the lens over all time, degrees, where it follows from the focal length.
+    /// Smallest and largest vertical field of view over all time, degrees; `None` unless a focal length is given.
     #[must_use]
     pub fn fov_of_focal_length(&self) -> Option<[f64; 2]> {
-        // Keyed lengths stay between their keys.
+        // Interpolation never overshoots the keys, so the extremes lie at keys.
         let [shortest, longest] = self.focal_length_mm.as_ref()?.bounds();
         Some([longest, shortest].map(|focal| (2.0 * half_fov(self.sensor_height_mm, focal)).to_degrees()))
     }
@@ -98,7 +98,10 @@ impl CameraParameters {
             position: DVec3::from(self.position.at(t)),
             orientation,
             near: self.near,
-            centre: DVec2::new(0.5 * size[0] as f64 - self.shift[0] * height, 0.5 * height + self.shift[1] * height),
+            principal_point: DVec2::new(
+                0.5 * size[0] as f64 - self.shift[0] * height,
+                0.5 * height + self.shift[1] * height,
+            ),
             size: [size[0] as f64, height],
             focal_pixels: match self.lens {
                 Lens::Perspective => 0.5 * height / math::tan(half_fov),
@@ -111,13 +114,13 @@ impl CameraParameters {
     }
 }
 
-/// Half the field of view across a sensor of some size, radians.
+/// Half the field of view for a sensor size and a focal length, radians.
 fn half_fov(sensor_mm: f64, focal_mm: f64) -> f64 {
     math::atan(0.5 * sensor_mm / focal_mm)
 }
 
-/// Columns: right, up, backward. Looking straight up keeps north (-z) at the top, so that east lies left, as on star
-/// charts; looking straight down, south is at the top.
+/// Orientation of a camera, columns: right, up, backward. When the camera looks straight up, north (-z) is at the top, so that east is on the left, as
+/// on star charts. When it looks straight down, south is at the top.
 fn look_at(position: DVec3, target: DVec3, roll: f64) -> DMat3 {
     let back = (position - target).try_normalize().unwrap_or(DVec3::Z);
     let reference = if back.y.abs() > 0.999_999 { DVec3::new(0.0, 0.0, back.y.signum()) } else { DVec3::Y };
@@ -127,47 +130,47 @@ fn look_at(position: DVec3, target: DVec3, roll: f64) -> DMat3 {
     DMat3::from_cols(right * cos + up * sin, up * cos - right * sin, back)
 }
 
-/// A camera at one instant, for a picture of one size. Pixel (0, 0) is the top left one, its centre at (0.5, 0.5).
+/// A camera at one instant, for a picture of one size. Pixel (0, 0) is at the top left; its center is at (0.5, 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Lens.
     pub lens: Lens,
-    /// Where it stands, m.
+    /// Position, m.
     pub position: DVec3,
-    /// Columns: right, up and backward in the world.
+    /// World-from-camera rotation; its columns are right, up and backward.
     pub orientation: DMat3,
-    /// Nothing nearer is drawn, m.
+    /// Near clipping distance, m.
     pub near: f64,
     /// Principal point, pixels.
-    pub centre: DVec2,
+    pub principal_point: DVec2,
     /// Picture size, pixels.
     pub size: [f64; 2],
-    /// Pixels a unit of tangent (perspective) or a radian (fisheye, panorama).
+    /// Focal length in pixels: pixels per unit of tangent (perspective) or per radian (fisheye, panorama).
     pub focal_pixels: f64,
     half_angle: f64,
     half_fov: f64,
 }
 
-/// Where a point of the world lies in the picture.
+/// A point of the world projected into the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
     /// Pixels from the picture's left and top edges.
     pub pixel: DVec2,
-    /// Depth, m: along the axis for perspective, distance for fisheye and panorama.
+    /// Depth, m: along the optical axis for perspective, Euclidean distance for fisheye and panorama.
     pub depth: f64,
-    /// Pixels that a metre across the line of sight covers there.
-    pub pixels_per_metre: f64,
+    /// Pixels covered by one meter perpendicular to the line of sight at that depth.
+    pub pixels_per_meter: f64,
 }
 
 impl Camera {
-    /// The same camera with a picture that reaches `pixels` further on every side.
+    /// The same camera with a picture extended by `pixels` on every side.
     pub fn with_overscan(mut self, pixels: usize) -> Self {
-        self.centre += DVec2::splat(pixels as f64);
+        self.principal_point += DVec2::splat(pixels as f64);
         self.size = self.size.map(|side| side + 2.0 * pixels as f64);
         self
     }
 
-    /// The camera behind a level mirror at `height`: it sees at each pixel what this one sees there in the mirror.
+    /// The camera reflected at a horizontal mirror at `height`: each of its pixels shows what this camera sees at that pixel in the mirror.
     /// Its frame is left-handed.
     pub fn mirrored(mut self, height: f64) -> Self {
         self.position.y = 2.0 * height - self.position.y;
@@ -175,13 +178,13 @@ impl Camera {
         self
     }
 
-    /// `point` in the camera's frame: right, up, backward, m.
+    /// `point` in camera space: right, up, backward, m.
     #[inline(always)]
     pub fn to_camera(&self, point: DVec3) -> DVec3 {
         self.orientation.transpose() * (point - self.position)
     }
 
-    /// Depth of `point` as this lens measures it, m; negative behind a perspective camera.
+    /// Depth of `point` in the convention of this lens (see [`Projection::depth`]), m; negative behind a perspective camera.
     #[inline(always)]
     pub fn depth(&self, point: DVec3) -> f64 {
         match self.lens {
@@ -190,7 +193,7 @@ impl Camera {
         }
     }
 
-    /// Where `point` lies in the picture; `None` where the lens cannot see it or it is nearer than `near`.
+    /// Projects `point` into the picture; `None` if it lies outside the field of view or nearer than `near`.
     #[inline(always)]
     pub fn project(&self, point: DVec3) -> Option<Projection> {
         let local = self.to_camera(point);
@@ -213,19 +216,19 @@ impl Camera {
             }
         };
         Some(Projection {
-            pixel: self.centre + DVec2::new(offset.x, -offset.y) * self.focal_pixels,
+            pixel: self.principal_point + DVec2::new(offset.x, -offset.y) * self.focal_pixels,
             depth,
-            pixels_per_metre: self.focal_pixels / depth,
+            pixels_per_meter: self.focal_pixels / depth,
         })
     }
 
-    /// The direction seen at a place in the picture, in the world; `None` outside a fisheye's circle.
+    /// The view direction at a position in the picture, in world space; `None` outside the circle of a fisheye.
     ///
-    /// Its length is 1 for fisheye and panorama; for perspective its extent along the axis is 1, so that
-    /// `position + depth * direction` is the point at a depth for every lens.
+    /// Its length is 1 for fisheye and panorama. For perspective its component along the optical axis is 1, so that
+    /// `position + depth * direction` is the point at that depth for every lens.
     pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
-        let x = (pixel.x - self.centre.x) / self.focal_pixels;
-        let y = (self.centre.y - pixel.y) / self.focal_pixels;
+        let x = (pixel.x - self.principal_point.x) / self.focal_pixels;
+        let y = (self.principal_point.y - pixel.y) / self.focal_pixels;
         let local = match self.lens {
             Lens::Perspective => DVec3::new(x, y, -1.0),
             Lens::Fisheye => {
@@ -246,13 +249,13 @@ impl Camera {
         Some(self.orientation * local)
     }
 
-    /// Angle from the axis as far as a fisheye lens sees, radians.
+    /// Half of the field of view of a fisheye lens, radians.
     #[must_use]
     pub fn half_angle(&self) -> f64 {
         self.half_angle
     }
 
-    /// What EXR headers say of it.
+    /// The camera metadata written to EXR headers.
     pub fn header(&self) -> CameraHeader {
         let rotation = self.orientation.transpose();
         let translation = -(rotation * self.position);
@@ -264,21 +267,22 @@ impl Camera {
             world_to_camera[3][row] = translation[row];
         }
         world_to_camera[3][3] = 1.0;
-        let single = |matrix: [[f64; 4]; 4]| matrix.map(|row| row.map(|value| value as f32));
-        let (straight, round) = (self.lens == Lens::Perspective, self.lens == Lens::Fisheye);
+        let to_f32 = |matrix: [[f64; 4]; 4]| matrix.map(|row| row.map(|value| value as f32));
+        let (is_perspective, is_fisheye) = (self.lens == Lens::Perspective, self.lens == Lens::Fisheye);
         CameraHeader {
-            world_to_camera: single(world_to_camera),
-            world_to_ndc: straight.then(|| single(self.world_to_ndc(&world_to_camera))),
-            vertical_fov_deg: straight.then_some((2.0 * self.half_fov).to_degrees() as f32),
+            world_to_camera: to_f32(world_to_camera),
+            world_to_ndc: is_perspective.then(|| to_f32(self.world_to_ndc(&world_to_camera))),
+            vertical_fov_deg: is_perspective.then_some((2.0 * self.half_fov).to_degrees() as f32),
             lens: Some(self.lens),
-            fisheye_fov_deg: round.then_some((2.0 * self.half_angle).to_degrees() as f32),
+            fisheye_fov_deg: is_fisheye.then_some((2.0 * self.half_angle).to_degrees() as f32),
         }
     }
 
-    /// Row-vector matrix to the screen window [-1, 1] of a perspective lens.
+    /// Row-vector matrix from world space to the screen window [-1, 1] of a perspective lens.
     fn world_to_ndc(&self, world_to_camera: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
         let [width, height] = self.size;
-        let (shift_x, shift_y) = (2.0 * self.centre.x / width - 1.0, 1.0 - 2.0 * self.centre.y / height);
+        let (shift_x, shift_y) =
+            (2.0 * self.principal_point.x / width - 1.0, 1.0 - 2.0 * self.principal_point.y / height);
         let projection = [
             [2.0 * self.focal_pixels / width, 0.0, 0.0, 0.0],
             [0.0, 2.0 * self.focal_pixels / height, 0.0, 0.0],
@@ -370,7 +374,7 @@ mod tests {
         };
         let camera = parameters.at(0.0, [512, 512]);
         let horizon = camera.project(DVec3::new(10.0, 0.001, 0.0)).unwrap();
-        assert!(((horizon.pixel - camera.centre).length() - 256.0).abs() < 0.1);
+        assert!(((horizon.pixel - camera.principal_point).length() - 256.0).abs() < 0.1);
         assert!(camera.project(DVec3::new(10.0, -0.1, 0.0)).is_none());
         assert!(camera.direction(DVec2::new(1.0, 1.0)).is_none());
     }

@@ -1,4 +1,4 @@
-//! The colour and luminance of black bodies, ready made for hot loops.
+//! Color and luminance of black bodies, tabulated for hot loops.
 
 use std::sync::LazyLock;
 
@@ -9,25 +9,25 @@ use super::{
 
 /// Lowest temperature of the table, K; below it a black body is dark.
 pub const LOWEST_K: f32 = 1.0;
-/// Highest temperature of the table, K; hotter bodies are given this colour and luminance.
+/// Highest temperature of the table, K; hotter bodies have this color and luminance.
 pub const HIGHEST_K: f32 = 10_000.0;
 
-/// Natural logarithm of the luminance given to bodies too cold to have one in single precision (1e-30 cd/m^2).
+/// Natural logarithm of the luminance (1e-30 cd/m^2) assigned to bodies too cold for single precision.
 pub const DARK_LN_LUMINANCE: f32 = -69.077_55;
 
 const ENTRIES: usize = HIGHEST_K as usize + 1;
 
 /// Black bodies of 1 to 10000 K as absolute ACEScg, one entry per kelvin.
 ///
-/// Planck's law is integrated over 360-830 nm on a geometric grid of temperatures; between them ln Y and X/Y, Z/Y, which are nearly
-/// straight in ln T, are interpolated by cubics (relative error below 1e-6) and then tabulated per kelvin.
+/// Planck's law is integrated over 360-830 nm on a geometric grid of temperatures. Between the grid points ln Y, X/Y and Z/Y, which are nearly
+/// linear in ln T, are interpolated by cubics (relative error below 1e-6) and tabulated per kelvin.
 #[derive(Clone, Debug)]
 pub struct BlackBody {
     /// Red, green, blue in cd/m^2 and ln of luminance.
     entries: Vec<[f32; 4]>,
 }
 
-/// The table, built at first use (a few ms).
+/// The table, built on first use (a few ms).
 #[must_use]
 pub fn black_body() -> &'static BlackBody {
     static TABLE: LazyLock<BlackBody> = LazyLock::new(BlackBody::new);
@@ -40,12 +40,12 @@ impl BlackBody {
         Self { entries: (0..ENTRIES).map(|kelvin| coarse.entry(kelvin as f64)).collect() }
     }
 
-    /// The table's cell and the place in it. NaN and everything cold count as 0 K.
+    /// The table interval of a temperature and the fraction within it. NaN and negative temperatures count as 0 K.
     #[inline(always)]
     fn locate(temperature_k: f32) -> (usize, f32) {
-        let within = if temperature_k > 0.0 { temperature_k.min(HIGHEST_K) } else { 0.0 };
-        let below = (within as usize).min(ENTRIES - 2);
-        (below, within - below as f32)
+        let clamped = if temperature_k > 0.0 { temperature_k.min(HIGHEST_K) } else { 0.0 };
+        let below = (clamped as usize).min(ENTRIES - 2);
+        (below, clamped - below as f32)
     }
 
     #[inline(always)]
@@ -59,7 +59,7 @@ impl BlackBody {
         between
     }
 
-    /// Light of a black body as ACEScg whose luminance is in cd/m^2. Linear between whole kelvins; dark (0) below about 150 K.
+    /// Radiance of a black body as ACEScg with luminance in cd/m^2. Linear between whole kelvins; 0 below about 150 K.
     ///
     /// ```
     /// let candle = bansho_base::color::blackbody::black_body().radiance(1900.0);
@@ -80,7 +80,7 @@ impl BlackBody {
     }
 }
 
-/// Coldest node, K: at 100 K luminance is near 1e-66 cd/m^2.
+/// Coldest node, K: at 100 K the luminance is about 1e-66 cd/m^2.
 const COARSE_LOWEST_K: f64 = 100.0;
 const COARSE_HIGHEST_K: f64 = 10_000.0;
 const COARSE_INTERVALS: usize = 384;
@@ -99,7 +99,7 @@ impl CoarseTable {
             let [x, y, z] = xyz_of_spectrum(|nm| planck_radiance_per_nm(nm, temperature_k));
             [libm::log(y * LUMINOUS_EFFICACY_LM_PER_W), x / y, z / y]
         };
-        // One node beyond the highest temperature would serve the cubic; the last cell uses the nodes before it instead.
+        // There is no node beyond the highest temperature: the cubic of the last interval uses the four last nodes instead.
         Self((0..=COARSE_INTERVALS).map(node).collect())
     }
 

@@ -10,7 +10,7 @@ pub fn white_luminance(ev100: f64) -> f64 {
     WHITE_AT_EV_0 * libm::exp2(ev100)
 }
 
-/// What scene-linear values in cd/m^2 are multiplied by, so that 1.0 is display white at `ev100`.
+/// Factor for scene-linear values in cd/m^2 such that 1.0 is display white at `ev100`.
 #[must_use]
 pub fn exposure_scale(ev100: f64) -> f64 {
     libm::exp2(-ev100) / WHITE_AT_EV_0
@@ -23,16 +23,16 @@ pub fn ev100_of_white_luminance(luminance: f64) -> f64 {
 }
 
 /// The EV100 of a picture taken with an f-number, an exposure time in seconds and a sensitivity (ISO): `log2(N^2 / t) - log2(S / 100)`
-/// (ISO 2720). `None` where one of them is not above 0, or the result lies beyond what any picture is taken with.
+/// (ISO 2720). `None` if one of them is not above 0, or if the absolute value of the result exceeds [`MAX_EV100`].
 #[must_use]
 pub fn ev100_of_camera(f_number: f64, exposure_time_s: f64, iso: f64) -> Option<f64> {
     let ev100 = libm::log2(f_number * f_number / exposure_time_s) - libm::log2(iso / 100.0);
-    let is_given = [f_number, exposure_time_s, iso].iter().all(|value| *value > 0.0);
-    (is_given && (-LARGEST_EV100..=LARGEST_EV100).contains(&ev100)).then_some(ev100)
+    let are_positive = [f_number, exposure_time_s, iso].iter().all(|value| *value > 0.0);
+    (are_positive && (-MAX_EV100..=MAX_EV100).contains(&ev100)).then_some(ev100)
 }
 
-/// Farthest from 0 that an exposure value at ISO 100 may lie.
-pub const LARGEST_EV100: f64 = 40.0;
+/// Largest absolute exposure value at ISO 100.
+pub const MAX_EV100: f64 = 40.0;
 
 #[cfg(test)]
 mod tests {

@@ -1,12 +1,12 @@
-//! From light to colour to display.
+//! From spectra to color to display.
 //!
-//! 1. [`spectrum`]: a spectrum becomes CIE 1931 XYZ; [`blackbody`] holds the Planckian ones ready made.
+//! 1. [`spectrum`]: a spectrum becomes CIE 1931 XYZ; [`blackbody`] tabulates black bodies.
 //! 2. [`space`]: XYZ (D65) and linear sRGB enter the working space, ACEScg, by Bradford adaptation D65 -> D60, and leave it
-//!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colours outside AP1; keep them.
+//!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colors outside AP1 and are kept.
 //! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
-//! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`display::tone`]) acts on the largest component, highlights take a
-//!    path to white and colours outside sRGB lose saturation ([`display::gamut`]), then sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
-//!    The view can be inverted on the whole sRGB cube ([`View::to_scene`]), so a plate through an empty scene is unchanged.
+//! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`display::tone`]) acts on the largest component, highlights
+//!    desaturate toward white and colors outside sRGB lose saturation ([`display::gamut`]), followed by sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
+//!    The view is invertible on the whole sRGB cube ([`View::to_scene`]), so a plate in an empty scene is unchanged.
 
 pub mod blackbody;
 pub mod display;
@@ -22,7 +22,7 @@ pub use display::{
     transfer::{decode_srgb, decode_srgb8, encode_srgb},
     view::{UnknownView, View},
 };
-pub use exposure::{LARGEST_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};
+pub use exposure::{MAX_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};
 pub use space::{
     ACESCG_FROM_SRGB, ACESCG_FROM_XYZ, LUMINANCE_WEIGHTS, Matrix3, SRGB_FROM_ACESCG, SRGB_FROM_XYZ, XYZ_FROM_ACESCG,
     XYZ_FROM_SRGB, acescg_from_srgb, acescg_from_xyz, luminance, srgb_from_acescg, xyz_from_acescg,

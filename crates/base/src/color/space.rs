@@ -1,7 +1,7 @@
-//! Colour spaces as matrices, all derived from chromaticities at compile time.
+//! Color spaces as matrices, all derived from chromaticities at compile time.
 //!
-//! XYZ here is always relative to D65, as for sRGB. Working values are ACEScg (AP1 primaries, D60 white); Bradford adaptation
-//! D65 -> D60 lies in every matrix that leads into the working space, its inverse in every matrix that leads out.
+//! XYZ here is always relative to D65, as for sRGB. The working space is ACEScg (AP1 primaries, D60 white). Every matrix into the working
+//! space includes the Bradford adaptation D65 -> D60, and every matrix out of it the inverse.
 
 use crate::math::MulAdd;
 
@@ -25,7 +25,7 @@ impl Matrix3 {
         Self([x, y, z]).transposed()
     }
 
-    /// Rows and columns exchanged.
+    /// The transposed matrix.
     #[must_use]
     pub const fn transposed(&self) -> Self {
         let [a, b, c] = self.0;
@@ -41,7 +41,7 @@ impl Matrix3 {
         Self([scaled(bc, d), scaled(ca, d), scaled(ab, d)]).transposed()
     }
 
-    /// The same numbers in single precision.
+    /// The matrix in single precision.
     #[must_use]
     pub const fn single(&self) -> [[f32; 3]; 3] {
         let [a, b, c] = self.0;
@@ -69,7 +69,7 @@ const fn diagonal(v: [f64; 3]) -> Matrix3 {
     Matrix3([[v[0], 0.0, 0.0], [0.0, v[1], 0.0], [0.0, 0.0, v[2]]])
 }
 
-/// XYZ with Y = 1 of a chromaticity.
+/// XYZ of a chromaticity, with Y = 1.
 const fn xyz_of_chromaticity([x, y]: [f64; 2]) -> [f64; 3] {
     [x / y, 1.0, (1.0 - x - y) / y]
 }
@@ -117,11 +117,11 @@ pub const ACESCG_FROM_SRGB: Matrix3 = ACESCG_FROM_XYZ.times(&XYZ_FROM_SRGB);
 /// Linear sRGB of ACEScg, adapted: white stays (1, 1, 1).
 pub const SRGB_FROM_ACESCG: Matrix3 = ACESCG_FROM_SRGB.inverse();
 
-/// Luminance of ACEScg: the Y of the light that was put in. These are the Y weights of AP1 (0.2722, 0.6741, 0.0537) seen through the
-/// adaptation back to D65, because emitted light was adapted on its way in; they sum to 1.
+/// Weights of the luminance of ACEScg: the Y, relative to D65, of the light before adaptation. They are the Y weights of AP1 (0.2722, 0.6741,
+/// 0.0537) combined with the adaptation back to D65, since emitted light is adapted on conversion to ACEScg; they sum to 1.
 pub const LUMINANCE_WEIGHTS: [f32; 3] = narrow(XYZ_FROM_ACESCG.0[1]);
 
-/// Luminance of an ACEScg colour: cd/m^2 for scene light, relative to display white when exposed.
+/// Luminance of an ACEScg color: in cd/m^2 for scene light, relative to display white for exposed light.
 #[inline(always)]
 #[must_use]
 pub fn luminance(acescg: [f32; 3]) -> f32 {
@@ -145,7 +145,7 @@ pub fn acescg_from_srgb(srgb: [f32; 3]) -> [f32; 3] {
     apply_single(&const { ACESCG_FROM_SRGB.single() }, srgb)
 }
 
-/// Linear sRGB of ACEScg; negative where the colour lies outside.
+/// Linear sRGB of ACEScg; negative components where the color lies outside sRGB.
 #[inline(always)]
 #[must_use]
 pub fn srgb_from_acescg(acescg: [f32; 3]) -> [f32; 3] {

@@ -1,13 +1,13 @@
-//! Spectra to CIE XYZ: colour-matching functions, Planck's law, spectral lines.
+//! Spectra to CIE XYZ: color-matching functions, Planck's law, spectral lines.
 
 use std::sync::LazyLock;
 
-/// CIE 1931 2-degree colour-matching functions: a header line with the origin, then `nm,xbar,ybar,zbar`.
+/// CIE 1931 2-degree color-matching functions: a header line with the origin, then `nm,xbar,ybar,zbar`.
 const TABLE_TEXT: &str = include_str!("../data/cie1931_2deg_1nm.csv");
 
-/// First wavelength of the colour-matching functions, nm.
+/// First wavelength of the color-matching functions, nm.
 pub const FIRST_NM: usize = 360;
-/// Last wavelength of the colour-matching functions, nm.
+/// Last wavelength of the color-matching functions, nm.
 pub const LAST_NM: usize = 830;
 const COUNT: usize = LAST_NM - FIRST_NM + 1;
 
@@ -26,7 +26,7 @@ static MATCHING: LazyLock<[[f64; 3]; COUNT]> = LazyLock::new(|| {
     let rows = TABLE_TEXT.lines().filter(|line| !line.starts_with('#'));
     for (entry, line) in table.iter_mut().zip(rows) {
         for (value, field) in entry.iter_mut().zip(line.split(',').skip(1)) {
-            // The table is compiled in; a test reads every field of it, so the zero can never be taken.
+            // The table is compiled in and a test parses every field, so the fallback is never used.
             *value = field.trim().parse().unwrap_or(0.0);
         }
     }
@@ -47,7 +47,7 @@ pub fn xyz_of_spectrum(radiance_per_nm: impl Fn(f64) -> f64) -> [f64; 3] {
     xyz
 }
 
-/// XYZ of a spectral line per unit radiance: the colour-matching functions at `wavelength_nm`, linear between nm, zero outside 360-830.
+/// XYZ of a spectral line per unit radiance: the colour-matching functions at `wavelength_nm`, linear between whole nm, zero outside 360-830 nm.
 #[must_use]
 pub fn line_xyz(wavelength_nm: f64) -> [f64; 3] {
     let position = wavelength_nm - FIRST_NM as f64;

@@ -1,37 +1,37 @@
-//! The white balance of a camera: which light is shown as white.
+//! The white balance of a camera: the light that is shown as white.
 
 use super::{
     space::{ACESCG_FROM_XYZ, D65, XYZ_FROM_ACESCG, adaptation},
     spectrum::{planck_radiance_per_nm, xyz_of_spectrum},
 };
 
-/// Takes the light of a black body to white, and back, by Bradford's adaptation (Lam 1985) of exposed ACEScg.
+/// Maps the light of a black body to white, and back, by Bradford adaptation (Lam 1985) of exposed ACEScg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WhiteBalance {
-    balanced: [[f32; 3]; 3],
-    back: [[f32; 3]; 3],
+    forward: [[f32; 3]; 3],
+    inverse: [[f32; 3]; 3],
 }
 
 impl WhiteBalance {
-    /// For a black body of that temperature, K.
+    /// The white balance for a black body of that temperature, K.
     #[must_use]
     pub fn of_black_body(temperature_k: f64) -> Self {
         let balanced = ACESCG_FROM_XYZ.times(&adaptation(chromaticity(temperature_k), D65).times(&XYZ_FROM_ACESCG));
-        Self { balanced: balanced.single(), back: balanced.inverse().single() }
+        Self { forward: balanced.single(), inverse: balanced.inverse().single() }
     }
 
-    /// Light as it is shown.
+    /// The adapted light.
     #[inline(always)]
     #[must_use]
     pub fn apply(&self, acescg: [f32; 3]) -> [f32; 3] {
-        times(&self.balanced, acescg)
+        multiply(&self.forward, acescg)
     }
 
-    /// The light that is shown so.
+    /// The light that [`apply`](Self::apply) maps to `acescg`.
     #[inline(always)]
     #[must_use]
     pub fn invert(&self, acescg: [f32; 3]) -> [f32; 3] {
-        times(&self.back, acescg)
+        multiply(&self.inverse, acescg)
     }
 }
 
@@ -42,9 +42,9 @@ pub fn chromaticity(temperature_k: f64) -> [f64; 2] {
     [x / (x + y + z), y / (x + y + z)]
 }
 
-/// In one order, without fused multiply-adds, so that all machines agree.
+/// Matrix times vector in a fixed order and without fused multiply-adds, so that all machines give the same bits.
 #[inline(always)]
-fn times(matrix: &[[f32; 3]; 3], [r, g, b]: [f32; 3]) -> [f32; 3] {
+fn multiply(matrix: &[[f32; 3]; 3], [r, g, b]: [f32; 3]) -> [f32; 3] {
     let [x, y, z] = matrix;
     [x[0] * r + x[1] * g + x[2] * b, y[0] * r + y[1] * g + y[2] * b, z[0] * r + z[1] * g + z[2] * b]
 }

@@ -1,22 +1,22 @@
-//! The distance to a mesh, on a grid: negative inside.
+//! Signed distance field of a mesh on a regular grid, negative inside.
 //!
-//! Near the surface distances are exact; from there the nearest triangle is handed on from point to point in sweeps
-//! (Zhao 2005, as Bridson's SDFGen does). A point is inside where lines along at least two of the three axes
-//! cross the surface an odd number of times, so that a small hole does not turn the world inside out.
+//! Near the surface distances are exact. From there the nearest triangle is propagated between grid points by fast sweeping
+//! (Zhao 2005, as in Bridson's SDFGen). A point is inside if the rays along at least two of the three axes cross the surface
+//! an odd number of times; by this majority a small hole does not invert inside and outside.
 
 use glam::{DVec3, UVec3, Vec3};
 
 use super::mesh::Mesh;
 use crate::math;
 
-/// Cells along the longest side of the mesh.
-const CELLS: f64 = 64.0;
-/// Cells around the mesh on every side.
-const MARGIN: f64 = 3.0;
-/// Cells across a thin mesh, so that some lie within it,
-const CELLS_ACROSS: f64 = 2.5;
-/// and about as many cells in all at most for that.
-const MOST_CELLS: f64 = 7e5;
+/// Cells along the longest side of the bounding box of the mesh.
+const CELLS_ALONG_LONGEST_SIDE: f64 = 64.0;
+/// Cells around the bounding box on every side.
+const MARGIN_CELLS: f64 = 3.0;
+/// Cells across the thickness of a thin mesh, so that some grid points lie inside it,
+const MIN_CELLS_ACROSS: f64 = 2.5;
+/// and the approximate limit on the total number of cells for that.
+const MAX_CELLS: f64 = 7e5;
 
 /// Signed distance to a mesh, m.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,40 +29,41 @@ pub struct DistanceField {
 }
 
 impl DistanceField {
-    /// The distances to `mesh`.
+    /// Computes the distances to `mesh`.
     pub fn new(mesh: &Mesh) -> Self {
         let [min, max] = mesh.bounds();
-        let spacing = spacing(mesh, (max - min).max_element());
-        let size = ((max - min) / spacing + 2.0 * MARGIN).ceil().as_uvec3() + UVec3::ONE;
-        let origin = min - MARGIN * spacing;
-        let mut building = Building::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
-        building.sweep();
-        let inside = building.inside();
+        let spacing = grid_spacing(mesh, (max - min).max_element());
+        let size = ((max - min) / spacing + 2.0 * MARGIN_CELLS).ceil().as_uvec3() + UVec3::ONE;
+        let origin = min - MARGIN_CELLS * spacing;
+        let mut builder = GridBuilder::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
+        builder.sweep();
+        let inside = builder.classify_inside();
         let signed = |(distance, inside): (f32, bool)| if inside { -distance } else { distance };
         let distance =
-            building.distance.iter().zip(inside).map(|(d, inside)| signed((*d * spacing as f32, inside))).collect();
-        Self { origin, spacing, size: building.size, distance }
+            builder.distance.iter().zip(inside).map(|(d, inside)| signed((*d * spacing as f32, inside))).collect();
+        Self { origin, spacing, size: builder.size, distance }
     }
 
-    /// Distance at `point`; beyond the grid at least as far as its edge is.
+    /// Signed distance at `point`, m, trilinear between grid points. Outside the grid: the distance at the nearest point of the grid plus the distance
+    /// from there.
     pub fn at(&self, point: DVec3) -> f64 {
         let last = DVec3::from(self.size.map(|side| (side - 1) as f64));
-        let place = (point - self.origin) / self.spacing;
-        let held = place.clamp(DVec3::ZERO, last);
-        let cell = held.floor().min(last - 1.0);
-        let f = held - cell;
+        let grid_position = (point - self.origin) / self.spacing;
+        let clamped = grid_position.clamp(DVec3::ZERO, last);
+        let cell = clamped.floor().min(last - 1.0);
+        let f = clamped - cell;
         let [x, y, z] = cell.to_array().map(|c| c as usize);
         let corner = |i: usize, j: usize, k: usize| f64::from(self.distance[self.index([x + i, y + j, z + k])]);
         let along = |j, k| corner(0, j, k) * (1.0 - f.x) + corner(1, j, k) * f.x;
         let across = |k| along(0, k) * (1.0 - f.y) + along(1, k) * f.y;
-        across(0) * (1.0 - f.z) + across(1) * f.z + (place - held).length() * self.spacing
+        across(0) * (1.0 - f.z) + across(1) * f.z + (grid_position - clamped).length() * self.spacing
     }
 
-    /// Unit vector away from the mesh at `point`: the gradient of the distance.
+    /// Unit vector away from the mesh at `point`: the normalized gradient of the distance, by central differences.
     pub fn normal(&self, point: DVec3) -> DVec3 {
         let step = 0.5 * self.spacing;
-        let slope = |axis: DVec3| self.at(point + axis * step) - self.at(point - axis * step);
-        DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Y)
+        let difference = |axis: DVec3| self.at(point + axis * step) - self.at(point - axis * step);
+        DVec3::new(difference(DVec3::X), difference(DVec3::Y), difference(DVec3::Z)).normalize_or(DVec3::Y)
     }
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -70,24 +71,25 @@ impl DistanceField {
     }
 }
 
-/// Distance between grid points for a mesh with such a longest side: small enough for its thickness, if that can be.
-fn spacing(mesh: &Mesh, longest: f64) -> f64 {
+/// Distance between grid points for a mesh whose bounding box has the longest side `longest`: fine enough for the thickness of the mesh, as far as
+/// [`MAX_CELLS`] allows.
+fn grid_spacing(mesh: &Mesh, longest: f64) -> f64 {
     let [min, max] = mesh.bounds();
     let (middle, mut volume, mut area) = (0.5 * (min + max), 0.0, 0.0);
     for [a, b, c] in mesh.triangles().map(|corners| corners.map(|corner| corner - middle)) {
         volume += a.dot(b.cross(c)) / 6.0;
         area += 0.5 * (b - a).cross(c - a).length();
     }
-    // A plate's sides are all its area, twice; what is nowhere as thin is thicker by that.
+    // Twice the volume over the area is the thickness of a plate, and less than the thickness of any more compact body.
     let thickness = 2.0 * volume.abs() / area.max(f64::MIN_POSITIVE);
-    let finest = math::cbrt((max - min + thickness).element_product() / MOST_CELLS);
-    // A sheet without thickness has no inside that a finer grid would find.
-    let across = if thickness > finest { (thickness / CELLS_ACROSS).max(finest) } else { f64::INFINITY };
-    across.min(longest / CELLS).max(1e-9)
+    let finest = math::cbrt((max - min + thickness).element_product() / MAX_CELLS);
+    // A sheet without thickness has no inside, so a finer grid would not help.
+    let across = if thickness > finest { (thickness / MIN_CELLS_ACROSS).max(finest) } else { f64::INFINITY };
+    across.min(longest / CELLS_ALONG_LONGEST_SIDE).max(1e-9)
 }
 
-/// The grid while it is filled; lengths in cells.
-struct Building {
+/// The grid under construction; lengths in cells.
+struct GridBuilder {
     size: [usize; 3],
     triangles: Vec<[Vec3; 3]>,
     distance: Vec<f32>,
@@ -96,18 +98,18 @@ struct Building {
 
 const NONE: u32 = u32::MAX;
 
-impl Building {
+impl GridBuilder {
     fn new(mesh: &Mesh, origin: DVec3, spacing: f64, size: [usize; 3]) -> Self {
-        let cells = |corner: DVec3| ((corner - origin) / spacing).as_vec3();
+        let to_cells = |corner: DVec3| ((corner - origin) / spacing).as_vec3();
         let count = size.iter().product();
-        let triangles = mesh.triangles().map(|corners| corners.map(cells)).collect();
-        let mut building = Self { size, triangles, distance: vec![f32::INFINITY; count], nearest: vec![NONE; count] };
-        (0..building.triangles.len()).for_each(|triangle| building.mark_near(triangle));
-        building
+        let triangles = mesh.triangles().map(|corners| corners.map(to_cells)).collect();
+        let mut builder = Self { size, triangles, distance: vec![f32::INFINITY; count], nearest: vec![NONE; count] };
+        (0..builder.triangles.len()).for_each(|triangle| builder.compute_exact_distances(triangle));
+        builder
     }
 
-    /// Exact distances of the points within a cell of the box around a triangle.
-    fn mark_near(&mut self, triangle: usize) {
+    /// Computes exact distances at the grid points within one cell of the bounding box of a triangle.
+    fn compute_exact_distances(&mut self, triangle: usize) {
         let [a, b, c] = self.triangles[triangle];
         let low = (a.min(b).min(c).floor() - 1.0).max(Vec3::ZERO).as_uvec3();
         let high = (a.max(b).max(c).ceil() + 1.0).max(Vec3::ZERO).as_uvec3();
@@ -116,23 +118,23 @@ impl Building {
         for z in low.z as usize..end(2) {
             for y in low.y as usize..end(1) {
                 for x in low.x as usize..end(0) {
-                    self.offer([x, y, z], triangle as u32);
+                    self.update_distance([x, y, z], triangle as u32);
                 }
             }
         }
     }
 
-    fn offer(&mut self, place: [usize; 3], triangle: u32) {
-        let index = (place[2] * self.size[1] + place[1]) * self.size[0] + place[0];
-        let point = Vec3::from(place.map(|coordinate| coordinate as f32));
-        let distance = distance_to_triangle(point, self.triangles[triangle as usize]);
+    fn update_distance(&mut self, grid_point: [usize; 3], triangle: u32) {
+        let index = (grid_point[2] * self.size[1] + grid_point[1]) * self.size[0] + grid_point[0];
+        let position = Vec3::from(grid_point.map(|coordinate| coordinate as f32));
+        let distance = distance_to_triangle(position, self.triangles[triangle as usize]);
         if distance < self.distance[index] {
             self.distance[index] = distance;
             self.nearest[index] = triangle;
         }
     }
 
-    /// Hands nearest triangles on along all eight diagonals, twice.
+    /// Propagates nearest triangles in sweeps along all eight diagonals, twice.
     fn sweep(&mut self) {
         let [width, height, depth] = self.size;
         for diagonal in 0..16 {
@@ -140,44 +142,44 @@ impl Building {
             for k in 0..depth {
                 for j in 0..height {
                     for i in 0..width {
-                        let place = [forward(0, i, width), forward(1, j, height), forward(2, k, depth)];
-                        self.take_over(place, diagonal);
+                        let grid_point = [forward(0, i, width), forward(1, j, height), forward(2, k, depth)];
+                        self.propagate_from_neighbors(grid_point, diagonal);
                     }
                 }
             }
         }
     }
 
-    /// Tries the nearest triangles of the three points behind `place`.
-    fn take_over(&mut self, place: [usize; 3], diagonal: usize) {
+    /// Tries the nearest triangles of the three neighbors of `point` that this sweep has already visited.
+    fn propagate_from_neighbors(&mut self, point: [usize; 3], diagonal: usize) {
         for axis in 0..3 {
-            let mut behind = place;
-            behind[axis] = if diagonal >> axis & 1 == 0 { place[axis].wrapping_sub(1) } else { place[axis] + 1 };
-            if behind[axis] < self.size[axis] {
-                let triangle = self.nearest[(behind[2] * self.size[1] + behind[1]) * self.size[0] + behind[0]];
+            let mut neighbor = point;
+            neighbor[axis] = if diagonal >> axis & 1 == 0 { point[axis].wrapping_sub(1) } else { point[axis] + 1 };
+            if neighbor[axis] < self.size[axis] {
+                let triangle = self.nearest[(neighbor[2] * self.size[1] + neighbor[1]) * self.size[0] + neighbor[0]];
                 if triangle != NONE {
-                    self.offer(place, triangle);
+                    self.update_distance(point, triangle);
                 }
             }
         }
     }
 
-    /// Whether each point is inside, by majority of three lines.
-    fn inside(&self) -> Vec<bool> {
+    /// Whether each grid point is inside, by majority vote of the rays along the three axes.
+    fn classify_inside(&self) -> Vec<bool> {
         let mut votes = vec![0u8; self.distance.len()];
         for axis in 0..3 {
-            self.vote(axis, &mut votes);
+            self.add_inside_votes(axis, &mut votes);
         }
         votes.into_iter().map(|votes| votes >= 2).collect()
     }
 
-    /// Adds a vote to every point before which the line along `axis` has crossed the surface an odd number of times.
-    fn vote(&self, axis: usize, votes: &mut [u8]) {
+    /// Adds a vote to every grid point at which the ray along `axis` has crossed the surface an odd number of times.
+    fn add_inside_votes(&self, axis: usize, votes: &mut [u8]) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let strides = [1, self.size[0], self.size[0] * self.size[1]];
         let mut crossings = vec![Vec::new(); self.size[u] * self.size[v]];
         for corners in &self.triangles {
-            mark_crossings(corners, [axis, u, v], [self.size[u], self.size[v]], &mut crossings);
+            find_crossings(corners, [axis, u, v], [self.size[u], self.size[v]], &mut crossings);
         }
         for (line, crossings) in crossings.iter_mut().enumerate() {
             crossings.sort_unstable_by(f32::total_cmp);
@@ -193,17 +195,17 @@ impl Building {
     }
 }
 
-/// Notes where the grid's lines along the first of `axes` cross a triangle.
-fn mark_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2], crossings: &mut [Vec<f32>]) {
-    // Lines a hair beside the grid's points pass no corner and no edge of a mesh that was made on round numbers.
+/// Records where the grid lines along the first of the axes cross a triangle.
+fn find_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2], crossings: &mut [Vec<f32>]) {
+    // The lines are shifted slightly, so that they do not pass through vertices and edges of meshes with round coordinates.
     let shift = [1.371e-4, 2.137e-4];
-    let flat = corners.map(|corner| [corner[u] - shift[0], corner[v] - shift[1]]);
+    let projected = corners.map(|corner| [corner[u] - shift[0], corner[v] - shift[1]]);
     let cross = |[ax, ay]: [f32; 2], [bx, by]: [f32; 2], [px, py]: [f32; 2]| {
         f64::from(bx - ax) * f64::from(py - ay) - f64::from(by - ay) * f64::from(px - ax)
     };
-    let area = cross(flat[0], flat[1], flat[2]);
+    let area = cross(projected[0], projected[1], projected[2]);
     let range = |k: usize| {
-        let (low, high) = (flat.map(|c| c[k]), flat.map(|c| c[k]));
+        let (low, high) = (projected.map(|c| c[k]), projected.map(|c| c[k]));
         let low = low.into_iter().fold(f32::INFINITY, f32::min).ceil().max(0.0) as usize;
         let high = high.into_iter().fold(f32::NEG_INFINITY, f32::max).floor();
         if high < 0.0 { low..low } else { low..(high as usize + 1).min(size[k]) }
@@ -211,7 +213,7 @@ fn mark_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2
     for j in range(1) {
         for i in range(0) {
             let point = [i as f32, j as f32];
-            let weights = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| cross(flat[a], flat[b], point) / area);
+            let weights = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| cross(projected[a], projected[b], point) / area);
             if area != 0.0 && weights.iter().all(|weight| *weight >= 0.0) {
                 let at: f64 = (0..3).map(|k| weights[k] * f64::from(corners[k][axis])).sum();
                 crossings[j * size[0] + i].push(at as f32);

@@ -1,149 +1,150 @@
-//! Surfaces made of triangles.
+//! Triangle meshes.
 
 use glam::DVec3;
 
-/// Most triangles of a mesh.
-pub const MOST_TRIANGLES: usize = 4_000_000;
+/// Maximum number of triangles of a mesh.
+pub const MAX_TRIANGLES: usize = 4_000_000;
 
-/// Most corners of a mesh: as many as that many triangles have which share none.
-pub const MOST_CORNERS: usize = 3 * MOST_TRIANGLES;
+/// Maximum number of vertices of a mesh: as many as [`MAX_TRIANGLES`] triangles have without shared vertices.
+pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 
-/// A surface of triangles, right-handed, y up, m.
+/// A triangle mesh: right-handed, y up, in meters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    corners: Vec<[f32; 3]>,
+    vertices: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// Why corners and triangles make no mesh.
+/// Why vertices and triangles do not form a valid mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MeshError {
     /// No triangle has an area.
     #[error("it has no triangles with an area")]
     NoTriangles,
-    /// More than are read.
-    #[error("it has {found} triangles; at most {MOST_TRIANGLES} are read")]
+    /// Too many triangles.
+    #[error("it has {found} triangles; at most {MAX_TRIANGLES} are read")]
     TooManyTriangles {
         /// How many it has.
         found: usize,
     },
-    /// More than are read.
-    #[error("it has {found} corners; at most {MOST_CORNERS} are read")]
-    TooManyCorners {
+    /// Too many vertices.
+    #[error("it has {found} vertices; at most {MAX_VERTICES} are read")]
+    TooManyVertices {
         /// How many it has.
         found: usize,
     },
-    /// A triangle names a corner that is not there.
-    #[error("triangle {} names corner {}, and there are {corners}", triangle + 1, u64::from(*corner) + 1)]
-    NoSuchCorner {
-        /// Which triangle, from 0.
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {} refers to vertex {}, and there are {vertex_count}", triangle + 1, u64::from(*vertex) + 1)]
+    VertexIndexOutOfRange {
+        /// Index of the triangle, from 0.
         triangle: usize,
-        /// Which corner it names, from 0.
-        corner: u32,
-        /// How many there are.
-        corners: usize,
+        /// The vertex index, from 0.
+        vertex: u32,
+        /// Number of vertices.
+        vertex_count: usize,
     },
-    /// A coordinate that is not finite or beyond 1e6 m.
-    #[error("corner {} lies beyond 1e6 m or nowhere", corner + 1)]
-    FarCorner {
-        /// Which corner, from 0.
-        corner: usize,
+    /// A coordinate is not finite or beyond 1e6 m.
+    #[error("vertex {} is not finite or lies beyond 1e6 m", vertex + 1)]
+    VertexOutOfBounds {
+        /// Index of the vertex, from 0.
+        vertex: usize,
     },
 }
 
 impl Mesh {
-    /// The mesh of `triangles` between `corners`; triangles without an area are left out.
+    /// The mesh of `triangles`, which are indices into `vertices`. Triangles without an area are omitted.
     ///
     /// # Errors
-    /// No triangle with an area, too many, corners that are not there or not finite.
-    pub fn new(corners: Vec<[f32; 3]>, mut triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
-        if triangles.len() > MOST_TRIANGLES {
+    /// No triangle with an area, too many triangles or vertices, or vertices that do not exist or are not finite.
+    pub fn new(vertices: Vec<[f32; 3]>, mut triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        if triangles.len() > MAX_TRIANGLES {
             return Err(MeshError::TooManyTriangles { found: triangles.len() });
         }
-        if corners.len() > MOST_CORNERS {
-            return Err(MeshError::TooManyCorners { found: corners.len() });
+        if vertices.len() > MAX_VERTICES {
+            return Err(MeshError::TooManyVertices { found: vertices.len() });
         }
-        let near = |corner: &[f32; 3]| corner.iter().all(|value| value.abs() <= 1e6);
-        if let Some(corner) = corners.iter().position(|corner| !near(corner)) {
-            return Err(MeshError::FarCorner { corner });
+        let near = |vertex: &[f32; 3]| vertex.iter().all(|value| value.abs() <= 1e6);
+        if let Some(vertex) = vertices.iter().position(|vertex| !near(vertex)) {
+            return Err(MeshError::VertexOutOfBounds { vertex });
         }
-        for (triangle, named) in triangles.iter().enumerate() {
-            if let Some(&corner) = named.iter().find(|&&corner| corner as usize >= corners.len()) {
-                return Err(MeshError::NoSuchCorner { triangle, corner, corners: corners.len() });
+        for (triangle, indices) in triangles.iter().enumerate() {
+            if let Some(&vertex) = indices.iter().find(|&&vertex| vertex as usize >= vertices.len()) {
+                return Err(MeshError::VertexIndexOutOfRange { triangle, vertex, vertex_count: vertices.len() });
             }
         }
-        triangles.retain(|named| normal(named.map(|corner| point(corners[corner as usize]))).length() > 0.0);
-        if triangles.is_empty() { Err(MeshError::NoTriangles) } else { Ok(Self { corners, triangles }) }
+        triangles
+            .retain(|indices| area_normal(indices.map(|vertex| to_dvec3(vertices[vertex as usize]))).length() > 0.0);
+        if triangles.is_empty() { Err(MeshError::NoTriangles) } else { Ok(Self { vertices, triangles }) }
     }
 
-    /// How many triangles it has; at least one.
+    /// Number of triangles; at least one.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// Bytes that it takes in memory.
+    /// Size in memory, bytes.
     pub fn memory_bytes(&self) -> u64 {
-        (size_of_val(&self.corners[..]) + size_of_val(&self.triangles[..])) as u64
+        (size_of_val(&self.vertices[..]) + size_of_val(&self.triangles[..])) as u64
     }
 
-    /// Never: a mesh has a triangle.
+    /// Always false: a mesh has at least one triangle.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    /// The corners of every triangle, anticlockwise as seen from outside.
+    /// The vertices of every triangle, counterclockwise as seen from outside.
     pub fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
-        self.triangles.iter().map(|named| named.map(|corner| point(self.corners[corner as usize])))
+        self.triangles.iter().map(|indices| indices.map(|vertex| to_dvec3(self.vertices[vertex as usize])))
     }
 
-    /// Least and greatest corner of the box around it.
+    /// Minimum and maximum corner of the bounding box.
     pub fn bounds(&self) -> [DVec3; 2] {
         let empty = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        self.triangles().flatten().fold(empty, |[min, max], corner| [min.min(corner), max.max(corner)])
+        self.triangles().flatten().fold(empty, |[min, max], vertex| [min.min(vertex), max.max(vertex)])
     }
 
-    /// Its points by chance, each part as likely as its area.
+    /// A sampler of points on the surface, uniform by area.
     pub fn sampler(&self) -> SurfaceSampler {
         let mut area = 0.0;
-        let triangles = self.triangles().map(|corners| {
-            area += 0.5 * normal(corners).length();
-            (area, corners)
+        let triangles = self.triangles().map(|vertices| {
+            area += 0.5 * area_normal(vertices).length();
+            (area, vertices)
         });
         SurfaceSampler { triangles: triangles.collect() }
     }
 }
 
-fn point(corner: [f32; 3]) -> DVec3 {
-    DVec3::from(corner.map(f64::from))
+fn to_dvec3(vertex: [f32; 3]) -> DVec3 {
+    DVec3::from(vertex.map(f64::from))
 }
 
-/// Normal of a triangle, twice its area long.
-fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+/// Normal of a triangle; its length is twice the area.
+fn area_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Points on a mesh, each part of it as likely as its area.
+/// Samples points on a mesh, uniformly by area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceSampler {
-    /// Triangles with the area up to their end, m^2.
+    /// Triangles with the cumulative area including each, m^2.
     triangles: Vec<(f64, [DVec3; 3])>,
 }
 
 impl SurfaceSampler {
-    /// The whole area, m^2.
+    /// Total area, m^2.
     pub fn area(&self) -> f64 {
         self.triangles.last().map_or(0.0, |(area, _)| *area)
     }
 
-    /// The point and unit normal that belong to three numbers in [0, 1).
-    pub fn at(&self, [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
-        let wanted = which * self.area();
-        let index = self.triangles.partition_point(|(area, _)| *area <= wanted).min(self.triangles.len() - 1);
-        let corners = self.triangles[index].1;
-        // Folding the unit square over its diagonal keeps points even over the triangle.
+    /// The point and unit normal for three uniform numbers in [0, 1).
+    pub fn sample(&self, [triangle, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+        let target_area = triangle * self.area();
+        let index = self.triangles.partition_point(|(area, _)| *area <= target_area).min(self.triangles.len() - 1);
+        let vertices = self.triangles[index].1;
+        // Folding the unit square over its diagonal keeps the distribution uniform over the triangle.
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-        let [a, b, c] = corners;
-        (a + (b - a) * u + (c - a) * v, normal(corners).normalize_or(DVec3::Y))
+        let [a, b, c] = vertices;
+        (a + (b - a) * u + (c - a) * v, area_normal(vertices).normalize_or(DVec3::Y))
     }
 }
 
@@ -166,7 +167,8 @@ mod tests {
         let mut on_top = 0;
         for i in 0..6000 {
             let f = f64::from(i);
-            let (point, normal) = sampler.at([(f + 0.5) / 6000.0, (f * 0.618_034).fract(), (f * 0.414_214).fract()]);
+            let (point, normal) =
+                sampler.sample([(f + 0.5) / 6000.0, (f * 0.618_034).fract(), (f * 0.414_214).fract()]);
             let outside = (point - DVec3::splat(0.5)).abs().max_element();
             assert!((outside - 0.5).abs() < 1e-6);
             assert!(normal.dot(point - DVec3::splat(0.5)) > 0.0, "normals point out");
@@ -181,8 +183,8 @@ mod tests {
         assert_eq!(Mesh::new(corners.clone(), vec![[0, 1, 2]]), Err(MeshError::NoTriangles));
         assert_eq!(
             Mesh::new(corners, vec![[0, 1, 9]]),
-            Err(MeshError::NoSuchCorner { triangle: 0, corner: 9, corners: 3 })
+            Err(MeshError::VertexIndexOutOfRange { triangle: 0, vertex: 9, vertex_count: 3 })
         );
-        assert_eq!(Mesh::new(vec![[f32::NAN; 3]], vec![]), Err(MeshError::FarCorner { corner: 0 }));
+        assert_eq!(Mesh::new(vec![[f32::NAN; 3]], vec![]), Err(MeshError::VertexOutOfBounds { vertex: 0 }));
     }
 }

@@ -1,17 +1,17 @@
-//! Particles as other programs take them.
+//! Particles for export to other programs.
 
 use std::collections::BTreeMap;
 
-/// What can be known of a particle beside its place and velocity.
+/// A quantity of a particle besides its position and velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Quantity {
-    /// Of a gas, K.
+    /// Temperature of a gas, K.
     Temperature,
-    /// Of a gas, kg/m^3.
+    /// Density of a gas, kg/m^3.
     Density,
-    /// Of each electron that the particle stands for, eV.
+    /// Energy of each electron that the particle represents, eV.
     Energy,
-    /// That the particle brings into the air, W.
+    /// Power that the particle deposits in the atmosphere, W.
     Power,
 }
 
@@ -39,19 +39,19 @@ impl Quantity {
     }
 }
 
-/// Particles of everything in a scene that has any, at one time. All lists are of one length.
+/// The particles of all phenomena of a scene at one time. All arrays have the same length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
-    /// Places, m.
+    /// Positions, m.
     pub positions: Vec<[f32; 3]>,
     /// Velocities, m/s.
     pub velocities: Vec<[f32; 3]>,
-    /// What else is known of some of them; 0 for the others.
+    /// Further quantities; 0 for particles that lack one.
     pub quantities: BTreeMap<Quantity, Vec<f32>>,
 }
 
 impl PointCloud {
-    /// How many particles there are.
+    /// Number of particles.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
@@ -61,7 +61,7 @@ impl PointCloud {
         self.positions.is_empty()
     }
 
-    /// Adds the particles of another.
+    /// Appends the particles of another cloud.
     pub fn extend(&mut self, other: &Self) {
         let before = self.len();
         self.positions.extend_from_slice(&other.positions);

@@ -1,8 +1,8 @@
-//! Line drawings: strokes in the plane, as they come from a vector graphics file.
+//! Line drawings: strokes in the plane, read from a vector graphics file.
 
 use crate::math::DVec2;
 
-/// A stroke as a line through points.
+/// A stroke as a polyline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
     /// Its name in the file, if it has one.
@@ -11,19 +11,19 @@ pub struct Stroke {
     pub points: Vec<DVec2>,
 }
 
-/// Strokes in the order in which they were drawn.
+/// A line drawing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
-    /// Its strokes.
+    /// The strokes, in drawing order.
     pub strokes: Vec<Stroke>,
-    /// The corner of the sheet that was drawn on with the least coordinates.
-    pub low: DVec2,
-    /// The corner with the greatest.
-    pub high: DVec2,
+    /// Corner of the drawing area with the smallest coordinates.
+    pub min: DVec2,
+    /// Corner of the drawing area with the largest coordinates.
+    pub max: DVec2,
 }
 
 impl Drawing {
-    /// Bytes that its points take in memory.
+    /// Size of its points in memory, bytes.
     pub fn memory_bytes(&self) -> u64 {
         self.strokes.iter().map(|stroke| size_of_val(&stroke.points[..]) as u64).sum()
     }

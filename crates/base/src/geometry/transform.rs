@@ -1,44 +1,44 @@
-//! Where a thing stands, how it is turned and how large it is.
+//! Position, rotation and uniform scale of an object.
 
 use glam::{DQuat, DVec3};
 
 use crate::math;
 
-/// Scale, then turn, then move.
+/// World-from-local transform: scale, then rotation, then translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
-    /// Where its own origin comes to lie, m.
+pub struct Transform {
+    /// Position of the local origin in world space, m.
     pub position: DVec3,
-    /// How it is turned.
+    /// Rotation.
     pub rotation: DQuat,
-    /// How many times larger it is, the same along all axes; above 0.
+    /// Uniform scale, above 0.
     pub scale: f64,
 }
 
-impl Placement {
-    /// Moved to `position`, turned about x, then y, then z by `rotation_deg` degrees, `scale` times as large.
+impl Transform {
+    /// Scaled by `scale`, rotated about x, then y, then z by `rotation_deg` degrees, and moved to `position`.
     pub fn new(position: [f64; 3], rotation_deg: [f64; 3], scale: f64) -> Self {
-        Self { position: position.into(), rotation: turn(rotation_deg.map(f64::to_radians)), scale }
+        Self { position: position.into(), rotation: rotation_from_euler(rotation_deg.map(f64::to_radians)), scale }
     }
 
-    /// A point of the thing, in the world.
+    /// World-space point of a local point.
     pub fn to_world(&self, point: DVec3) -> DVec3 {
         self.position + self.rotation * (point * self.scale)
     }
 
-    /// A point of the world, in the thing's own coordinates.
+    /// Local point of a world-space point.
     pub fn to_local(&self, point: DVec3) -> DVec3 {
         self.rotation.inverse() * (point - self.position) / self.scale
     }
 
-    /// A direction of the thing, in the world.
-    pub fn turn(&self, direction: DVec3) -> DVec3 {
+    /// World-space direction of a local direction; the length is unchanged.
+    pub fn transform_direction(&self, direction: DVec3) -> DVec3 {
         self.rotation * direction
     }
 }
 
-/// The turn about x, then y, then z by these angles, radians.
-fn turn(angles: [f64; 3]) -> DQuat {
+/// Rotation about x, then y, then z by these angles, radians.
+fn rotation_from_euler(angles: [f64; 3]) -> DQuat {
     let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| math::sin_cos(0.5 * angle));
     let (cc, cs, sc, ss) = (cx * cz, cx * sz, sx * cz, sx * sz);
     DQuat::from_xyzw(cy * sc - sy * cs, cy * ss + sy * cc, cy * cs - sy * sc, cy * cc + sy * ss)
@@ -50,15 +50,15 @@ mod tests {
 
     #[test]
     fn turns_are_about_x_then_y_then_z() {
-        let placement = Placement::new([1.0, 0.0, 0.0], [90.0, 0.0, 90.0], 2.0);
+        let placement = Transform::new([1.0, 0.0, 0.0], [90.0, 0.0, 90.0], 2.0);
         // y turns to z about x, and z stays when turned about z; x turns to y.
         assert!((placement.to_world(DVec3::Y) - DVec3::new(1.0, 0.0, 2.0)).length() < 1e-12);
-        assert!((placement.turn(DVec3::X) - DVec3::Y).length() < 1e-12);
+        assert!((placement.transform_direction(DVec3::X) - DVec3::Y).length() < 1e-12);
     }
 
     #[test]
     fn there_and_back_is_the_same_point() {
-        let placement = Placement::new([1.0, -2.0, 3.0], [10.0, 20.0, 30.0], 0.3);
+        let placement = Transform::new([1.0, -2.0, 3.0], [10.0, 20.0, 30.0], 0.3);
         let point = DVec3::new(0.4, 5.0, -6.0);
         assert!((placement.to_local(placement.to_world(point)) - point).length() < 1e-12);
     }

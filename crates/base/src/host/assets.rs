@@ -1,4 +1,4 @@
-//! What a scene refers to by name: pictures, meshes, drawings and text, wherever they are kept.
+//! Assets that a scene refers to by name: pictures, meshes, drawings and text, wherever they are stored.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -11,88 +11,88 @@ use crate::{
     image::Image,
 };
 
-/// How the numbers of a picture are meant.
+/// Color encoding of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// sRGB-encoded values from 0 to 1, made to be looked at (PNG, JPEG).
+    /// Display-referred: sRGB-encoded values from 0 to 1 (PNG, JPEG).
     DisplaySrgb,
-    /// Linear light in the sRGB (Rec. 709) primaries, D65: an EXR file without other chromaticities.
+    /// Linear light with the sRGB (Rec. 709) primaries, D65: an EXR file that states no other chromaticities.
     LinearSrgb,
     /// Linear light in ACEScg (AP1, D60).
     LinearAcescg,
 }
 
-/// A picture that was read.
+/// A decoded picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Red, green, blue, straight alpha (1 where the file has none), in `encoding`.
-    pub colour: Image<4>,
+    pub color: Image<4>,
     /// The file's depth channel (`Z`), if it has one; row after row.
     pub depth: Option<Vec<f32>>,
-    /// What the colours mean.
+    /// Encoding of the colors.
     pub encoding: Encoding,
-    /// Exposure value at ISO 100 with which it was taken, as far as the file records it.
+    /// Exposure value at ISO 100 with which it was taken, if the file records it.
     pub exposure_ev100: Option<f64>,
 }
 
-/// Why an asset cannot be had.
+/// Why an asset could not be loaded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{path}: {problem}")]
 pub struct AssetError {
-    /// The asset's name, resolved as far as it could be.
+    /// The asset's path, resolved as far as possible.
     pub path: String,
     /// What is wrong.
     pub problem: AssetProblem,
 }
 
-fn of_all(others: u64) -> String {
-    if others == 0 { String::new() } else { format!(", since other inputs take {}", memory::shown(others)) }
+fn other_inputs_note(others: u64) -> String {
+    if others == 0 { String::new() } else { format!(", since other inputs take {}", memory::format_bytes(others)) }
 }
 
-fn only(instead: &[&str]) -> String {
+fn found_instead_note(instead: &[&str]) -> String {
     if instead.is_empty() { String::new() } else { format!(", only {}", instead.join(", ")) }
 }
 
 /// What can be wrong with an asset.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AssetProblem {
-    /// There is nothing of that name.
+    /// There is no such file.
     #[error("no such file")]
     Missing,
-    /// Its name has more than one place for the frame number, or one of too many digits.
+    /// The file name has more than one placeholder for the frame number, or one with too many digits.
     #[error("has no one place for the frame number; allowed: one run of up to 20 `#` in the file's name")]
     FrameNumber,
-    /// It is there but cannot be read.
+    /// It exists but cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
-    /// What bears its name holds no bytes with an end: a folder, a pipe, a device.
+    /// It is not a regular file but a folder, a pipe or a device.
     #[error("is {found}; allowed: an ordinary file")]
     NotAFile {
         /// What it is, such as `a pipe`.
         found: &'static str,
     },
-    /// It has more bytes than are read.
+    /// The file is too large.
     #[error("has {bytes} bytes; allowed: up to {limit}")]
     FileSize {
-        /// How many it has.
+        /// Size of the file, bytes.
         bytes: u64,
-        /// Most that are read.
+        /// Largest size that is read, bytes.
         limit: u64,
     },
-    /// It would take more memory than the inputs of a scene may.
-    #[error("takes {} of memory once it is read; allowed: up to {}{}", memory::shown(*.bytes), memory::shown(*.limit), of_all(*.others))]
+    /// It would exceed the memory limit for the inputs of a scene.
+    #[error("takes {} of memory once it is read; allowed: up to {}{}", memory::format_bytes(*.bytes), memory::format_bytes(*.limit), other_inputs_note(*.others))]
     Memory {
-        /// Bytes that it would take while it is read, at the most.
+        /// Upper bound of the memory that reading it takes, bytes.
         bytes: u64,
-        /// Bytes that it may take.
+        /// Bytes that it may occupy.
         limit: u64,
-        /// Bytes that other inputs of the scene take already, for which the limit is lower.
+        /// Bytes that other inputs of the scene occupy already; they lower the limit.
         others: u64,
     },
-    /// It would take more memory than the system has.
-    #[error("takes {} of memory once it is read, more than there is", memory::shown(*.bytes))]
+    /// It would need more memory than the system has.
+    #[error("takes {} of memory once it is read, more than there is", memory::format_bytes(*.bytes))]
     NoMemory {
-        /// Bytes that it would take while it is read, at the most.
+        /// Upper bound of the memory that reading it takes, bytes.
         bytes: u64,
     },
     /// It lies outside the folder that a scene is confined to.
@@ -101,31 +101,31 @@ pub enum AssetProblem {
         /// The folder.
         root: String,
     },
-    /// What another program said of it, which had tried.
+    /// The error message of another program that tried to load it.
     #[error("{0}")]
-    Told(String),
+    Reported(String),
     /// A drawing without strokes.
-    #[error("holds no strokes{} (allowed: an SVG file with path, polyline, polygon or line elements)", only(.instead))]
+    #[error("contains no strokes{} (allowed: an SVG file with path, polyline, polygon or line elements)", found_instead_note(.instead))]
     NoStrokes {
-        /// Names of the elements that it draws instead.
+        /// Names of the elements that it contains instead.
         instead: Vec<&'static str>,
     },
-    /// A drawing was asked for a stroke that it lacks.
+    /// The requested stroke is not in the drawing.
     #[error("has no stroke of the id `{0}`")]
     NoStroke(String),
-    /// Its name ends in something that is not a picture.
+    /// The extension of its name is not that of a supported picture format.
     #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
     UnknownKind,
-    /// Its name ends in something that is not a mesh.
+    /// The extension of its name is not that of a supported mesh format.
     #[error("is not a mesh Bansho reads (allowed: .glb, .gltf)")]
     UnknownMeshKind,
-    /// It holds no usable mesh.
-    #[error("holds no usable mesh: {0}")]
+    /// It contains no usable mesh.
+    #[error("contains no usable mesh: {0}")]
     Mesh(#[from] MeshError),
-    /// Its contents are damaged or not what the name says.
+    /// Its contents are damaged or do not match the extension of its name.
     #[error("is damaged or not of the kind its name says: {0}")]
     Damaged(String),
-    /// It claims to be larger than is allowed.
+    /// Its stated width or height is too large.
     #[error("claims {width} x {height} pixels; at most {limit} on a side are read")]
     TooLarge {
         /// Claimed width.
@@ -135,7 +135,7 @@ pub enum AssetProblem {
         /// Most pixels on a side.
         limit: u64,
     },
-    /// It claims more pixels in all than are allowed.
+    /// Its stated number of pixels is too large.
     #[error("claims {width} x {height} pixels; at most {limit} in all are read")]
     TooManyPixels {
         /// Claimed width.
@@ -145,16 +145,16 @@ pub enum AssetProblem {
         /// Most pixels in all.
         limit: u64,
     },
-    /// A picture was asked for a channel that it lacks.
+    /// The requested channel is not in the picture.
     #[error("has no channel `{0}`")]
     NoChannel(String),
 }
 
-/// Gives a scene its pictures, meshes and texts. `####` in a path stands for the frame number with leading zeros.
+/// Loads the assets of a scene. `####` in a path stands for the frame number with leading zeros.
 ///
-/// A loader may keep what it read; it may be called from several threads.
+/// Implementations may cache assets and may be called from several threads.
 pub trait Assets: Send + Sync {
-    /// The picture at `path`, for frame `frame` where it is a sequence.
+    /// The picture at `path`, for frame `frame` if it is a sequence.
     ///
     /// # Errors
     /// The asset is missing, damaged, too large or not a picture.
@@ -178,22 +178,22 @@ pub trait Assets: Send + Sync {
     /// The asset is missing or not UTF-8.
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError>;
 
-    /// Whether there is something at `path` for frame `frame`, which is not read.
+    /// Checks that there is a readable asset at `path` for frame `frame`, without reading it.
     ///
     /// # Errors
-    /// There is nothing, or nothing that can be read.
+    /// The asset is missing or unreadable.
     fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
         self.digest(path, frame).map(drop)
     }
 
-    /// A digest of the bytes behind `path` for frame `frame`: two assets with one digest are the same.
+    /// A digest of the contents of `path` for frame `frame`: assets with equal digests are the same.
     ///
     /// # Errors
     /// The asset is missing or unreadable.
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError>;
 }
 
-/// Assets held in memory, for programs that embed Bansho and for tests. Digests are of the given name only.
+/// Assets in memory, for programs that embed Bansho and for tests. Digests depend on the path only.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryAssets {
     pictures: BTreeMap<String, Arc<Picture>>,
@@ -203,22 +203,22 @@ pub struct MemoryAssets {
 }
 
 impl MemoryAssets {
-    /// Keeps `picture` under `path`.
+    /// Stores `picture` under `path`.
     pub fn insert_picture(&mut self, path: impl Into<String>, picture: Picture) {
         self.pictures.insert(path.into(), Arc::new(picture));
     }
 
-    /// Keeps `mesh` under `path`.
+    /// Stores `mesh` under `path`.
     pub fn insert_mesh(&mut self, path: impl Into<String>, mesh: Mesh) {
         self.meshes.insert(path.into(), Arc::new(mesh));
     }
 
-    /// Keeps `drawing` under `path`.
+    /// Stores `drawing` under `path`.
     pub fn insert_drawing(&mut self, path: impl Into<String>, drawing: Drawing) {
         self.drawings.insert(path.into(), Arc::new(drawing));
     }
 
-    /// Keeps `text` under `path`.
+    /// Stores `text` under `path`.
     pub fn insert_text(&mut self, path: impl Into<String>, text: impl Into<Arc<str>>) {
         self.texts.insert(path.into(), text.into());
     }
@@ -246,8 +246,8 @@ impl Assets for MemoryAssets {
     }
 
     fn digest(&self, path: &str, _frame: i64) -> Result<[u8; 32], AssetError> {
-        let drawn = self.pictures.contains_key(path) || self.drawings.contains_key(path);
-        if !drawn && !self.meshes.contains_key(path) && !self.texts.contains_key(path) {
+        let is_picture = self.pictures.contains_key(path) || self.drawings.contains_key(path);
+        if !is_picture && !self.meshes.contains_key(path) && !self.texts.contains_key(path) {
             return Err(missing(path));
         }
         let mut digest = [0; 32];

@@ -1,4 +1,4 @@
-//! How often things that are slow to build were built, for tests that hold "built once".
+//! Counts how often expensive objects are constructed, for tests that each is built only once.
 
 use std::{
     collections::BTreeMap,
@@ -7,12 +7,12 @@ use std::{
 
 static COUNTS: Mutex<BTreeMap<&'static str, u64>> = Mutex::new(BTreeMap::new());
 
-/// Counts the construction of a `kind` of thing; constructors call it themselves.
+/// Counts the construction of an object of this `kind`; called by constructors.
 pub fn count(kind: &'static str) {
     *COUNTS.lock().unwrap_or_else(PoisonError::into_inner).entry(kind).or_default() += 1;
 }
 
-/// How many of each kind this process has built since the last call.
+/// The number of constructions of each kind in this process since the last call.
 pub fn take() -> BTreeMap<&'static str, u64> {
     std::mem::take(&mut *COUNTS.lock().unwrap_or_else(PoisonError::into_inner))
 }

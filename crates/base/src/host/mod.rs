@@ -1,4 +1,4 @@
-//! What the library asks of the program that runs it: files, memory, a way to stop, text for terminals, and scratch memory.
+//! Interfaces to the host program: assets, memory, progress and cancellation, text for terminals, and scratch memory.
 
 pub mod assets;
 pub mod constructions;

@@ -1,24 +1,24 @@
-//! Progress, stages and cancelling: the caller watches, the library only reports.
+//! Progress, stages and cancellation: the library reports, the caller observes.
 
-/// A part of the work whose time is worth knowing.
+/// A stage of the work whose time is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// Reading pictures and other assets.
     Load,
     /// Stepping the phenomena to the frame's time.
     Advance,
-    /// What phenomena prepare once a frame before pixels are drawn.
+    /// Preparing the phenomena, once per frame, before pixels are drawn.
     Prepare,
     /// Drawing phenomena and compositing them.
     Draw,
-    /// View transform, dither and quantising.
+    /// View transform, dither and quantization.
     View,
     /// Compressing and writing files.
     Write,
 }
 
 impl Stage {
-    /// Every stage, in the order of a frame's life.
+    /// All stages, in the order in which a frame passes through them.
     pub const ALL: [Self; 6] = [Self::Load, Self::Advance, Self::Prepare, Self::Draw, Self::View, Self::Write];
 
     /// Its name as `--stats` and `--progress json` print it.
@@ -34,12 +34,12 @@ impl Stage {
     }
 }
 
-/// Work was stopped because the observer asked for it.
+/// Error: the observer asked to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// Watches work; keeps the clock, since libraries do not read it. Called from several threads.
+/// Observes the work. Time is measured by implementations, since the library does not read clocks. Called from several threads.
 pub trait Observer: Send + Sync {
     /// Work of this kind begins on this thread.
     fn begin(&self, _stage: Stage) {}
@@ -47,19 +47,19 @@ pub trait Observer: Send + Sync {
     /// Work of this kind ends on this thread.
     fn end(&self, _stage: Stage) {}
 
-    /// Whether to stop; asked at least once every strip of a picture and every simulation step.
+    /// Whether to stop; queried at least once per strip of a picture and per simulation step.
     fn cancelled(&self) -> bool {
         false
     }
 }
 
-/// An observer that wants nothing.
+/// An observer that does nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unobserved;
 
 impl Observer for Unobserved {}
 
-/// Reports a stage from its making until it is dropped.
+/// RAII guard: the stage lasts from its construction until it is dropped.
 pub struct StageGuard<'a> {
     observer: &'a dyn Observer,
     stage: Stage,

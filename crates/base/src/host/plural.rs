@@ -1,6 +1,6 @@
-//! Counts as people read them in messages.
+//! Singular and plural of counts in messages.
 
-/// `count` things, each called `one`: `1 item`, `2 items`.
+/// `count` with the noun `one` in singular or plural: `1 item`, `2 items`.
 ///
 /// ```
 /// use bansho_base::host::plural::counted;
@@ -11,8 +11,8 @@ pub fn counted(count: usize, one: &str) -> String {
     if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
 }
 
-/// How many are allowed: `exactly 2 items` or `1 to 8 items`.
+/// An allowed range of counts: `exactly 2 items` or `1 to 8 items`.
 #[must_use]
-pub fn between(min: usize, max: usize, one: &str) -> String {
+pub fn count_range(min: usize, max: usize, one: &str) -> String {
     if min == max { format!("exactly {}", counted(min, one)) } else { format!("{min} to {}", counted(max, one)) }
 }

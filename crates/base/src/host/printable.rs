@@ -1,9 +1,9 @@
-//! Text that others wrote, as it may be shown on a terminal.
+//! Escapes untrusted text for display on a terminal.
 
 use std::{borrow::Cow, fmt::Write};
 
-/// `text` in one line, with every character that would steer a terminal or turn the direction of reading as its escape, such as `\u{1b}`:
-/// names of files and values of scenes may hold any.
+/// `text` with every control character and every character that changes the reading direction replaced by its escape, such as `\u{1b}`. The result is
+/// one line. File names and values of scenes may contain any character.
 ///
 /// ```
 /// use bansho_base::host::printable::printable;
@@ -11,13 +11,13 @@ use std::{borrow::Cow, fmt::Write};
 /// assert_eq!(printable("火.png"), "火.png");
 /// ```
 pub fn printable(text: &str) -> Cow<'_, str> {
-    if !text.chars().any(steers) {
+    if !text.chars().any(is_control_or_bidi) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len());
     for character in text.chars() {
         // Writing to a string does not fail.
-        let _ = if steers(character) {
+        let _ = if is_control_or_bidi(character) {
             write!(shown, "{}", character.escape_default())
         } else {
             shown.write_char(character)
@@ -26,36 +26,36 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// As [`printable`], with one character for each, so that a mark below it stands where it should: a space for a tab, the picture of a control
-/// (U+2400 and after), and a replacement character for what turns the direction of reading.
+/// Like [`printable`], but replaces one character by one, so that a marker on the line below stays aligned: a tab by a space, a control character by
+/// its picture (Control Pictures, from U+2400 on), and a character that changes the reading direction by the replacement character.
 ///
 /// ```
-/// assert_eq!(bansho_base::host::printable::pictured("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
+/// assert_eq!(bansho_base::host::printable::with_control_pictures("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
 /// ```
-pub fn pictured(text: &str) -> String {
+pub fn with_control_pictures(text: &str) -> String {
     let picture = |character: char| match character {
         '\t' => ' ',
         '\0'..='\x1f' => char::from_u32(0x2400 + u32::from(character)).unwrap_or(char::REPLACEMENT_CHARACTER),
         '\x7f' => '\u{2421}',
-        other if steers(other) => char::REPLACEMENT_CHARACTER,
+        other if is_control_or_bidi(other) => char::REPLACEMENT_CHARACTER,
         other => other,
     };
     text.chars().map(picture).collect()
 }
 
-/// Characters of a text that are shown at its start, and at its end, where not all are.
-const SHOWN: [usize; 2] = [2000, 1000];
+/// Number of characters shown of the start and of the end of a text that is shortened.
+const EXCERPT_LENGTHS: [usize; 2] = [2000, 1000];
 
-/// As [`printable`], without the middle of a text of more than 3,000 characters: what is wrong stands in front, what is allowed at the end,
-/// and between them a value of any length.
+/// Like [`printable`], without the middle of a text of more than 3,000 characters. An error message begins with what is wrong and ends with what is
+/// allowed; the value between them may have any length.
 ///
 /// ```
-/// use bansho_base::host::printable::message;
-/// let shown = message(&format!("`{}` is not known; allowed: fire", "a".repeat(1_000_000))).into_owned();
+/// use bansho_base::host::printable::printable_excerpt;
+/// let shown = printable_excerpt(&format!("`{}` is not known; allowed: fire", "a".repeat(1_000_000))).into_owned();
 /// assert!(shown.starts_with("`aaa") && shown.contains("aaa [...] aaa") && shown.ends_with("allowed: fire") && shown.len() < 3100);
 /// ```
-pub fn message(text: &str) -> Cow<'_, str> {
-    let [first, last] = SHOWN;
+pub fn printable_excerpt(text: &str) -> Cow<'_, str> {
+    let [first, last] = EXCERPT_LENGTHS;
     let cut = |(start, _): (usize, char)| start;
     let (Some(end), Some(start)) =
         (text.char_indices().nth(first).map(cut), text.char_indices().rev().nth(last - 1).map(cut))
@@ -68,8 +68,9 @@ pub fn message(text: &str) -> Cow<'_, str> {
     Cow::Owned(format!("{} [...] {}", printable(&text[..end]), printable(&text[start..])))
 }
 
-/// Controls, line and paragraph separators, and the marks of the Unicode bidirectional algorithm (UAX #9) that let text look like other text.
-fn steers(character: char) -> bool {
+/// Whether it is a control character, a line or paragraph separator, or a formatting character of the Unicode bidirectional algorithm (UAX #9), which
+/// can make text look like other text.
+fn is_control_or_bidi(character: char) -> bool {
     character.is_control()
         || matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

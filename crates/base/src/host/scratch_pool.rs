@@ -1,31 +1,31 @@
-//! Things that tasks of the thread pool work with and hand on.
+//! Scratch objects that are reused by the tasks of a thread pool.
 //!
-//! Work that is cut into as many tasks as can be stays even among threads to its end, where large tasks leave one of them alone with the last.
-//! But then no task should make what it works with.
+//! Many small tasks balance the load between threads to the end, whereas the last of a few large tasks leaves the other threads idle. But then a task
+//! should not allocate its own scratch memory.
 
 use std::sync::{Mutex, PoisonError};
 
-/// As many things as there are tasks at once, made where none is left over.
+/// A pool of scratch objects: at most as many as there are concurrent tasks, created on demand.
 #[derive(Debug)]
-pub struct Spares<T, M> {
-    make: M,
-    left: Mutex<Vec<T>>,
+pub struct ScratchPool<T, M> {
+    create: M,
+    free: Mutex<Vec<T>>,
 }
 
-impl<T, M: Fn() -> T> Spares<T, M> {
-    /// None yet; `make` makes them.
-    pub fn new(make: M) -> Self {
-        Self { make, left: Mutex::default() }
+impl<T, M: Fn() -> T> ScratchPool<T, M> {
+    /// An empty pool; `create` makes new objects.
+    pub fn new(create: M) -> Self {
+        Self { create, free: Mutex::default() }
     }
 
-    /// Does a task with one of them, which is as the task before left it.
+    /// Runs `task` with a scratch object, which is in the state in which the previous task left it.
     #[inline(always)]
-    pub fn lend<R>(&self, task: impl FnOnce(&mut T) -> R) -> R {
-        let left = || self.left.lock().unwrap_or_else(PoisonError::into_inner);
-        let spare = left().pop();
-        let mut spare = spare.unwrap_or_else(&self.make);
-        let result = task(&mut spare);
-        left().push(spare);
+    pub fn with<R>(&self, task: impl FnOnce(&mut T) -> R) -> R {
+        let free = || self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let scratch = free().pop();
+        let mut scratch = scratch.unwrap_or_else(&self.create);
+        let result = task(&mut scratch);
+        free().push(scratch);
         result
     }
 }
@@ -36,12 +36,12 @@ mod tests {
 
     #[test]
     fn what_a_task_gives_back_the_next_one_has() {
-        let spares = Spares::new(Vec::new);
-        spares.lend(|first: &mut Vec<i32>| {
+        let pool = ScratchPool::new(Vec::new);
+        pool.with(|first: &mut Vec<i32>| {
             first.push(1);
             // While the first is lent, there is another.
-            spares.lend(|second| second.extend([2, 3]));
+            pool.with(|second| second.extend([2, 3]));
         });
-        spares.lend(|last| assert_eq!(*last, [1]));
+        pool.with(|last| assert_eq!(*last, [1]));
     }
 }

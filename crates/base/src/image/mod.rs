@@ -4,9 +4,9 @@ use glam::DVec2;
 
 use crate::{camera::Lens, color::AlphaConvention};
 
-/// A picture of `N` floats a pixel, rows from the top, pixels from the left.
+/// A picture with `N` floats per pixel, rows from the top, pixels from the left.
 ///
-/// What the floats mean is the holder's business; in a [`Frame`] they are scene-linear ACEScg.
+/// The meaning of the floats is up to the owner; in a [`Frame`] they are scene-linear ACEScg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image<const N: usize> {
     width: usize,
@@ -20,7 +20,7 @@ impl<const N: usize> Image<N> {
         Self { width, height, pixels: vec![value; width * height] }
     }
 
-    /// A picture around existing pixels; `None` unless there are `width * height` of them.
+    /// A picture of existing pixels; `None` unless there are `width * height` of them.
     pub fn from_pixels(width: usize, height: usize, pixels: Vec<[f32; N]>) -> Option<Self> {
         (pixels.len() == width * height).then_some(Self { width, height, pixels })
     }
@@ -60,22 +60,22 @@ impl<const N: usize> Image<N> {
         self.row(y)[x]
     }
 
-    /// The value at a place in pixels from the left and top edges, bilinear between the middles of pixels; beyond the outermost middles as at
-    /// the nearest.
-    pub fn between(&self, place: DVec2) -> [f32; N] {
+    /// The value at a position in pixels from the left and top edges, by bilinear interpolation between pixel centers. Positions beyond the outermost
+    /// centers are clamped to them.
+    pub fn sample_bilinear(&self, position: DVec2) -> [f32; N] {
         if self.pixels.is_empty() {
             return [0.0; N];
         }
         let last = DVec2::new(self.width as f64 - 1.0, self.height as f64 - 1.0);
-        let place = (place - 0.5).clamp(DVec2::ZERO, last);
-        let (x, y) = (place.x as usize, place.y as usize);
+        let position = (position - 0.5).clamp(DVec2::ZERO, last);
+        let (x, y) = (position.x as usize, position.y as usize);
         let (right, below) = ((x + 1).min(self.width - 1), (y + 1).min(self.height - 1));
-        let (u, v) = (place.x.fract() as f32, place.y.fract() as f32);
+        let (u, v) = (position.x.fract() as f32, position.y.fract() as f32);
         let [a, b, c, d] = [self.at(x, y), self.at(right, y), self.at(x, below), self.at(right, below)];
         std::array::from_fn(|i| (1.0 - v) * ((1.0 - u) * a[i] + u * b[i]) + v * ((1.0 - u) * c[i] + u * d[i]))
     }
 
-    /// The part `rect` of this picture; `None` where it reaches outside.
+    /// The region `rect` of this picture; `None` if it extends outside.
     pub fn crop(&self, rect: Rect) -> Option<Self> {
         if rect.right() > self.width || rect.bottom() > self.height {
             return None;
@@ -114,12 +114,12 @@ impl Rect {
         self.y + self.height
     }
 
-    /// Whether it holds no pixel.
+    /// Whether it contains no pixel.
     pub fn is_empty(&self) -> bool {
         self.width == 0 || self.height == 0
     }
 
-    /// The smallest rectangle that holds both; an empty one holds nothing.
+    /// The smallest rectangle that contains both; empty rectangles are ignored.
     pub fn union(&self, other: &Self) -> Self {
         if self.is_empty() {
             return *other;
@@ -131,7 +131,7 @@ impl Rect {
         Self { x, y, width: self.right().max(other.right()) - x, height: self.bottom().max(other.bottom()) - y }
     }
 
-    /// What both rectangles cover.
+    /// The intersection of both rectangles.
     pub fn intersection(&self, other: &Self) -> Self {
         let (x, y) = (self.x.max(other.x), self.y.max(other.y));
         let width = self.right().min(other.right()).saturating_sub(x);
@@ -143,16 +143,17 @@ impl Rect {
 /// How a float channel is stored in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// 16-bit float: colour.
+    /// 16-bit float, for color.
     Half,
-    /// 32-bit float: measured quantities and depth.
+    /// 32-bit float, for measured quantities and depth.
     Single,
 }
 
-/// One named plane of floats beside the beauty, as large as the frame's data window.
+/// A named plane of floats besides the beauty pass, of the size of the frame's data window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Name with that of its layer, such as `torch.temperature_k` or `plate.R`. An EXR file has `.V` behind one that ends in no component.
+    /// Name including that of its layer, such as `torch.temperature_k` or `plate.R`. In an EXR file `.V` is appended to names that do not end in a
+    /// component.
     pub name: String,
     /// How it is stored.
     pub precision: Precision,
@@ -160,78 +161,78 @@ pub struct Channel {
     pub values: Vec<f32>,
 }
 
-/// Where the camera stood, for headers that compositing programs read.
+/// Camera metadata for file headers, for compositing programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraHeader {
-    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), metres.
+    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), meters.
     pub world_to_camera: [[f32; 4]; 4],
-    /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; no matrix says it of domes and panoramas.
+    /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; `None` for domes and panoramas, for which there is no such matrix.
     pub world_to_ndc: Option<[[f32; 4]; 4]>,
     /// Vertical field of view of a perspective lens, degrees.
     pub vertical_fov_deg: Option<f32>,
-    /// How directions become places in the picture; `None` for what no lens saw.
+    /// Projection of the lens; `None` for pictures that were not taken through a lens.
     pub lens: Option<Lens>,
-    /// Whole angle of a fisheye's circle, degrees.
+    /// Full angle of a fisheye's circle, degrees.
     pub fisheye_fov_deg: Option<f32>,
 }
 
-/// What a frame says about itself. Nothing here depends on the machine or the hour.
+/// Metadata of a frame. Nothing here depends on the machine or the time of day.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameHeader {
     /// Frame number.
     pub number: i64,
     /// Exposure value at ISO 100 that the pixels are scaled by.
     pub exposure_ev100: f32,
-    /// Temperature of the black body whose light is white to the camera, K; D65 is without. The pixels are not changed by it.
+    /// White balance: temperature of the black body whose light is shown as white, K; `None` is D65. The pixels are not changed by it.
     pub white_balance_k: Option<f32>,
-    /// Frames a second as a fraction.
+    /// Frames per second as a fraction.
     pub fps: [u32; 2],
-    /// Time the shutter is open, seconds.
+    /// Exposure time, seconds.
     pub exposure_time_s: f32,
     /// Camera at the middle of the exposure.
     pub camera: CameraHeader,
     /// Fingerprint of everything the pixels depend on.
     pub fingerprint: [u8; 32],
-    /// Size of the whole picture, of which the pixels may be a part.
+    /// Size of the whole picture (display window), of which the pixels may be a region.
     pub display_size: [usize; 2],
-    /// Where the pixels lie in the whole picture; may begin left of or above it (overscan).
+    /// Position of the pixels (data window) in the whole picture; negative with overscan.
     pub data_origin: [i64; 2],
 }
 
 /// A finished picture, scene-linear ACEScg, exposed so that 1.0 is display white.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// What it is.
+    /// Metadata.
     pub header: FrameHeader,
     /// Premultiplied red, green, blue and alpha.
     pub beauty: Image<4>,
-    /// Distance of the nearest thing that was drawn, m; infinite where there is nothing.
+    /// Depth of the nearest object drawn, m; infinite where there is none.
     pub depth: Option<Vec<f32>>,
-    /// Layers and AOVs, in the order in which they were asked for.
+    /// Layers and AOVs, in the requested order.
     pub channels: Vec<Channel>,
     /// Whether a plate fills the picture, so that it is opaque.
     pub opaque: bool,
-    /// Figures of each phenomenon that has any, where they were asked for.
+    /// Figures of the phenomena that have any, if requested.
     pub figures: Vec<FigureSet>,
-    /// The pixels beyond which all are empty: no light, no alpha, infinite depth.
+    /// Bounding rectangle of the pixels that are not empty. Empty means no light, no alpha, infinite depth.
     pub content: Rect,
 }
 
-/// A number that a frame is known by, such as a rain rate.
+/// A named number that characterizes a frame, such as a rain rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figure {
-    /// What it is, in words joined by `_`.
+    /// Its name, words joined by `_`.
     pub name: &'static str,
-    /// Its unit; empty for a plain number.
+    /// Its unit; empty for a dimensionless number.
     pub unit: &'static str,
-    /// Its value; not finite where there is none.
+    /// Its value; not finite if there is none.
     pub value: f64,
 }
 
 /// The figures of one phenomenon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureSet {
-    /// Its name in the scene.
+    /// Name of the phenomenon in the scene.
     pub phenomenon: String,
     /// Its figures.
     pub figures: Vec<Figure>,
@@ -240,9 +241,9 @@ pub struct FigureSet {
 /// Display pixels: sRGB-encoded, straight alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DisplayPixels {
-    /// 8 bits a channel.
+    /// 8 bits per channel.
     Eight(Vec<[u8; 4]>),
-    /// 16 bits a channel.
+    /// 16 bits per channel.
     Sixteen(Vec<[u16; 4]>),
 }
 
@@ -255,7 +256,7 @@ pub struct DisplayImage {
     pub height: usize,
     /// Whether every pixel is opaque, so that alpha may be left out.
     pub opaque: bool,
-    /// What its straight alpha is made for, where it is not opaque.
+    /// Convention of its straight alpha, if it is not opaque.
     pub alpha: AlphaConvention,
     /// Pixels, row after row from the top.
     pub pixels: DisplayPixels,

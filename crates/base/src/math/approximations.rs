@@ -1,35 +1,35 @@
 //! Branch-free `f32` approximations for hot loops.
 //!
-//! Each takes one number and is always inlined: a plain loop over `[f32; 16]` under `fearless_simd::dispatch!` becomes vector code, and the
-//! same function called alone is its scalar twin, bit for bit. Multiply-adds are [`MulAdd`] explicitly: slow where
-//! the processor (or the enclosing function, outside `dispatch!`) has no such instruction; outside hot loops use [`super::f32`].
+//! Each function takes one number and is always inlined: a plain loop over `[f32; 16]` under `fearless_simd::dispatch!` is vectorized, and a scalar
+//! call gives the same bits. Multiply-adds are explicit ([`MulAdd`]): slow where the processor, or the enclosing function outside `dispatch!`, has no
+//! such instruction. Outside hot loops use [`super::f32`].
 //! Coefficients are minimax fits with the stated error before rounding; the stated bounds include rounding and are tested.
 
 use super::MulAdd;
 
-/// 3 * 2^22: added to a number below 2^22 in size it rounds that to a whole number, which then stands in the low bits of the sum.
-pub const ROUND: f32 = 12_582_912.0;
-const SIGN: u32 = 0x8000_0000;
+/// 3 * 2^22: adding it to a number of magnitude below 2^22 rounds that number to an integer, which is then in the low bits of the sum.
+pub const ROUNDING_MAGIC: f32 = 12_582_912.0;
+const SIGN_BIT: u32 = 0x8000_0000;
 
-/// The whole number nearest to `x`, ties to the even one; for `x` below 2^22 in size.
+/// `x` rounded to the nearest integer, ties to even; for magnitudes below 2^22.
 #[inline(always)]
 pub fn rounded(x: f32) -> f32 {
-    (x + ROUND) - ROUND
+    (x + ROUNDING_MAGIC) - ROUNDING_MAGIC
 }
 
-/// The same as an integer. (A cast would check each lane of a vector by itself.)
+/// Like [`rounded`], as an integer. (A saturating cast would be checked lane by lane.)
 #[inline(always)]
-pub fn whole(x: f32) -> i32 {
-    (x + ROUND).to_bits().wrapping_sub(ROUND.to_bits()).cast_signed()
+pub fn round_to_i32(x: f32) -> i32 {
+    (x + ROUNDING_MAGIC).to_bits().wrapping_sub(ROUNDING_MAGIC.to_bits()).cast_signed()
 }
 
-/// 2 to the power `x`; relative error below 1.4e-7. From 128 on infinite, below -126 zero (no subnormals); NaN stays NaN.
+/// 2 to the power `x`; relative error below 1.4e-7. From 128 on the result is infinite, below -126 it is 0 (no subnormals); NaN stays NaN.
 #[inline(always)]
 pub fn exp2(x: f32) -> f32 {
-    let held = if x > -127.0 { x } else { -127.0 };
-    let held = if held < 128.0 { held } else { 128.0 };
-    let rounded = held + ROUND;
-    let f = held - (rounded - ROUND);
+    let clamped = if x > -127.0 { x } else { -127.0 };
+    let clamped = if clamped < 128.0 { clamped } else { 128.0 };
+    let rounded = clamped + ROUNDING_MAGIC;
+    let f = clamped - (rounded - ROUNDING_MAGIC);
     // 2^f = 1 + f q(f) on [-1/2, 1/2], fit 2.0e-9.
     let q = 1.535_336e-4f32.fma(f, 1.339_887_5e-3).fma(f, 9.618_437e-3);
     let q = q.fma(f, 5.550_332_5e-2).fma(f, 2.402_264_8e-1).fma(f, 6.931_472e-1);
@@ -39,15 +39,15 @@ pub fn exp2(x: f32) -> f32 {
     if x.is_nan() { x } else { result }
 }
 
-/// e to the power `x`; relative error below 1.6e-7. Above 88.7 infinite, below -87.3 zero (no subnormals); NaN stays NaN.
+/// e to the power `x`; relative error below 1.6e-7. Above 88.7 the result is infinite, below -87.3 it is 0 (no subnormals); NaN stays NaN.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
-    let held = if x > -88.0 { x } else { -88.0 };
-    let held = if held < 89.0 { held } else { 89.0 };
-    let rounded = held.fma(std::f32::consts::LOG2_E, ROUND);
-    let whole = rounded - ROUND;
-    // ln 2 in two parts, so that what is left of a large x is not rounded away.
-    let f = whole.fma(-0.693_359_4, held);
+    let clamped = if x > -88.0 { x } else { -88.0 };
+    let clamped = if clamped < 89.0 { clamped } else { 89.0 };
+    let rounded = clamped.fma(std::f32::consts::LOG2_E, ROUNDING_MAGIC);
+    let whole = rounded - ROUNDING_MAGIC;
+    // ln 2 is split in two, so that the remainder of a large x keeps its precision (Cody & Waite).
+    let f = whole.fma(-0.693_359_4, clamped);
     let f = whole.fma(2.121_944_4e-4, f);
     // e^f = 1 + f + f^2 q(f) on [-ln 2 / 2, ln 2 / 2], fit 3.1e-9.
     let q = 1.381_461_5e-3f32.fma(f, 8.368_71e-3).fma(f, 4.166_839e-2);
@@ -58,7 +58,7 @@ pub fn exp(x: f32) -> f32 {
     if x.is_nan() { x } else { result }
 }
 
-/// `x` times 2 to the power that stands in the low bits of `rounded`: adds to the exponent, without passing through that power itself.
+/// `x` times 2 to the power in the low bits of `rounded`: adds to the exponent bits, so that the power itself may overflow.
 #[inline(always)]
 fn scale(x: f32, rounded: f32) -> f32 {
     f32::from_bits(x.to_bits().wrapping_add(rounded.to_bits() << 23))
@@ -96,24 +96,24 @@ pub fn pow(x: f32, y: f32) -> f32 {
     exp2(y * log2(x))
 }
 
-/// Sine of `x` turns; absolute error below 1.8e-7 beside that of `x` itself. NaN where `x` is not finite.
+/// Sine of `x` turns; absolute error below 1.8e-7 in addition to the rounding error of `x`. NaN where `x` is not finite.
 #[inline(always)]
 pub fn sin_turns(x: f32) -> f32 {
     let r = x - x.round_ties_even();
-    // Fold the outer quarters in: sin(pi - a) = sin a.
-    let size = f32::from_bits(r.to_bits() & !SIGN);
-    let folded = if size > 0.25 { 0.5 - size } else { size };
-    sin_quarter(f32::from_bits(folded.to_bits() | (r.to_bits() & SIGN)))
+    // Fold the outer quarters: sin(pi - a) = sin a.
+    let magnitude = f32::from_bits(r.to_bits() & !SIGN_BIT);
+    let folded = if magnitude > 0.25 { 0.5 - magnitude } else { magnitude };
+    sin_quarter(f32::from_bits(folded.to_bits() | (r.to_bits() & SIGN_BIT)))
 }
 
-/// Cosine of `x` turns; absolute error below 1.8e-7 beside that of `x` itself. NaN where `x` is not finite.
+/// Cosine of `x` turns; absolute error below 1.8e-7 in addition to the rounding error of `x`. NaN where `x` is not finite.
 #[inline(always)]
 pub fn cos_turns(x: f32) -> f32 {
     let r = x - x.round_ties_even();
-    sin_quarter(0.25 - f32::from_bits(r.to_bits() & !SIGN))
+    sin_quarter(0.25 - f32::from_bits(r.to_bits() & !SIGN_BIT))
 }
 
-/// Sine of `r` turns on [-1/4, 1/4]: odd polynomial of degree 9, fit 5.3e-9; held to [-1, 1].
+/// Sine of `r` turns on [-1/4, 1/4]: odd polynomial of degree 9, fit 5.3e-9; clamped to [-1, 1].
 #[inline(always)]
 fn sin_quarter(r: f32) -> f32 {
     let r2 = r * r;
@@ -126,18 +126,18 @@ fn sin_quarter(r: f32) -> f32 {
 /// Angle of the direction (`x`, `y`) from the first axis in [-pi, pi], radians; absolute error below 4e-7. 0 where both are 0.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
-    let (across, along) = (f32::from_bits(y.to_bits() & !SIGN), f32::from_bits(x.to_bits() & !SIGN));
-    let steep = across > along;
-    let (least, greatest) = if steep { (along, across) } else { (across, along) };
+    let (abs_y, abs_x) = (f32::from_bits(y.to_bits() & !SIGN_BIT), f32::from_bits(x.to_bits() & !SIGN_BIT));
+    let steep = abs_y > abs_x;
+    let (smaller, larger) = if steep { (abs_x, abs_y) } else { (abs_y, abs_x) };
     // atan r = r q(r^2) on [0, 1], fit 3.8e-8.
-    let r = least / if greatest > 0.0 { greatest } else { 1.0 };
+    let r = smaller / if larger > 0.0 { larger } else { 1.0 };
     let r2 = r * r;
     let q = (-4.054_555e-3_f32).fma(r2, 2.186_291_5e-2).fma(r2, -5.591_226_6e-2).fma(r2, 9.642_193e-2);
     let q = q.fma(r2, -1.390_862_8e-1).fma(r2, 1.994_656_5e-1).fma(r2, -3.332_986e-1);
     let angle = r * q.fma(r2, 9.999_993e-1);
     let angle = if steep { std::f32::consts::FRAC_PI_2 - angle } else { angle };
     let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
-    f32::from_bits(angle.to_bits() | (y.to_bits() & SIGN))
+    f32::from_bits(angle.to_bits() | (y.to_bits() & SIGN_BIT))
 }
 
 #[cfg(test)]

@@ -96,18 +96,18 @@ pub fn tanh(x: f32) -> f32 {
     libm::tanhf(x)
 }
 
-/// `sqrt(x^2 + y^2)` without overflow on the way.
+/// `sqrt(x^2 + y^2)` without intermediate overflow.
 pub fn hypot(x: f32, y: f32) -> f32 {
     libm::hypotf(x, y)
 }
 
-/// `a` at `t = 0`, `b` at `t = 1`, both exactly; straight between and beyond.
+/// Linear interpolation: exactly `a` at `t = 0` and `b` at `t = 1`; extrapolates outside.
 #[inline(always)]
 pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a * (1.0 - t) + b * t
 }
 
-/// `x` held to [0, 1]; NaN becomes 0.
+/// `x` clamped to [0, 1]; NaN becomes 0.
 #[inline(always)]
 pub fn saturate(x: f32) -> f32 {
     if x > 0.0 { if x < 1.0 { x } else { 1.0 } } else { 0.0 }

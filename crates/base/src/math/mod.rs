@@ -1,8 +1,8 @@
-//! Mathematics with the same result on every machine.
+//! Mathematical functions with the same results on every machine.
 //!
 //! The platform's `sin`, `exp` or `pow` differ in their last bits between systems, so a picture made with them is not
-//! reproducible. Here every function is computed by `libm`, written in Rust with IEEE operations only. Of glam's functions those are used
-//! that need no more than these and a square root.
+//! reproducible. Here every function is computed by `libm`, which is written in Rust with IEEE operations only. Of glam only functions are used that
+//! need no more than these operations and a square root.
 //! The free functions take `f64`; [`f32`](mod@f32) holds the same for `f32`; [`approximations`] holds branch-free approximations for hot loops.
 
 pub mod approximations;
@@ -16,9 +16,9 @@ pub use glam::{
     Quat, UVec2, UVec3, Vec2, Vec3, Vec3A, Vec4,
 };
 
-/// Multiply-adds of hot loops.
+/// Multiply-add for hot loops.
 pub trait MulAdd: Sized {
-    /// `self * factor + term`, rounded once; rounded twice in WebAssembly, where rounding once would be thirty times slower.
+    /// `self * factor + term`, rounded once; rounded twice in WebAssembly, where fused multiply-add is emulated and thirty times slower.
     #[must_use]
     fn fma(self, factor: Self, term: Self) -> Self;
 }
@@ -131,18 +131,18 @@ pub fn tanh(x: f64) -> f64 {
     libm::tanh(x)
 }
 
-/// `sqrt(x^2 + y^2)` without overflow on the way.
+/// `sqrt(x^2 + y^2)` without intermediate overflow.
 pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
 }
 
-/// `a` at `t = 0`, `b` at `t = 1`, both exactly; straight between and beyond.
+/// Linear interpolation: exactly `a` at `t = 0` and `b` at `t = 1`; extrapolates outside.
 #[inline(always)]
 pub fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a * (1.0 - t) + b * t
 }
 
-/// `x` held to [0, 1]; NaN becomes 0.
+/// `x` clamped to [0, 1]; NaN becomes 0.
 #[inline(always)]
 pub fn saturate(x: f64) -> f64 {
     if x > 0.0 { if x < 1.0 { x } else { 1.0 } } else { 0.0 }
@@ -155,12 +155,12 @@ pub fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The fractional part of a phase in turns, in [0, 1): reduced in `f64`, so that hours of time lose nothing. NaN where `turns` is
+/// The fractional part of a phase in turns, in [0, 1): reduced in `f64`, so that large times lose no precision. NaN if `turns` is
 /// not finite.
 #[inline(always)]
 pub fn reduce_phase(turns: f64) -> ::core::primitive::f32 {
     let phase = (turns - turns.floor()) as ::core::primitive::f32;
-    // Rounding to f32 may reach the full turn, which is the same phase as none.
+    // Rounding to f32 may give 1, which is the same phase as 0.
     if phase >= 1.0 { 0.0 } else { phase }
 }
 

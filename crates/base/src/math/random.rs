@@ -1,13 +1,13 @@
-//! Random numbers as a pure function of (seed, instance, birth, step, purpose).
+//! Counter-based random numbers: a pure function of (seed, instance, id, step, purpose).
 //!
-//! Nothing is drawn from a stream: a number belongs to what it is for, so frames, threads and the order of evaluation cannot change it.
+//! Numbers are not drawn from a stream: each depends only on these arguments, so it is independent of frames, threads and the order of evaluation.
 //! The generator is Philox4x32-10 (Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011);
-//! it needs 32-bit operations and the high half of a 32-bit product, so that shaders and WebAssembly agree.
+//! it needs only 32-bit operations and the high half of a 32-bit product, so that shaders and WebAssembly give the same numbers.
 
 use super::approximations;
 use crate::math::{self, Vec3};
 
-/// What a number is for: two purposes never share numbers. Made from a name, so that code says `Purpose::named("position")`.
+/// What a number is used for: different purposes have independent numbers. Created from a name, as in `Purpose::named("position")`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Purpose(pub u32);
 
@@ -18,14 +18,14 @@ impl Purpose {
     }
 }
 
-/// The key of one instance's random numbers.
+/// The key of the random numbers of one instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key([u32; 2]);
 
 impl Key {
     /// The key of `instance` under `seed`. For one instance, different seeds always give different keys.
     pub const fn new(seed: u64, instance: &str) -> Self {
-        // MurmurHash3 maps its 32-bit seed one-to-one for a given text, so both halves together keep all 64 bits.
+        // For a given text MurmurHash3 is a bijection of its 32-bit seed, so both halves together preserve all 64 bits.
         let low = murmur3(instance.as_bytes(), seed as u32);
         let high = murmur3(instance.as_bytes(), (seed >> 32) as u32 ^ 0x9e37_79b9);
         Self([low, high])
@@ -36,24 +36,24 @@ impl Key {
         self.0
     }
 
-    /// Four random words for one thing (`birth_id`) at one `step` for one `purpose`.
+    /// Four random words for one object (`id`) at one `step` for one `purpose`.
     #[inline(always)]
-    pub const fn words(self, birth_id: u64, step: u32, purpose: Purpose) -> [u32; 4] {
-        philox4x32_10([birth_id as u32, (birth_id >> 32) as u32, step, purpose.0], self.0)
+    pub const fn words(self, id: u64, step: u32, purpose: Purpose) -> [u32; 4] {
+        philox4x32_10([id as u32, (id >> 32) as u32, step, purpose.0], self.0)
     }
 
-    /// Four numbers in [0, 1), each a multiple of 2^-24.
+    /// Four uniform numbers in [0, 1), each a multiple of 2^-24.
     #[inline(always)]
-    pub fn uniforms(self, birth_id: u64, step: u32, purpose: Purpose) -> [f32; 4] {
-        self.words(birth_id, step, purpose).map(uniform)
+    pub fn uniforms(self, id: u64, step: u32, purpose: Purpose) -> [f32; 4] {
+        self.words(id, step, purpose).map(uniform)
     }
 }
 
 impl Key {
-    /// The [`uniforms`](Self::uniforms) of `N` steps from `first` on, each of the four for all steps: loops over steps become vectors.
+    /// The [`uniforms`](Self::uniforms) of `N` steps from `first` on, as four arrays over the steps, so that loops over steps are vectorized.
     #[inline(always)]
-    pub fn uniforms_of_steps<const N: usize>(self, birth_id: u64, first: u32, purpose: Purpose) -> [[f32; N]; 4] {
-        let (mut a, mut b) = ([birth_id as u32; N], [(birth_id >> 32) as u32; N]);
+    pub fn uniforms_of_steps<const N: usize>(self, id: u64, first: u32, purpose: Purpose) -> [[f32; N]; 4] {
+        let (mut a, mut b) = ([id as u32; N], [(id >> 32) as u32; N]);
         let (mut c, mut d) = ([first; N], [purpose.0; N]);
         for step in 0..N {
             c[step] = first.wrapping_add(step as u32);
@@ -93,8 +93,8 @@ pub const fn philox4x32_10(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
 
 #[inline(always)]
 const fn philox_round([a, b, c, d]: [u32; 4], [k0, k1]: [u32; 2]) -> [u32; 4] {
-    let (high0, low0) = multiply(0xd251_1f53, a);
-    let (high1, low1) = multiply(0xcd9e_8d57, c);
+    let (high0, low0) = mul_wide(0xd251_1f53, a);
+    let (high1, low1) = mul_wide(0xcd9e_8d57, c);
     [high1 ^ b ^ k0, low1, high0 ^ d ^ k1, low0]
 }
 
@@ -104,9 +104,9 @@ const fn next_key([k0, k1]: [u32; 2]) -> [u32; 2] {
     [k0.wrapping_add(0x9e37_79b9), k1.wrapping_add(0xbb67_ae85)]
 }
 
-/// High and low half of a product.
+/// High and low half of the 64-bit product.
 #[inline(always)]
-const fn multiply(a: u32, b: u32) -> (u32, u32) {
+const fn mul_wide(a: u32, b: u32) -> (u32, u32) {
     let product = a as u64 * b as u64;
     ((product >> 32) as u32, product as u32)
 }
@@ -136,20 +136,20 @@ const fn murmur3_block(block: u32) -> u32 {
     block.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593)
 }
 
-/// A number in [0, 1) from the upper 24 bits of a word, exactly.
+/// A uniform number in [0, 1) from the upper 24 bits of a word, exact.
 #[inline(always)]
 pub fn uniform(word: u32) -> f32 {
-    // By way of a signed number: all machines turn those into floats at once.
+    // Through a signed integer: every instruction set converts those to floats in one instruction.
     (word >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
-/// A number in [0, 1) from the upper 53 bits of two words, exactly.
+/// A uniform number in [0, 1) from the upper 53 bits of two words, exact.
 #[inline(always)]
 pub fn uniform_f64(high: u32, low: u32) -> f64 {
     (((high as u64) << 32 | low as u64) >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
 }
 
-/// Two independent normal numbers of mean 0 and variance 1 (Box & Muller 1958); none is farther from 0 than 5.8.
+/// Two independent standard normal numbers (Box & Muller 1958); their magnitude is at most 5.8.
 #[inline(always)]
 pub fn normal_pair(words: [u32; 2]) -> [f32; 2] {
     // From (0, 1], so that the logarithm is finite.
@@ -159,44 +159,44 @@ pub fn normal_pair(words: [u32; 2]) -> [f32; 2] {
     [radius * approximations::cos_turns(turns), radius * approximations::sin_turns(turns)]
 }
 
-/// A unit vector, uniform on the sphere.
+/// A unit vector, uniformly distributed on the sphere.
 #[inline(always)]
 pub fn direction(words: [u32; 2]) -> Vec3 {
     let u = uniform(words[0]);
     let turns = uniform(words[1]);
-    // Archimedes: the height is uniform; 1 - z^2 = 4 u (1 - u).
+    // The height z is uniform (Archimedes); 1 - z^2 = 4 u (1 - u).
     let radius = 2.0 * (u * (1.0 - u)).sqrt();
     Vec3::new(radius * approximations::cos_turns(turns), radius * approximations::sin_turns(turns), 1.0 - 2.0 * u)
 }
 
-/// Largest mean that [`poisson`] counts through.
-const POISSON_COUNTED_MEAN: f64 = 256.0;
+/// Largest mean for which [`poisson`] uses sequential inversion.
+const MAX_INVERSION_MEAN: f64 = 256.0;
 const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
 
-/// A count with Poisson distribution of mean `mean`; 0 where the mean is not above 0 or NaN.
+/// A Poisson-distributed count with mean `mean`; 0 if the mean is not above 0 or NaN.
 ///
-/// It is the quantile function at the uniform number that `words` make, so for fixed words it does not fall as the mean grows
-/// (but for rounding in the farthest tail).
-/// Above a mean of 256 the quantile is that of Cornish and Fisher (1938), at times one count
-/// away from the exact one (a few in the farthest tail).
+/// It is the quantile function at the uniform number given by `words`, so for fixed words it does not decrease as the mean grows
+/// (except for rounding in the far tail).
+/// Above a mean of 256 the quantile is the Cornish-Fisher expansion (1938), which sometimes differs by one count
+/// from the exact one (by a few in the far tail).
 pub fn poisson(mean: f64, words: [u32; 2]) -> u64 {
-    // The middle of one of 2^52 equal parts: never 0 or 1.
+    // The midpoint of one of 2^52 equal intervals: never 0 or 1.
     let u = (((words[0] as u64) << 32 | words[1] as u64) >> 12) as f64 * (1.0 / TWO_TO_52) + 0.5 / TWO_TO_52;
     if mean.is_nan() || mean <= 0.0 {
         0
-    } else if mean <= POISSON_COUNTED_MEAN {
-        poisson_counted(mean, u)
+    } else if mean <= MAX_INVERSION_MEAN {
+        poisson_by_inversion(mean, u)
     } else {
-        poisson_expanded(mean, u)
+        poisson_cornish_fisher(mean, u)
     }
 }
 
-/// Smallest n whose cumulative probability exceeds `u`.
-fn poisson_counted(mean: f64, u: f64) -> u64 {
+/// Smallest n whose cumulative probability exceeds `u`, by summing probabilities from 0.
+fn poisson_by_inversion(mean: f64, u: f64) -> u64 {
     let mut probability = math::exp(-mean);
     let mut cumulative = probability;
     let mut count = 0;
-    // Rounding may keep the sum just below 1: stop where the tail no longer changes it.
+    // Rounding may keep the sum just below 1: stop when the tail no longer changes it.
     while cumulative <= u && (probability > 1e-17 || (count as f64) < mean) {
         count += 1;
         probability *= mean / count as f64;
@@ -205,15 +205,15 @@ fn poisson_counted(mean: f64, u: f64) -> u64 {
     count
 }
 
-fn poisson_expanded(mean: f64, u: f64) -> u64 {
+fn poisson_cornish_fisher(mean: f64, u: f64) -> u64 {
     let z = normal_quantile(u);
     let deviation = math::sqrt(mean);
     let x = mean + deviation * z + (z * z - 1.0) / 6.0 + (z - z * z * z) / (72.0 * deviation);
     (x + 0.5).floor().max(0.0) as u64
 }
 
-/// The number that a normal variable of mean 0 and variance 1 stays below with probability `p`, 0 < p < 1;
-/// relative error below 1.2e-9 (Acklam's rational approximations).
+/// Quantile of the standard normal distribution at the probability `p`, 0 < p < 1;
+/// relative error below 1.2e-9 (Acklam's rational approximation).
 fn normal_quantile(p: f64) -> f64 {
     let tail = |q: f64| {
         let r = math::sqrt(-2.0 * math::ln(q));
@@ -256,7 +256,7 @@ fn normal_quantile(p: f64) -> f64 {
     q * polynomial(r, numerator) / polynomial(r, denominator)
 }
 
-/// A polynomial from its coefficients, highest power first.
+/// Evaluates a polynomial, coefficients from the highest power down.
 fn polynomial<const N: usize>(x: f64, coefficients: [f64; N]) -> f64 {
     coefficients.into_iter().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }

@@ -1,24 +1,24 @@
-//! SIMD vectors of sixteen numbers, and the operations that they share with a scalar: equations are written once for both.
+//! SIMD vectors of sixteen numbers and the operations that they share with scalars, so that equations are written once for both.
 //!
 //! Names follow `std::simd`. They are never those of `f32` itself (`min`, `max`, `abs`, `sqrt`, `mul_add`): an inherent method wins over a
-//! trait's, and `mul_add` of `fearless_simd` is not fused below AVX2, so that code would compile to something else without a word.
+//! trait's, and `mul_add` of `fearless_simd` is not fused below AVX2, so that code would silently compile to something else.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{__m256, _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps};
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::approximations::ROUND;
+use super::approximations::ROUNDING_MAGIC;
 use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*, u32x16};
 
 /// Lanes of a vector, whatever the width of the processor's registers.
 pub const LANES: usize = 16;
 
-/// A scalar or a vector. Multiply-adds are fused at every vector width, so that all give the same bits.
+/// A scalar or a vector. Multiply-adds are fused at every vector width, so that all widths give the same bits.
 pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
-    /// The constant `value` in every lane of a vector as wide as `self`. (`splat` is what `fearless_simd` calls its constructor.)
+    /// `value` in every lane of a vector as wide as `self`. (`splat` is the name of the constructor in `fearless_simd`.)
     #[must_use]
     fn broadcast(self, value: f32) -> Self;
-    /// Fused multiply-add, `self * factor + term` rounded once; NaN where any of them is.
+    /// Fused multiply-add, `self * factor + term` rounded once; NaN if any of them is.
     #[must_use]
     fn fma(self, factor: Self, term: Self) -> Self;
     /// Square root; NaN below 0 and of NaN.
@@ -63,7 +63,7 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn simd_rsqrt(self) -> Self {
-        refine_inverse_root(self, f32::from_bits(INVERSE_ROOT - (self.to_bits() >> 1)))
+        refine_rsqrt(self, f32::from_bits(RSQRT_MAGIC - (self.to_bits() >> 1)))
     }
     #[inline(always)]
     fn simd_abs(self) -> Self {
@@ -83,48 +83,48 @@ impl Real for f32 {
     }
 }
 
-/// Half of the bits of a number taken from these are those of about its inverse root: the exponent halved and turned (Lomont 2003).
-const INVERSE_ROOT: u32 = 0x5f34_0000;
+/// Magic constant of the fast inverse square root: subtracting half of the bits of a number gives the bits of a first guess (Lomont 2003).
+const RSQRT_MAGIC: u32 = 0x5f34_0000;
 
-/// A guess at `1 / sqrt(value)`, times a polynomial of its error `e = 1 - value guess^2`, from -0.033 to 0.094: `1 / sqrt(1 - e)` to
-/// 2e-8, by least squares.
+/// Refines a guess at `1 / sqrt(value)`: multiplies it by a polynomial of its error `e = 1 - value guess^2`, from -0.033 to 0.094, which
+/// approximates `1 / sqrt(1 - e)` to 2e-8 (least-squares fit).
 #[inline(always)]
-fn refine_inverse_root<R: Real>(value: R, guess: R) -> R {
-    let like = |constant: f32| value.broadcast(constant);
-    let error = (like(0.0) - value * guess).fma(guess, like(1.0));
-    let low = error.fma(like(0.500_001_4), like(1.0));
-    let high = error.fma(like(0.311_153_4), like(0.374_954_5));
+fn refine_rsqrt<R: Real>(value: R, guess: R) -> R {
+    let splat = |constant: f32| value.broadcast(constant);
+    let error = (splat(0.0) - value * guess).fma(guess, splat(1.0));
+    let low = error.fma(splat(0.500_001_4), splat(1.0));
+    let high = error.fma(splat(0.311_153_4), splat(0.374_954_5));
     let square = error * error;
-    guess * square.fma(square.fma(like(0.316_214_53), high), low)
+    guess * square.fma(square.fma(splat(0.316_214_53), high), low)
 }
 
-/// A batch.
+/// A vector of [`LANES`] numbers.
 pub type Lanes<S> = f32x16<S>;
 
-/// Half a batch, for loops that end or skip often.
+/// Half as many lanes, for loops with frequent early exits.
 pub type HalfLanes<S> = f32x8<S>;
 
-/// A quarter of a batch: four numbers that belong to one thing.
+/// Four lanes: four numbers that belong to one object.
 pub type FourLanes<S> = f32x4<S>;
 
-/// [`Real`] for a vector type of that many numbers.
-macro_rules! real_batch {
-    ($Batch:ident, $count:expr) => {
-        impl<S: Simd> Real for $Batch<S> {
+/// Implements [`Real`] for a vector type with that many lanes.
+macro_rules! impl_real {
+    ($Vector:ident, $count:expr) => {
+        impl<S: Simd> Real for $Vector<S> {
             #[inline(always)]
             fn broadcast(self, value: f32) -> Self {
                 Self::splat(self.simd, value)
             }
             #[inline(always)]
             fn fma(self, factor: Self, term: Self) -> Self {
-                if cfg!(feature = "broken-kernel") && has_fused(self.simd.level()) {
+                if cfg!(feature = "broken-kernel") && has_fma(self.simd.level()) {
                     return self * factor + term;
                 }
-                if has_fused(self.simd.level()) {
+                if has_fma(self.simd.level()) {
                     return self.mul_add(factor, term);
                 }
                 let mut result = [0.0; $count];
-                fused_one_by_one(self.as_slice(), factor.as_slice(), term.as_slice(), &mut result);
+                fma_per_lane(self.as_slice(), factor.as_slice(), term.as_slice(), &mut result);
                 Self::from_slice(self.simd, &result)
             }
             #[inline(always)]
@@ -133,8 +133,8 @@ macro_rules! real_batch {
             }
             #[inline(always)]
             fn simd_rsqrt(self) -> Self {
-                let guess = INVERSE_ROOT - (self.to_bits() >> 1);
-                refine_inverse_root(self, guess.bitcast())
+                let guess = RSQRT_MAGIC - (self.to_bits() >> 1);
+                refine_rsqrt(self, guess.bitcast())
             }
             #[inline(always)]
             fn simd_abs(self) -> Self {
@@ -156,28 +156,29 @@ macro_rules! real_batch {
     };
 }
 
-real_batch!(Lanes, LANES);
-real_batch!(HalfLanes, LANES / 2);
-real_batch!(FourLanes, LANES / 4);
+impl_real!(Lanes, LANES);
+impl_real!(HalfLanes, LANES / 2);
+impl_real!(FourLanes, LANES / 4);
 
 /// Whether vectors of this level have a fused multiply-add; known when the code for the level is compiled.
 #[inline(always)]
-fn has_fused(level: Level) -> bool {
+fn has_fma(level: Level) -> bool {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     return matches!(level, Level::Avx2(_) | Level::Avx512(_));
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
     return !level.is_fallback();
 }
 
-/// The same bits for old processors, slowly; kept out of line, since in line it would multiply the size of everything.
+/// Fused multiply-add lane by lane, for processors without the instruction: the same bits, but slow. Not inlined, since inlining would multiply the
+/// code size.
 #[inline(never)]
-fn fused_one_by_one(values: &[f32], factors: &[f32], terms: &[f32], results: &mut [f32]) {
+fn fma_per_lane(values: &[f32], factors: &[f32], terms: &[f32], results: &mut [f32]) {
     for (lane, result) in results.iter_mut().enumerate() {
         *result = values[lane].mul_add(factors[lane], terms[lane]);
     }
 }
 
-/// Runs code with the baseline vectors of the processor's family: for tests, and to compare with the widest.
+/// Runs code with the baseline instruction set of the target architecture, for tests and comparisons with the widest vectors.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! dispatch_baseline {
@@ -199,46 +200,46 @@ pub fn any_positive<S: Simd>(values: Lanes<S>) -> bool {
     values.simd_gt(values.broadcast(0.0)).any_true()
 }
 
-/// Numbers in even steps from `first` to `last`.
+/// Evenly spaced numbers from `first` to `last`.
 #[inline(always)]
-pub fn evenly_spaced<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
+pub fn linspace<S: Simd>(simd: S, first: f32, last: f32) -> Lanes<S> {
     ramp(simd, first, (last - first) * (1.0 / (LANES - 1) as f32))
 }
 
-/// Whole part, wrapped by `mask` (a power of two less 1), and fraction in [0, 1].
+/// Integer part, wrapped by `mask` (a power of two minus 1), and fraction in [0, 1].
 ///
-/// A whole number may come out as the one below with fraction 1, which interpolates to the same.
+/// An integer may be split into the integer below and the fraction 1, which interpolates to the same value.
 #[inline(always)]
-pub fn wrap_split<S: Simd>(place: Lanes<S>, mask: u32) -> (u32x16<S>, Lanes<S>) {
-    let rounded = (place - place.broadcast(0.5)) + place.broadcast(ROUND);
-    (rounded.to_bits() & mask, place - (rounded - place.broadcast(ROUND)))
+pub fn wrap_split<S: Simd>(value: Lanes<S>, mask: u32) -> (u32x16<S>, Lanes<S>) {
+    let rounded = (value - value.broadcast(0.5)) + value.broadcast(ROUNDING_MAGIC);
+    (rounded.to_bits() & mask, value - (rounded - value.broadcast(ROUNDING_MAGIC)))
 }
 
-/// The nearest whole number of each, from 0 to 2^22.
+/// Each lane rounded to the nearest integer, for values from 0 to 2^22.
 #[inline(always)]
-pub fn nearest_whole<S: Simd>(value: Lanes<S>) -> u32x16<S> {
-    (value + value.broadcast(ROUND)).to_bits() & 0x003f_ffff
+pub fn round_to_u32<S: Simd>(value: Lanes<S>) -> u32x16<S> {
+    (value + value.broadcast(ROUNDING_MAGIC)).to_bits() & 0x003f_ffff
 }
 
-/// Fetches entry `index[lane]` of a table for each lane and turns entries of four into four batches.
+/// Gathers entry `index[lane]` of a table for each lane and transposes the entries of four numbers into four vectors.
 ///
 /// `N` is a power of two; indices wrap.
 #[inline(always)]
-pub fn fetch<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: u32x16<S>) -> [Lanes<S>; 4] {
+pub fn gather<S: Simd, const N: usize>(simd: S, table: &[[f32; 4]; N], index: u32x16<S>) -> [Lanes<S>; 4] {
     let mut offsets = [0; LANES];
     ((index << 2) & (4 * N as u32 - 4)).store_slice(&mut offsets);
     let values = table.as_flattened();
-    let (low, high) = (fetch_half(simd, values, &offsets, 0), fetch_half(simd, values, &offsets, LANES / 2));
-    let mut batches = [Lanes::splat(simd, 0.0); 4];
+    let (low, high) = (gather_half(simd, values, &offsets, 0), gather_half(simd, values, &offsets, LANES / 2));
+    let mut columns = [Lanes::splat(simd, 0.0); 4];
     for k in 0..4 {
-        batches[k] = low[k].combine(high[k]);
+        columns[k] = low[k].combine(high[k]);
     }
-    batches
+    columns
 }
 
-/// The entries of eight lanes from `first` on, as four halves of batches.
+/// Gathers the entries of eight lanes from `first` on.
 #[inline(always)]
-fn fetch_half<S: Simd>(simd: S, values: &[f32], offsets: &[u32; LANES], first: usize) -> [HalfLanes<S>; 4] {
+fn gather_half<S: Simd>(simd: S, values: &[f32], offsets: &[u32; LANES], first: usize) -> [HalfLanes<S>; 4] {
     let mut pairs = [HalfLanes::splat(simd, 0.0); 4];
     for (lane, pair) in pairs.iter_mut().enumerate() {
         let [near, far] = [first + lane, first + lane + 4].map(|lane| {
@@ -250,7 +251,7 @@ fn fetch_half<S: Simd>(simd: S, values: &[f32], offsets: &[u32; LANES], first: u
     transpose(simd, pairs)
 }
 
-/// Turns eight entries, of which a batch holds the `i`th and the one four after it, into their four columns.
+/// Transposes eight entries of four numbers into four columns. Vector `i` holds entries `i` and `i + 4`.
 #[inline(always)]
 fn transpose<S: Simd>(simd: S, pairs: [HalfLanes<S>; 4]) -> [HalfLanes<S>; 4] {
     #[cfg(target_arch = "x86_64")]
@@ -271,7 +272,7 @@ fn transpose<S: Simd>(simd: S, pairs: [HalfLanes<S>; 4]) -> [HalfLanes<S>; 4] {
 
 #[cfg(target_arch = "x86_64")]
 fearless_simd::kernel!(
-    /// Within each half of the vectors, in half the shuffles that entries one by one would take.
+    /// Transposes within each half of the vectors, with half as many shuffles as for single entries.
     #[inline(always)]
     fn transpose_avx2(avx2: Avx2, a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256; 4] {
         let (low, high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
@@ -340,7 +341,7 @@ mod tests {
     fn fetching_gathers_entries_lane_by_lane() {
         let table: [[f32; 4]; 32] = std::array::from_fn(|i| std::array::from_fn(|k| (10 * i + k) as f32));
         let index: [u32; LANES] = std::array::from_fn(|lane| (7 * lane % 32) as u32);
-        let batches = crate::dispatch_baseline!(simd => fetch(simd, &table, u32x16::from_slice(simd, &index)).map(|batch| batch.as_slice().to_vec()));
+        let batches = crate::dispatch_baseline!(simd => gather(simd, &table, u32x16::from_slice(simd, &index)).map(|batch| batch.as_slice().to_vec()));
         for lane in 0..LANES {
             for k in 0..4 {
                 assert_eq!(batches[k][lane], table[index[lane] as usize][k]);

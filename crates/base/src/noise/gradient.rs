@@ -1,21 +1,21 @@
 //! One octave of gradient noise (Perlin 1985, 2002) on a hashed lattice, in 2, 3 and 4 dimensions.
 //!
-//! Everything here is branch-free and always inlined, so that a loop over 16 points becomes vector code. Products and sums are
-//! deliberately not fused: the arithmetic is mostly integer, and so the single point stays fast where there is no such instruction.
+//! All functions are branch-free and always inlined, so that a loop over 16 points is vectorized. Products and sums are
+//! deliberately not fused: the arithmetic is mostly integer, and the scalar version stays fast on processors without fused multiply-add.
 
-/// A number of dimensions in which there is noise: implemented for `[f32; 2]`, `[f32; 3]` and `[f32; 4]`.
+/// Dimensions of the noise: implemented for `[f32; 2]`, `[f32; 3]` and `[f32; 4]`.
 pub trait Dimension: Copy + private::Sealed {
-    /// Factor that brings the noise of unit gradients into [-1, 1].
+    /// Factor that scales the noise of unit gradients to [-1, 1].
     ///
-    /// At a corner at distance d a unit gradient gives at most d, so the noise is at most `sum w d <= sqrt(sum w d^2)` (weights w
-    /// sum to 1). That sum falls apart into one term an axis, `(1 - s) f^2 + s (1 - f)^2` with s the fade of f. As s <= f for f <=
+    /// The unit gradient of a corner at distance d contributes at most d, so the noise is at most `sum w d <= sqrt(sum w d^2)` (the weights w
+    /// sum to 1). That sum separates into one term per axis, `(1 - s) f^2 + s (1 - f)^2`, where s is the fade of f. Since s <= f for f <=
     /// 1/2, the term is at most `f^2 + f (1 - 2 f) = f - f^2 <= 1/4`: in n dimensions the noise is at most sqrt(n) / 2.
     const SCALE: f32;
 
     /// Noise in [-1, 1] at the fraction `self` of the cell that lies between the lattice coordinates `lower` and `upper`.
     fn gradient_noise(self, lower: Self::Cells, upper: Self::Cells, seed: u32) -> f32;
 
-    /// Whole-number coordinates, one an axis.
+    /// Integer coordinates, one per axis.
     type Cells: Copy;
 }
 
@@ -28,42 +28,42 @@ mod private {
 
 const FACTORS: [u32; 4] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d, 0x27d4_eb2f];
 
-/// Adds a coordinate other than the first to a hash. One round of mixing between coordinates is enough to leave no translation
-/// under which the lattice repeats; it is shared by all corners that have the coordinate.
+/// Adds a coordinate other than the first to a hash. One round of mixing between coordinates suffices to avoid translations
+/// under which the lattice repeats. The result is shared by all corners with that coordinate.
 #[inline(always)]
-fn add(hash: u32, axis: usize, cell: u32) -> u32 {
+fn hash_coordinate(hash: u32, axis: usize, cell: u32) -> u32 {
     let hash = hash.wrapping_add(cell.wrapping_mul(FACTORS[axis]));
     (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d)
 }
 
 /// Adds the first coordinate and mixes all bits into the upper ones ("lowbias32" by Wellons, public domain, without its last shift).
 #[inline(always)]
-fn finish(hash: u32, cell: u32) -> u32 {
+fn hash_first(hash: u32, cell: u32) -> u32 {
     let hash = hash.wrapping_add(cell.wrapping_mul(FACTORS[0]));
     let hash = (hash ^ hash >> 16).wrapping_mul(0x7feb_352d);
     (hash ^ hash >> 15).wrapping_mul(0x846c_a68b)
 }
 
-/// Turns the sign of `x` if the highest bit of `bits` is set.
+/// Flips the sign of `x` if the highest bit of `bits` is set.
 #[inline(always)]
 fn signed(x: f32, bits: u32) -> f32 {
     f32::from_bits(x.to_bits() ^ (bits & 0x8000_0000))
 }
 
-/// The fade `6 f^5 - 15 f^4 + 10 f^3` (Perlin 2002): first and second derivative are 0 at both ends.
+/// The fade `6 f^5 - 15 f^4 + 10 f^3` (Perlin 2002): the first and second derivatives are 0 at both ends.
 #[inline(always)]
 fn fade(f: f32) -> f32 {
     f * f * f * (f * (f * 6.0 - 15.0) + 10.0)
 }
 
 #[inline(always)]
-fn mixed(a: f32, b: f32, s: f32) -> f32 {
+fn lerp(a: f32, b: f32, s: f32) -> f32 {
     a + (b - a) * s
 }
 
-/// One of 8 unit vectors at 22.5 + 45 k degrees times (`x`, `y`).
+/// Dot product of (`x`, `y`) with one of 8 unit vectors, at 22.5 + 45 k degrees.
 #[inline(always)]
-fn slope_2(hash: u32, x: f32, y: f32) -> f32 {
+fn gradient_dot_2(hash: u32, x: f32, y: f32) -> f32 {
     const COS: f32 = 0.923_879_5;
     const SIN: f32 = 0.382_683_43;
     let swap = (hash as i32) < 0;
@@ -71,11 +71,11 @@ fn slope_2(hash: u32, x: f32, y: f32) -> f32 {
     signed(u * COS, hash << 1) + signed(v * SIN, hash << 2)
 }
 
-/// One of the 12 vertices of the icosahedron times (`x`, `y`, `z`): up to fifth order they favour no direction (a spherical
-/// 5-design), and none lies along an axis; the usual 12 edges of the cube manage third order.
+/// Dot product of (`x`, `y`, `z`) with one of the 12 vertices of the icosahedron. They are isotropic up to fifth order (a spherical
+/// 5-design), and none lies along an axis; the usual 12 edges of the cube are isotropic to third order only.
 #[inline(always)]
-fn slope_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
-    // (0, 1, phi) / sqrt(1 + phi^2) and its cyclic turns.
+fn gradient_dot_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
+    // (0, 1, phi) / sqrt(1 + phi^2) and its cyclic permutations.
     const SHORT: f32 = 0.525_731_1;
     const LONG: f32 = 0.850_650_8;
     let (first, last) = thirds(hash);
@@ -97,13 +97,14 @@ fn slope_3(hash: u32, x: f32, y: f32, z: f32) -> f32 {
     signed(u * SHORT, bits << 31) + signed(v * LONG, bits << 30)
 }
 
-/// One of the 24 vertices of the 24-cell, the turns of (1, 1, 0, 0) / sqrt(2), times (`x`, `y`, `z`, `w`): a spherical 5-design.
+/// Dot product of (`x`, `y`, `z`, `w`) with one of the 24 vertices of the 24-cell, the signed permutations of (1, 1, 0, 0) / sqrt(2): a spherical
+/// 5-design.
 #[inline(always)]
-fn slope_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
+fn gradient_dot_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
     const HALF_DIAGONAL: f32 = std::f32::consts::FRAC_1_SQRT_2;
     let bits = hash ^ hash >> 16;
     let (first, last) = thirds(hash);
-    // Three ways to part the axes in two pairs, and one of the two.
+    // There are three ways to divide the axes into two pairs; choose one, and one of its pairs.
     let other = bits & 4 != 0;
     let with_x = if first {
         y
@@ -116,47 +117,55 @@ fn slope_4(hash: u32, x: f32, y: f32, z: f32, w: f32) -> f32 {
     (signed(u, bits << 31) + signed(v, bits << 30)) * HALF_DIAGONAL
 }
 
-/// Whether a hash lies in the first, or in the last, of three equal parts of its range.
+/// Whether a hash lies in the first and in the last third of its range.
 #[inline(always)]
 fn thirds(hash: u32) -> (bool, bool) {
     let hash = hash as i32;
     (hash < -715_827_883, hash >= 715_827_883)
 }
 
-/// Noise on the line between two corners of a cell, `hash` being that of all coordinates but the first.
+/// Noise on the edge between two corners of a cell; `hash` is that of all coordinates except the first.
 #[inline(always)]
 fn row_2(lower: u32, upper: u32, hash: u32, [x, y]: [f32; 2]) -> f32 {
-    mixed(slope_2(finish(hash, lower), x, y), slope_2(finish(hash, upper), x - 1.0, y), fade(x))
+    lerp(gradient_dot_2(hash_first(hash, lower), x, y), gradient_dot_2(hash_first(hash, upper), x - 1.0, y), fade(x))
 }
 
 #[inline(always)]
 fn row_3(lower: u32, upper: u32, hash: u32, [x, y, z]: [f32; 3]) -> f32 {
-    mixed(slope_3(finish(hash, lower), x, y, z), slope_3(finish(hash, upper), x - 1.0, y, z), fade(x))
+    lerp(
+        gradient_dot_3(hash_first(hash, lower), x, y, z),
+        gradient_dot_3(hash_first(hash, upper), x - 1.0, y, z),
+        fade(x),
+    )
 }
 
 #[inline(always)]
 fn row_4(lower: u32, upper: u32, hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
-    mixed(slope_4(finish(hash, lower), x, y, z, w), slope_4(finish(hash, upper), x - 1.0, y, z, w), fade(x))
+    lerp(
+        gradient_dot_4(hash_first(hash, lower), x, y, z, w),
+        gradient_dot_4(hash_first(hash, upper), x - 1.0, y, z, w),
+        fade(x),
+    )
 }
 
-/// Noise in a face between two rows.
+/// Noise in the face between two rows.
 #[inline(always)]
 fn face_3(lower: [u32; 3], upper: [u32; 3], hash: u32, [x, y, z]: [f32; 3]) -> f32 {
-    let near = row_3(lower[0], upper[0], add(hash, 1, lower[1]), [x, y, z]);
-    mixed(near, row_3(lower[0], upper[0], add(hash, 1, upper[1]), [x, y - 1.0, z]), fade(y))
+    let near = row_3(lower[0], upper[0], hash_coordinate(hash, 1, lower[1]), [x, y, z]);
+    lerp(near, row_3(lower[0], upper[0], hash_coordinate(hash, 1, upper[1]), [x, y - 1.0, z]), fade(y))
 }
 
 #[inline(always)]
 fn face_4(lower: [u32; 4], upper: [u32; 4], hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
-    let near = row_4(lower[0], upper[0], add(hash, 1, lower[1]), [x, y, z, w]);
-    mixed(near, row_4(lower[0], upper[0], add(hash, 1, upper[1]), [x, y - 1.0, z, w]), fade(y))
+    let near = row_4(lower[0], upper[0], hash_coordinate(hash, 1, lower[1]), [x, y, z, w]);
+    lerp(near, row_4(lower[0], upper[0], hash_coordinate(hash, 1, upper[1]), [x, y - 1.0, z, w]), fade(y))
 }
 
-/// Noise in a cube between two faces.
+/// Noise in the cube between two faces.
 #[inline(always)]
 fn cube_4(lower: [u32; 4], upper: [u32; 4], hash: u32, [x, y, z, w]: [f32; 4]) -> f32 {
-    let near = face_4(lower, upper, add(hash, 2, lower[2]), [x, y, z, w]);
-    mixed(near, face_4(lower, upper, add(hash, 2, upper[2]), [x, y, z - 1.0, w]), fade(z))
+    let near = face_4(lower, upper, hash_coordinate(hash, 2, lower[2]), [x, y, z, w]);
+    lerp(near, face_4(lower, upper, hash_coordinate(hash, 2, upper[2]), [x, y, z - 1.0, w]), fade(z))
 }
 
 impl Dimension for [f32; 2] {
@@ -166,8 +175,8 @@ impl Dimension for [f32; 2] {
     #[inline(always)]
     fn gradient_noise(self, lower: [u32; 2], upper: [u32; 2], seed: u32) -> f32 {
         let [x, y] = self;
-        let near = row_2(lower[0], upper[0], add(seed, 1, lower[1]), self);
-        mixed(near, row_2(lower[0], upper[0], add(seed, 1, upper[1]), [x, y - 1.0]), fade(y)) * Self::SCALE
+        let near = row_2(lower[0], upper[0], hash_coordinate(seed, 1, lower[1]), self);
+        lerp(near, row_2(lower[0], upper[0], hash_coordinate(seed, 1, upper[1]), [x, y - 1.0]), fade(y)) * Self::SCALE
     }
 }
 
@@ -178,8 +187,8 @@ impl Dimension for [f32; 3] {
     #[inline(always)]
     fn gradient_noise(self, lower: [u32; 3], upper: [u32; 3], seed: u32) -> f32 {
         let [x, y, z] = self;
-        let near = face_3(lower, upper, add(seed, 2, lower[2]), self);
-        mixed(near, face_3(lower, upper, add(seed, 2, upper[2]), [x, y, z - 1.0]), fade(z)) * Self::SCALE
+        let near = face_3(lower, upper, hash_coordinate(seed, 2, lower[2]), self);
+        lerp(near, face_3(lower, upper, hash_coordinate(seed, 2, upper[2]), [x, y, z - 1.0]), fade(z)) * Self::SCALE
     }
 }
 
@@ -190,8 +199,8 @@ impl Dimension for [f32; 4] {
     #[inline(always)]
     fn gradient_noise(self, lower: [u32; 4], upper: [u32; 4], seed: u32) -> f32 {
         let [x, y, z, w] = self;
-        let near = cube_4(lower, upper, add(seed, 3, lower[3]), self);
-        mixed(near, cube_4(lower, upper, add(seed, 3, upper[3]), [x, y, z, w - 1.0]), fade(w)) * Self::SCALE
+        let near = cube_4(lower, upper, hash_coordinate(seed, 3, lower[3]), self);
+        lerp(near, cube_4(lower, upper, hash_coordinate(seed, 3, upper[3]), [x, y, z, w - 1.0]), fade(w)) * Self::SCALE
     }
 }
 
@@ -202,7 +211,9 @@ mod tests {
     /// Every gradient a function can give, each as often as it comes up among many hashes.
     fn gradients<const N: usize>(slope: impl Fn(u32, [f32; N]) -> f32) -> Vec<[f64; N]> {
         let unit = |axis: usize| std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
-        (0..60_000u32).map(|i| std::array::from_fn(|axis| slope(finish(add(0, 1, i), 3), unit(axis)) as f64)).collect()
+        (0..60_000u32)
+            .map(|i| std::array::from_fn(|axis| slope(hash_first(hash_coordinate(0, 1, i), 3), unit(axis)) as f64))
+            .collect()
     }
 
     /// Unit length, mean 0, and second and fourth moments of an even distribution over the sphere.
@@ -228,30 +239,38 @@ mod tests {
 
     #[test]
     fn gradients_favour_no_direction_up_to_fourth_order() {
-        assert_even(&gradients::<2>(|hash, [x, y]| slope_2(hash, x, y)), 8);
-        assert_even(&gradients::<3>(|hash, [x, y, z]| slope_3(hash, x, y, z)), 12);
-        assert_even(&gradients::<4>(|hash, [x, y, z, w]| slope_4(hash, x, y, z, w)), 24);
+        assert_even(&gradients::<2>(|hash, [x, y]| gradient_dot_2(hash, x, y)), 8);
+        assert_even(&gradients::<3>(|hash, [x, y, z]| gradient_dot_3(hash, x, y, z)), 12);
+        assert_even(&gradients::<4>(|hash, [x, y, z, w]| gradient_dot_4(hash, x, y, z, w)), 24);
     }
 
     #[test]
     fn one_cell_has_hand_worked_values() {
         // On a corner every slope is 0; beside it the noise is that corner's slope alone, as the fade begins with f^3.
         assert_eq!([0.0, 0.0].gradient_noise([3, 5], [4, 6], 9), 0.0);
-        let hash = finish(add(9, 1, 5), 3);
-        let (near, alone) =
-            ([1e-3f32, 0.0].gradient_noise([3, 5], [4, 6], 9), slope_2(hash, 1e-3, 0.0) * std::f32::consts::SQRT_2);
+        let hash = hash_first(hash_coordinate(9, 1, 5), 3);
+        let (near, alone) = (
+            [1e-3f32, 0.0].gradient_noise([3, 5], [4, 6], 9),
+            gradient_dot_2(hash, 1e-3, 0.0) * std::f32::consts::SQRT_2,
+        );
         assert!((near - alone).abs() < 4e-8, "{near} {alone}");
         assert_eq!(fade(0.5), 0.5);
         // The middle of a cell: a quarter of the sum of four slopes.
         let corners = [(3, 5, 0.5, 0.5), (4, 5, -0.5, 0.5), (3, 6, 0.5, -0.5), (4, 6, -0.5, -0.5)];
-        let sum: f32 = corners.iter().map(|&(i, j, x, y)| slope_2(finish(add(9, 1, j), i), x, y)).sum();
+        let sum: f32 =
+            corners.iter().map(|&(i, j, x, y)| gradient_dot_2(hash_first(hash_coordinate(9, 1, j), i), x, y)).sum();
         let middle = [0.5, 0.5].gradient_noise([3, 5], [4, 6], 9);
         assert!((middle - sum / 4.0 * std::f32::consts::SQRT_2).abs() < 1e-6);
     }
 
     #[test]
     fn hash_changes_half_its_upper_bits_with_any_coordinate_bit() {
-        let hash = |cell: [u32; 4]| finish(add(add(add(7, 3, cell[3]), 2, cell[2]), 1, cell[1]), cell[0]);
+        let hash = |cell: [u32; 4]| {
+            hash_first(
+                hash_coordinate(hash_coordinate(hash_coordinate(7, 3, cell[3]), 2, cell[2]), 1, cell[1]),
+                cell[0],
+            )
+        };
         for axis in 0..4 {
             for bit in 0..32 {
                 let changed = |i: u32| {

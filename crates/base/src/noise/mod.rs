@@ -1,7 +1,7 @@
-//! Gradient noise in 2, 3 and 4 dimensions, in octaves, repeating along an axis where that is wanted.
+//! Fractal gradient noise in 2, 3 and 4 dimensions, optionally periodic along each axis.
 //!
-//! A coordinate is a whole cell and a fraction ([`Coordinate`]), so that neither hours of time nor high octaves lose precision. One
-//! octave has mean 0 over the cells and the variance [`VARIANCE`]; it is 0 on every lattice point, so octaves are shifted against
+//! A coordinate is an integer cell and a fraction ([`Coordinate`]), so that large times and high octaves lose no precision. One
+//! octave has mean 0 over the cells and the variance [`VARIANCE`]. It is 0 at every lattice point, so octaves are shifted against
 //! each other.
 
 mod gradient;
@@ -12,27 +12,27 @@ pub use gradient::Dimension;
 
 use crate::math::{approximations, random::murmur3};
 
-/// Points that are worked on at once, at every vector width.
+/// Points processed together, at every vector width.
 pub const LANES: usize = 16;
 
-/// Variance of one octave in 2, 3 and 4 dimensions, with all cells and seeds: `(4 / n) A B^(n-1)`, where with the fade s
+/// Variance of one octave in 2, 3 and 4 dimensions, over all cells and seeds: `(4 / n) A B^(n-1)`, where with the fade s
 /// `A = 2 integral of (1 - s)^2 f^2 df` and `B = 2 integral of (1 - s)^2 df`.
 pub const VARIANCE: [f64; 3] = [0.093_062, 0.048_613, 0.028_568];
 
-/// Most octaves.
+/// Maximum number of octaves.
 pub const MAX_OCTAVES: u32 = 16;
 
-/// A coordinate of the lattice: a whole cell and the fraction of the way to the next.
+/// A lattice coordinate: an integer cell and the fraction within it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coordinate {
-    /// Whole cells, modulo 2^32.
+    /// Cell index, modulo 2^32.
     pub cell: i32,
     /// From 0 to 1.
     pub fraction: f32,
 }
 
 impl Coordinate {
-    /// Splits `x`; cells beyond 32 bits wrap around (the lattice itself repeats after 2^32). Not finite: 0.
+    /// Splits `x`; cells beyond 32 bits wrap around (the lattice itself repeats after 2^32). Values that are not finite give 0.
     #[inline(always)]
     pub fn from_f64(x: f64) -> Self {
         let floor = x.floor();
@@ -41,7 +41,7 @@ impl Coordinate {
         Self { cell: wrapped as u32 as i32, fraction: if fraction <= 1.0 { fraction } else { 0.0 } }
     }
 
-    /// Splits `x`, which is finite and not beyond 2^31.
+    /// Splits `x`, which must be finite with a magnitude of at most 2^31.
     #[inline(always)]
     pub fn from_f32(x: f32) -> Self {
         let floor = x.floor();
@@ -49,15 +49,15 @@ impl Coordinate {
     }
 }
 
-/// How octaves are added.
+/// Parameters of the sum of octaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fractal {
-    /// How many octaves, from 1 to [`MAX_OCTAVES`].
+    /// Number of octaves, from 1 to [`MAX_OCTAVES`].
     pub octaves: u32,
-    /// How many times finer each octave is than the one before, from 1 to 16; whole, so that all octaves repeat together and far
+    /// Ratio of the frequencies of consecutive octaves, from 1 to 16; an integer, so that all octaves repeat together and large
     /// coordinates stay exact.
     pub lacunarity: u32,
-    /// How many times higher each octave is than the one before; not negative.
+    /// Ratio of the amplitudes of consecutive octaves; not negative.
     pub gain: f32,
 }
 
@@ -67,13 +67,13 @@ impl Fractal {
 }
 
 impl Default for Fractal {
-    /// Four octaves, each twice as fine and half as high.
+    /// Four octaves, each with twice the frequency and half the amplitude of the previous one.
     fn default() -> Self {
         Self { octaves: 4, ..Self::SINGLE }
     }
 }
 
-/// Why noise cannot be made.
+/// Why noise parameters are invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoiseError {
     /// Number of octaves.
@@ -99,16 +99,16 @@ pub enum NoiseError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise<const N: usize> {
     octaves: Vec<Octave<N>>,
-    /// Cells of the first octave after which each axis repeats, 0 where it does not.
+    /// Period of each axis in cells of the first octave, 0 if it does not repeat.
     periods: [u32; N],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Octave<const N: usize> {
     seed: u32,
-    /// How many times finer than the octave before.
+    /// Frequency relative to the previous octave.
     ratio: u32,
-    /// Shift in cells, below 1, so that the zeros of the octaves do not meet.
+    /// Shift in cells, below 1, so that the zeros of the octaves do not coincide.
     shift: [f32; N],
     periods: [u32; N],
     amplitude: f32,
@@ -118,7 +118,7 @@ impl<const N: usize> Noise<N>
 where
     [f32; N]: Dimension<Cells = [u32; N]>,
 {
-    /// Noise for `seed`. `periods` are cells of the first octave after which an axis repeats, 0 where it does not.
+    /// Noise for `seed`. `periods` are the periods of the axes in cells of the first octave, 0 for an axis that does not repeat.
     /// Amplitudes are divided by their sum.
     ///
     /// # Errors
@@ -131,7 +131,7 @@ where
         let octave = |(index, amplitude): (usize, f32)| Octave {
             seed: murmur3(&(index as u32).to_le_bytes(), seed),
             ratio: if index == 0 { 1 } else { fractal.lacunarity },
-            // Multiples of 1/256 keep the sum of shift and fraction exact enough never to skip a cell.
+            // With multiples of 1/256 the sum of shift and fraction is exact enough never to skip a cell.
             shift: std::array::from_fn(|axis| (murmur3(&[index as u8, axis as u8, 1], seed) >> 24) as f32 / 256.0),
             periods: periods.map(|period| if period == 0 { 0 } else { period * fractal.lacunarity.pow(index as u32) }),
             amplitude: amplitude / sum,
@@ -139,14 +139,14 @@ where
         Ok(Self { octaves: amplitudes.into_iter().enumerate().map(octave).collect(), periods })
     }
 
-    /// Value at one point. In loops use [`row`](Self::row) or [`lanes`](Self::lanes): the same bytes, many times faster.
+    /// Value at one point. In loops use [`row`](Self::row) or [`lanes`](Self::lanes), which give the same bits and are many times faster.
     pub fn at(&self, point: [Coordinate; N]) -> f32 {
         let mut cells = std::array::from_fn(|axis| reduce(point[axis].cell, self.periods[axis]));
         let mut fractions = point.map(|coordinate| coordinate.fraction);
-        self.octaves.iter().fold(0.0, |sum, octave| sum + octave.descend(&mut cells, &mut fractions))
+        self.octaves.iter().fold(0.0, |sum, octave| sum + octave.refine_and_evaluate(&mut cells, &mut fractions))
     }
 
-    /// Values at 16 points, given by axis. Call it inside `fearless_simd::dispatch!`, from functions that are `#[inline(always)]`.
+    /// Values at 16 points, given as one array per axis. Call it inside `fearless_simd::dispatch!`, from functions that are `#[inline(always)]`.
     #[inline(always)]
     pub fn lanes(&self, cells: &[[i32; LANES]; N], fractions: &[[f32; LANES]; N]) -> [f32; LANES] {
         let mut cells: [[u32; LANES]; N] =
@@ -157,7 +157,7 @@ where
             for lane in 0..LANES {
                 let mut cell = std::array::from_fn(|axis| cells[axis][lane]);
                 let mut fraction = std::array::from_fn(|axis| fractions[axis][lane]);
-                sums[lane] += octave.descend(&mut cell, &mut fraction);
+                sums[lane] += octave.refine_and_evaluate(&mut cell, &mut fraction);
                 for axis in 0..N {
                     cells[axis][lane] = cell[axis];
                     fractions[axis][lane] = fraction[axis];
@@ -181,7 +181,7 @@ where
             let mut cells = origin.map(|coordinate| [coordinate.cell; LANES]);
             let mut fractions = origin.map(|coordinate| [coordinate.fraction; LANES]);
             for lane in 0..LANES {
-                let x = origin[0].advanced(padded[lane]);
+                let x = origin[0].offset_by(padded[lane]);
                 cells[0][lane] = x.cell;
                 fractions[0][lane] = x.fraction;
             }
@@ -192,18 +192,18 @@ where
 }
 
 impl Coordinate {
-    /// This coordinate moved by `distance`, which is finite and not beyond 2^30.
+    /// This coordinate moved by `distance`, which must be finite with a magnitude of at most 2^30.
     #[inline(always)]
-    pub fn advanced(self, distance: f32) -> Self {
+    pub fn offset_by(self, distance: f32) -> Self {
         let whole = distance.floor();
         let fraction = self.fraction + (distance - whole);
         let carry = fraction.floor();
-        // 2^16 cells and what is left of them: each is small enough for [`approximations::whole`].
+        // Multiples of 2^16 cells and the remainder: each is small enough for [`approximations::round_to_i32`].
         let far = (whole * (1.0 / 65_536.0)).floor();
         let near = whole - far * 65_536.0;
-        let cells = (approximations::whole(far) << 16)
-            .wrapping_add(approximations::whole(near))
-            .wrapping_add(approximations::whole(carry));
+        let cells = (approximations::round_to_i32(far) << 16)
+            .wrapping_add(approximations::round_to_i32(near))
+            .wrapping_add(approximations::round_to_i32(carry));
         Self { cell: self.cell.wrapping_add(cells), fraction: fraction - carry }
     }
 }
@@ -212,15 +212,15 @@ impl<const N: usize> Octave<N>
 where
     [f32; N]: Dimension<Cells = [u32; N]>,
 {
-    /// Moves a point from the octave before into this one and gives its share of the sum.
+    /// Transforms a point from the previous octave to this one and returns the contribution of this octave to the sum.
     #[inline(always)]
-    fn descend(&self, cells: &mut [u32; N], fractions: &mut [f32; N]) -> f32 {
+    fn refine_and_evaluate(&self, cells: &mut [u32; N], fractions: &mut [f32; N]) -> f32 {
         let mut upper = [0; N];
         for axis in 0..N {
             let moved = fractions[axis] * self.ratio as f32 + self.shift[axis];
             let whole = moved.floor();
-            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(approximations::whole(whole) as u32);
-            // At most one period too far: the point was reduced before the first octave. Without a period nothing changes.
+            let cell = cells[axis].wrapping_mul(self.ratio).wrapping_add(approximations::round_to_i32(whole) as u32);
+            // The cell exceeds the period at most once, since the point was reduced before the first octave. Without a period nothing changes.
             let period = self.periods[axis];
             cells[axis] = cell.wrapping_sub(if cell >= period { period } else { 0 });
             fractions[axis] = moved - whole;
@@ -231,13 +231,13 @@ where
     }
 }
 
-/// `cell` modulo `period`, not negative; 0 stands for the 2^32 of the lattice itself.
+/// `cell` modulo `period`, not negative; a period of 0 means 2^32, the period of the lattice itself.
 #[inline(always)]
 fn reduce(cell: i32, period: u32) -> u32 {
     if period == 0 {
         return cell as u32;
     }
-    // f64 holds both exactly; a quotient that is not whole is far enough from the next whole number for one division.
+    // f64 represents both exactly, and a quotient that is not an integer is farther from the next integer than the rounding error of one division.
     let quotient = (cell as f64 / period as f64).floor();
     (cell as u32).wrapping_sub((quotient as i32 as u32).wrapping_mul(period))
 }

@@ -67,7 +67,7 @@ fn vector_rows_and_lanes_give_the_bytes_of_single_points() {
     let mut row = vec![0.0; 67];
     noise.row(level, origin, &along, &mut row);
     for (distance, value) in along.iter().zip(&row) {
-        let single = noise.at([origin[0].advanced(*distance), origin[1], origin[2]]);
+        let single = noise.at([origin[0].offset_by(*distance), origin[1], origin[2]]);
         assert_eq!(single.to_bits(), value.to_bits());
     }
 }
@@ -148,7 +148,7 @@ fn structure(noise: &Noise<3>, [x, y, z]: [f64; 3], distance: f64) -> f64 {
     let count = 25_000;
     let square = |index: u64| {
         let here = random_point::<3>(index);
-        let there = std::array::from_fn(|axis| here[axis].advanced(step[axis]));
+        let there = std::array::from_fn(|axis| here[axis].offset_by(step[axis]));
         let difference = (noise.at(there) - noise.at(here)) as f64;
         difference * difference
     };
@@ -209,10 +209,10 @@ fn coordinates_split_and_advance_without_loss() {
     assert_eq!(Coordinate::from_f64(f64::NAN), Coordinate { cell: 0, fraction: 0.0 });
     assert_eq!(Coordinate::from_f64(f64::INFINITY).fraction, 0.0);
     assert_eq!(Coordinate::from_f32(-1.5), Coordinate { cell: -2, fraction: 0.5 });
-    assert_eq!(Coordinate::from_f32(2.75).advanced(-3.5), Coordinate { cell: -1, fraction: 0.25 });
+    assert_eq!(Coordinate::from_f32(2.75).offset_by(-3.5), Coordinate { cell: -1, fraction: 0.25 });
     for distance in [-1_073_741_824.0_f32, -70_000.5, -65_536.0, 65_535.5, 123_456.75, 999_999_936.0] {
         let cell = 2 + distance.floor() as i32 + i32::from(0.75 + distance - distance.floor() >= 1.0);
-        assert_eq!(Coordinate::from_f32(2.75).advanced(distance).cell, cell, "{distance}");
+        assert_eq!(Coordinate::from_f32(2.75).offset_by(distance).cell, cell, "{distance}");
     }
     assert_eq!(
         [reduce(-1, 5), reduce(7, 5), reduce(-10, 5), reduce(i32::MIN, 3), reduce(-1, 0)],

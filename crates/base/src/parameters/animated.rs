@@ -83,28 +83,28 @@ impl<T: Animate> Animated<T> {
 
     /// Value at time `t`.
     pub fn at(&self, t: f64) -> T {
-        let (_, t) = self.turns(t);
-        self.each(|value| value, |curve| curve.eval(t))
+        let (_, t) = self.split_period(t);
+        self.map_components(|value| value, |curve| curve.eval(t))
     }
 
     /// Change a second at time `t`; see [`Curve::derivative`].
     pub fn rate(&self, t: f64) -> T {
-        let (_, t) = self.turns(t);
-        self.each(|_| 0.0, |curve| curve.derivative(t))
+        let (_, t) = self.split_period(t);
+        self.map_components(|_| 0.0, |curve| curve.derivative(t))
     }
 
     /// Integral over time from `from` to `to`, exact but for rounding: the way that a keyed speed covers, so that any frame alone is right.
     pub fn integral(&self, from: f64, to: f64) -> T {
         let keyed = |curve: &Curve| {
             let Some(period) = self.period else { return curve.integral(from, to) };
-            let [(before, from), (after, to)] = [from, to].map(|t| self.turns(t));
+            let [(before, from), (after, to)] = [from, to].map(|t| self.split_period(t));
             (after - before).mul_add(curve.integral(0.0, period), curve.integral(from, to))
         };
-        self.each(|value| value * (to - from), keyed)
+        self.map_components(|value| value * (to - from), keyed)
     }
 
     /// Whole periods before time `t`, and the time within its period.
-    fn turns(&self, t: f64) -> (f64, f64) {
+    fn split_period(&self, t: f64) -> (f64, f64) {
         let Some(period) = self.period else { return (0.0, t) };
         let turns = (t / period).floor();
         (turns, t - turns * period)
@@ -123,7 +123,7 @@ impl<T: Animate> Animated<T> {
 
     /// Least and greatest value of each component over all time.
     pub fn bounds(&self) -> [T; 2] {
-        [0, 1].map(|side| self.each(|value| value, |curve| curve.range()[side]))
+        [0, 1].map(|side| self.map_components(|value| value, |curve| curve.range()[side]))
     }
 
     /// Keys (time, value), ascending; none for a constant.
@@ -149,7 +149,7 @@ impl<T: Animate> Animated<T> {
     }
 
     /// The value whose components are `constant` of a constant's, or `keyed` of the curves.
-    fn each(&self, constant: impl Fn(f64) -> f64, keyed: impl Fn(&Curve) -> f64) -> T {
+    fn map_components(&self, constant: impl Fn(f64) -> f64, keyed: impl Fn(&Curve) -> f64) -> T {
         match &self.motion {
             Motion::Constant(value) => T::from_components(|index| constant(value.component(index))),
             Motion::Keyed(curves) => T::from_components(|index| keyed(&curves[index])),

@@ -7,18 +7,18 @@ pub fn assets(table: &Table, descriptor: &TableDescriptor) -> Vec<String> {
     let mut paths = Vec::new();
     for parameter in &descriptor.parameters {
         if let Some(node) = table.get(parameter.key) {
-            gather(&node.value, &parameter.kind, &mut paths);
+            collect_paths(&node.value, &parameter.kind, &mut paths);
         }
     }
     paths
 }
 
-fn gather(value: &Value, kind: &Kind, paths: &mut Vec<String>) {
+fn collect_paths(value: &Value, kind: &Kind, paths: &mut Vec<String>) {
     match (kind, value) {
         (Kind::Asset, Value::Text(path)) => paths.push(path.clone()),
-        (Kind::Optional(inner) | Kind::Auto(inner), value) => gather(value, inner, paths),
+        (Kind::Optional(inner) | Kind::Auto(inner), value) => collect_paths(value, inner, paths),
         (Kind::List { item, .. }, Value::List(items)) => {
-            items.iter().for_each(|node| gather(&node.value, item, paths));
+            items.iter().for_each(|node| collect_paths(&node.value, item, paths));
         }
         (Kind::Table(descriptor), Value::Table(table)) => paths.extend(assets(table, descriptor())),
         _ => {}

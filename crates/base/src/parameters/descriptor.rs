@@ -1,7 +1,7 @@
 //! What a parameter is: enough to parse it, to explain it, to edit it and to draw a valid one at random.
 
 use super::Value;
-use crate::host::plural::between;
+use crate::host::plural::count_range;
 
 /// One parameter.
 #[derive(Clone, Debug)]
@@ -142,7 +142,7 @@ impl Kind {
             Self::Optional(inner) => inner.expectation(),
             Self::Auto(inner) => format!("\"auto\" or {}", inner.expectation()),
             Self::List { item, min, max } => {
-                format!("a list of {}, each {}", between(*min, *max, "item"), item.expectation())
+                format!("a list of {}, each {}", count_range(*min, *max, "item"), item.expectation())
             }
             Self::Table(_) => "a table".into(),
         }

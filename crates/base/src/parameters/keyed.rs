@@ -39,13 +39,13 @@ fn interpolation_name(interpolation: Interpolation) -> InterpolationName {
 }
 
 /// Most control points of a curve or keys of a value: those of half an hour of frames, each keyed. Every copy of a curve holds them all.
-pub const MOST_POINTS: usize = 100_000;
+pub const MAX_POINTS: usize = 100_000;
 
 /// Whether there are not too many control points or keys.
-fn has_room(items: &[Node], node: &Node, reader: &mut Reader) -> bool {
-    let fits = items.len() <= MOST_POINTS;
+fn check_point_count(items: &[Node], node: &Node, reader: &mut Reader) -> bool {
+    let fits = items.len() <= MAX_POINTS;
     if !fits {
-        reader.report(node, ProblemKind::ListLength { found: items.len(), min: 1, max: MOST_POINTS });
+        reader.report(node, ProblemKind::ListLength { found: items.len(), min: 1, max: MAX_POINTS });
     }
     fits
 }
@@ -144,7 +144,7 @@ impl Parameter for Curve {
                 return None;
             }
         };
-        if !has_room(items, node, reader) {
+        if !check_point_count(items, node, reader) {
             return None;
         }
         let points = match &node.value {
@@ -193,7 +193,7 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
         };
         let expected = Self::kind(limits);
         let (items, interpolation) = keyed_table(table, "keys", node, &expected, reader)?;
-        if !has_room(items, node, reader) {
+        if !check_point_count(items, node, reader) {
             return None;
         }
         let read_key = |item: &Node, reader: &mut Reader| match &item.value {
@@ -259,11 +259,11 @@ mod tests {
             table.push("keys", points(count));
             Value::Table(table)
         };
-        let told = ProblemKind::ListLength { found: MOST_POINTS + 1, min: 1, max: MOST_POINTS };
-        assert_eq!(fault::<Animated<f64>, _>(keyed(MOST_POINTS), &Range::default()), None);
-        assert_eq!(fault::<Animated<f64>, _>(keyed(MOST_POINTS + 1), &Range::default()), Some(told.clone()));
+        let told = ProblemKind::ListLength { found: MAX_POINTS + 1, min: 1, max: MAX_POINTS };
+        assert_eq!(fault::<Animated<f64>, _>(keyed(MAX_POINTS), &Range::default()), None);
+        assert_eq!(fault::<Animated<f64>, _>(keyed(MAX_POINTS + 1), &Range::default()), Some(told.clone()));
         let limits = CurveLimits { x: Range::default(), ..CurveLimits::default() };
-        assert_eq!(fault::<Curve, _>(points(MOST_POINTS), &limits), None);
-        assert_eq!(fault::<Curve, _>(points(MOST_POINTS + 1), &limits), Some(told));
+        assert_eq!(fault::<Curve, _>(points(MAX_POINTS), &limits), None);
+        assert_eq!(fault::<Curve, _>(points(MAX_POINTS + 1), &limits), Some(told));
     }
 }

@@ -6,10 +6,10 @@
 pub mod animated;
 mod assets;
 mod descriptor;
-mod fault;
 mod keyed;
 mod macros;
-pub mod parameter_fault;
+mod model_error;
+pub mod parameter_error;
 mod problem;
 mod reader;
 mod sample;
@@ -18,10 +18,10 @@ mod value;
 
 pub use assets::assets;
 pub use descriptor::{Choice, Descriptor, Kind, TableDescriptor};
-pub use fault::ModelFault;
-pub use keyed::{CurveLimits, InterpolationName, MOST_POINTS};
+pub use keyed::{CurveLimits, InterpolationName, MAX_POINTS};
+pub use model_error::ModelError;
 pub use problem::{Problem, ProblemKind, nearest};
-pub use reader::{MOST_PROBLEMS, Problems, Reader};
+pub use reader::{MAX_PROBLEMS, Problems, Reader};
 pub use sample::sample;
 pub use types::{AssetPath, Auto, Length, Parameter, Parameters, Range, path};
 pub use value::{Entry, Node, Span, Table, Value};

@@ -1,9 +1,9 @@
 //! Faults in what a file says, each with its place, what is wrong and what is allowed.
 
-use super::{ModelFault, Span};
+use super::{ModelError, Span};
 use crate::host::{
     assets::AssetError,
-    plural::{between, counted},
+    plural::{count_range, counted},
 };
 
 /// One fault.
@@ -34,11 +34,11 @@ pub enum ProblemKind {
     Syntax(String),
     /// The text says more than is read: what it comes to in memory is a hundred times its own length.
     #[error(
-        "the text holds more than {most} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {most}"
+        "the text holds more than {limit} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {limit}"
     )]
     TooManyValues {
         /// Most that are read.
-        most: usize,
+        limit: usize,
     },
     /// The key means nothing here.
     #[error("unknown key `{}`{}; allowed: {}", excerpt(.key), did_you_mean(.nearest), .allowed.join(", "))]
@@ -89,7 +89,7 @@ pub enum ProblemKind {
         seconds: f64,
     },
     /// A list too short or too long.
-    #[error("has {}; allowed: {}", counted(*.found, "item"), between(*.min, *.max, "item"))]
+    #[error("has {}; allowed: {}", counted(*.found, "item"), count_range(*.min, *.max, "item"))]
     ListLength {
         /// How many it has.
         found: usize,
@@ -120,7 +120,7 @@ pub enum ProblemKind {
     Conflict(String),
     /// What a model says of parameters that are each within their own bounds.
     #[error(transparent)]
-    Model(#[from] ModelFault),
+    Model(#[from] ModelError),
     /// The file is of a newer format.
     #[error("format {found} is newer than this program knows; known: up to {known}")]
     NewerFormat {

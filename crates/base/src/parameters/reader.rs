@@ -3,12 +3,12 @@
 use super::{Choice, Kind, Node, Problem, ProblemKind, Span, nearest};
 
 /// Most problems of a file that are kept: the first ones. Nobody reads more of them, and a file can hold a million.
-pub const MOST_PROBLEMS: usize = 100;
+pub const MAX_PROBLEMS: usize = 100;
 
 /// What is wrong with a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Problems {
-    /// The first of them in the order of the file, [`MOST_PROBLEMS`] at most; those without a place come last.
+    /// The first of them in the order of the file, [`MAX_PROBLEMS`] at most; those without a place come last.
     pub listed: Vec<Problem>,
     /// How many there are beyond those.
     pub omitted: usize,
@@ -45,18 +45,18 @@ impl Reader {
 
     /// Notes a problem at `span`.
     pub fn report_at(&mut self, span: Option<Span>, kind: ProblemKind) {
-        self.report_made(span, || kind);
+        self.report_with(span, || kind);
     }
 
     /// Notes a problem at `span`; what it says is only made where it is to be listed.
-    pub fn report_made(&mut self, span: Option<Span>, kind: impl FnOnce() -> ProblemKind) {
+    pub fn report_with(&mut self, span: Option<Span>, kind: impl FnOnce() -> ProblemKind) {
         if self.last_listed.is_some_and(|last| start(span.as_ref()) >= last) {
             self.omitted += 1;
             return;
         }
         self.problems.push(Problem { span, path: self.path.join("."), kind: kind() });
         // Sorting as many again each time keeps the cost of a problem the same however many there are.
-        if self.problems.len() >= 2 * MOST_PROBLEMS {
+        if self.problems.len() >= 2 * MAX_PROBLEMS {
             self.keep_first();
         }
     }
@@ -64,9 +64,9 @@ impl Reader {
     /// Sorts the problems and leaves out those after the most that are kept.
     fn keep_first(&mut self) {
         self.problems.sort_by_key(|problem| start(problem.span.as_ref()));
-        if self.problems.len() > MOST_PROBLEMS {
-            self.omitted += self.problems.len() - MOST_PROBLEMS;
-            self.problems.truncate(MOST_PROBLEMS);
+        if self.problems.len() > MAX_PROBLEMS {
+            self.omitted += self.problems.len() - MAX_PROBLEMS;
+            self.problems.truncate(MAX_PROBLEMS);
             self.last_listed = self.problems.last().map(|last| start(last.span.as_ref()));
         }
     }
@@ -123,7 +123,7 @@ mod tests {
             order.iter().for_each(|&at| reader.report_at(Some(at..at + 1), problem(at)));
             let problems = reader.into_problems();
             let found: Vec<usize> = problems.listed.iter().map(|problem| start(problem.span.as_ref())).collect();
-            assert_eq!((found, problems.omitted), ((0..MOST_PROBLEMS).collect(), COUNT - MOST_PROBLEMS));
+            assert_eq!((found, problems.omitted), ((0..MAX_PROBLEMS).collect(), COUNT - MAX_PROBLEMS));
         }
     }
 
@@ -131,21 +131,21 @@ mod tests {
     fn as_many_as_are_kept_are_all_listed() {
         let mut reader = Reader::new();
         reader.report_at(None, problem(0));
-        (1..MOST_PROBLEMS).for_each(|at| reader.report_at(Some(at..at), problem(at)));
+        (1..MAX_PROBLEMS).for_each(|at| reader.report_at(Some(at..at), problem(at)));
         let problems = reader.into_problems();
-        assert_eq!((problems.listed.len(), problems.omitted), (MOST_PROBLEMS, 0));
-        assert_eq!(problems.listed[MOST_PROBLEMS - 1].span, None, "what has no place comes last");
+        assert_eq!((problems.listed.len(), problems.omitted), (MAX_PROBLEMS, 0));
+        assert_eq!(problems.listed[MAX_PROBLEMS - 1].span, None, "what has no place comes last");
     }
 
     #[test]
     fn what_is_not_listed_is_not_made() {
         let (mut reader, mut made) = (Reader::new(), 0);
         for at in 0..10_000 {
-            reader.report_made(Some(at..at), || {
+            reader.report_with(Some(at..at), || {
                 made += 1;
                 problem(at)
             });
         }
-        assert_eq!(made, 2 * MOST_PROBLEMS);
+        assert_eq!(made, 2 * MAX_PROBLEMS);
     }
 }

@@ -39,7 +39,7 @@ pub trait Parameters: Sized + Default {
         let known = || Self::table().parameters.iter().map(|parameter| parameter.key).chain(ignored.iter().copied());
         for entry in &table.entries {
             if !known().any(|key| key == entry.key) {
-                reader.report_made(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
+                reader.report_with(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                     key: entry.key.clone(),
                     nearest: nearest(&entry.key, known()).map(str::to_owned),
                     allowed: known().map(str::to_owned).collect(),

@@ -1,6 +1,6 @@
 //! Quantities beside light: how their samples become one number a pixel.
 
-use super::strip::{mix, reset};
+use super::strip::{blend, reset};
 use crate::math::MulAdd;
 
 /// How the samples of an AOV become one number.
@@ -76,12 +76,12 @@ impl AovPlane {
     }
 
     /// Its samples count `share`, those of another plane of the same size and AOV the rest.
-    pub(super) fn dissolve(&mut self, other: &Self, share: f32, rule: AovRule) {
+    pub(super) fn crossfade(&mut self, other: &Self, share: f32, rule: AovRule) {
         if rule == AovRule::Nearest {
             return self.add_plane(other, rule);
         }
-        mix(&mut self.values, &other.values, share);
-        mix(&mut self.weights, &other.weights, share);
+        blend(&mut self.values, &other.values, share);
+        blend(&mut self.weights, &other.weights, share);
     }
 
     /// Makes it an empty plane of so many pixels.

@@ -4,7 +4,7 @@ use std::{error::Error, sync::Arc};
 
 use crate::{
     host::assets::Assets,
-    parameters::{ModelFault, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
+    parameters::{ModelError, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
 };
 
 use super::Phenomenon;
@@ -34,7 +34,7 @@ pub struct BuildError {
 impl BuildError {
     /// A phenomenon's own fault, at the parameter that it names.
     pub fn new(key: impl Into<String>, fault: impl Error + Send + Sync + 'static) -> Self {
-        Self { key: key.into(), kind: ModelFault::new(fault).into() }
+        Self { key: key.into(), kind: ModelError::new(fault).into() }
     }
 }
 

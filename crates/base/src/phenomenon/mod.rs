@@ -13,7 +13,7 @@ use crate::{
     image::{Figure, Image, Rect},
 };
 use strip::{AovDescriptor, DepthInterval, Shutter, Strip, View};
-use surroundings::{Neighbours, Publication, Surroundings};
+use surroundings::{OtherPhenomena, Publication, Surroundings};
 
 /// How a stepped phenomenon moves: in steps that are fixed in seconds, whatever the frame rate, size or shutter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +23,7 @@ pub struct Stepping {
     /// How long it runs before time 0, so that it begins developed, s.
     pub preroll: f64,
     /// In a loop: for how long one run of it passes into the next, s. The preroll is then longer by half of that.
-    pub dissolve: f64,
+    pub crossfade: f64,
 }
 
 impl Stepping {
@@ -49,7 +49,7 @@ impl Stepping {
     /// run.
     #[must_use]
     pub fn steps_for(&self, other: &Self, taken: u64) -> Option<u64> {
-        let alike = self.step == other.step && self.dissolve == other.dissolve;
+        let alike = self.step == other.step && self.crossfade == other.crossfade;
         (taken + self.preroll_steps()).checked_sub(other.preroll_steps()).filter(|_| alike)
     }
 }
@@ -157,7 +157,7 @@ pub trait Phenomenon: Send + Sync {
     fn luminance(&self) -> f64;
 
     /// What a user should know of how it will look among others.
-    fn remark(&self, _neighbors: &Neighbours) -> Option<Remark> {
+    fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
         None
     }
 
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn steps_count_from_the_beginning_of_the_preroll() {
-        let stepping = Stepping { step: 0.1, preroll: 0.98, dissolve: 0.0 };
+        let stepping = Stepping { step: 0.1, preroll: 0.98, crossfade: 0.0 };
         assert_eq!(stepping.preroll_steps(), 10);
         assert_eq!((stepping.time_after(0), stepping.time_after(13)), (-1.0, 3.0 * 0.1));
         // 0.3 / 0.1 is a little less than 3 in floating point; before the preroll nothing has been stepped.

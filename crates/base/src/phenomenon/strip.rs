@@ -65,7 +65,7 @@ impl DepthInterval {
 
 /// Motion of the picture while the shutter is open that one instant stands for, pixels, and the most instants.
 const PIXELS_PER_INSTANT: f64 = 1.0;
-const MOST_INSTANTS: f64 = 16.0;
+const MAX_INSTANTS: f64 = 16.0;
 
 /// One exposure seen by one camera.
 #[derive(Clone, Debug)]
@@ -89,9 +89,9 @@ pub struct View {
     /// Luminance that a display will show as white, cd/m^2, where it is known: what is far below needs no drawing.
     pub white_luminance: Option<f64>,
     /// Whether AOVs are asked for; strips then have planes for them.
-    pub measured: bool,
+    pub aovs_requested: bool,
     /// In a loop: the same at the time of the turn before or after, whichever is nearer, for runs that pass from one turn to the next.
-    pub other_turn: Option<Arc<Self>>,
+    pub adjacent_loop_view: Option<Arc<Self>>,
 }
 
 impl View {
@@ -109,14 +109,14 @@ impl View {
             window: Rect::of_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
-            measured: false,
-            other_turn: None,
+            aovs_requested: false,
+            adjacent_loop_view: None,
         }
     }
 
     /// The view of another part of the picture.
-    pub fn through(self, window: Rect) -> Self {
-        self.and_other_turn(|view| view.window = window)
+    pub fn with_window(self, window: Rect) -> Self {
+        self.with_adjacent_loop_view(|view| view.window = window)
     }
 
     /// The view within a loop of `turn` seconds.
@@ -124,13 +124,13 @@ impl View {
         let by = if self.shutter.middle() < 0.5 * turn { turn } else { -turn };
         let shutter = Shutter { open: self.shutter.open + by, close: self.shutter.close + by };
         let other = Self { shutter, next_middle: self.next_middle + by, ..self.clone() };
-        Self { other_turn: Some(Arc::new(other)), ..self }
+        Self { adjacent_loop_view: Some(Arc::new(other)), ..self }
     }
 
     /// The view after `change`, made at the other time too.
-    fn and_other_turn(mut self, change: impl Fn(&mut Self)) -> Self {
+    fn with_adjacent_loop_view(mut self, change: impl Fn(&mut Self)) -> Self {
         change(&mut self);
-        if let Some(other) = &mut self.other_turn {
+        if let Some(other) = &mut self.adjacent_loop_view {
             change(Arc::make_mut(other));
         }
         self
@@ -138,12 +138,12 @@ impl View {
 
     /// The whole picture as it is seen in a level mirror at `height`, m.
     pub fn mirrored(&self, height: f64) -> Self {
-        let mirrored = self.clone().and_other_turn(|view| {
+        let mirrored = self.clone().with_adjacent_loop_view(|view| {
             view.camera = view.camera.mirrored(height);
             view.mirror = Some(height);
-            view.measured = false;
+            view.aovs_requested = false;
         });
-        mirrored.through(Rect::of_size(self.size[0], self.size[1]))
+        mirrored.with_window(Rect::of_size(self.size[0], self.size[1]))
     }
 
     /// How far the sky moves in the picture while the shutter is open, at most, pixels.
@@ -172,7 +172,7 @@ impl View {
     /// Cameras at as many instants, each for an equal part of the exposure, as the motion of what is far away needs in the picture: one
     /// where it stands still.
     pub fn cameras(&self) -> Vec<Camera> {
-        self.cameras_at_most(MOST_INSTANTS)
+        self.cameras_at_most(MAX_INSTANTS)
     }
 
     /// The same for what is small and sharp, which needs more of them.
@@ -212,7 +212,7 @@ pub struct Strip {
     absorption: Absorption,
 }
 
-/// Planes of a strip that takes all colours alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
+/// Planes of a strip that takes all colors alike, to put samples behind each other one pixel at a time: `L += T l; T *= t`.
 #[derive(Debug)]
 pub struct GrayPlanes<'a> {
     /// Red, green and blue of L.
@@ -231,10 +231,10 @@ enum Absorption {
     /// None: T is 1.
     #[default]
     None,
-    /// The first, which stands for all three: soot takes all colours alike.
+    /// The first, which stands for all three: soot takes all colors alike.
     Gray,
     /// All three.
-    Coloured,
+    Colored,
 }
 
 impl Absorption {
@@ -242,13 +242,13 @@ impl Absorption {
         match self {
             Self::None => 0,
             Self::Gray => 1,
-            Self::Coloured => 3,
+            Self::Colored => 3,
         }
     }
 }
 
 /// Of each value `share`, and the rest of the other.
-pub(crate) fn mix(values: &mut [f32], others: &[f32], share: f32) {
+pub(crate) fn blend(values: &mut [f32], others: &[f32], share: f32) {
     values.iter_mut().zip(others).for_each(|(value, other)| *value = share.fma(*value - other, *other));
 }
 
@@ -307,7 +307,7 @@ impl Strip {
         match self.absorption {
             Absorption::None => [1.0; 3],
             Absorption::Gray => [self.transmittance[0][index]; 3],
-            Absorption::Coloured => [0, 1, 2].map(|c| self.transmittance[c][index]),
+            Absorption::Colored => [0, 1, 2].map(|c| self.transmittance[c][index]),
         }
     }
 
@@ -317,7 +317,7 @@ impl Strip {
         match self.absorption {
             Absorption::None => None,
             Absorption::Gray => Some([red, red, red]),
-            Absorption::Coloured => Some([red, green, blue]),
+            Absorption::Colored => Some([red, green, blue]),
         }
     }
 
@@ -328,12 +328,12 @@ impl Strip {
             let [red, green, blue] = &mut self.transmittance;
             green.clone_from(red);
             blue.clone_from(red);
-            self.absorption = Absorption::Coloured;
+            self.absorption = Absorption::Colored;
         }
         &mut self.transmittance
     }
 
-    /// Planes to write to where nothing coloured absorbs; `None` once something does.
+    /// Planes to write to where nothing colored absorbs; `None` once something does.
     pub fn gray_planes_mut(&mut self) -> Option<GrayPlanes<'_>> {
         self.begin_gray();
         let [red, green, blue] = &mut self.radiance;
@@ -345,11 +345,11 @@ impl Strip {
         })
     }
 
-    fn absorb_as(&mut self, absorption: Absorption) {
+    fn upgrade_absorption(&mut self, absorption: Absorption) {
         match absorption {
             Absorption::None => {}
             Absorption::Gray => self.begin_gray(),
-            Absorption::Coloured => _ = self.transmittance_planes_mut(),
+            Absorption::Colored => _ = self.transmittance_planes_mut(),
         }
     }
 
@@ -362,7 +362,7 @@ impl Strip {
     }
 
     /// An empty strip over the same pixels before the same plate.
-    pub fn emptied(&self) -> Self {
+    pub fn empty_like(&self) -> Self {
         let mut empty = Self::default();
         empty.reset(self.rect, None, self.aovs.len());
         empty.plate_depth.clone_from(&self.plate_depth);
@@ -370,18 +370,18 @@ impl Strip {
     }
 
     /// Makes it the mean of itself, which counts `share`, and another strip over the same pixels: as one take dissolves into the next.
-    pub fn dissolve(&mut self, mut other: Self, share: f32, aovs: &[AovDescriptor]) {
+    pub fn crossfade(&mut self, mut other: Self, share: f32, aovs: &[AovDescriptor]) {
         for (own, other) in self.radiance.iter_mut().zip(&other.radiance) {
-            mix(own, other, share);
+            blend(own, other, share);
         }
         let absorption = self.absorption.max(other.absorption);
-        self.absorb_as(absorption);
-        other.absorb_as(absorption);
+        self.upgrade_absorption(absorption);
+        other.upgrade_absorption(absorption);
         let planes = self.transmittance.iter_mut().zip(&other.transmittance);
-        planes.take(absorption.planes()).for_each(|(own, other)| mix(own, other, share));
+        planes.take(absorption.planes()).for_each(|(own, other)| blend(own, other, share));
         self.depth.iter_mut().zip(&other.depth).for_each(|(own, other)| *own = own.min(*other));
         for ((own, other), aov) in self.aovs.iter_mut().zip(&other.aovs).zip(aovs) {
-            own.dissolve(other, share, aov.rule);
+            own.crossfade(other, share, aov.rule);
         }
     }
 
@@ -424,7 +424,7 @@ impl Strip {
             let left = match self.absorption {
                 Absorption::None => f32x16::splat(simd, 1.0),
                 Absorption::Gray => f32x16::from_slice(simd, &self.transmittance[0][pixels.clone()]),
-                Absorption::Coloured => f32x16::from_slice(simd, &self.transmittance[c][pixels.clone()]),
+                Absorption::Colored => f32x16::from_slice(simd, &self.transmittance[c][pixels.clone()]),
             };
             (before + radiance[c] * left).store_slice(sum);
         }
@@ -452,7 +452,7 @@ impl Strip {
             let left = match self.absorption {
                 Absorption::None => None,
                 Absorption::Gray => Some(&self.transmittance[0]),
-                Absorption::Coloured => Some(&self.transmittance[c]),
+                Absorption::Colored => Some(&self.transmittance[c]),
             };
             match left {
                 None => {

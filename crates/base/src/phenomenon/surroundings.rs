@@ -50,7 +50,7 @@ pub struct Light {
 
 /// What arrives from a light at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arrival {
+pub struct IncidentLight {
     /// Illuminance on a plane that faces the light, lux, ACEScg.
     pub illuminance: [f32; 3],
     /// Unit vector toward the light; 0 where it stands.
@@ -62,9 +62,11 @@ pub struct Arrival {
 impl Light {
     /// What arrives at `point`.
     #[inline]
-    pub fn arriving(&self, point: DVec3) -> Arrival {
+    pub fn incident_light(&self, point: DVec3) -> IncidentLight {
         let (position, radius) = match self.emitter {
-            Emitter::Directional { toward } => return Arrival { illuminance: self.intensity, toward, distance: 0.0 },
+            Emitter::Directional { toward } => {
+                return IncidentLight { illuminance: self.intensity, toward, distance: 0.0 };
+            }
             Emitter::Point { position, radius } => (position, radius),
             Emitter::Spot { position, .. } => (position, 0.0),
         };
@@ -72,14 +74,14 @@ impl Light {
         let square = offset.length_squared();
         let distance = square.sqrt();
         let toward = if distance > 0.0 { offset * (1.0 / distance) } else { DVec3::ZERO };
-        let factor = self.emitter.share(-toward) / square.max(radius * radius).max(1e-12);
-        Arrival { illuminance: self.intensity.map(|value| value * factor as f32), toward, distance }
+        let factor = self.emitter.spot_falloff(-toward) / square.max(radius * radius).max(1e-12);
+        IncidentLight { illuminance: self.intensity.map(|value| value * factor as f32), toward, distance }
     }
 
     /// Illuminance on a plane at `point` that faces the light (lux, ACEScg), and the unit vector toward it.
     #[inline]
     pub fn illuminance(&self, point: DVec3) -> ([f32; 3], DVec3) {
-        let Arrival { illuminance, toward, .. } = self.arriving(point);
+        let IncidentLight { illuminance, toward, .. } = self.incident_light(point);
         (illuminance, toward)
     }
 }
@@ -87,7 +89,7 @@ impl Light {
 impl Emitter {
     /// Share of its intensity that it sends in a direction (unit vector): all, but for a cone.
     #[inline]
-    fn share(&self, direction: DVec3) -> f64 {
+    fn spot_falloff(&self, direction: DVec3) -> f64 {
         let Self::Spot { axis, cos_inner, cos_outer, .. } = *self else { return 1.0 };
         let cone = ((direction.dot(axis) - cos_outer) / (cos_inner - cos_outer).max(1e-9)).clamp(0.0, 1.0);
         cone * cone * (3.0 - 2.0 * cone)
@@ -117,7 +119,7 @@ impl Publication {
 /// What one phenomenon of a scene is among, to look at before anything is drawn: nothing is copied, so that of many phenomena each can be
 /// asked.
 #[derive(Clone, Copy)]
-pub struct Neighbours<'a> {
+pub struct OtherPhenomena<'a> {
     /// The scene's own lights and obstacles.
     pub scene: &'a Publication,
     /// How many phenomena there are.
@@ -125,12 +127,12 @@ pub struct Neighbours<'a> {
     /// What the phenomenon of a number publishes; only asked for where it matters.
     pub published: &'a dyn Fn(usize) -> &'a Publication,
     /// Its own number.
-    pub own: usize,
+    pub own_index: usize,
     /// The light of the sky.
     pub sky: &'a Sky,
 }
 
-impl<'a> Neighbours<'a> {
+impl<'a> OtherPhenomena<'a> {
     /// All lights but its own.
     pub fn lights(&self) -> impl Iterator<Item = &'a Light> + use<'a> {
         self.others().flat_map(|publication| &publication.lights)
@@ -142,7 +144,7 @@ impl<'a> Neighbours<'a> {
     }
 
     fn others(&self) -> impl Iterator<Item = &'a Publication> + use<'a> {
-        let (own, published) = (self.own, self.published);
+        let (own, published) = (self.own_index, self.published);
         let others = (0..self.count).filter(move |index| *index != own);
         std::iter::once(self.scene).chain(others.map(published))
     }
@@ -212,7 +214,8 @@ mod tests {
         };
         let (scene, published) = (shining(1.0), [shining(2.0), shining(3.0), shining(4.0)]);
         let published = |index: usize| &published[index];
-        let neighbours = Neighbours { scene: &scene, count: 3, published: &published, own: 1, sky: &Sky::DARK };
+        let neighbours =
+            OtherPhenomena { scene: &scene, count: 3, published: &published, own_index: 1, sky: &Sky::DARK };
         let intensities: Vec<f32> = neighbours.lights().map(|light| light.intensity[0]).collect();
         assert_eq!((intensities, neighbours.occluders().count()), (vec![1.0, 2.0, 4.0], 0));
     }

@@ -1,7 +1,8 @@
-//! What all phenomena of a scene share: air, gravity, wind, sky and occluders.
+//! What all phenomena of a scene share: air, gravity, wind, sky and obstacles.
 
 pub mod air;
 pub mod gravity;
+pub mod obstacle;
 pub mod occluder;
 pub mod sky;
 pub mod wind;

@@ -32,8 +32,8 @@ fn a_drawing_without_strokes_or_that_is_none_is_a_located_error() {
     folder
         .write("text.svg", "<svg><defs><path id=\"a\" d=\"M0 0L1 1\"/></defs><use href=\"#a\"/><text>arc</text></svg>");
     for (file, expected) in [
-        ("empty.svg", "holds no strokes (allowed"),
-        ("text.svg", "holds no strokes, only use, text (allowed"),
+        ("empty.svg", "contains no strokes (allowed"),
+        ("text.svg", "contains no strokes, only use, text (allowed"),
         ("words.svg", "it is no SVG"),
         ("gone.svg", "no such file"),
     ] {

@@ -13,7 +13,7 @@ use bansho_base::{
 };
 
 use super::{
-    LakeFrame,
+    model::LakeFrame,
     parameters::{GroundKind, GroundParameters},
     surface::{Surface, SurfaceSample, fresnel},
     waves::WaveSlope,
@@ -121,20 +121,22 @@ impl PreparedGround<'_> {
         let position = DVec2::new(hit.point.x, hit.point.z);
         let microfacets = self.surface.microfacets(position, hit.footprint, sample.film);
         let backdrop = self.backdrop.as_ref().map(|Backdrop { image, side }| {
-            let [red, green, blue, _] = image.between(hit.pixel / *side as f64);
+            let [red, green, blue, _] = image.sample_bilinear(hit.pixel / *side as f64);
             [red, green, blue]
         });
         let blurred_reflection = glossy_reflection(self.surroundings, backdrop, hit.point, viewer, &microfacets);
-        let mirror_image = self.surroundings.reflection.map_or([0.0; 4], |image| image.between(hit.pixel));
+        let mirror_image = self.surroundings.reflection.map_or([0.0; 4], |image| image.sample_bilinear(hit.pixel));
         let (puddle, fresnel, wetness) = (sample.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
         [0, 1, 2].map(|c| wetness * (puddle * fresnel).fma(mirror_image[c], (1.0 - puddle) * blurred_reflection[c]))
     }
 
     fn lake_specular(&self, hit: &Hit, lake: &LakeFrame) -> [f32; 3] {
         let slope = lake.waves.slope(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let mirror_image =
-            self.surroundings.reflection.map_or([0.0; 4], |image| image.between(self.reflected_pixel(hit, slope)));
-        let blurred_reflection = lake.blurred_reflection.between(hit.pixel);
+        let mirror_image = self
+            .surroundings
+            .reflection
+            .map_or([0.0; 4], |image| image.sample_bilinear(self.reflected_pixel(hit, slope)));
+        let blurred_reflection = lake.blurred_reflection.sample_bilinear(hit.pixel);
         let (unresolved, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
         [0, 1, 2].map(|c| fresnel * unresolved.fma(blurred_reflection[c], (1.0 - unresolved) * mirror_image[c]))
     }

@@ -9,9 +9,9 @@ use bansho_base::{
     },
     world::sky::{Night, Sky},
 };
+use fearless_simd::prelude::*;
 
 use super::stars;
-use fearless_simd::prelude::*;
 
 /// Steps of elevation from the horizon to the zenith, even in the root of its sine.
 const ELEVATION_STEPS: usize = 512;
@@ -52,7 +52,7 @@ impl NightSky {
             let root = step as f64 / ELEVATION_STEPS as f64;
             let elevation = math::asin(root * root);
             let dimmed = (scale * night.transmittance(elevation)) as f32;
-            let [even, glow, blue] = night.parallel(elevation).terms().map(with_zero);
+            let [even, glow, blue] = night.almucantar(elevation).terms().map(with_zero);
             Almucantar { even, glow, blue, milky_way: with_zero(color.map(|value| value * dimmed)) }
         };
         Self {
@@ -66,7 +66,7 @@ impl NightSky {
     /// Radiance in the directions of unit vectors.
     #[inline(always)]
     pub(super) fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
-        let [xs, ys, zs] = &directions.axes;
+        let [xs, ys, zs] = &directions.components;
         let (mut steps, mut toward, mut milky_way_weights) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             let sine = if ys[i] > 0.0 { ys[i] } else { 0.0 };

@@ -57,6 +57,7 @@
 //! 8. `render::prepared` composites layers, squares and [sparks](crate::sparks) into strips.
 
 mod fault;
+mod model;
 pub(crate) mod paper_squares;
 mod parameters;
 mod phenomenon;
@@ -66,11 +67,11 @@ pub mod simulate;
 mod tests;
 
 pub use fault::{ParticleFault, ParticleFaultKind};
+pub use model::FlameParticles;
 pub use parameters::{
     BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, LifeParameters, MotionParameters,
     TemperatureLaw, Tension, WindForce,
 };
-pub use phenomenon::FlameParticles;
 pub use simulate::{
     burner::heskestad,
     derived::check_particle_count,

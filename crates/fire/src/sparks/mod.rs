@@ -154,7 +154,7 @@ impl SparkEmitter<'_> {
         let cooled = math::pow(spark.age / spark.life, 0.8);
         let hottest = self.parameters.temperature_k;
         let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled);
-        let radius = 0.5 * self.parameters.size * self.scale * opened.pixels_per_metre;
+        let radius = 0.5 * self.parameters.size * self.scale * opened.pixels_per_meter;
         let area = std::f64::consts::PI * radius * radius;
         let radiance = color::black_body().radiance(temperature as f32);
         Streak::new(opened.pixel, closed.pixel, radius.max(0.6), radiance, area, 0.5 * (opened.depth + closed.depth))

@@ -12,7 +12,7 @@ pub(crate) struct PictureCache {
 
 /// Memory of a picture, bytes.
 fn bytes(picture: &Picture) -> usize {
-    size_of_val(picture.colour.pixels()) + picture.depth.as_ref().map_or(0, |depth| size_of_val(&depth[..]))
+    size_of_val(picture.color.pixels()) + picture.depth.as_ref().map_or(0, |depth| size_of_val(&depth[..]))
 }
 
 impl PictureCache {
@@ -55,7 +55,7 @@ mod tests {
     fn the_least_used_pictures_make_room() {
         let picture = || {
             Arc::new(Picture {
-                colour: Image::filled(4, 4, [0.0; 4]),
+                color: Image::filled(4, 4, [0.0; 4]),
                 depth: None,
                 encoding: Encoding::LinearSrgb,
                 exposure_ev100: None,

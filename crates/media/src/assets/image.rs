@@ -123,5 +123,5 @@ fn rgb(codes: [u8; 3]) -> [f32; 4] {
 fn picture(width: u64, height: u64, pixels: Vec<[f32; 4]>, encoding: Encoding) -> Result<Picture, AssetProblem> {
     let color = Image::from_pixels(width as usize, height as usize, pixels);
     let color = color.ok_or_else(|| damaged("its pixels do not fill it"))?;
-    Ok(Picture { colour: color, depth: None, encoding, exposure_ev100: None })
+    Ok(Picture { color, depth: None, encoding, exposure_ev100: None })
 }

@@ -44,7 +44,7 @@ impl MemoryLimit {
         if bytes > self.available() {
             return Err(AssetProblem::Memory { bytes, limit: self.available(), others: self.used });
         }
-        if memory::is_granted(bytes as f64) { Ok(()) } else { Err(AssetProblem::NoMemory { bytes }) }
+        if memory::can_allocate(bytes as f64) { Ok(()) } else { Err(AssetProblem::NoMemory { bytes }) }
     }
 }
 

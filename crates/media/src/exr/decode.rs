@@ -16,7 +16,7 @@ use ::exr::{
     meta::{MetaData, attribute::SampleType, header::Header},
 };
 use bansho_base::{
-    color::{LARGEST_EV100, ev100_of_camera},
+    color::{MAX_EV100, ev100_of_camera},
     host::assets::{AssetProblem, Picture},
     image::Image,
 };
@@ -330,7 +330,7 @@ fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = 
 fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter) -> Result<Picture, AssetProblem> {
     let (width, height) = (planes.width, planes.height);
     let conversion = primaries::conversion(header.parts[selection.part].chromaticities)
-        .ok_or_else(|| damaged("its chromaticities describe no colours"))?;
+        .ok_or_else(|| damaged("its chromaticities describe no colors"))?;
     let mut color = planes.values.color.unwrap_or_else(|| {
         // A file of depth alone: shown as gray, opaque.
         let depth = planes.values.depth.iter().flatten();
@@ -344,12 +344,12 @@ fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter
     });
     let color = Image::from_pixels(width, height, color).ok_or_else(|| damaged("its pixels do not fill it"))?;
     let exposure_ev100 = exposure(&header.parts[selection.part]);
-    Ok(Picture { colour: color, depth, encoding: conversion.encoding, exposure_ev100 })
+    Ok(Picture { color, depth, encoding: conversion.encoding, exposure_ev100 })
 }
 
 /// Exposure value at ISO 100 by Bansho's own attribute, or by those of OpenEXR for a camera's settings.
 fn exposure(part: &PartHeader) -> Option<f64> {
-    let own = part.float(KEY_EXPOSURE).filter(|ev100| ev100.abs() <= LARGEST_EV100);
+    let own = part.float(KEY_EXPOSURE).filter(|ev100| ev100.abs() <= MAX_EV100);
     own.or_else(|| ev100_of_camera(part.float("aperture")?, part.float("expTime")?, part.float("isoSpeed")?))
 }
 

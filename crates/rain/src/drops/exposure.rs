@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn roofs_shelter_what_is_beneath_them_and_slanted_rain_comes_in() {
         let occluder = Occluder::Cuboid {
-            centre: DVec3::new(0.0, 3.1, 0.0),
+            center: DVec3::new(0.0, 3.1, 0.0),
             half_extents: DVec3::new(1.0, 0.1, 1.0),
             rotation: DQuat::IDENTITY,
         };
@@ -264,7 +264,7 @@ mod tests {
                 && ray_hits_occluder(&occluder, DVec3::new(-3.0, 0.0, 0.0), slanted)
         );
         assert!(!ray_hits_occluder(&occluder, DVec3::new(0.0, 4.0, 0.0), DVec3::Y));
-        let ball = Occluder::Sphere { centre: DVec3::new(0.0, 2.0, 0.0), radius: 0.5 };
+        let ball = Occluder::Sphere { center: DVec3::new(0.0, 2.0, 0.0), radius: 0.5 };
         assert!(
             ray_hits_occluder(&ball, DVec3::ZERO, DVec3::Y)
                 && !ray_hits_occluder(&ball, DVec3::new(0.6, 0.0, 0.0), DVec3::Y)

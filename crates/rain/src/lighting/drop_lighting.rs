@@ -2,7 +2,7 @@
 
 use bansho_base::{
     math::{self, DVec3, MulAdd, approximations, simd::LANES},
-    phenomenon::surroundings::{Arrival, Emitter, Light},
+    phenomenon::surroundings::{Emitter, IncidentLight, Light},
 };
 
 use super::{drop_phase_function::DropPhaseFunction, tiles::lerp_color};
@@ -65,7 +65,7 @@ impl DropLighting<'_> {
     /// `E p / (4 pi)`.
     #[inline(always)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
-        let Arrival { illuminance, toward, distance } = light.arriving(point);
+        let IncidentLight { illuminance, toward, distance } = light.incident_light(point);
         if illuminance == [0.0; 3] {
             return [0.0; 3];
         }
@@ -103,7 +103,7 @@ impl DropLighting<'_> {
     pub(crate) fn max_radiance(&self, center: DVec3, radius: f64) -> f32 {
         let max_radiance = |light: &Light| {
             let intensity = light.intensity.into_iter().fold(0.0, f32::max) * self.scattering.greatest;
-            let nearest = (light.arriving(center).distance - radius).max(f64::MIN_POSITIVE);
+            let nearest = (light.incident_light(center).distance - radius).max(f64::MIN_POSITIVE);
             match light.emitter {
                 Emitter::Directional { .. } => intensity,
                 Emitter::Spot { position, axis, cos_outer, .. }

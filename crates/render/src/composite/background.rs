@@ -63,7 +63,7 @@ impl<'a> Behind<'a> {
         }
     }
 
-    /// Colours in a row of `rect`, traced to `sources`; `buffer` holds them if any is bent.
+    /// Colors in a row of `rect`, traced to `sources`; `buffer` holds them if any is bent.
     pub(crate) fn colour_row<'b>(
         &self,
         rect: Rect,
@@ -245,7 +245,7 @@ impl Bend<'_> {
 fn split(place: f32, side: usize) -> (u32, f32) {
     let place = place.max(0.0).min((side - 1) as f32);
     let whole = place.floor().min(side.saturating_sub(2) as f32);
-    (approximations::whole(whole).cast_unsigned(), place - whole)
+    (approximations::round_to_i32(whole).cast_unsigned(), place - whole)
 }
 
 #[cfg(test)]

@@ -252,7 +252,7 @@ impl March<'_> {
         (before.pixel + (after.pixel - before.pixel) * part, sight.way(t))
     }
 
-    /// The plate's colour infinitely far along a line of sight that met nothing.
+    /// The plate's color infinitely far along a line of sight that met nothing.
     fn beyond(&self, sight: &Sight) -> Option<[f32; 4]> {
         let end = self.camera.project(sight.from + sight.toward * FAR)?.pixel;
         (self.is_inside(end) && !self.plate_depth(end).is_finite()).then(|| self.radiance(end))?
@@ -274,7 +274,7 @@ impl March<'_> {
 
     /// The plate's radiance and coverage at a pixel.
     fn radiance(&self, pixel: DVec2) -> Option<[f32; 4]> {
-        let [red, green, blue, coverage] = self.colour.between(pixel);
+        let [red, green, blue, coverage] = self.colour.sample_bilinear(pixel);
         let scale = 1.0 / self.exposure;
         scale.is_finite().then_some([scale * red, scale * green, scale * blue, coverage])
     }
@@ -322,7 +322,7 @@ mod tests {
         [pillar, wall, ground].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// A plate whose colours are the places that it shows, exposed.
+    /// A plate whose colors are the places that it shows, exposed.
     fn plate(view: &View) -> PlateFrame {
         let mut colour = Image::filled(SIZE[0], SIZE[1], [0.0, 0.0, 0.0, 1.0]);
         let mut depth = Image::filled(SIZE[0], SIZE[1], [f32::INFINITY]);

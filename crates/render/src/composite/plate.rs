@@ -1,8 +1,7 @@
-//! The plate of a frame: its colours as the scene sees them, and the depth to hide behind.
+//! The plate of a frame: its colors as the scene sees them, and the depth to hide behind.
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::BuildError;
 use bansho_base::{
     camera::{Camera, Lens},
     color,
@@ -13,6 +12,7 @@ use bansho_base::{
     image::Image,
     math::DVec2,
     phenomenon::LevelMirror,
+    phenomenon::kind::BuildError,
 };
 
 use super::mirror;
@@ -97,14 +97,14 @@ fn load(context: &ShotContext, number: i64, camera: &Camera) -> Result<PlateFram
     let pictures =
         context.plan.scene.plate.read_frame(context.compiled.assets().as_ref(), number).map_err(plate_error)?;
     let Some(PlatePictures { image, depth }) = pictures else { return Ok(PlateFrame::default()) };
-    let width = image.colour.width();
-    let fit = Fit::new(context, [width, image.colour.height()]);
+    let width = image.color.width();
+    let fit = Fit::new(context, [width, image.color.height()]);
     let depths = depth.as_ref().and_then(|picture| picture.depth.as_ref());
     let depth = depths.map(|depths| fit_depth(context, camera, depths, width, &fit));
     Ok(PlateFrame { colour: Some(fit_colour(context, &image, &fit)), depth })
 }
 
-/// How the picture's pixels fall on the plate's: the plate fills the picture, centred, its longer side cut.
+/// How the picture's pixels fall on the plate's: the plate fills the picture, centered, its longer side cut.
 pub(crate) struct Fit {
     picture: [usize; 2],
     plate: [usize; 2],
@@ -167,7 +167,7 @@ fn fit_colour(context: &ShotContext, picture: &Picture, fit: &Fit) -> Image<4> {
             let mut sum = [0.0_f32; 3];
             for &(plate_y, weight_y) in &rows {
                 for &(plate_x, weight_x) in &columns[x] {
-                    let colour = picture.colour.at(plate_x, plate_y);
+                    let colour = picture.color.at(plate_x, plate_y);
                     for c in 0..3 {
                         sum[c] += weight_y * weight_x * colour[c];
                     }
@@ -189,7 +189,7 @@ pub(crate) fn to_scene(view: &color::View, encoding: Encoding, colour: [f32; 3])
     }
 }
 
-/// Depth is never mixed between pixels: each takes its nearest neighbour's.
+/// Depth is never mixed between pixels: each takes its nearest neighbor's.
 fn fit_depth(context: &ShotContext, camera: &Camera, depth: &[f32], plate_width: usize, fit: &Fit) -> Image<1> {
     let kind = context.plan.scene.plate.depth_kind;
     let scale = context.plan.scene.plate.depth_scale;

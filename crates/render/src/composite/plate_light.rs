@@ -24,7 +24,7 @@ pub(crate) fn plate_light(context: &ShotContext) -> Option<ElevationProfile> {
     let path = context.plan.scene.plate.image.as_ref()?;
     let picture = context.compiled.assets().picture(&path.0, context.plan.scene.picture.first_frame).ok()?;
     let camera = context.plan.scene.camera.at(0.0, context.plan.size);
-    let [width, height] = [picture.colour.width(), picture.colour.height()];
+    let [width, height] = [picture.color.width(), picture.color.height()];
     let fit = Fit::new(context, [width, height]);
     let view = context.plan.shown();
     let step = width.max(height).div_ceil(SAMPLES);
@@ -33,13 +33,13 @@ pub(crate) fn plate_light(context: &ShotContext) -> Option<ElevationProfile> {
         .flat_map(|y| places(width).map(move |x| [x, y]))
         .filter_map(|[x, y]| {
             let pixel = DVec2::new(fit.in_picture(0, x), fit.in_picture(1, y));
-            let [red, green, blue, _] = picture.colour.at(x, y);
+            let [red, green, blue, _] = picture.color.at(x, y);
             let light = to_scene(&view, picture.encoding, [red, green, blue]);
             sample(&camera, pixel, limited(picture.encoding, light))
         })
         .collect();
     let above = open_sky(&samples);
-    ElevationProfile::of_samples(samples.into_iter().chain(above))
+    ElevationProfile::from_samples(samples.into_iter().chain(above))
 }
 
 /// Share of the upper half of a plate that is taken for its sky: the brightest.
@@ -78,7 +78,7 @@ fn sample(camera: &Camera, pixel: DVec2, radiance: [f32; 3]) -> Option<Elevation
     let weight = match camera.lens {
         Lens::Perspective => 1.0 / (length * length * length),
         Lens::Fisheye => 1.0,
-        Lens::Panorama => math::cos((camera.centre.y - pixel.y) / camera.focal_pixels).max(0.0),
+        Lens::Panorama => math::cos((camera.principal_point.y - pixel.y) / camera.focal_pixels).max(0.0),
     };
     Some(ElevationSample { sine: direction.y / length, weight, radiance })
 }
@@ -117,7 +117,7 @@ mod tests {
             "{lowest:?} {zenith:?}"
         );
         assert!((zenith[2] / zenith[0] - 2.0).abs() < 1e-5);
-        let profile = ElevationProfile::of_samples(samples.iter().copied().chain(sky)).unwrap();
+        let profile = ElevationProfile::from_samples(samples.iter().copied().chain(sky)).unwrap();
         // What is seen stays as it is: at its top the mean of pillars and sky.
         let seen =
             bansho_base::world::sky::Sky::measured(profile).radiance(bansho_base::math::DVec3::new(0.0, 0.29, 0.0));

@@ -3,7 +3,7 @@
 use bansho_base::{
     host::{
         observer::{self, Cancelled, Observer},
-        scratch_pool::Spares,
+        scratch_pool::ScratchPool,
     },
     image::{Channel, Frame, FrameHeader, Image, Precision, Rect},
     math::MulAdd,
@@ -13,11 +13,11 @@ use bansho_base::{
     },
 };
 
-use super::slices::Slice;
 use super::{
     accumulate::Accumulator,
     background::{Behind, Sources},
     plate::PlateFrame,
+    slices::Slice,
 };
 use crate::compiled::ActiveRun;
 use bansho_scene::PLATE_LAYER;
@@ -178,7 +178,7 @@ pub(crate) fn frame(
     let level = Level::new();
     let Canvas { mut beauty, mut depth, stale } = Canvas::new(window, spent);
     let strip_pixels = STRIP_ROWS * window.width;
-    let workers = Spares::new(Worker::default);
+    let workers = ScratchPool::new(Worker::default);
     let planes: Vec<Vec<Vec<f32>>> = beauty
         .pixels_mut()
         .par_chunks_mut(strip_pixels)
@@ -193,7 +193,7 @@ pub(crate) fn frame(
             if rect.is_empty() {
                 return Ok(Vec::new());
             }
-            workers.lend(|worker| {
+            workers.with(|worker| {
                 composition.accumulate(level, rect, worker);
                 composition.behind.trace(rect, &mut worker.sources);
                 finish_strip(composition, level, worker, strip, beauty, depth);

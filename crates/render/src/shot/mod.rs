@@ -114,7 +114,7 @@ impl Shot {
             Some(frame) => frame,
             None => {
                 let all = Rect::of_size(view.size[0], view.size[1]);
-                view = view.through(all);
+                view = view.with_window(all);
                 let whole = self.compose(&view, &plate, &mirrored, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.context.plan.window)).ok_or(Cancelled)?
             }

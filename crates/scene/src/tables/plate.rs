@@ -5,9 +5,8 @@ use std::sync::Arc;
 use bansho_base::{
     host::assets::{AssetError, AssetProblem, Assets, Picture},
     parameters::ProblemKind,
+    phenomenon::kind::BuildError,
 };
-
-use bansho_base::phenomenon::kind::BuildError;
 
 use super::picture::PlateParameters;
 
@@ -20,7 +19,7 @@ pub struct PlatePictures {
 }
 
 fn size(picture: &Picture) -> [usize; 2] {
-    [picture.colour.width(), picture.colour.height()]
+    [picture.color.width(), picture.color.height()]
 }
 
 impl PlateParameters {

@@ -30,7 +30,7 @@ pub(crate) fn check_extent(text: &str) -> Result<(), Problem> {
     match signs.map(|(at, _)| at).nth(MOST_VALUES) {
         None => Ok(()),
         Some(at) => {
-            let kind = ProblemKind::TooManyValues { most: MOST_VALUES };
+            let kind = ProblemKind::TooManyValues { limit: MOST_VALUES };
             Err(Problem { span: Some(at..at + 1), path: String::new(), kind })
         }
     }
@@ -116,7 +116,7 @@ mod tests {
         let last = text(MOST_VALUES).len();
         assert_eq!(
             (problem.kind, problem.span),
-            (ProblemKind::TooManyValues { most: MOST_VALUES }, Some(last..last + 1))
+            (ProblemKind::TooManyValues { limit: MOST_VALUES }, Some(last..last + 1))
         );
     }
 

@@ -125,7 +125,7 @@ impl From<ReportedProblem> for Problem {
     fn from(found: ReportedProblem) -> Self {
         let ReportedProblem { span, path, reason, asset } = found;
         let kind = match asset {
-            Some(path) => ProblemKind::Asset(AssetError { path, problem: AssetProblem::Told(reason) }),
+            Some(path) => ProblemKind::Asset(AssetError { path, problem: AssetProblem::Reported(reason) }),
             None => ProblemKind::Conflict(reason),
         };
         Self { span, path, kind }

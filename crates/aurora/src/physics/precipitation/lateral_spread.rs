@@ -2,18 +2,17 @@
 
 use std::sync::OnceLock;
 
-use bansho_base::{host::once::get_or_make, math, math::random::Key};
+use bansho_base::{host::once::get_or_compute, math, math::random::Key};
+use rayon::prelude::*;
 
-use super::TrackModel;
 use super::{
-    Deposition,
+    Deposition, TrackModel,
     electron_track::{Collision, TrackSampler, collision_count},
     energy_grid::{self, NODES, node_energy_ev},
     hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
     spectrum::ARC,
 };
 use crate::physics::atmosphere::atmosphere;
-use rayon::prelude::*;
 
 /// Approximate number of sampled collisions per energy and the minimum number of tracks: a few long tracks dominate the
 /// variance.
@@ -30,12 +29,12 @@ static HARD_SPHERE: OnceLock<SpreadByEnergy> = OnceLock::new();
 
 fn by_energy(model: TrackModel) -> &'static SpreadByEnergy {
     match model {
-        TrackModel::Fang => get_or_make(&FANG, || {
+        TrackModel::Fang => get_or_compute(&FANG, || {
             // Tracks are monoenergetic, so the spectrum does not matter.
             let tracks = TrackSampler::new(&Deposition::new(atmosphere(), ARC), 0.0);
             SpreadByEnergy::new(|node, key, particle| altitudes_km(tracks.sample_track(node, key, particle)))
         }),
-        TrackModel::HardSphereAtmosphere => get_or_make(&HARD_SPHERE, || {
+        TrackModel::HardSphereAtmosphere => get_or_compute(&HARD_SPHERE, || {
             let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0);
             SpreadByEnergy::new(|node, key, particle| altitudes_km(spheres.track(node_energy_ev(node), key, particle)))
         }),

@@ -7,12 +7,14 @@
 use std::ops::Range;
 
 use bansho_base::{
-    host::scratch_pool::Spares,
+    host::scratch_pool::ScratchPool,
     math::{
         approximations,
         simd::{FourLanes, HalfLanes, Real},
     },
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS};
 use crate::{
@@ -25,8 +27,6 @@ use crate::{
         },
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Rows per batch.
 const ROWS: usize = 16;
@@ -89,10 +89,10 @@ impl ColumnBuffer {
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        let spares = Spares::new(ProfileScratch::default);
+        let spares = ScratchPool::new(ProfileScratch::default);
         strips.with_max_len(1).for_each(|strip| {
             spares
-                .lend(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
+                .with(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
         });
         picture
     }

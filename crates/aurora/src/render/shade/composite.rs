@@ -2,10 +2,12 @@
 //! chart.
 
 use bansho_base::{
-    host::scratch_pool::Spares,
+    host::scratch_pool::ScratchPool,
     math,
     math::simd::{FourLanes, HalfLanes, Real},
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use super::attenuation::EmitterColors;
 use crate::{
@@ -18,8 +20,6 @@ use crate::{
         },
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Rows per batch.
 const ROWS: usize = 16;
@@ -53,9 +53,9 @@ impl ColumnBuffer {
             soft_rows.push(soft_projection.row(colatitude as f32) - 0.5);
         }
         let coloring = ColorPass { chart, soft, soft_projection, emitter_colors, field, cosines, sines, soft_rows };
-        let spares = Spares::new(Vec::new);
+        let spares = ScratchPool::new(Vec::new);
         strips.with_max_len(1).for_each(|strip| {
-            spares.lend(|column| dispatch!(level, simd => coloring.color_strip(simd, strip, column)));
+            spares.with(|column| dispatch!(level, simd => coloring.color_strip(simd, strip, column)));
         });
         self
     }

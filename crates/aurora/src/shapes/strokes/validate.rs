@@ -1,14 +1,19 @@
 //! Converts parameters to drawn sheets and validates them.
 
-use super::intersection::first_crossing;
-use crate::shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch};
-use crate::shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing};
-use bansho_base::geometry::strokes::Drawing;
-use bansho_base::host::assets::{AssetError, AssetProblem, Assets};
-use bansho_base::math::curve::Curve;
-use bansho_base::math::{self, DVec2, smoothstep};
-use bansho_base::parameters::Auto;
 use std::sync::Arc;
+
+use bansho_base::{
+    geometry::strokes::Drawing,
+    host::assets::{AssetError, AssetProblem, Assets},
+    math::{self, DVec2, curve::Curve, smoothstep},
+    parameters::Auto,
+};
+
+use super::intersection::first_crossing;
+use crate::shapes::{
+    SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing,
+    geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
+};
 
 /// Points closer than this are merged, km.
 const SAME_KM: f64 = 1e-6;
@@ -191,8 +196,8 @@ fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) ->
 }
 
 fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
-    let middle = drawing.low.midpoint(drawing.high);
-    let scale = extent_km / (drawing.high - drawing.low).max_element();
+    let middle = drawing.min.midpoint(drawing.max);
+    let scale = extent_km / (drawing.max - drawing.min).max_element();
     points.iter().map(|&point| (point - middle) * scale).collect()
 }
 

@@ -10,7 +10,7 @@ use crate::job::{
 
 /// Smaller pictures than this many pixels are not asked about.
 const FEW_PIXELS: f64 = 4e6;
-/// Bytes of a pixel of a frame: colour, alpha and depth as they are drawn.
+/// Bytes of a pixel of a frame: color, alpha and depth as they are drawn.
 const FRAME_BYTES: f64 = 20.0;
 
 /// What a job asks of memory, beside its plan.
@@ -42,7 +42,7 @@ impl Need {
         let aovs: usize = infos.iter().filter(|_| plan.aovs).map(|info| info.aovs.len()).sum();
         let channels = layers + aovs;
         let frame = FRAME_BYTES + 4.0 * channels as f64;
-        // A display picture, the samples of the file and the file itself; an EXR holds half colours and single channels.
+        // A display picture, the samples of the file and the file itself; an EXR holds half colors and single channels.
         let written = match request.display {
             Some(BitDepth::Eight) => 3.0 * 4.0,
             Some(BitDepth::Sixteen) => 3.0 * 8.0,
@@ -83,23 +83,23 @@ pub(crate) fn check(
     }
     let (need, channels) = Need::new(compiled, plan, request);
     let bytes = need.bytes(drawn, whole);
-    if memory::is_granted(bytes) {
+    if memory::can_allocate(bytes) {
         return Ok(());
     }
     let would = format!("would take {:.1} GiB", bytes / f64::from(1 << 30));
     // The overscan is too much only where the picture itself would fit.
     let bare = pixels(size, 0);
-    if overscan > 0 && drawn > bare && memory::is_granted(need.bytes(bare, bare)) {
+    if overscan > 0 && drawn > bare && memory::can_allocate(need.bytes(bare, bare)) {
         let fits = |overscan| {
             let pixels = pixels(size, overscan);
-            memory::is_granted(need.bytes(pixels, pixels))
+            memory::can_allocate(need.bytes(pixels, pixels))
         };
-        let most = memory::most(overscan, fits);
+        let most = memory::largest_fitting_count(overscan, fits);
         let message =
             format!("{} x {} pixels with this overscan {would}; allowed: up to {most}", window.width, window.height);
         return Err(scene.fault("picture.overscan", ProblemKind::Conflict(message)));
     }
-    let share = memory::most(1000, |share| memory::is_granted(0.001 * share as f64 * bytes));
+    let share = memory::largest_fitting_count(1000, |share| memory::can_allocate(0.001 * share as f64 * bytes));
     let most = [window.width, window.height].map(|side| (side as f64 * (0.001 * share as f64).sqrt()).floor() as usize);
     let conflict = Conflict::Memory { size: [window.width, window.height], channels, would, most };
     if request.own_size || channels > 0 {

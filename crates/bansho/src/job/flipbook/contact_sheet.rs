@@ -25,7 +25,7 @@ bansho_base::choice! {
     pub enum ContactBackground {
         /// Black: the light of the phenomena alone.
         Black = "black",
-        /// Squares of two greys, which show what hides the background.
+        /// Squares of two grays, which show what hides the background.
         Checkerboard = "checkerboard",
     }
 }
@@ -58,7 +58,7 @@ pub(crate) fn run(job: &PreparedJob, sheet: &SheetLayout, observer: &dyn JobObse
 /// Lays a frame over the background, in light: premultiplied light is what is added to what shows through. A frame over a plate stays as it is.
 fn lay_over(frame: &mut Frame, background: ContactBackground, view: &View) {
     if background == ContactBackground::Checkerboard && !frame.opaque {
-        let view = view.balanced(frame.header.white_balance_k.map(f64::from));
+        let view = view.with_white_balance(frame.header.white_balance_k.map(f64::from));
         let squares = SQUARES.map(|light| view.to_scene([light; 3]));
         let width = frame.beauty.width();
         for (index, pixel) in frame.beauty.pixels_mut().iter_mut().enumerate() {
@@ -150,7 +150,7 @@ mod tests {
         light[3] = [0.3, 0.2, 0.1, 0.0];
         for (view, kelvin) in [(View::DISPLAY, None), (View::STANDARD, None), (View::DISPLAY, Some(4000.0))] {
             let codes = shown(&light, false, ContactBackground::Checkerboard, &view, kelvin);
-            let view = view.balanced(kelvin.map(f64::from));
+            let view = view.with_white_balance(kelvin.map(f64::from));
             is_near(codes[0], [SQUARES[0]; 3]);
             is_near(codes[SQUARE], [SQUARES[1]; 3]);
             let board = view.to_scene([SQUARES[0]; 3]);

@@ -288,7 +288,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Alpha as grey.
+/// Alpha as gray.
 fn alpha(pixels: &DisplayPixels) -> DisplayPixels {
     match pixels {
         DisplayPixels::Eight(pixels) => {

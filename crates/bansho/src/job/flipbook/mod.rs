@@ -41,8 +41,8 @@ pub use self::crop::FlipbookCrop;
 
 /// A flipbook that is wanted. Begin with [`Flipbook::new`].
 ///
-/// PNG: color in sRGB with straight alpha; alpha again, as grey, for engines that want it apart; motion in pixels to
-/// the next frame, in 16 bits around a middle that means none. EXR: colour scene-linear with premultiplied alpha; motion in
+/// PNG: color in sRGB with straight alpha; alpha again, as gray, for engines that want it apart; motion in pixels to
+/// the next frame, in 16 bits around a middle that means none. EXR: color scene-linear with premultiplied alpha; motion in
 /// pixels as it is.
 #[derive(Clone, Debug)]
 pub struct Flipbook {

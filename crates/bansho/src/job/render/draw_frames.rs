@@ -101,7 +101,7 @@ pub(crate) fn draw_frames(
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
-/// Draws frame `number`; `seek` holds the frame drawn before where the two are not neighbours.
+/// Draws frame `number`; `seek` holds the frame drawn before where the two are not neighbors.
 fn draw(
     shot: &mut dyn FrameSource,
     number: i64,

@@ -45,7 +45,7 @@ pub use fault::{ListKind, StreaksFault};
 bansho_base::choice! {
     /// What streak textures are written as.
     pub enum StreakFormat {
-        /// Grey PNG, linear, with a scale; with a light, colour PNG beside it.
+        /// Gray PNG, linear, with a scale; with a light, color PNG beside it.
         Png = "png",
         /// EXR: opacity as 32-bit float; with a light, radiance in R, G, B.
         Exr = "exr",

@@ -1,4 +1,4 @@
-//! What straight alpha is made for.
+//! Conventions of straight alpha.
 
 crate::choice! {
     /// How alpha and color of a picture with straight alpha are chosen. A display format can only cover what is behind, while fire, rain and

@@ -1,34 +1,35 @@
-//! From linear sRGB without limits into the displayable cube: tone, the path of highlights to white, and the gamut map.
+//! From unbounded linear sRGB into the display cube: tone curve, desaturation of highlights toward white, and gamut mapping.
 //!
-//! A colour is taken apart as in HSV, which holds for negative components too: brightness `m = max`, saturation
-//! `s = (max - min) / max` (above 1 outside sRGB) and the place `t = (mid - min) / (max - min)` in its sector of hue. Then
+//! A color is decomposed as in HSV, which also works for negative components: brightness `m = max`, saturation
+//! `s = (max - min) / max` (above 1 outside sRGB) and the position `t = (mid - min) / (max - min)` within its hue sector. Then
 //!
-//! 1. brightness takes the tone curve, which also tells the compression `c`;
-//! 2. saturation shrinks, `v = s (1 - w)` with `w = c^2 / (c^2 + c0^2)`: bright colours run to white. Inside sRGB `s' = v`; from outside
-//!    `s' = 1 - (1 - v)^2 / w` up to `v = 1`, a soft onset, and 1 beyond: mixed with just enough white. Mixing with white keeps `t`,
-//!    that is the dominant wavelength;
-//! 3. colours from red to yellow, and no others, are bent toward yellow as they are compressed: `t' = t (1 + a) / (1 + a t)`, the
-//!    change of ratio a Reinhard curve on each channel would make. Without it over-exposed flames turn salmon, with channels that are
-//!    simply clipped they turn flat yellow. `a <= BEND_LIMIT` keeps the shift of hue below 34 degrees of HSV.
+//! 1. brightness is mapped by the tone curve, which also gives the compression `c`;
+//! 2. saturation decreases, `v = s (1 - w)` with `w = c^2 / (c^2 + c0^2)`: bright colors approach white. Inside sRGB `s' = v`; from outside
+//!    `s' = 1 - (1 - v)^2 / w` up to `v = 1`, which gives a smooth onset, and 1 beyond: mixed with just enough white. Mixing with white preserves
+//!    `t`, and so the dominant wavelength;
+//! 3. colors from red to yellow, and no others, are shifted toward yellow as they are compressed: `t' = t (1 + a) / (1 + a t)`, the
+//!    change of ratio that a Reinhard curve on each channel would make. Without this shift overexposed flames turn salmon; with simply clipped
+//!    channels they turn flat yellow. `a <= BEND_LIMIT` keeps the hue shift below 34 degrees of HSV.
 //!
-//! Each step is a bijection onto its range and depends only on what is undone before it, so the whole has an exact inverse on the cube.
+//! Each step is a bijection onto its range and depends only on quantities that the inverse has already recovered, so the whole transform has an
+//! exact inverse on the cube.
 
 use super::tone::ToneCurve;
 use crate::math::MulAdd;
 
-/// Compression at which a colour is half way to white (`c0`): chosen by eye on ramps of black bodies from 1000 to 3000 K.
+/// Compression at which a color is halfway to white (`c0`): chosen by eye on ramps of black bodies from 1000 to 3000 K.
 const HALF_WHITE_COMPRESSION: f32 = 17.0;
 const HALF_WHITE_SQUARED: f32 = HALF_WHITE_COMPRESSION * HALF_WHITE_COMPRESSION;
-/// Growth of the bend `a` with compression: `a = BEND c / (1 + BEND c / BEND_LIMIT) min(s, 1)`.
+/// Rate at which the hue shift `a` grows with compression: `a = BEND c / (1 + BEND c / BEND_LIMIT) min(s, 1)`.
 const BEND: f32 = 1.8;
-/// Largest bend.
+/// Largest hue shift `a`.
 const BEND_LIMIT: f32 = 11.0;
 
-/// Below this a colour is black, so that no quotient underflows. It is taken off again at the end: a test there for black would share its
-/// condition with the maximum at the start, for which the compiler splits the loop and gives up vectors.
+/// Lower bound of brightness, so that no quotient underflows. It is subtracted again at the end: a test for black there would share its condition
+/// with the maximum at the start, and the compiler would then split the loop and not vectorize it.
 const BLACK: f32 = 1e-12;
-/// Larger components count as this, so that no product overflows.
-const LARGEST: f32 = 1e8;
+/// Components are clamped to this, so that no product overflows.
+const MAX_COMPONENT: f32 = 1e8;
 
 #[inline(always)]
 fn max(a: f32, b: f32) -> f32 {
@@ -40,42 +41,42 @@ fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// A component within what the formulas bear: NaN and minus infinity become 0.
+/// A component clamped to [`MAX_COMPONENT`]; NaN and components below `-MAX_COMPONENT` become 0.
 #[inline(always)]
-pub(super) fn sanitised(x: f32) -> f32 {
-    let finite = if x.abs() <= LARGEST { x } else { 0.0 };
-    if x > LARGEST { LARGEST } else { finite }
+pub(super) fn sanitized(x: f32) -> f32 {
+    let finite = if x.abs() <= MAX_COMPONENT { x } else { 0.0 };
+    if x > MAX_COMPONENT { MAX_COMPONENT } else { finite }
 }
 
 /// Largest, middle and smallest component.
 #[inline(always)]
-fn sorted([r, g, b]: [f32; 3]) -> [f32; 3] {
+fn sort_components([r, g, b]: [f32; 3]) -> [f32; 3] {
     let (high, low) = (max(r, g), min(r, g));
     [max(high, b), max(low, min(high, b)), min(low, b)]
 }
 
-/// `value` replaced by the new largest, middle or smallest component, whichever it was.
+/// The new value of the component that is now `value`: `values` holds those of the largest, middle and smallest component.
 #[inline(always)]
-fn replaced(value: f32, [most, _, least]: [f32; 3], values: [f32; 3]) -> f32 {
-    let lower = if value <= least { values[2] } else { values[1] };
-    if value >= most { values[0] } else { lower }
+fn replace_component(value: f32, [largest, _, smallest]: [f32; 3], values: [f32; 3]) -> f32 {
+    let lower = if value <= smallest { values[2] } else { values[1] };
+    if value >= largest { values[0] } else { lower }
 }
 
-/// Puts new values for the largest, middle and smallest component where `rgb` has them.
+/// `rgb` with its largest, middle and smallest component replaced by `values`.
 #[inline(always)]
-fn placed([r, g, b]: [f32; 3], parts: [f32; 3], values: [f32; 3]) -> [f32; 3] {
-    [replaced(r, parts, values), replaced(g, parts, values), replaced(b, parts, values)]
+fn with_sorted_components([r, g, b]: [f32; 3], sorted: [f32; 3], values: [f32; 3]) -> [f32; 3] {
+    [replace_component(r, sorted, values), replace_component(g, sorted, values), replace_component(b, sorted, values)]
 }
 
-/// Whether the hue lies from red to yellow: red is largest and blue smallest.
+/// Whether the hue lies between red and yellow: red is the largest component and blue the smallest.
 #[inline(always)]
-fn is_warm(rgb: [f32; 3], [most, _, least]: [f32; 3]) -> bool {
-    (rgb[0] >= most) & (rgb[2] <= least)
+fn is_warm(rgb: [f32; 3], [largest, _, smallest]: [f32; 3]) -> bool {
+    (rgb[0] >= largest) & (rgb[2] <= smallest)
 }
 
-/// Saturation `s` on its path to white at compression `c`.
+/// Saturation `s` reduced toward white at compression `c`.
 #[inline(always)]
-fn whitened(s: f32, c: f32) -> f32 {
+fn compress_saturation(s: f32, c: f32) -> f32 {
     // 1 - w = c0^2 / sum and 1 / w = sum / c^2 from one division. Without compression 1 - v is 0 wherever 1 / w is used.
     let squared = max(c * c, 1e-20);
     let sum = squared + HALF_WHITE_SQUARED;
@@ -86,9 +87,9 @@ fn whitened(s: f32, c: f32) -> f32 {
     if s > 1.0 { bounded } else { v }
 }
 
-/// The saturation that [`whitened`] takes to `s`, 0 to 1.
+/// Inverse of [`compress_saturation`] for `s` from 0 to 1.
 #[inline(always)]
-fn unwhitened(s: f32, c: f32) -> f32 {
+fn expand_saturation(s: f32, c: f32) -> f32 {
     let sum = c.fma(c, HALF_WHITE_SQUARED);
     let w = c * c / sum;
     let outside = 1.0 - ((1.0 - s) * w).sqrt();
@@ -96,44 +97,44 @@ fn unwhitened(s: f32, c: f32) -> f32 {
     v * (sum / HALF_WHITE_SQUARED)
 }
 
-/// Linear sRGB of any size and sign to linear display sRGB within 0..=1. Components must be [`sanitised`].
+/// Linear sRGB of any size and sign to linear display sRGB within 0..=1. Components must be [`sanitized`].
 #[inline(always)]
 pub(super) fn to_cube(tone: &ToneCurve, rgb: [f32; 3]) -> [f32; 3] {
-    let parts = sorted(rgb);
-    let most = max(parts[0], BLACK);
-    let (range, rise) = (parts[0] - parts[2], parts[1] - parts[2]);
-    let (brightness, c) = tone.apply(most);
+    let sorted = sort_components(rgb);
+    let largest = max(sorted[0], BLACK);
+    let (range, rise) = (sorted[0] - sorted[2], sorted[1] - sorted[2]);
+    let (brightness, c) = tone.apply(largest);
     let brightness = brightness - BLACK;
 
-    let saturation = whitened(range / most, c);
+    let saturation = compress_saturation(range / largest, c);
 
     // t' with t = rise / range and a = bend / scale, brought to one division.
-    let warm_bend = BEND * c * min(range, most);
-    let bend = if is_warm(rgb, parts) { warm_bend } else { 0.0 };
-    let scale = most * c.fma(BEND / BEND_LIMIT, 1.0);
+    let warm_bend = BEND * c * min(range, largest);
+    let bend = if is_warm(rgb, sorted) { warm_bend } else { 0.0 };
+    let scale = largest * c.fma(BEND / BEND_LIMIT, 1.0);
     let t = rise * (scale + bend) / max(range.fma(scale, bend * rise), 1e-35);
 
     let chroma = brightness * saturation;
-    placed(rgb, parts, [brightness, chroma.fma(min(t, 1.0) - 1.0, brightness), brightness - chroma])
+    with_sorted_components(rgb, sorted, [brightness, chroma.fma(min(t, 1.0) - 1.0, brightness), brightness - chroma])
 }
 
-/// The linear sRGB that [`to_cube`] takes to `display`, whose components lie within 0..=1; reaches outside sRGB for the brightest colours.
+/// Inverse of [`to_cube`] for `display` with components within 0..=1; the brightest colors map to linear sRGB outside the gamut.
 #[inline(always)]
 pub(super) fn from_cube(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
-    let parts = sorted(display);
-    let brightness = max(parts[0], BLACK);
-    let (range, rise) = (parts[0] - parts[2], parts[1] - parts[2]);
-    let (most, c) = tone.invert(brightness);
+    let sorted = sort_components(display);
+    let brightness = max(sorted[0], BLACK);
+    let (range, rise) = (sorted[0] - sorted[2], sorted[1] - sorted[2]);
+    let (largest, c) = tone.invert(brightness);
 
-    let saturation = unwhitened(range / brightness, c);
+    let saturation = expand_saturation(range / brightness, c);
     let warm_bend = BEND * c / c.fma(BEND / BEND_LIMIT, 1.0) * min(saturation, 1.0);
-    let bend = if is_warm(display, parts) { warm_bend } else { 0.0 };
+    let bend = if is_warm(display, sorted) { warm_bend } else { 0.0 };
     let bent = rise / max(range, 1e-35);
     let t = bent / bend.fma(1.0 - bent, 1.0);
 
-    let most = most - BLACK;
-    let chroma = most * saturation;
-    placed(display, parts, [most, chroma.fma(t - 1.0, most), most - chroma])
+    let largest = largest - BLACK;
+    let chroma = largest * saturation;
+    with_sorted_components(display, sorted, [largest, chroma.fma(t - 1.0, largest), largest - chroma])
 }
 
 #[cfg(test)]
@@ -144,7 +145,7 @@ mod tests {
     const CURVE: ToneCurve = ToneCurve::with_shoulder(0.6, 16.0);
 
     fn place_in_sector(rgb: [f32; 3]) -> f32 {
-        let [most, mid, least] = sorted(rgb);
+        let [most, mid, least] = sort_components(rgb);
         (mid - least) / (most - least)
     }
 
@@ -155,7 +156,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-7, "{rgb:?}");
             }
         }
-        // One part of white in a colour outside: (0.5, -0.1, 0.2) has s = 1.2, t = 0.5; s' = 1 gives (0.5, 0, 0.25).
+        // One part of white in a color outside: (0.5, -0.1, 0.2) has s = 1.2, t = 0.5; s' = 1 gives (0.5, 0, 0.25).
         let mapped = to_cube(&CURVE, [0.5, -0.1, 0.2]);
         assert!((mapped[2] - 0.25).abs() < 1e-6 && mapped[1] == 0.0 && mapped[0] == 0.5, "{mapped:?}");
     }
@@ -208,7 +209,7 @@ mod tests {
 
     #[test]
     fn neighbours_stay_neighbours() {
-        // Across every border of sectors and the grey axis, at brightness below, in and beyond the shoulder.
+        // Across every border of sectors and the gray axis, at brightness below, in and beyond the shoulder.
         let seeds =
             [[1.0, 1.0, 0.2], [1.0, 0.2, 0.2], [0.5, 0.5, 0.5], [0.2, 1.0, 1.0], [1.0, 0.2, 1.0], [1.0, 0.3, 0.0]];
         for (seed, scale) in seeds.iter().flat_map(|seed| [0.4, 0.6, 1.0, 4.0, 16.0].map(|scale| (seed, scale))) {

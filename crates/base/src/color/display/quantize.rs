@@ -1,16 +1,16 @@
-//! From display light to codes: alpha, encoding, dither and rounding, one pixel at a time and alike at every vector width.
+//! From display light to codes: alpha, encoding, dither and rounding, one pixel at a time, with the same bits at every vector width.
 
 use super::transfer::{clamp_unit, encode_srgb};
 use crate::math::{MulAdd, approximations};
 
-/// A number that stands for a display component.
+/// An integer type for the codes of display components.
 pub trait DisplayCode: Copy + Default + sealed::Sealed {
-    /// The code of full light.
-    const LARGEST: f32;
-    /// Width of the dither in codes.
-    const DITHER: f32;
-    /// A pixel of whole numbers from 0 to [`LARGEST`](Self::LARGEST).
-    fn from_wholes(wholes: [u32; 4]) -> [Self; 4];
+    /// The code of full light, as a float.
+    const MAX_CODE: f32;
+    /// Amplitude of the dither from peak to peak, in codes.
+    const DITHER_WIDTH: f32;
+    /// A pixel of integers from 0 to [`MAX_CODE`](Self::MAX_CODE).
+    fn from_integers(wholes: [u32; 4]) -> [Self; 4];
 }
 
 mod sealed {
@@ -20,30 +20,30 @@ mod sealed {
 }
 
 impl DisplayCode for u8 {
-    const LARGEST: f32 = 255.0;
-    /// Less than one, so that a value within 1/32 of a whole code keeps that code: what was 8 bits stays as it was.
-    const DITHER: f32 = 1.0 - 2.0 / 32.0;
+    const MAX_CODE: f32 = 255.0;
+    /// Less than 1, so that a value within 1/32 of a code keeps that code: 8-bit input passes unchanged.
+    const DITHER_WIDTH: f32 = 1.0 - 2.0 / 32.0;
     #[inline(always)]
-    fn from_wholes([r, g, b, a]: [u32; 4]) -> [Self; 4] {
+    fn from_integers([r, g, b, a]: [u32; 4]) -> [Self; 4] {
         (r | g << 8 | b << 16 | a << 24).to_le_bytes()
     }
 }
 
 impl DisplayCode for u16 {
-    const LARGEST: f32 = 65_535.0;
-    /// A step of 1/65535 cannot be seen.
-    const DITHER: f32 = 0.0;
+    const MAX_CODE: f32 = 65_535.0;
+    /// No dither: a step of 1/65535 is not visible.
+    const DITHER_WIDTH: f32 = 0.0;
     #[inline(always)]
-    fn from_wholes([r, g, b, a]: [u32; 4]) -> [Self; 4] {
+    fn from_integers([r, g, b, a]: [u32; 4]) -> [Self; 4] {
         [r as Self, g as Self, b as Self, a as Self]
     }
 }
 
-/// Fractions of 2^32 that step the dither along x and y: the two-dimensional generalisation of the golden ratio (Roberts 2018, R2
-/// sequence), whose values spread as evenly as blue noise and need no table.
+/// Increments of the dither phase along x and y, as fractions of 2^32: the two-dimensional generalization of the golden ratio (Roberts 2018, R2
+/// sequence), whose values are distributed as evenly as blue noise without a table.
 const STEP_X: u32 = 0xC13F_A9A9;
 const STEP_Y: u32 = 0x91E1_0DA5;
-/// Places of the four channels in the pattern, far apart so that their errors do not add up to grey.
+/// Phase offsets of the four channels, far apart so that their errors do not add up to gray.
 const CHANNEL_OFFSETS: [u32; 4] = [0, 0x5555_5555, 0xAAAA_AAAA, 0x8000_0000];
 
 /// The dither's phase at a pixel.
@@ -52,26 +52,26 @@ pub(super) fn dither_phase(x: u32, y: u32) -> u32 {
     x.wrapping_mul(STEP_X).wrapping_add(y.wrapping_mul(STEP_Y))
 }
 
-/// Dither in codes, within half of `C::DITHER` of zero, evenly distributed. A triangle of the phase, so that it has no seam.
+/// Dither in codes, uniformly distributed within `C::DITHER_WIDTH / 2` of zero. A triangle wave of the phase, so that it has no discontinuity.
 #[inline(always)]
 fn dither<C: DisplayCode>(phase: u32, channel: usize) -> f32 {
     let saw = phase.wrapping_add(CHANNEL_OFFSETS[channel]);
     let triangle = (saw << 1) ^ (saw.cast_signed() >> 31).cast_unsigned();
     let unit = (triangle >> 8).cast_signed() as f32 * (1.0 / 16_777_216.0);
-    (unit - 0.5) * C::DITHER
+    (unit - 0.5) * C::DITHER_WIDTH
 }
 
-/// The code of a number from -0.5 to 65535.5.
+/// The code nearest to a number from -0.5 to 65535.5.
 #[inline(always)]
-fn code_of(x: f32) -> u32 {
-    approximations::whole(x).cast_unsigned()
+fn round_to_code(x: f32) -> u32 {
+    approximations::round_to_i32(x).cast_unsigned()
 }
 
 /// Encodes light (0..=1) unless `RAW`, and rounds it to a code.
 #[inline(always)]
 fn component_code<C: DisplayCode, const RAW: bool>(light: f32, phase: u32, channel: usize) -> u32 {
     let encoded = if RAW { clamp_unit(light) } else { encode_srgb(light) };
-    code_of(encoded.fma(C::LARGEST, dither::<C>(phase, channel)))
+    round_to_code(encoded.fma(C::MAX_CODE, dither::<C>(phase, channel)))
 }
 
 /// Codes of an opaque pixel.
@@ -81,15 +81,15 @@ pub(super) fn opaque_codes<C: DisplayCode, const RAW: bool>([r, g, b]: [f32; 3],
         component_code::<C, RAW>(r, phase, 0),
         component_code::<C, RAW>(g, phase, 1),
         component_code::<C, RAW>(b, phase, 2),
-        C::LARGEST as u32,
+        C::MAX_CODE as u32,
     ]
 }
 
-/// Codes of a pixel without a plate behind it, for programs that blend linear light: `A = max(alpha, r, g, b)` in linear light, color
+/// Codes of a pixel without a plate behind it, for programs that blend linear light: `A = max(alpha, r, g, b)` in linear light, and the color
 /// `rgb / A`, encoded.
 ///
 /// Alpha is rounded first and the color divided by the rounded alpha, so that color times alpha is exact over black even where alpha
-/// has few codes. Where light can be seen alpha is therefore rounded up, elsewhere it is dithered.
+/// has few codes. Where light is visible alpha is therefore rounded up; elsewhere it is dithered.
 #[inline(always)]
 pub(super) fn linear_alpha_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
     let [r, g, b] = light;
@@ -98,30 +98,30 @@ pub(super) fn linear_alpha_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3
     let alpha = clamp_unit(alpha);
     let coverage = if alpha > brightest { alpha } else { brightest };
 
-    let needed = approximations::rounded(brightest.fma(C::LARGEST, 0.499));
-    // In 16 bits 65535 + 0.499 is 65535.5 in single precision, and rounds to a code that there is not.
-    let needed = if needed < C::LARGEST { needed } else { C::LARGEST };
-    // Half a code over black: 0.5 / 12.92 of one in the straight part of sRGB.
-    let needed = if brightest >= 0.5 / 12.92 / C::LARGEST { needed } else { 0.0 };
-    let dithered = approximations::rounded(coverage.fma(C::LARGEST, dither::<C>(phase, 3)));
+    let needed = approximations::rounded(brightest.fma(C::MAX_CODE, 0.499));
+    // With 16 bits, 65535 + 0.499 is 65535.5 in single precision, which would round to a code that does not exist.
+    let needed = if needed < C::MAX_CODE { needed } else { C::MAX_CODE };
+    // Light below half a code over black is not visible: 0.5 / 12.92 codes, in the linear part of sRGB.
+    let needed = if brightest >= 0.5 / 12.92 / C::MAX_CODE { needed } else { 0.0 };
+    let dithered = approximations::rounded(coverage.fma(C::MAX_CODE, dither::<C>(phase, 3)));
     let code = if dithered > needed { dithered } else { needed };
 
-    let quotient = C::LARGEST / code;
+    let quotient = C::MAX_CODE / code;
     let scale = if code > 0.0 { quotient } else { 0.0 };
     let [r, g, b, _] = opaque_codes::<C, RAW>([r * scale, g * scale, b * scale], phase);
-    [r, g, b, code_of(code)]
+    [r, g, b, round_to_code(code)]
 }
 
-/// The background before which [`encoded_alpha_codes`] are nearest to the truth: mid-gray, half of the encoded range.
+/// The background over which [`encoded_alpha_codes`] are closest to the exact result: mid-gray, half of the encoded range.
 const MID_GRAY_ENCODED: f32 = 0.5;
 /// Its linear light.
 const MID_GRAY: f32 = 0.214_041_14;
 
 /// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = A color + (1 - A) background`.
 ///
-/// With `E = encode(rgb)` the codes that are seen over black, the color is `E / A`, so that the blend over black is `E` whatever `A` is.
-/// `A` is the least-squares solution over a mid-gray background `G`: the truth there is `encode(rgb + (1 - alpha) G)`, hence
-/// `1 - A = mean over r, g, b of (encode(rgb + (1 - alpha) G) - E) / encode(G)`; at least the largest `E`, which a color can carry.
+/// With the codes `E = encode(rgb)` over black, the color is `E / A`, so that the blend over black is `E` for any `A`.
+/// `A` is the least-squares solution over a mid-gray background `G`: the exact result there is `encode(rgb + (1 - alpha) G)`, hence
+/// `1 - A = mean over r, g, b of (encode(rgb + (1 - alpha) G) - E) / encode(G)`; `A` is at least the largest `E`, so that no color exceeds 1.
 #[inline(always)]
 pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
     let over_black = opaque_codes::<C, false>(light, phase);
@@ -132,13 +132,13 @@ pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, p
     }
     let coverage = clamp_unit(gained.fma(-1.0 / (3.0 * MID_GRAY_ENCODED), 1.0));
 
-    let dithered = code_of(coverage.fma(C::LARGEST, dither::<C>(phase, 3)));
+    let dithered = round_to_code(coverage.fma(C::MAX_CODE, dither::<C>(phase, 3)));
     let [r, g, b, _] = over_black;
     let code = dithered.max(r).max(g).max(b);
-    let quotient = C::LARGEST / code as f32;
+    let quotient = C::MAX_CODE / code as f32;
     let scale = if code > 0 { quotient } else { 0.0 };
-    // At most the largest code, since `code` is at least as large as each.
-    let color = |component: u32| code_of(component as f32 * scale);
+    // At most the largest code, since `code` is at least as large as each component.
+    let color = |component: u32| round_to_code(component as f32 * scale);
     [color(r), color(g), color(b), code]
 }
 
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn saturated_pixels_keep_their_alpha_in_every_depth() {
         fn hold<C: DisplayCode>() {
-            let largest = C::LARGEST as u32;
+            let largest = C::MAX_CODE as u32;
             for (light, alpha) in extreme_pixels() {
                 for phase in phases().step_by(211) {
                     let linear = linear_alpha_codes::<C, false>(light.map(seen), alpha, phase);

@@ -1,12 +1,12 @@
-//! The tone curve: how scene brightness without limit becomes display brightness from 0 to 1.
+//! The tone curve: maps unbounded scene brightness to display brightness from 0 to 1.
 
 use crate::math::MulAdd;
 
-/// Identity up to a knee; above it a shoulder that meets the identity with the same slope and reaches 1 exactly at a finite white.
+/// Identity up to a knee; above it a shoulder that continues the identity with the same slope and reaches exactly 1 at a finite white point.
 ///
-/// With `x = (m - knee) / (1 - knee)` and `X` the same of the white, the shoulder is the extended Reinhard curve
-/// `knee + (1 - knee) x (1 + x / X^2) / (1 + x)` (Reinhard et al. 2002, eq. 4). Besides the curve value each function gives the
-/// *compression* `c = (1 - knee) x^2 / (1 + x)`, 0 below the knee and close to `m` far above it, which drives the path to white.
+/// With `x = (m - knee) / (1 - knee)` and `X` the same for the white point, the shoulder is the extended Reinhard curve
+/// `knee + (1 - knee) x (1 + x / X^2) / (1 + x)` (Reinhard et al. 2002, eq. 4). Besides the value each function returns the
+/// *compression* `c = (1 - knee) x^2 / (1 + x)`, 0 below the knee and close to `m` far above it, which controls the desaturation toward white.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToneCurve {
     knee: f32,
@@ -16,7 +16,7 @@ pub struct ToneCurve {
     inverse_span: f32,
     /// `1 / X^2`.
     curvature: f32,
-    /// Factor of the compression.
+    /// Factor of the compression, usually `span`.
     compression_scale: f32,
 }
 
@@ -47,13 +47,13 @@ impl ToneCurve {
         (if n < 1.0 { n } else { 1.0 }, self.compression(x, reciprocal))
     }
 
-    /// Scene value and compression that belong to the display value `n` from 0 to 1.
+    /// Scene value and compression for the display value `n` from 0 to 1.
     #[inline(always)]
     #[must_use]
     pub fn invert(&self, n: f32) -> (f32, f32) {
         let over = (n - self.knee) * self.inverse_span;
         let y = if over > 0.0 { over } else { 0.0 };
-        // x^2 / X^2 + (1 - y) x - y = 0, in the form that does not cancel.
+        // Solves x^2 / X^2 + (1 - y) x - y = 0 in the form without cancellation.
         let rest = 1.0 - y;
         let root = rest.fma(rest, 4.0 * y * self.curvature).sqrt();
         let x = 2.0 * y / (rest + root);

@@ -1,15 +1,15 @@
-//! The sRGB transfer function (IEC 61966-2-1), both ways.
+//! The sRGB transfer function (IEC 61966-2-1) and its inverse.
 
 use std::sync::LazyLock;
 
 use crate::math::MulAdd;
 
-/// Linear value below which sRGB is a straight line.
+/// Linear value below which the sRGB encoding is linear.
 const LINEAR_LIMIT: f32 = 0.003_130_8;
 const LINEAR_SLOPE: f32 = 12.92;
 
 /// `1.055 x^(1/2.4) - 0.055` as a polynomial in `s = x^(1/4)`, from the constant term up: minimax over `LINEAR_LIMIT..=1`, error below
-/// 1e-7. Written as `1.055 s^(5/3) - 0.055` the function is smooth enough for that, and `s` costs two square roots.
+/// 1e-7. As a function of `s`, `1.055 s^(5/3) - 0.055`, it is smooth enough for that; `s` takes two square roots.
 const POLYNOMIAL: [f32; 9] = [
     -0.057_718_296,
     0.111_458_71,
@@ -37,11 +37,11 @@ pub fn encode_srgb(linear: f32) -> f32 {
     if x <= LINEAR_LIMIT { x * LINEAR_SLOPE } else { power }
 }
 
-/// `x` within 0..=1; NaN becomes 0. Comparisons, not `clamp`, so that every vector width selects alike.
+/// `x` clamped to 0..=1; NaN becomes 0. Comparisons instead of `clamp`, so that all vector widths give the same bits.
 #[inline(always)]
 pub(super) fn clamp_unit(x: f32) -> f32 {
-    let above = if x > 0.0 { x } else { 0.0 };
-    if above < 1.0 { above } else { 1.0 }
+    let non_negative = if x > 0.0 { x } else { 0.0 };
+    if non_negative < 1.0 { non_negative } else { 1.0 }
 }
 
 /// Linear light of an sRGB value, exact to rounding. Values outside 0..=1 and NaN are clamped.
@@ -52,7 +52,7 @@ pub fn decode_srgb(encoded: f32) -> f32 {
     linear as f32
 }
 
-/// Linear light of an 8-bit sRGB code, by table.
+/// Linear light of an 8-bit sRGB code, from a table.
 #[inline]
 #[must_use]
 pub fn decode_srgb8(code: u8) -> f32 {

@@ -4,7 +4,7 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     alpha::AlphaConvention,
-    gamut::{from_cube, sanitised, to_cube},
+    gamut::{from_cube, sanitized, to_cube},
     quantize::DisplayCode,
     row,
     tone::ToneCurve,
@@ -15,33 +15,33 @@ use crate::color::{
     white_balance::WhiteBalance,
 };
 
-/// Scene brightness up to which the default view changes nothing.
+/// Scene brightness up to which the default view is the identity.
 const KNEE: f32 = 0.6;
 /// Scene brightness that the default view shows as full display light.
 const WHITE: f32 = 16.0;
-/// Pixels that are balanced at once.
-const BALANCED: usize = 256;
+/// Pixels that are white-balanced at a time.
+const BALANCE_CHUNK: usize = 256;
 
-/// How exposed scene light is shown.
+/// The transform of exposed scene light for display.
 ///
-/// - `display`: for looking at. Identity for colours inside sRGB below 0.6, a shoulder to 16, highlights run to white, hue kept but for
-///   warm highlights, which bend toward yellow ([`gamut`](super::gamut)).
-/// - `standard`: identity inside sRGB up to 1.0; only what lies beyond is changed, by the same path.
-/// - `raw`: the ACEScg numbers, clamped to 0..=1 and not encoded.
+/// - `display`: for viewing. Identity for colors inside sRGB below 0.6, a shoulder up to 16, highlights desaturate toward white, hue is preserved
+///   except in warm highlights, which shift toward yellow ([`gamut`](super::gamut)).
+/// - `standard`: identity inside sRGB up to 1.0; only values beyond are changed, by the same desaturation.
+/// - `raw`: ACEScg values clamped to 0..=1, without encoding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// `None` for `raw`.
     tone: Option<ToneCurve>,
-    /// What is done to light first, unless it is shown `raw`.
+    /// White balance, applied first; `None` for `raw`.
     balance: Option<WhiteBalance>,
     name: &'static str,
 }
 
-/// There is no view of that name.
+/// Error: there is no view of that name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no view `{name}` (allowed: display, standard, raw)")]
 pub struct UnknownView {
-    /// The name that was asked for.
+    /// The requested name.
     pub name: String,
 }
 
@@ -52,10 +52,10 @@ impl Default for View {
 }
 
 impl View {
-    /// The default: tone curve, highlights to white, gamut map, sRGB.
+    /// The default: tone curve, desaturated highlights, gamut mapping, sRGB encoding.
     pub const DISPLAY: Self =
         Self { tone: Some(ToneCurve::with_shoulder(KNEE, WHITE)), balance: None, name: "display" };
-    /// No tone curve: gamut map and sRGB.
+    /// No tone curve: gamut mapping and sRGB encoding.
     pub const STANDARD: Self = Self { tone: Some(ToneCurve::clip()), balance: None, name: "standard" };
     /// Linear ACEScg, clamped.
     pub const RAW: Self = Self { tone: None, balance: None, name: "raw" };
@@ -66,7 +66,7 @@ impl View {
     /// The view called `name`.
     ///
     /// # Errors
-    /// There is none of that name; the message lists those there are.
+    /// There is no view of that name; the message lists all names.
     pub fn from_name(name: &str) -> Result<Self, UnknownView> {
         [Self::DISPLAY, Self::STANDARD, Self::RAW]
             .into_iter()
@@ -74,10 +74,10 @@ impl View {
             .ok_or_else(|| UnknownView { name: name.to_owned() })
     }
 
-    /// The same view of a camera whose white balance is set to the light of a black body of that temperature, K; of one that takes D65 for
-    /// white without. `raw` shows light as it is.
+    /// The same view with the camera's white balance set to the light of a black body of that temperature, K; `None` is D65. `raw` ignores white
+    /// balance.
     #[must_use]
-    pub fn balanced(mut self, temperature_k: Option<f64>) -> Self {
+    pub fn with_white_balance(mut self, temperature_k: Option<f64>) -> Self {
         self.balance = temperature_k.filter(|_| self.tone.is_some()).map(WhiteBalance::of_black_body);
         self
     }
@@ -93,26 +93,26 @@ impl View {
     #[must_use]
     pub fn to_display(&self, acescg: [f32; 3]) -> [f32; 3] {
         match (&self.tone, &self.balance) {
-            (Some(tone), Some(balance)) => shown(tone, balanced(balance, acescg)),
-            (Some(tone), None) => shown(tone, acescg),
+            (Some(tone), Some(balance)) => display_from_acescg(tone, apply_balance(balance, acescg)),
+            (Some(tone), None) => display_from_acescg(tone, acescg),
             (None, _) => clamped(acescg),
         }
     }
 
-    /// The exposed ACEScg that this view shows as the linear sRGB `display` (clamped to 0..=1): the inverse of
-    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colours come from outside sRGB. `raw` has no sRGB to
-    /// invert; for it the colour is only brought into ACEScg.
+    /// The exposed ACEScg that this view displays as the linear sRGB `display` (clamped to 0..=1): the inverse of
+    /// [`to_display`](Self::to_display) to within 1e-5. Bright saturated colors come from outside sRGB. `raw` has no sRGB encoding to
+    /// invert; for it the color is only converted to ACEScg.
     #[inline(always)]
     #[must_use]
     pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {
         match (&self.tone, &self.balance) {
-            (Some(tone), Some(balance)) => balance.invert(unshown(tone, display)),
-            (Some(tone), None) => unshown(tone, display),
+            (Some(tone), Some(balance)) => balance.invert(acescg_from_display(tone, display)),
+            (Some(tone), None) => acescg_from_display(tone, display),
             (None, _) => acescg_from_srgb(clamped(display)),
         }
     }
 
-    /// [`to_scene`](Self::to_scene) for many pixels in place: linear sRGB in, exposed ACEScg out; the fourth component is left alone.
+    /// [`to_scene`](Self::to_scene) for many pixels in place: linear sRGB in, exposed ACEScg out; the fourth component is unchanged.
     pub fn to_scene_row(&self, level: Level, pixels: &mut [[f32; 4]]) {
         let Some(tone) = &self.tone else {
             for pixel in pixels {
@@ -128,15 +128,15 @@ impl View {
         }
     }
 
-    /// One row of display codes of premultiplied, exposed ACEScg.
+    /// Converts one row of premultiplied, exposed ACEScg to display codes.
     ///
-    /// `y` and `x0` are the picture coordinates of the row and its first pixel, so that a crop is dithered like the whole. Without a
-    /// convention of `alpha` (there is a plate) pixels are opaque. With [`AlphaConvention::Linear`] `A = max(alpha, r, g, b)` in linear
-    /// display light and the color is `rgb / A`, encoded; with [`AlphaConvention::Encoded`] a blend of encoded values over black gives
-    /// the opaque codes, and one over mid-gray is nearest to the truth. `raw` encodes nothing and is always linear.
-    /// Black is code 0 and display white the largest code; 8 bits are dithered, except that values which are 8-bit codes stay so.
-    /// What is below 0 or not a number counts as 0, in alpha too; what is infinite, as the brightest light.
-    /// The shorter of `pixels` and `out` decides how many are written. Same bytes at every `level`.
+    /// `y` and `x0` are the picture coordinates of the row and its first pixel, so that a crop is dithered like the whole picture. Without an
+    /// `alpha` convention (when there is a plate) pixels are opaque. With [`AlphaConvention::Linear`] `A = max(alpha, r, g, b)` in linear
+    /// display light and the color is `rgb / A`, encoded; with [`AlphaConvention::Encoded`] blending encoded values over black gives
+    /// the opaque codes, and over mid-gray the closest approximation. `raw` has no encoding and is always linear.
+    /// Black is code 0 and display white the largest code; 8-bit output is dithered, except that values which are 8-bit codes are preserved.
+    /// Values below 0 and NaN count as 0, also in alpha; infinite values count as the brightest light.
+    /// The shorter of `pixels` and `out` determines how many pixels are written. The bytes are the same at every `level`.
     pub fn display_row<C: DisplayCode>(
         &self,
         level: Level,
@@ -147,18 +147,20 @@ impl View {
         out: &mut [[C; 4]],
     ) {
         let Some(balance) = &self.balance else { return self.row(level, pixels, [x0, y], alpha, out) };
-        let mut buffer = [[0.0; 4]; BALANCED];
-        for ((part, out), first) in pixels.chunks(BALANCED).zip(out.chunks_mut(BALANCED)).zip((0..).step_by(BALANCED)) {
-            let shown = &mut buffer[..part.len()];
-            for (shown, [r, g, b, alpha]) in shown.iter_mut().zip(part) {
-                let [r, g, b] = balanced(balance, [*r, *g, *b]);
-                *shown = [r, g, b, *alpha];
+        let mut buffer = [[0.0; 4]; BALANCE_CHUNK];
+        for ((input, out), first) in
+            pixels.chunks(BALANCE_CHUNK).zip(out.chunks_mut(BALANCE_CHUNK)).zip((0..).step_by(BALANCE_CHUNK))
+        {
+            let balanced = &mut buffer[..input.len()];
+            for (balanced, [r, g, b, alpha]) in balanced.iter_mut().zip(input) {
+                let [r, g, b] = apply_balance(balance, [*r, *g, *b]);
+                *balanced = [r, g, b, *alpha];
             }
-            self.row(level, shown, [x0.wrapping_add(first), y], alpha, out);
+            self.row(level, balanced, [x0.wrapping_add(first), y], alpha, out);
         }
     }
 
-    /// One row of light that has been balanced.
+    /// Converts one row of light that is already white-balanced.
     fn row<C: DisplayCode>(
         &self,
         level: Level,
@@ -167,36 +169,35 @@ impl View {
         alpha: Option<AlphaConvention>,
         out: &mut [[C; 4]],
     ) {
-        // Coordinates only feed the dither, which repeats after 2^32.
-        let place = row::Place { x: x0 as u32, y: y as u32 };
+        // Coordinates are only used by the dither, which repeats after 2^32 pixels.
+        let position = row::PixelPosition { x: x0 as u32, y: y as u32 };
         match &self.tone {
-            Some(tone) => dispatch!(level, _simd => row::encoded::<C>(tone, pixels, place, alpha, out)),
-            None => dispatch!(level, _simd => row::raw::<C>(pixels, place, alpha, out)),
+            Some(tone) => dispatch!(level, _simd => row::encode_row::<C>(tone, pixels, position, alpha, out)),
+            None => dispatch!(level, _simd => row::encode_raw_row::<C>(pixels, position, alpha, out)),
         }
     }
 }
 
-/// Light under a white balance. What the matrix would turn into no number at all, such as infinite light in all three components, is brought
-/// within bounds before.
+/// Applies a white balance. Components are clamped first: the matrix would turn infinite light in all three components into NaN.
 #[inline(always)]
-fn balanced(balance: &WhiteBalance, [r, g, b]: [f32; 3]) -> [f32; 3] {
-    balance.apply([sanitised(r), sanitised(g), sanitised(b)])
+fn apply_balance(balance: &WhiteBalance, [r, g, b]: [f32; 3]) -> [f32; 3] {
+    balance.apply([sanitized(r), sanitized(g), sanitized(b)])
 }
 
 /// Exposed ACEScg to linear display sRGB under a tone curve.
 #[inline(always)]
-pub(super) fn shown(tone: &ToneCurve, [r, g, b]: [f32; 3]) -> [f32; 3] {
-    let finite = [sanitised(r), sanitised(g), sanitised(b)];
+pub(super) fn display_from_acescg(tone: &ToneCurve, [r, g, b]: [f32; 3]) -> [f32; 3] {
+    let finite = [sanitized(r), sanitized(g), sanitized(b)];
     to_cube(tone, srgb_from_acescg(finite))
 }
 
-/// Linear display sRGB to the exposed ACEScg that [`shown`] takes to it.
+/// Inverse of [`display_from_acescg`].
 #[inline(always)]
-pub(super) fn unshown(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
+pub(super) fn acescg_from_display(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
     acescg_from_srgb(from_cube(tone, clamped(display)))
 }
 
-/// Components within 0..=1.
+/// Components clamped to 0..=1.
 #[inline(always)]
 pub(super) fn clamped([r, g, b]: [f32; 3]) -> [f32; 3] {
     [clamp_unit(r), clamp_unit(g), clamp_unit(b)]
@@ -230,7 +231,7 @@ mod tests {
 
     #[test]
     fn cube_survives_the_way_to_the_scene_and_back() {
-        for view in [View::DISPLAY, View::STANDARD, View::DISPLAY.balanced(Some(4000.0))] {
+        for view in [View::DISPLAY, View::STANDARD, View::DISPLAY.with_white_balance(Some(4000.0))] {
             for index in 0..17 * 17 * 17 {
                 let c = [index % 17, index / 17 % 17, index / 289].map(|i| i as f32 / 16.0);
                 let back = view.to_display(view.to_scene(c));
@@ -269,7 +270,7 @@ mod tests {
     #[test]
     fn every_level_gives_the_same_bytes() {
         let pixels = wild_pixels(4099);
-        for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.balanced(Some(4000.0))] {
+        for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.with_white_balance(Some(4000.0))] {
             for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
                 view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
@@ -291,7 +292,7 @@ mod tests {
     #[test]
     fn rows_agree_with_the_scalar_view() {
         let pixels = wild_pixels(1000);
-        for view in [View::DISPLAY, View::DISPLAY.balanced(Some(4000.0))] {
+        for view in [View::DISPLAY, View::DISPLAY.with_white_balance(Some(4000.0))] {
             let mut out = vec![[0_u16; 4]; pixels.len()];
             view.display_row(Level::new(), &pixels, 0, 0, None, &mut out);
             for (pixel, codes) in pixels.iter().zip(&out) {
@@ -355,7 +356,7 @@ mod tests {
         let huge = [f32::INFINITY, f32::MAX, 1e38, 1e9];
         let row: Vec<[f32; 4]> = huge.iter().map(|&light| [light, light, light, 1.0]).collect();
         for kelvin in [None, Some(1500.0), Some(4000.0), Some(6504.0), Some(20_000.0)] {
-            for view in [View::DISPLAY, View::STANDARD].map(|view| view.balanced(kelvin)) {
+            for view in [View::DISPLAY, View::STANDARD].map(|view| view.with_white_balance(kelvin)) {
                 let name = view.name();
                 for light in huge {
                     let shown = view.to_display([light; 3]);

@@ -1,24 +1,24 @@
-//! Curves through control points, as an artist edits them.
+//! Curves through control points.
 
 mod segment;
 
 use segment::{Segment, monotone_slopes};
 
-/// How values between control points are found.
+/// Interpolation between control points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Interpolation {
     /// Straight lines.
     Linear,
     /// Each value holds until the next point.
     Step,
-    /// A smooth curve (continuous derivative) that never overshoots its points: rising where they rise, level where they turn.
+    /// A smooth curve (continuous derivative) that never overshoots its points: monotone where they are, and level at local extrema.
     Monotone,
 }
 
-/// Why points do not make a curve. Indices count from 0.
+/// Why points do not define a curve. Indices count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CurveError {
-    /// There is no point at all.
+    /// There are no points.
     #[error("there must be at least one point")]
     Empty,
     /// A point does not lie after the one before it.
@@ -33,7 +33,7 @@ pub enum CurveError {
         /// The offending point.
         index: usize,
     },
-    /// Two points lie so far apart, or differ so much over so short a way, that the slope between them cannot be computed.
+    /// Two points are so far apart, or the curve between them is so steep, that the slope cannot be computed.
     #[error("between point {index} and point {} the curve is too steep or too long to compute", index + 1)]
     OutOfRange {
         /// The second of the two points.
@@ -41,12 +41,12 @@ pub enum CurveError {
     },
 }
 
-/// A function of one number through control points; outside them the first and the last value hold.
+/// A function of one variable through control points; constant before the first and after the last point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     points: Vec<[f64; 2]>,
     segments: Vec<Segment>,
-    /// Integral from the first point up to each point.
+    /// Integral from the first point to each point.
     integrals: Vec<f64>,
     interpolation: Interpolation,
 }
@@ -55,7 +55,7 @@ impl Curve {
     /// The curve through `points` (x, y), x ascending.
     ///
     /// # Errors
-    /// No point, x not ascending, a number that is not finite, or a slope beyond 1e100.
+    /// There are no points, x is not ascending, a number is not finite, or a slope exceeds 1e100.
     pub fn new(points: Vec<[f64; 2]>, interpolation: Interpolation) -> Result<Self, CurveError> {
         check(&points)?;
         let slopes = match interpolation {
@@ -75,7 +75,7 @@ impl Curve {
         Ok(Self { points, segments, integrals, interpolation })
     }
 
-    /// The curve that is `value` everywhere; `None` where `value` is not finite.
+    /// The constant curve `value`; `None` if `value` is not finite.
     pub fn constant(value: f64) -> Option<Self> {
         Self::new(vec![[0.0, value]], Interpolation::Linear).ok()
     }
@@ -85,29 +85,29 @@ impl Curve {
         &self.points
     }
 
-    /// How values between points are found.
+    /// Interpolation between points.
     pub fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 
-    /// Value at `x`, never outside the values of the two points around it. NaN gives the first value.
+    /// Value at `x`, always between the values of the two adjacent points. NaN gives the first value.
     pub fn eval(&self, x: f64) -> f64 {
-        match self.place(x) {
-            Place::Before => self.points[0][1],
-            Place::Within(index, t) => self.segments[index].value(t),
-            Place::After => self.points[self.points.len() - 1][1],
+        match self.locate(x) {
+            Location::Before => self.points[0][1],
+            Location::Within(index, t) => self.segments[index].value(t),
+            Location::After => self.points[self.points.len() - 1][1],
         }
     }
 
-    /// Slope at `x`: 0 outside the points and between the points of a step curve; at a corner that of the segment to the right.
+    /// Derivative at `x`: 0 outside the points and for step curves; at a control point that of the segment to the right.
     pub fn derivative(&self, x: f64) -> f64 {
-        match self.place(x) {
-            Place::Within(index, t) => self.segments[index].slope(t),
-            Place::Before | Place::After => 0.0,
+        match self.locate(x) {
+            Location::Within(index, t) => self.segments[index].slope(t),
+            Location::Before | Location::After => 0.0,
         }
     }
 
-    /// Integral from `from` to `to`, exact for every interpolation but for rounding; negative where `to` lies before `from`.
+    /// Integral from `from` to `to`, exact up to rounding; negative if `to` is less than `from`.
     pub fn integral(&self, from: f64, to: f64) -> f64 {
         self.integral_from_first(to) - self.integral_from_first(from)
     }
@@ -115,54 +115,54 @@ impl Curve {
     /// Integral from the first point to `x`.
     fn integral_from_first(&self, x: f64) -> f64 {
         let last = self.points.len() - 1;
-        match self.place(x) {
-            Place::Before => self.points[0][1] * (x - self.points[0][0]),
-            Place::Within(index, t) => self.integrals[index] + self.segments[index].integral(t),
-            Place::After => self.integrals[last] + self.points[last][1] * (x - self.points[last][0]),
+        match self.locate(x) {
+            Location::Before => self.points[0][1] * (x - self.points[0][0]),
+            Location::Within(index, t) => self.integrals[index] + self.segments[index].integral(t),
+            Location::After => self.integrals[last] + self.points[last][1] * (x - self.points[last][0]),
         }
     }
 
-    /// `count` values at equal distances from `low` to `high`, both included (only `low` where `count` is 1).
+    /// `count` values at equal distances from `low` to `high`, both included (only `low` if `count` is 1).
     pub fn sample_table(&self, count: usize, low: f64, high: f64) -> Vec<f32> {
         let last = count.saturating_sub(1).max(1) as f64;
         (0..count).map(|index| self.eval(crate::math::lerp(low, high, index as f64 / last)) as f32).collect()
     }
 
-    /// Whether it never falls.
+    /// Whether it is monotonically increasing (not strictly).
     pub fn is_increasing(&self) -> bool {
         self.points.is_sorted_by(|a, b| a[1] <= b[1])
     }
 
-    /// Least and greatest value.
+    /// Smallest and largest value.
     pub fn range(&self) -> [f64; 2] {
         self.points
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| [low.min(point[1]), high.max(point[1])])
     }
 
-    fn place(&self, x: f64) -> Place {
+    fn locate(&self, x: f64) -> Location {
         let after = self.points.partition_point(|point| point[0] <= x);
         if after == 0 {
-            Place::Before
+            Location::Before
         } else if after == self.points.len() {
-            Place::After
+            Location::After
         } else {
             let (start, end) = (self.points[after - 1][0], self.points[after][0]);
-            Place::Within(after - 1, (x - start) / (end - start))
+            Location::Within(after - 1, (x - start) / (end - start))
         }
     }
 }
 
-/// Where an x lies among the points.
-enum Place {
+/// Position of an x relative to the control points.
+enum Location {
     Before,
-    /// In the segment of that index, at a fraction of its length.
+    /// In the segment with that index, at a fraction of its length.
     Within(usize, f64),
     After,
 }
 
-/// Slopes and lengths up to this size leave room for the products that the cubic needs.
-const LARGEST: f64 = 1e100;
+/// Slopes and lengths up to this magnitude do not overflow in the products of the cubic.
+const MAX_MAGNITUDE: f64 = 1e100;
 
 fn check(points: &[[f64; 2]]) -> Result<(), CurveError> {
     if points.is_empty() {
@@ -176,7 +176,7 @@ fn check(points: &[[f64; 2]]) -> Result<(), CurveError> {
         if pair[1][0] <= pair[0][0] {
             return Err(CurveError::NotAscending { index: index + 1 });
         }
-        if length > LARGEST || rise.abs() > LARGEST || (rise / length).abs() > LARGEST {
+        if length > MAX_MAGNITUDE || rise.abs() > MAX_MAGNITUDE || (rise / length).abs() > MAX_MAGNITUDE {
             return Err(CurveError::OutOfRange { index: index + 1 });
         }
     }
@@ -260,7 +260,7 @@ mod tests {
                         .collect();
                     let (low, high) = (pair[0][1].min(pair[1][1]), pair[0][1].max(pair[1][1]));
                     assert!(values.iter().all(|y| (low..=high).contains(y)));
-                    // Rounding of the cubic may turn neighbours around by a few units in the last place.
+                    // Rounding of the cubic may turn neighbors around by a few units in the last place.
                     let rising = if pair[1][1] >= pair[0][1] { 1.0 } else { -1.0 };
                     assert!(values.windows(2).all(|y| (y[1] - y[0]) * rising >= -1e-14));
                 }

@@ -35,7 +35,7 @@ fn gray_and_coloured_absorption_come_to_the_same() {
 fn dissolves_mix_light_and_transmittance_and_keep_what_is_nearest() {
     let mut strip = Strip::default();
     strip.reset(Rect::of_size(1, 1), Some(&|_| &[9.0]), 2);
-    let mut other = strip.emptied();
+    let mut other = strip.empty_like();
     assert_eq!((other.rect, other.plate_depth(0), other.aovs.len()), (strip.rect, 9.0, 2));
     strip.add_behind(0, [8.0; 3], [1.0; 3], 2.0);
     strip.aovs[0].add(0, 100.0, 1.0);
@@ -44,7 +44,7 @@ fn dissolves_mix_light_and_transmittance_and_keep_what_is_nearest() {
     other.aovs[0].add(0, 20.0, 3.0);
     other.aovs[1].keep_nearest(0, 7.0, 1.0);
     let aov = |rule| AovDescriptor { name: "", unit: "", doc: "", rule };
-    strip.dissolve(other, 0.75, &[aov(AovRule::WeightedMean), aov(AovRule::Nearest)]);
+    strip.crossfade(other, 0.75, &[aov(AovRule::WeightedMean), aov(AovRule::Nearest)]);
     assert_eq!(strip.radiance.map(|plane| plane[0]), [6.0, 7.0, 10.0]);
     assert_eq!((strip.transmittance[0][0], strip.transmittance[1][0], strip.depth[0]), (0.75, 0.875, 1.0));
     assert_eq!(strip.aovs[0].resolve(0, AovRule::WeightedMean), (75.0 + 15.0) / 1.5);
@@ -91,6 +91,6 @@ fn a_dome_that_rolls_needs_several_instants() {
 #[test]
 fn a_picture_in_a_mirror_is_not_measured() {
     let mut view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.0 }, 0.0, [8, 8], 0);
-    view.measured = true;
-    assert!(!view.mirrored(0.0).measured);
+    view.aovs_requested = true;
+    assert!(!view.mirrored(0.0).aovs_requested);
 }

@@ -30,7 +30,7 @@ pub struct ElevationSample {
 
 impl ElevationProfile {
     /// The mean of `samples` in each band; a band without any has that of the nearest with some. `None` where there is none at all.
-    pub fn of_samples(samples: impl IntoIterator<Item = ElevationSample>) -> Option<Self> {
+    pub fn from_samples(samples: impl IntoIterator<Item = ElevationSample>) -> Option<Self> {
         let mut sums = [[0.0_f64; 4]; BANDS];
         for ElevationSample { sine, weight, radiance } in samples {
             let sum = &mut sums[((position(sine) + 0.5) as usize).min(BANDS - 1)];
@@ -102,14 +102,14 @@ mod tests {
 
     #[test]
     fn a_uniform_surrounding_has_its_radiance_everywhere_and_pi_of_it_on_the_ground() {
-        let even = ElevationProfile::of_samples([sample(0.1, 3.0)]).unwrap();
+        let even = ElevationProfile::from_samples([sample(0.1, 3.0)]).unwrap();
         for sine in [-1.0, -0.3, 0.0, 0.8, 1.0] {
             assert_eq!(even.radiance(sine), [3.0, 1.5, 0.0]);
         }
         assert!((f64::from(even.horizontal_illuminance()[0]) - 3.0 * PI).abs() < 1e-3);
         assert_eq!(even.scaled(2.0).radiance(0.2), [6.0, 3.0, 0.0]);
         assert!(!even.is_dark() && even.scaled(0.0).is_dark());
-        assert_eq!(ElevationProfile::of_samples([]), None);
+        assert_eq!(ElevationProfile::from_samples([]), None);
     }
 
     #[test]
@@ -118,7 +118,7 @@ mod tests {
             let sine = f64::from(i) / 199.0 - 0.5;
             sample(sine, if sine > 0.0 { 8.0 } else { 1.0 })
         });
-        let profile = ElevationProfile::of_samples(seen).unwrap();
+        let profile = ElevationProfile::from_samples(seen).unwrap();
         assert_eq!([1.0, 0.2, -0.2, -1.0].map(|sine| profile.radiance(sine)[0]), [8.0, 8.0, 1.0, 1.0]);
         let rising = (0..40).map(|i| profile.radiance(f64::from(i) / 200.0 - 0.1)[0]).collect::<Vec<_>>();
         assert!(rising.is_sorted(), "{rising:?}");

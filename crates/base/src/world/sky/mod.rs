@@ -14,7 +14,7 @@ use crate::{
 };
 
 pub use elevations::{ElevationProfile, ElevationSample};
-pub use night::{EARTH_RADIUS_KM, Night, NightParameters, Parallel};
+pub use night::{Almucantar, EARTH_RADIUS_KM, Night, NightParameters};
 
 /// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). What lies
 /// below the horizon has the horizon's.
@@ -45,7 +45,7 @@ crate::parameters! {
         kind: SkyKind = SkyKind::Overcast;
         /// Luminance overhead: a rainy day has 500 to 5000, late dusk 1.
         luminance: Animated<f64> = Animated::from(2000.0), limits(Range::new(0.0, 1e6)), unit("cd/m^2");
-        /// Temperature of a black body of its colour; by day, for at night each of its lights has its own.
+        /// Temperature of a black body of its color; by day, for at night each of its lights has its own.
         temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
         /// Whether it is seen, or only lights.
         visible: bool = true;
@@ -64,7 +64,7 @@ impl SkyParameters {
     /// The sky at time `t`.
     pub fn at(&self, t: f64) -> Sky {
         if self.kind == SkyKind::Night {
-            return Sky::of_night(self.night.at(t));
+            return Sky::from_night(self.night.at(t));
         }
         let colour = black_body().radiance(self.temperature_k as f32);
         let scale = self.luminance.at(t) / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
@@ -94,7 +94,7 @@ impl Sky {
         Self { zenith: profile.radiance(1.0), measured: Some(profile), ..Self::DARK }
     }
 
-    fn of_night(night: Night) -> Self {
+    fn from_night(night: Night) -> Self {
         Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night), measured: None }
     }
 
@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(sky(SkyKind::Night).radiance_at_elevations(&sines), None);
         let samples = [(-0.5, 1.0), (0.5, 9.0)];
         let sample = |(sine, value)| ElevationSample { sine, weight: 1.0, radiance: [value; 3] };
-        let measured = Sky::measured(ElevationProfile::of_samples(samples.map(sample)).unwrap());
+        let measured = Sky::measured(ElevationProfile::from_samples(samples.map(sample)).unwrap());
         let planes = measured.radiance_at_elevations(&sines).unwrap();
         assert_eq!(planes[1].map(|value| value), sines.map(|sine| measured.radiance(DVec3::Y * f64::from(sine))[1]));
     }

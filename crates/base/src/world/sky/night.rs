@@ -9,7 +9,7 @@ use crate::{
     parameters::{Range, animated::Animated},
 };
 
-const SHARE: Range = Range::new(0.0, 100.0);
+const BRIGHTNESS_RANGE: Range = Range::new(0.0, 100.0);
 
 crate::parameters! {
     /// What is seen at night, with `kind = "night"`; brightness is absolute, so that the sky's own `luminance` plays no part.
@@ -19,11 +19,11 @@ crate::parameters! {
         /// Where the sun stands, from north over east.
         sun_azimuth_deg: f64 = 0.0, limits(Range::new(-360.0, 360.0)), unit("degrees");
         /// Brightness of the airglow beside a usual night's.
-        airglow: f64 = 1.0, limits(SHARE);
+        airglow: f64 = 1.0, limits(BRIGHTNESS_RANGE);
         /// Brightness of the stars beside the real sky's; 0 for none.
-        stars: f64 = 1.0, limits(SHARE);
+        stars: f64 = 1.0, limits(BRIGHTNESS_RANGE);
         /// Brightness of the Milky Way beside the real one's.
-        milky_way: f64 = 1.0, limits(SHARE);
+        milky_way: f64 = 1.0, limits(BRIGHTNESS_RANGE);
         /// Magnitudes that the air takes overhead.
         extinction: f64 = 0.22, limits(Range::new(0.0, 5.0)), unit("mag");
     }
@@ -33,7 +33,7 @@ crate::parameters! {
 /// al. 1998). The last stands for the hydroxyl bands that the eye sees.
 const AIRGLOW: [(f64, f64, f64); 4] =
     [(557.7, 0.22, 97.0), (630.0, 0.08, 250.0), (589.3, 0.03, 92.0), (660.0, 0.2, 87.0)];
-/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its colour, K.
+/// Luminance of zodiacal light, faint stars and the airglow's continuum together, cd/m^2 (Leinert et al. 1998), and its color, K.
 const BACKGROUND: f64 = 1.2e-4;
 const BACKGROUND_K: f32 = 9500.0;
 /// Logarithm (base 10) of the luminance overhead, cd/m^2, for every 3 degrees that the sun is lower, from the horizon on (Koomen et
@@ -76,21 +76,21 @@ impl NightParameters {
 
 /// The night along a circle of one elevation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Parallel {
+pub struct Almucantar {
     /// What is there all around: ACEScg, cd/m^2.
-    even: [f32; 3],
+    uniform: [f32; 3],
     /// What is added over the sun, by the fourth power of how far a direction turns to it.
     glow: [f32; 3],
     /// What is added in proportion to that.
     blue: [f32; 3],
 }
 
-impl Parallel {
+impl Almucantar {
     /// What radiance is made of: all around, over the sun by the fourth power of how far a direction turns to it, and in proportion
     /// to that.
     #[must_use]
     pub fn terms(&self) -> [[f32; 3]; 3] {
-        [self.even, self.glow, self.blue]
+        [self.uniform, self.glow, self.blue]
     }
 
     /// Radiance where a direction turns toward the sun by `toward`: 1 over it, 0 opposite.
@@ -99,7 +99,7 @@ impl Parallel {
     pub fn radiance(&self, toward: f32) -> [f32; 3] {
         let squared = toward * toward;
         let fourth = squared * squared;
-        std::array::from_fn(|c| self.glow[c].mul_add(fourth, self.blue[c].mul_add(toward, self.even[c])))
+        std::array::from_fn(|c| self.glow[c].mul_add(fourth, self.blue[c].mul_add(toward, self.uniform[c])))
     }
 }
 
@@ -107,7 +107,7 @@ impl Night {
     /// Radiance from a direction above the horizon (ACEScg, cd/m^2).
     pub(super) fn radiance(&self, direction: DVec3) -> [f32; 3] {
         let elevation = math::asin(direction.y.clamp(0.0, 1.0));
-        self.parallel(elevation).radiance(self.toward(direction) as f32)
+        self.almucantar(elevation).radiance(self.toward(direction) as f32)
     }
 
     /// Unit vector to where the sun stands below the horizon.
@@ -129,11 +129,11 @@ impl Night {
 
     /// All directions of an elevation in radians.
     #[must_use]
-    pub fn parallel(&self, elevation: f64) -> Parallel {
+    pub fn almucantar(&self, elevation: f64) -> Almucantar {
         let overhead = self.transmittance(std::f64::consts::FRAC_PI_2);
         // Scattered light fills up a third of what the air takes.
         let diffuse = 0.3 + 0.7 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
-        let mut even = of_kind(BACKGROUND_K, BACKGROUND * diffuse);
+        let mut even = blackbody_light(BACKGROUND_K, BACKGROUND * diffuse);
         for (wavelength_nm, kilorayleigh, altitude_km) in AIRGLOW {
             let scale = LUMINOUS_EFFICACY_LM_PER_W * KILORAYLEIGH / wavelength_nm;
             let brightness = self.airglow * kilorayleigh * van_rhijn(elevation, altitude_km) * diffuse * scale;
@@ -141,11 +141,11 @@ impl Night {
         }
         // What is left of the day: blue overhead, brighter and yellow low over the sun.
         let low = math::exp(-elevation / TWILIGHT_ARCH);
-        let blue = of_kind(10_000.0, self.twilight);
+        let blue = blackbody_light(10_000.0, self.twilight);
         let single = |colour: DVec3| colour.to_array().map(|value| value as f32);
-        Parallel {
-            even: single(even + blue),
-            glow: single(of_kind(3200.0, self.twilight * 9.0 * low * low)),
+        Almucantar {
+            uniform: single(even + blue),
+            glow: single(blackbody_light(3200.0, self.twilight * 9.0 * low * low)),
             blue: single(blue * (2.0 * low)),
         }
     }
@@ -158,7 +158,7 @@ fn van_rhijn(elevation: f64, altitude_km: f64) -> f64 {
 }
 
 /// Light of a black body's colour and of that luminance.
-fn of_kind(temperature_k: f32, brightness: f64) -> DVec3 {
+fn blackbody_light(temperature_k: f32, brightness: f64) -> DVec3 {
     let colour = black_body().radiance(temperature_k);
     let scale = brightness / f64::from(luminance(colour)).max(f64::MIN_POSITIVE);
     DVec3::from(colour.map(f64::from)) * scale

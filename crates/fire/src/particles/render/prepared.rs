@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use bansho_base::{
     host::{
         observer::{Cancelled, Observer, check},
-        once::get_or_make,
+        once::get_or_compute,
     },
     image::Rect,
     math::DVec3,
@@ -15,6 +15,7 @@ use bansho_base::{
         surroundings::Surroundings,
     },
 };
+use fearless_simd::{Level, dispatch};
 
 use super::{
     aovs::{MotionField, min_max},
@@ -22,27 +23,23 @@ use super::{
     depth_layers::DepthLayers,
     gas::Gas,
 };
-use crate::particles::render::depth_layers::{GasStatistics, is_visible};
-use crate::particles::{
-    paper_squares::Squares,
-    parameters::{LookParameters, SpriteStyle},
-    render::{
-        resolve::{
-            BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES, TAU,
-        },
-        splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
-    },
-};
 use crate::{
     chemiluminescence_color,
-    particles::render::{
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{detail::Detail, spline, strain::Strain, upsample::RowInterpolator},
-        splat::{grid::Grid, kernel::Profile},
+    particles::{
+        paper_squares::Squares,
+        parameters::{LookParameters, SpriteStyle},
+        render::{
+            depth_layers::{GasStatistics, is_visible},
+            project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+            resolve::{
+                BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES,
+                TAU, detail::Detail, spline, strain::Strain, upsample::RowInterpolator,
+            },
+            splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, grid::Grid, kernel::Profile, splat},
+        },
     },
     sparks::{SparkEmitter, Streak},
 };
-use fearless_simd::{Level, dispatch};
 
 /// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {
@@ -136,7 +133,7 @@ impl<'a> PreparedGas<'a> {
         let mut sparks = spark_emitter(&gas, look, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         let prepared = Self { gas, look, view, level: Level::new(), layers, mode, sparks, haze: OnceLock::new() };
-        if view.measured {
+        if view.aovs_requested {
             prepared.haze();
         }
         Ok(prepared)
@@ -214,7 +211,7 @@ fn splat_gas<'a>(
         grid,
         detail,
         scattered: scattered.collect(),
-        motion: if view.measured { MotionField::new(gas, look, view) } else { None },
+        motion: if view.aovs_requested { MotionField::new(gas, look, view) } else { None },
         temperatures: min_max(gas.particles.temperature.iter().copied()),
     }))
 }
@@ -368,12 +365,12 @@ impl PreparedGas<'_> {
             DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::Integral => (None, false),
             _ => (None, true),
         };
-        get_or_make(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
+        get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
     }
 
     /// The haze, in the one slice in which its AOV is written.
     fn measured_haze(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
-        let is_here = self.view.measured && slice.contains(self.layers.center(self.layers.count - 1));
+        let is_here = self.view.aovs_requested && slice.contains(self.layers.center(self.layers.count - 1));
         self.haze.get().and_then(Option::as_ref).filter(|_| is_here)
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bansho_base::{
     geometry::{
         mesh::{Mesh, SurfaceSampler},
-        transform::Placement,
+        transform::Transform,
     },
     host::assets::Assets,
     math::{
@@ -31,7 +31,7 @@ const BASE_FROUDE: f64 = 0.4;
 pub(crate) struct Burner {
     pub(crate) parameters: BurnerParameters,
     /// Rotation and scale; the position varies over time.
-    placement: Placement,
+    placement: Transform,
     area: BurnerSurface,
     /// Diameter D across which gas burns, m; it sets puffing frequency and eddy size.
     pub(crate) diameter: f64,
@@ -74,7 +74,7 @@ impl Burner {
         assets: &dyn Assets,
     ) -> Result<Self, ParticleFaultKind> {
         let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
-        let placement = Placement::new([0.0; 3], parameters.rotation_deg, scale);
+        let placement = Transform::new([0.0; 3], parameters.rotation_deg, scale);
         let (area, size) = area(parameters, assets)?;
         let equivalent = math::sqrt(4.0 * size.area_m2 / std::f64::consts::PI);
         let height = match parameters.height {
@@ -136,8 +136,12 @@ impl Burner {
             BurnerSurface::Strip => position.z.abs() / radius,
             BurnerSurface::Cuboid | BurnerSurface::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
         };
-        let placement = Placement { position: self.position(t), ..self.placement };
-        SpawnPoint { position: placement.to_world(position), direction: placement.turn(direction), radial_fraction }
+        let placement = Transform { position: self.position(t), ..self.placement };
+        SpawnPoint {
+            position: placement.to_world(position),
+            direction: placement.transform_direction(direction),
+            radial_fraction,
+        }
     }
 
     /// Position and direction in the burner's own coordinates.
@@ -157,7 +161,7 @@ impl Burner {
                 (DVec3::new(along, 0.0, self.parameters.diameter * (w - 0.5)), DVec3::Y)
             }
             BurnerSurface::Cuboid => box_surface_point(self.parameters.size, [u, v, w]),
-            BurnerSurface::Surface(sampler) => sampler.at([uniform_f64(words[0], words[3]), v, w]),
+            BurnerSurface::Surface(sampler) => sampler.sample([uniform_f64(words[0], words[3]), v, w]),
         }
     }
 }
@@ -176,17 +180,17 @@ struct Size {
 }
 
 /// Corners of the bounding box of a rotated mesh.
-fn extent(mesh: &Mesh, placement: &Placement) -> [DVec3; 2] {
+fn extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
     let corners = mesh.triangles().flatten().map(|corner| placement.to_world(corner));
     let primitive_extent = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
     corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent)
 }
 
 /// The same for the analytic shapes.
-fn primitive_extent(parameters: &BurnerParameters, placement: &Placement) -> [DVec3; 2] {
+fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
-    let axis = |unit: DVec3, half: f64| placement.turn(unit) * half;
+    let axis = |unit: DVec3, half: f64| placement.transform_direction(unit) * half;
     let half = match parameters.shape {
         BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
         BurnerShape::Disc => {

@@ -105,7 +105,7 @@ mod tests {
     use std::sync::Arc;
 
     use bansho_base::{
-        geometry::{distance_field::DistanceField, mesh::Mesh, transform::Placement},
+        geometry::{distance_field::DistanceField, mesh::Mesh, transform::Transform},
         math::DQuat,
     };
 
@@ -118,7 +118,7 @@ mod tests {
     /// A horizontal plate centered at a height of 0.6.
     fn plate(thickness: f64) -> Occluder {
         let half_extents = DVec3::new(3.0, 0.5 * thickness, 3.0);
-        Occluder::Cuboid { centre: DVec3::Y * 0.6, half_extents, rotation: DQuat::IDENTITY }
+        Occluder::Cuboid { center: DVec3::Y * 0.6, half_extents, rotation: DQuat::IDENTITY }
     }
 
     /// The same plate as a mesh, 2 x 0.2 x 2 m.
@@ -128,7 +128,7 @@ mod tests {
         let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         let mesh = Mesh::new(corners, triangles).unwrap();
-        let placement = Placement::new([0.0, 0.6, 0.0], [0.0; 3], 1.0);
+        let placement = Transform::new([0.0, 0.6, 0.0], [0.0; 3], 1.0);
         Occluder::Mesh { distance: Arc::new(DistanceField::new(&mesh)), placement }
     }
 

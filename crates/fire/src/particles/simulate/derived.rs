@@ -133,7 +133,7 @@ fn preroll(parameters: &FlameParticlesParameters, longest_residence: f64) -> f64
 
 /// Whether the operating system would grant the memory of so many particles.
 fn have_memory(count: i64) -> bool {
-    memory::is_granted(count as f64 * MEMORY_PER_PARTICLE)
+    memory::can_allocate(count as f64 * MEMORY_PER_PARTICLE)
 }
 
 /// Checks whether `count` particles may be alive beside the `others` of all other flames.
@@ -145,7 +145,8 @@ pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault
     if count <= taken && have_memory(count + others) {
         return Ok(());
     }
-    let max_particles = memory::most(taken.min(count), |max_particles| have_memory(max_particles + others));
+    let max_particles =
+        memory::largest_fitting_count(taken.min(count), |max_particles| have_memory(max_particles + others));
     let max_particles = if count > taken && have_memory(taken + others) { taken } else { max_particles };
     let gib = (count as f64 + others as f64) * MEMORY_PER_PARTICLE / f64::from(1 << 30);
     let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most: max_particles };

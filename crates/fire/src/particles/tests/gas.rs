@@ -166,7 +166,7 @@ fn a_thin_plate_lets_nothing_through() {
         parameters.preroll_s = Auto::Set(0.0);
         let half_extents = DVec3::new(3.0, 0.5 * thickness, 3.0);
         let centre = DVec3::Y * 0.6;
-        let plate = Occluder::Cuboid { centre, half_extents, rotation: bansho_base::math::DQuat::IDENTITY };
+        let plate = Occluder::Cuboid { center: centre, half_extents, rotation: bansho_base::math::DQuat::IDENTITY };
         let world = World { occluders: vec![plate], ..World::default() };
         let mut simulation = simulation(&parameters);
         let mut reached = 0;
@@ -204,7 +204,7 @@ fn one_particle_falls_and_rises_as_buoyancy_says() {
 fn gas_flows_around_a_ball() {
     let mut parameters = FlameParticlesParameters { particles: 800, ..Default::default() };
     parameters.motion.turbulence = 0.1;
-    let ball = Occluder::Sphere { centre: DVec3::new(0.0, 0.4, 0.0), radius: 0.12 };
+    let ball = Occluder::Sphere { center: DVec3::new(0.0, 0.4, 0.0), radius: 0.12 };
     let world = World { occluders: vec![ball.clone()], ..World::default() };
     let mut above = 0;
     world.run(&mut simulation(&parameters), 0.3, |simulation, _| {

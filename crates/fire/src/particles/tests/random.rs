@@ -5,11 +5,13 @@ use bansho_base::{
     parameters::{Parameters, Reader, sample},
     world::gravity::STANDARD_GRAVITY,
 };
+use rayon::prelude::*;
 
 use super::*;
-use crate::particles::simulate::combustion::INNER_TEMPERATURE;
-use crate::particles::{parameters::WindForce, simulate::burner::Burner};
-use rayon::prelude::*;
+use crate::particles::{
+    parameters::WindForce,
+    simulate::{burner::Burner, combustion::INNER_TEMPERATURE},
+};
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {
@@ -133,9 +135,9 @@ fn obstacle(seed: u64, simulation: &Simulation) -> Option<Occluder> {
     let centre = burner.position(0.0) + size * DVec3::new(words[0] - 0.5, words[1], words[2] - 0.5);
     match (seed % 2, (3.0 * words[3]) as u32) {
         (0, _) => None,
-        (_, 0) => Some(Occluder::Sphere { centre, radius: 0.3 * size * words[0] }),
+        (_, 0) => Some(Occluder::Sphere { center: centre, radius: 0.3 * size * words[0] }),
         (_, 1) => Some(Occluder::Cuboid {
-            centre,
+            center: centre,
             half_extents: 0.5 * size * DVec3::new(words[1], 0.1 * words[2], words[0]),
             rotation: DQuat::from_rotation_z(words[3]),
         }),

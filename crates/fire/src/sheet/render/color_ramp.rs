@@ -1,5 +1,15 @@
 //! Color ramp: sharpening, eq. (6), and color, eq. (7), tabulated over T1.
 
+use bansho_base::{
+    color,
+    math::{
+        self,
+        simd::{Lanes, Real, gather, round_to_u32},
+    },
+    parameters::parameter_error::ParameterError,
+};
+use fearless_simd::Simd;
+
 use crate::{
     chemiluminescence_color,
     sheet::{
@@ -7,15 +17,6 @@ use crate::{
         render::curve_tables::{CurvePair, from_origin},
     },
 };
-use bansho_base::{
-    color,
-    math::{
-        self,
-        simd::{Lanes, Real, fetch, nearest_whole},
-    },
-    parameters::parameter_fault::ParameterFault,
-};
-use fearless_simd::Simd;
 
 /// Entries over T1: finer than a display can show, so that nearest-neighbor lookup suffices.
 const LEVELS: usize = 4096;
@@ -69,7 +70,7 @@ impl ColorRamp {
     ///
     /// # Errors
     /// The sharpening curve does not begin at the origin.
-    pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterFault> {
+    pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterError> {
         from_origin(&texture.sharpen, "texture.sharpen").map(drop)
     }
 
@@ -115,6 +116,6 @@ impl ColorRamp {
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
         let scaled = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);
-        fetch(t1.simd, &self.light, nearest_whole(scaled))
+        gather(t1.simd, &self.light, round_to_u32(scaled))
     }
 }

@@ -2,20 +2,21 @@
 //!
 //! A table holds two curves side by side, so that one load fetches both.
 
-use crate::sheet::{
-    equations,
-    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
-};
 use bansho_base::{
     math::{
         self,
         curve::Curve,
         random::Key,
-        simd::{LANES, Lanes, Real, any_positive, fetch, wrap_split},
+        simd::{LANES, Lanes, Real, any_positive, gather, wrap_split},
     },
-    parameters::parameter_fault::{FaultKind, ParameterFault},
+    parameters::parameter_error::{ParameterError, ParameterErrorKind},
 };
 use fearless_simd::{Simd, prelude::*, u32x16};
+
+use crate::sheet::{
+    equations,
+    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
+};
 
 /// Linear segments of a table.
 pub(crate) const SEGMENTS: usize = 512;
@@ -89,7 +90,7 @@ impl CurvePair {
     /// Both functions at table indices.
     #[inline(always)]
     pub(crate) fn fetch<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
-        let [first, first_delta, second, second_delta] = fetch(at.fraction.simd, &self.segments, at.segment);
+        let [first, first_delta, second, second_delta] = gather(at.fraction.simd, &self.segments, at.segment);
         [first_delta.fma(at.fraction, first), second_delta.fma(at.fraction, second)]
     }
 
@@ -153,11 +154,11 @@ pub(crate) struct ShapeTables {
 }
 
 /// The curve with the point (0, 0) that the paper demands prepended, unless it has one.
-pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, ParameterFault> {
+pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, ParameterError> {
     let mut points = curve.points().to_vec();
     match points.first() {
         Some([x, y]) if *x <= 0.0 && *y != 0.0 => {
-            return Err(ParameterFault { key, kind: FaultKind::NotZeroAtOrigin { value: *y } });
+            return Err(ParameterError { key, kind: ParameterErrorKind::NotZeroAtOrigin { value: *y } });
         }
         Some([x, _]) if *x > 0.0 => points.insert(0, [0.0, 0.0]),
         _ => {}
@@ -165,13 +166,13 @@ pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, Par
     Ok(Curve::new(points, curve.interpolation()).unwrap_or_else(|_| curve.clone()))
 }
 
-fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterFault> {
+fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterError> {
     const SLACK: f32 = 1e-6;
     let widest = samples.iter().enumerate().max_by(|a, b| (a.1[0] + a.1[1]).total_cmp(&(b.1[0] + b.1[1])));
     match widest {
-        Some((i, [core, fringe])) if core + fringe > 1.0 + SLACK => Err(ParameterFault {
+        Some((i, [core, fringe])) if core + fringe > 1.0 + SLACK => Err(ParameterError {
             key: "shape.fringe_width",
-            kind: FaultKind::WiderThanSheet {
+            kind: ParameterErrorKind::WiderThanSheet {
                 at: i as f64 / (samples.len() - 1) as f64,
                 sum: f64::from(core + fringe),
             },
@@ -267,7 +268,7 @@ impl ShapeTables {
     ///
     /// # Errors
     /// A curve that must begin at the origin does not, or core and fringe together are wider than the sheet.
-    pub(crate) fn check(shape: &ShapeParameters) -> Result<(), ParameterFault> {
+    pub(crate) fn check(shape: &ShapeParameters) -> Result<(), ParameterError> {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width")?;
         check_widths(&samples(&shape.core_width, &fringe))
     }
@@ -443,9 +444,10 @@ pub(crate) fn instance_key(seed: u64, name: &str, variation: i64, index: usize) 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bansho_base::math::simd::ramp;
     use fearless_simd::SimdBase;
+
+    use super::*;
 
     #[test]
     fn a_table_holds_its_ends_and_is_straight_between_samples() {

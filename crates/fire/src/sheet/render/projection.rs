@@ -8,7 +8,6 @@ use bansho_base::{
         simd::{LANES, Lanes, Real, ramp},
     },
 };
-
 use fearless_simd::{Simd, prelude::*};
 
 /// Sheet coordinates of sixteen pixels of a row.
@@ -69,7 +68,7 @@ impl PixelToSheet {
         let scale = 1.0 / camera.focal_pixels;
         let column = camera.orientation.col(0) * scale;
         let row = -camera.orientation.col(1) * scale;
-        let constant = -camera.orientation.col(2) - column * camera.centre.x - row * camera.centre.y;
+        let constant = -camera.orientation.col(2) - column * camera.principal_point.x - row * camera.principal_point.y;
         let form = |axis: DVec3| [constant, column, row].map(|direction| axis.dot(direction));
         let inverse_depth = form(normal / offset);
         let on_sheet = |axis: DVec3, size: f64, shift: f64| {
@@ -284,7 +283,7 @@ mod tests {
                 let column = (seen.pixel.x - 0.5).floor() as usize;
                 let batch = seen_batch(&pixel_to_sheet, column & !15, (seen.pixel.y - 0.5).round() as usize);
                 let lane = column & 15;
-                let pixel = 1.0 / (seen.pixels_per_metre * 1.0);
+                let pixel = 1.0 / (seen.pixels_per_meter * 1.0);
                 assert!((f64::from(batch.x[lane]) - x).abs() < 1.2 * pixel, "{lens:?} {x} {y} {batch:?}");
                 assert!((f64::from(batch.y[lane]) - y).abs() < 1.2 * pixel, "{lens:?} {x} {y} {batch:?}");
                 assert!((f64::from(batch.depth[lane]) - seen.depth).abs() < 0.01);

@@ -4,22 +4,22 @@ use bansho_base::{
     camera::upright_quad::UprightQuad,
     math::{
         self, DVec2, DVec3, approximations,
-        simd::{LANES, Lanes, Real, any_positive, evenly_spaced},
+        simd::{LANES, Lanes, Real, any_positive, linspace},
     },
     phenomenon::{strip::View, surroundings::Surroundings},
 };
+use fearless_simd::{Simd, prelude::*};
 
 use super::{
     projection::{PixelToSheet, SheetCoordinates, bounds},
     shade::{ShadedBatch, SheetState, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter};
 use crate::sheet::{
     FlameSheet,
     animate::warp::{FlameWaves, WarpState, WindLean},
+    render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter},
     texture::FractalLayers,
 };
-use fearless_simd::{Simd, prelude::*};
 
 /// Heights at which the light on the smoke is sampled.
 const LIGHT_SAMPLES: usize = 17;
@@ -77,7 +77,7 @@ pub(crate) fn shade_smoke<S: Simd>(
     let opacity = Lanes::from_slice(x.simd, &opacity);
     let (first, last) = (y[0], y[LANES - 1]);
     let (low, high) = (smoke.scattered_at(first), smoke.scattered_at(last));
-    let scattered = |k: usize| evenly_spaced(x.simd, low[k], high[k]) * opacity;
+    let scattered = |k: usize| linspace(x.simd, low[k], high[k]) * opacity;
     let light = [scattered(0), scattered(1), scattered(2), opacity];
     Some(ShadedBatch { t1: density, light })
 }

@@ -5,14 +5,11 @@ mod paper;
 
 use std::sync::{Arc, OnceLock};
 
-pub use paper::{PaperTexture, paper_texture};
-
+use bansho_base::math::simd::{Lanes, Real, gather, wrap_split};
 use fearless_simd::{Level, Simd, dispatch};
-
-use bansho_base::math::simd::{Lanes, Real, fetch, wrap_split};
-
 pub(crate) use fractal::{FRACTAL, FractalLayers};
 pub(crate) use paper::PaperLayer;
+pub use paper::{PaperTexture, paper_texture};
 
 /// Columns of a table, along u.
 pub(crate) const COLUMNS: usize = 256;
@@ -56,7 +53,7 @@ impl TextureTable {
         let (left, across) = wrap_split(column, COLUMNS as u32 - 1);
         let (below, up) = wrap_split(row, ROWS as u32 - 1);
         let index = below * COLUMNS as u32 + left;
-        let [low_left, low_right, high_left, high_right] = fetch(column.simd, &self.corners, index);
+        let [low_left, low_right, high_left, high_right] = gather(column.simd, &self.corners, index);
         let low = (low_right - low_left).fma(across, low_left);
         let high = (high_right - high_left).fma(across, high_left);
         (high - low).fma(up, low)

@@ -12,7 +12,7 @@ mod nodes;
 use std::collections::BTreeMap;
 
 use bansho_base::{
-    geometry::mesh::{MOST_CORNERS, MOST_TRIANGLES, Mesh, MeshError},
+    geometry::mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, MeshError},
     host::assets::AssetProblem,
     math::{DMat4, DVec3},
 };
@@ -109,11 +109,11 @@ fn check_totals<'s>(shapes: impl Iterator<Item = &'s PrimitiveMesh<'s>>) -> Resu
         triangles = triangles.saturating_add(shape.triangles);
         corners = corners.saturating_add(shape.corners);
     }
-    if triangles > MOST_TRIANGLES {
+    if triangles > MAX_TRIANGLES {
         return Err(MeshError::TooManyTriangles { found: triangles });
     }
-    if corners > MOST_CORNERS {
-        return Err(MeshError::TooManyCorners { found: corners });
+    if corners > MAX_VERTICES {
+        return Err(MeshError::TooManyVertices { found: corners });
     }
     Ok((corners * CORNER_BYTES + triangles * TRIANGLE_BYTES) as u64)
 }
@@ -210,7 +210,7 @@ impl MeshBuilder {
         let triangles = triangles(primitive_data.mode, &order);
         for (triangle, named) in triangles.iter().enumerate() {
             if let Some(&corner) = named.iter().find(|&&corner| corner as usize >= corners) {
-                return Err(MeshError::NoSuchCorner { triangle, corner, corners });
+                return Err(MeshError::VertexIndexOutOfRange { triangle, vertex: corner, vertex_count: corners });
             }
         }
         self.triangles.extend(triangles.into_iter().map(|named| named.map(|corner| first + corner)));

@@ -95,9 +95,11 @@ fn hostile_files_are_refused_with_a_reason() {
         reason(&glb(&document("", 4_000_000_000, ""), &bytes()), "glb")
             .contains("accessors[0].count reaches beyond its buffer")
     );
-    assert!(reason(&glb(&document("", 0, ""), &bytes()), "glb").contains("triangle 1 names corner 1, and there are 0"));
+    assert!(
+        reason(&glb(&document("", 0, ""), &bytes()), "glb").contains("triangle 1 refers to vertex 1, and there are 0")
+    );
     let lines = document("", 3, "").replace(r#""indices":1"#, r#""indices":1,"mode":1"#);
-    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "holds no usable mesh: it has no triangles with an area");
+    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "contains no usable mesh: it has no triangles with an area");
     assert!(reason(b"{", "gltf").starts_with("is damaged"));
     assert!(reason(b"", "obj").contains("allowed: .glb, .gltf"));
 }
@@ -142,7 +144,8 @@ fn a_fault_says_where_it_is_and_what_is_allowed() {
     let mut named_beyond = bytes();
     named_beyond[40] = 3;
     assert!(
-        reason(&glb(&document("", 3, ""), &named_beyond), "glb").contains("triangle 1 names corner 4, and there are 3")
+        reason(&glb(&document("", 3, ""), &named_beyond), "glb")
+            .contains("triangle 1 refers to vertex 4, and there are 3")
     );
 }
 
@@ -200,7 +203,7 @@ fn what_is_shown_too_often_is_refused_before_it_is_read() {
         .replace(r#""nodes":[{"#, &format!(r#""nodes":[{nodes}{{"#))
         .replace(r#""nodes":[0]"#, &format!(r#""nodes":[{}]"#, scene.join(",")));
     let told = reason(&glb(&json, &binary), "glb");
-    assert!(told.ends_with("it has 2000000000 corners; at most 12000000 are read"), "{told}");
+    assert!(told.ends_with("it has 2000000000 vertices; at most 12000000 are read"), "{told}");
     let unindexed = json.replace(r#","indices":1"#, "");
     let told = reason(&glb(&unindexed, &binary), "glb");
     assert!(told.ends_with("it has 666666000 triangles; at most 4000000 are read"), "{told}");

@@ -119,7 +119,7 @@ impl SvgReader {
         let points = || self.strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
         let bounds = || [points().fold(DVec2::INFINITY, DVec2::min), points().fold(DVec2::NEG_INFINITY, DVec2::max)];
         let [low, high] = self.sheet.unwrap_or_else(bounds);
-        Ok(Drawing { strokes: self.strokes, low, high })
+        Ok(Drawing { strokes: self.strokes, min: low, max: high })
     }
 }
 
@@ -197,15 +197,15 @@ mod tests {
                 (Some("right"), vec![[1.0, 2.0], [3.0, 4.0]]),
             ]
         );
-        assert_eq!((drawing.low, drawing.high), (DVec2::new(-10.0, 0.0), DVec2::new(10.0, 40.0)));
+        assert_eq!((drawing.min, drawing.max), (DVec2::new(-10.0, 0.0), DVec2::new(10.0, 40.0)));
     }
 
     #[test]
     fn without_a_view_box_the_size_or_the_strokes_say_what_was_drawn_on() {
         let drawing = decode_drawing("<svg width='30mm' height='20mm'><line x2='1'/></svg>").unwrap();
-        assert_eq!(drawing.high, DVec2::new(30.0, 20.0));
+        assert_eq!(drawing.max, DVec2::new(30.0, 20.0));
         let drawing = decode_drawing("<svg><path d='M1 2L5 4'/></svg>").unwrap();
-        assert_eq!((drawing.low, drawing.high), (DVec2::new(1.0, 2.0), DVec2::new(5.0, 4.0)));
+        assert_eq!((drawing.min, drawing.max), (DVec2::new(1.0, 2.0), DVec2::new(5.0, 4.0)));
     }
 
     #[test]
@@ -235,7 +235,7 @@ mod tests {
             assert_eq!(decode_drawing(text), Err(AssetProblem::NoStrokes { instead }), "{text}");
         }
         let shown = decode_drawing("<svg><use/><text>A</text></svg>").unwrap_err().to_string();
-        assert!(shown.starts_with("holds no strokes, only use, text (allowed: an SVG file with path"), "{shown}");
+        assert!(shown.starts_with("contains no strokes, only use, text (allowed: an SVG file with path"), "{shown}");
         for broken in ["", "<html/>", "<svg", "<svg><path d='M1'/></svg>", "<svg transform='x'/>", "</svg></svg>"] {
             assert!(matches!(decode_drawing(broken), Err(AssetProblem::Damaged(_))), "{broken}");
         }

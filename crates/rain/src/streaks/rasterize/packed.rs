@@ -52,7 +52,7 @@ pub(super) fn quantize_slope(value: f32) -> f32 {
 /// The nearest integer, modulo 2^16.
 #[inline(always)]
 fn round_to_u16(value: f32) -> u16 {
-    approximations::whole(value) as u16
+    approximations::round_to_i32(value) as u16
 }
 
 impl PackedStreak {

@@ -163,7 +163,7 @@ impl PinholeCamera {
             axes: [axis(0), axis(1), axis(2)],
             origin: camera.to_camera(origin).as_vec3().to_array(),
             focal_pixels: camera.focal_pixels as f32,
-            center: camera.centre.as_vec2().to_array(),
+            center: camera.principal_point.as_vec2().to_array(),
             near: camera.near as f32,
             since: since as f32,
         }

@@ -5,16 +5,18 @@ use bansho_base::{
     math::{DMat2, DVec2, DVec3},
     phenomenon::strip::View,
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::perspective::PerspectiveProjector;
-use crate::particles::render::splat::scratch_pool::PooledVec;
 use crate::particles::render::{
     gas::Gas,
     prepared::PARTICLES_PER_TASK,
-    splat::kernel::{LINE_PEAK, VARIANCE},
+    splat::{
+        kernel::{LINE_PEAK, VARIANCE},
+        scratch_pool::PooledVec,
+    },
 };
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// An ellipse in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 at its edge.
 #[derive(Clone, Copy, Debug)]
@@ -109,14 +111,14 @@ impl<'a> ParticleProjector<'a> {
         let motion = after.map_or(DVec2::ZERO, |after| across_seam(camera, after.pixel - first.pixel));
         let mut at = |projection: Projection| {
             if let Some(ellipse) = self.ellipse(gas, index, position, &projection, motion * self.shutter_fraction) {
-                let (depth, scale) = (projection.depth, projection.pixels_per_metre as f32);
+                let (depth, scale) = (projection.depth, projection.pixels_per_meter as f32);
                 each(ProjectedParticle { index, ellipse, depth, motion: motion.as_vec2().to_array(), scale });
             }
         };
         at(first);
         if camera.lens == Lens::Panorama {
             let turn = std::f64::consts::TAU * camera.focal_pixels;
-            let side = if first.pixel.x > camera.centre.x { -turn } else { turn };
+            let side = if first.pixel.x > camera.principal_point.x { -turn } else { turn };
             at(Projection { pixel: first.pixel + DVec2::new(side, 0.0), ..first });
         }
     }
@@ -185,7 +187,7 @@ fn outer(v: DVec2) -> DMat2 {
 /// Jacobian of the projection: pixels to the right and down per meter across the line of sight. A multiple of the identity for a
 /// perspective lens, by finite differences for others.
 fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> DMat2 {
-    let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_metre, -projection.pixels_per_metre));
+    let round = DMat2::from_diagonal(DVec2::new(projection.pixels_per_meter, -projection.pixels_per_meter));
     if camera.lens == Lens::Perspective {
         return round;
     }
@@ -197,7 +199,7 @@ fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> D
         Some(across_seam(camera, seen.pixel - projection.pixel) / step)
     };
     match (moved(one), moved(two)) {
-        (Some(one), Some(two)) => limit_anisotropy(DMat2::from_cols(one, two), projection.pixels_per_metre),
+        (Some(one), Some(two)) => limit_anisotropy(DMat2::from_cols(one, two), projection.pixels_per_meter),
         _ => round,
     }
 }
@@ -219,8 +221,10 @@ mod tests {
     };
 
     use super::*;
-    use crate::particles::render::splat::scratch_pool::ScratchPool;
-    use crate::particles::{Particle, Particles, render::gas::FadeOut};
+    use crate::particles::{
+        Particle, Particles,
+        render::{gas::FadeOut, splat::scratch_pool::ScratchPool},
+    };
 
     struct Everything;
 

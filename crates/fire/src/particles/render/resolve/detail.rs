@@ -10,8 +10,7 @@ use bansho_base::{
     noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
 };
 
-use crate::particles::parameters::LookParameters;
-use crate::particles::render::gas::Gas;
+use crate::particles::{parameters::LookParameters, render::gas::Gas};
 
 /// Standard deviation of the logistic distribution, pi / sqrt(3): its CDF is a sigmoid of slope 1.
 const LOGISTIC: f32 = 1.813_799_4;
@@ -181,7 +180,7 @@ impl Detail {
         let (mut cells, mut fractions) = ([[0; LANES]; 3], [[0.0; LANES]; 3]);
         for axis in 0..3 {
             for lane in 0..LANES {
-                let at = self.base[axis].advanced(self.shift[axis].mul_add(moment, positions[axis][lane]));
+                let at = self.base[axis].offset_by(self.shift[axis].mul_add(moment, positions[axis][lane]));
                 cells[axis][lane] = at.cell;
                 fractions[axis][lane] = at.fraction;
             }

@@ -2,9 +2,11 @@
 //!
 //! Coordinates are in cells of the whole picture, so that rounding does not depend on the window.
 
-use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
-use bansho_base::math::approximations;
 use std::ops::Range;
+
+use bansho_base::math::approximations;
+
+use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
 
 /// Cells per batch of weights: about one row of a sprite.
 pub(crate) const COLUMNS: usize = 8;
@@ -157,5 +159,5 @@ impl Chords {
 /// Truncated, and clamped to 0 ..= `max`.
 #[inline(always)]
 fn truncate_clamped(value: f32, max: i32) -> i32 {
-    approximations::whole(value.max(0.0).min(max as f32))
+    approximations::round_to_i32(value.max(0.0).min(max as f32))
 }

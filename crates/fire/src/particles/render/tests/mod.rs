@@ -44,7 +44,7 @@ fn view(camera: CameraParameters) -> View {
     View::new(camera, Shutter { open: 1.0, close: 1.0 }, 1.04, SIZE, 0)
 }
 
-/// A litre of gas at `position`.
+/// A liter of gas at `position`.
 fn ball(id: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
     Particle {
         id,
@@ -126,12 +126,12 @@ fn black(temperature: f32) -> f64 {
 #[test]
 fn a_ball_of_gas_shines_as_kirchhoffs_law_and_its_line_integral_say() {
     let view = view(camera());
-    let pixels_per_metre = view.camera.focal_pixels / DISTANCE;
+    let pixels_per_meter = view.camera.focal_pixels / DISTANCE;
     for soot in [1e-8, 2e-6, 3e-5] {
         let strip = drawn(&cloud([ball(0, [0.0; 3], 1800.0, soot)]), &smooth(), &view, 0, None);
         let absorption = soot_absorption(f64::from(soot), &smooth());
         for x in [80, 84, 88, 92, 96] {
-            let b = math::hypot(f64::from(x as u32) + 0.5 - 80.0, 0.5) / pixels_per_metre;
+            let b = math::hypot(f64::from(x as u32) + 0.5 - 80.0, 0.5) / pixels_per_meter;
             let depth = line_integral(b, 0.3) * 0.001 * absorption;
             let expected = black(1800.0) * -math::exp_m1(-depth);
             let got = luminance(&strip, x, 60);
@@ -351,7 +351,7 @@ fn the_plate_hides_what_is_behind_it() {
 
 #[test]
 fn aovs_measure_temperature_depth_and_motion() {
-    let view = View { measured: true, ..view(camera()) };
+    let view = View { aovs_requested: true, ..view(camera()) };
     let moving = Particle { velocity: [2.0, 1.0, 0.0], ..ball(0, [0.0; 3], 1640.0, 1e-7) };
     let strip = drawn(&cloud([moving]), &smooth(), &view, AOVS.len(), None);
     let at = |name: &str| aov(&strip, name, 80, 60);
@@ -387,7 +387,7 @@ fn temperature_is_weighted_by_light_and_stays_among_those_that_are_there() {
 
 #[test]
 fn deflection_is_written_as_light_is_bent() {
-    let view = View { measured: true, ..view(camera()) };
+    let view = View { aovs_requested: true, ..view(camera()) };
     let particles = glowing_cloud(200);
     let strip = drawn(&particles, &smooth(), &view, AOVS.len(), None);
     let angles = prepared(&particles, &smooth(), &view, |prepared| {

@@ -6,11 +6,11 @@
 use std::sync::OnceLock;
 
 use bansho_base::{
-    host::once::get_or_make,
+    host::once::get_or_compute,
     math::{
         DVec3, Vec3,
         random::{Key, Purpose},
-        simd::{Lanes, Real, fetch, wrap_split},
+        simd::{Lanes, Real, gather, wrap_split},
     },
     noise::{Coordinate, Fractal, Noise},
 };
@@ -48,7 +48,7 @@ impl TurbulenceTile {
 
     /// The tile, computed when a step first needs it: a flame that is only checked does without.
     fn tile(&self) -> &[[f32; 4]] {
-        get_or_make(&self.tile, || tile(self.key)).as_slice()
+        get_or_compute(&self.tile, || tile(self.key)).as_slice()
     }
 
     /// Noise of mean 0 and standard deviation 1 that varies over a unit of `position`.
@@ -130,7 +130,7 @@ impl<S: Simd> Row<'_, S> {
     #[inline(always)]
     fn at(&self, simd: S, y: u32x16<S>, z: u32x16<S>) -> [Lanes<S>; 4] {
         let start = ((z << SIDE.ilog2()) + y) << SIDE.ilog2();
-        lerp4(&fetch(simd, self.tile, start + self.x[0]), &fetch(simd, self.tile, start + self.x[1]), self.across)
+        lerp4(&gather(simd, self.tile, start + self.x[0]), &gather(simd, self.tile, start + self.x[1]), self.across)
     }
 }
 

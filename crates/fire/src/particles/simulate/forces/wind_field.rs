@@ -1,14 +1,15 @@
 //! The scene's wind sampled on a coarse grid around the gas: gusts are larger than flames.
 
-use crate::particles::simulate::forces::turbulence::lerp4;
 use bansho_base::{
     math::{
         DVec3, Vec3,
-        simd::{Lanes, Real, fetch, wrap_split},
+        simd::{Lanes, Real, gather, wrap_split},
     },
     world::wind::Wind,
 };
 use fearless_simd::{Simd, prelude::*};
+
+use crate::particles::simulate::forces::turbulence::lerp4;
 
 /// Grid points along each side of the box around the gas.
 const POINTS: usize = 4;
@@ -62,7 +63,7 @@ impl WindField {
         let starts = [first, first + next_y, first + next_z, first + (next_y + next_z)];
         let mut rows = [[splat(0.0); 4]; 4];
         for k in 0..4 {
-            let [here, next] = [fetch(simd, &self.velocity, starts[k]), fetch(simd, &self.velocity, starts[k] + 1)];
+            let [here, next] = [gather(simd, &self.velocity, starts[k]), gather(simd, &self.velocity, starts[k] + 1)];
             rows[k] = lerp4(&here, &next, across);
         }
         let (near, far) = (lerp4(&rows[0], &rows[1], up), lerp4(&rows[2], &rows[3], up));
@@ -73,8 +74,9 @@ impl WindField {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bansho_base::{parameters::animated::Animated, world::wind::WindParameters};
+
+    use super::*;
 
     #[test]
     fn it_is_the_wind_itself_within_a_few_percent() {

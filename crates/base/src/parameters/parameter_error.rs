@@ -3,16 +3,16 @@
 /// A parameter, or a pair of them, from which no phenomenon can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: {kind}")]
-pub struct ParameterFault {
+pub struct ParameterError {
     /// The parameter, sub-tables separated by dots, as in `shape.fringe_width`.
     pub key: &'static str,
     /// What is wrong.
-    pub kind: FaultKind,
+    pub kind: ParameterErrorKind,
 }
 
 /// What can be wrong with parameters that are each within their own bounds.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum FaultKind {
+pub enum ParameterErrorKind {
     /// A curve that must begin at the origin begins elsewhere.
     #[error("must be 0 at x = 0, but is {value}")]
     NotZeroAtOrigin {

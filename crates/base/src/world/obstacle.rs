@@ -1,18 +1,18 @@
-//! What a scene says of its obstacles.
+//! Parameters of an obstacle, and the solid that they describe.
 
 use std::sync::Arc;
 
-use bansho_base::{
-    geometry::{distance_field::DistanceField, transform::Placement},
-    host::assets::Assets,
-    math::DVec3,
+use glam::DVec3;
+
+use super::occluder::Occluder;
+use crate::{
+    geometry::{distance_field::DistanceField, transform::Transform},
+    host::{assets::Assets, constructions},
     parameters::{AssetPath, ProblemKind, Range},
-    phenomenon::surroundings::Occluder,
+    phenomenon::kind::BuildError,
 };
 
-use bansho_base::{host::constructions, phenomenon::kind::BuildError};
-
-bansho_base::choice! {
+crate::choice! {
     /// Shape of an obstacle.
     pub enum ObstacleShape {
         /// A ball with its middle at `position`.
@@ -26,7 +26,7 @@ bansho_base::choice! {
     }
 }
 
-bansho_base::parameters! {
+crate::parameters! {
     /// Something solid that gas flows around and drops fall on. It is not drawn: it stands for what the plate shows.
     pub struct ObstacleParameters {
         /// Its shape.
@@ -53,15 +53,17 @@ impl ObstacleParameters {
     /// A mesh without a file, or a file without a mesh.
     pub fn build(&self, assets: &dyn Assets) -> Result<Occluder, BuildError> {
         constructions::count("obstacle");
-        let placement = Placement::new(self.position, self.rotation_deg, self.scale);
+        let placement = Transform::new(self.position, self.rotation_deg, self.scale);
         Ok(match self.shape {
-            ObstacleShape::Sphere => Occluder::Sphere { centre: placement.position, radius: self.radius },
+            ObstacleShape::Sphere => Occluder::Sphere { center: placement.position, radius: self.radius },
             ObstacleShape::Box => Occluder::Cuboid {
-                centre: placement.position,
+                center: placement.position,
                 half_extents: 0.5 * DVec3::from(self.size),
                 rotation: placement.rotation,
             },
-            ObstacleShape::Plane => Occluder::HalfSpace { point: placement.position, normal: placement.turn(DVec3::Y) },
+            ObstacleShape::Plane => {
+                Occluder::HalfSpace { point: placement.position, normal: placement.transform_direction(DVec3::Y) }
+            }
             ObstacleShape::Mesh => {
                 let fault = |kind| BuildError { key: "file".into(), kind };
                 let missing = || ProblemKind::Conflict("an obstacle of shape \"mesh\" needs a `file`".into());

@@ -4,9 +4,9 @@ use std::{error::Error, fmt, sync::Arc};
 
 /// A model's own error of any type. Two are equal where they say the same.
 #[derive(Clone, Debug)]
-pub struct ModelFault(Arc<dyn Error + Send + Sync>);
+pub struct ModelError(Arc<dyn Error + Send + Sync>);
 
-impl ModelFault {
+impl ModelError {
     /// Keeps `error`.
     pub fn new(error: impl Error + Send + Sync + 'static) -> Self {
         Self(Arc::new(error))
@@ -18,19 +18,19 @@ impl ModelFault {
     }
 }
 
-impl PartialEq for ModelFault {
+impl PartialEq for ModelError {
     fn eq(&self, other: &Self) -> bool {
         self.to_string() == other.to_string()
     }
 }
 
-impl fmt::Display for ModelFault {
+impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
     }
 }
 
-impl Error for ModelFault {
+impl Error for ModelError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         self.0.source()
     }
@@ -43,10 +43,10 @@ mod tests {
 
     #[test]
     fn a_fault_stays_what_it_is() {
-        let fault = ModelFault::new(CurveError::Empty);
+        let fault = ModelError::new(CurveError::Empty);
         assert_eq!(fault.to_string(), CurveError::Empty.to_string());
         assert_eq!(fault.downcast::<CurveError>(), Some(&CurveError::Empty));
         assert!(fault.downcast::<fmt::Error>().is_none());
-        assert_eq!((fault == ModelFault::new(CurveError::Empty), fault == ModelFault::new(fmt::Error)), (true, false));
+        assert_eq!((fault == ModelError::new(CurveError::Empty), fault == ModelError::new(fmt::Error)), (true, false));
     }
 }
