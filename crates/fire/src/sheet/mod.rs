@@ -10,23 +10,27 @@
 //! - K. Perlin, "An image synthesizer" (1985) and "Improving noise" (2002): the gradient noise of the default texture.
 //!
 //! # Equations
-//! | step | equation | function |
+//! | equation | what it says | function |
 //! |---|---|---|
-//! | texture and scroll | `T0 = T(u, w - s (t - t0))` (1), (2) | `Clock::scroll`, `Texture::sample` |
-//! | threshold | `L = 1 - (1 - V(w)) (1 - H(u))` (4) | [`equations::threshold`] |
-//! | cut | `T1 = max(0, T0 - L)` (5) | [`equations::above_threshold`] |
-//! | sharpen | `T2 = C(T1)` (6) | `ColorRamp` |
-//! | color | `(r, g, b) = (R, G, B)(T2)` (7) | `ColorRamp` |
-//! | rise | `w_p = (1 - k) sqrt(y) + k y` (9) | [`equations::rise`] |
-//! | distance from the axis | `x' = 2 abs(x - 1/2)` (10), (13), (17) | [`equations::axis_distance`] |
-//! | speed profile | `K = h + (1 - h) F((x' - A) / D)` (11) | [`equations::fringe_position`], [`equations::speed_profile`] |
-//! | slowed rise | `w = w_p / K` (12) | [`equations::slowed_rise`] |
-//! | fluttering edge | `E = A(w) + D(w) P(w - s (t - t0))` (15) | [`equations::fluttering_edge`] |
-//! | across | `u' = x' / E` (16) | [`equations::across`] |
-//! | texture coordinate | `u = (1 +- u') / 2` (14), (18) | [`equations::texture_u`] |
-//! | the paper's texture | sum of products of cosines (20) | [`paper_texture`], [`PaperTexture`] |
+//! | (1) | `(p, q) = (u, w - s (t - t0))`: the texture scrolls upward | `animate::clock::Clock::scroll` |
+//! | (2) | `T0 = T(u, w - s (t - t0))`, in [0, 1]: value of the texture | `texture::Texture::sample` |
+//! | (4) | `L = 1 - (1 - V(w)) (1 - H(u))`: threshold | [`equations::threshold`] |
+//! | (5) | `T1 = max(0, T0 - L)`: cut at the threshold | [`equations::above_threshold`] |
+//! | (6) | `T2 = C(T1)`: sharpen | `render::color_ramp::ColorRamp::new` |
+//! | (7) | `(r, g, b) = (R, G, B)(T2)`: color | `render::color_ramp::unscaled_color` |
+//! | (9) | `w_p = (1 - k) sqrt(y) + k y`: rise | [`equations::rise`] |
+//! | (10) | `x' = 2 abs(x - 1/2)`: distance from the axis | [`equations::axis_distance`] |
+//! | (11) | `K = h + (1 - h) F((x' - A) / D)`: speed profile | [`equations::fringe_position`], [`equations::speed_profile`] |
+//! | (12) | `w = w_p / K`: slowed rise | [`equations::slowed_rise`] |
+//! | (13) | `x' = 2 x - 1`: (10), right of the axis | [`equations::axis_distance`] |
+//! | (14) | `u = (1 + u') / 2`: right of the axis | [`equations::texture_u`] |
+//! | (15) | `E = A(w) + D(w) P(w - s (t - t0))`: fluttering edge | [`equations::fluttering_edge`] |
+//! | (16) | `u' = x' / E` for `x' < E`: across the flame | [`equations::across`] |
+//! | (17) | `x' = 1 - 2 x`: (10), left of the axis | [`equations::axis_distance`] |
+//! | (18) | `u = (1 - u') / 2`: left of the axis | [`equations::texture_u`] |
+//! | (20) | sum of products of cosines: the texture of the paper | [`paper_texture`], [`PaperTexture`] |
 //!
-//! (8) and (19) do not exist in the paper.
+//! (3) are bounds that follow from (1). (8) and (19) do not exist in the paper.
 //!
 //! # Data flow
 //! 1. `parameters` holds the scene's values; [`FlameSheet::new`] checks them and makes one `FlameInstance` per entry of `instances`.
