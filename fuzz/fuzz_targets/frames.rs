@@ -1,7 +1,7 @@
 //! Frame specifications: any text is refused or names frames in ascending order, each once.
 #![no_main]
 
-use bansho_render::frames::{MOST_FRAMES, parse};
+use bansho::job::frames::{MOST_FRAMES, parse};
 
 libfuzzer_sys::fuzz_target!(|spec: &str| {
     // Millions of frames are allowed, but under a sanitizer they take so long that nothing else is tried.

@@ -12,30 +12,40 @@
 //! - A. Vallance Jones (1974), *Aurora*; M. H. Rees (1989), *Physics and Chemistry of the Upper Atmosphere*: yields and line ratios.
 //! - F. Kasten and A. T. Young (1989): air mass for the extinction in the lower atmosphere.
 //!
-//! # Equations of the thesis
+//! # Equations
 //!
-//! | equation | meaning | function |
+//! | equation | what it says | function |
 //! |---|---|---|
 //! | (2.1) | control points of a stroke | `shapes::geometry::polyline::resample_by_index` |
 //! | (2.2) | charge density | `simulate::field::sheet_field::FieldBuilder::charge_density` |
-//! | (2.3) to (2.5) | Poisson's equation | [`PoissonSolver::solve`](simulate::field::PoissonSolver::solve) |
+//! | (2.3) | Poisson's equation | [`PoissonSolver::solve`](simulate::field::PoissonSolver::solve) |
+//! | (2.4), (2.5) | second derivatives by central differences | [`PoissonSolver::solve`](simulate::field::PoissonSolver::solve) |
 //! | (2.6) | Gauss-Seidel iteration | [`gauss_seidel_sweep`](simulate::field::gauss_seidel_sweep) |
-//! | (2.7) to (2.9) | electric field by central differences | [`Grid2::gradient`](simulate::field::Grid2::gradient), `FieldBuilder::sample_table` |
+//! | (2.7) | electric field, the negative gradient of the potential | `simulate::field::sheet_field::FieldBuilder::sample_table` |
+//! | (2.8), (2.9) | its components by central differences | [`Grid2::gradient`](simulate::field::Grid2::gradient) |
 //! | (2.10) | Lorentz force | `simulate::forces::Integrator::integrate` |
-//! | (2.11), (2.12), (2.17) | SPH density | `simulate::forces::Repulsion::compute_accelerations`, by [`bansho_sph::compute_densities`] |
+//! | (2.11) | density of particles | [`bansho_sph::compute_densities`] |
+//! | (2.12) | poly6 kernel | [`bansho_sph::Poly6`] |
 //! | (2.13) | pressure | [`bansho_sph::StateEquation::pressure`] |
-//! | (2.14) to (2.16), (2.18) | pressure force | [`bansho_sph::PressureForce`] |
-//! | (2.19), (2.20) | time integration | `simulate::forces::Integrator::integrate` |
-//! | 2.3.4, table 3.3 | births and deaths | `simulate::relocation::Relocation::relocate` |
-//! | (2.21), (2.24) | deflection by collisions | `physics::precipitation::electron_track::TrackState::advance`, `lateral_spread` |
-//! | (2.22) | collision probability | [`HardSphereAtmosphere`](physics::precipitation::HardSphereAtmosphere) |
-//! | (2.25), (2.26) | quenching by collisions, thermal speed | [`hard_sphere_quenching`](physics::emission::collisions::hard_sphere_quenching), [`thermal_speed`](physics::emission::collisions::thermal_speed) |
-//! | (2.27) | attenuation; here the extinction of the lower atmosphere | [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
-//! | (2.28) | Gaussian blur in the picture | `single_collisions::blur::BlurredImage` |
-//! | (2.29) | spectral lines to XYZ | [`Emitter::color_per_kilorayleigh`](physics::emission::Emitter::color_per_kilorayleigh) |
-//! | (2.30) | XYZ to RGB | [`bansho_base::color`] |
-//!
-//! Equations (1) to (5) of Fang et al. are [`physics::precipitation::fang2010`].
+//! | (2.14) | repulsion: pressure force | [`bansho_sph::PressureForce::compute_accelerations`] |
+//! | (2.15), (2.16) | spiky kernel and its gradient | [`bansho_sph::Spiky`] |
+//! | (2.17), (2.18) | cubic spline kernel and its gradient | [`bansho_sph::CubicSpline`] |
+//! | (2.19), (2.20) | position and velocity after a step | `simulate::forces::Integrator::integrate` |
+//! | (2.21) | step of an electron along B and a deflection, replaced by steps from collision to collision | `physics::precipitation::electron_track::TrackState::advance`, `physics::precipitation::lateral_spread::lateral_spread_km` |
+//! | (2.22) | probability of a collision | [`HardSphereAtmosphere::track`](physics::precipitation::HardSphereAtmosphere::track) |
+//! | (2.23) | step in the picture, replaced by the projection of every collision | `render::project::altitude_polynomial::RowPolynomials::points` |
+//! | (2.24) | next position, deflected by a collision | `physics::precipitation::electron_track::TrackState::advance` |
+//! | (2.25) | probability of quenching | [`hard_sphere_quenching`](physics::emission::collisions::hard_sphere_quenching), [`radiated_fraction`](physics::emission::quenching::radiated_fraction) |
+//! | (2.26) | mean thermal speed | [`thermal_speed`](physics::emission::collisions::thermal_speed) |
+//! | (2.27) | attenuation by distance, replaced by the extinction of the lower atmosphere | [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
+//! | (2.28) | Gaussian blur in the picture | `single_collisions::blur::BlurKernel::new`, `single_collisions::blur::BlurredImage::new` |
+//! | (2.29) | XYZ of spectral lines | `physics::emission::emitter::absolute_xyz` |
+//! | (2.30) | XYZ to RGB, here ACEScg | [`ACESCG_FROM_XYZ`](bansho_base::color::space::ACESCG_FROM_XYZ) |
+//! | section 2.2.2 | in-between shapes by cubic splines | [`Sequence::at`](shapes::Sequence::at) |
+//! | section 2.3.3 | limit of the speed by conservation of energy | `simulate::forces::Integrator::energy_limit_factor` |
+//! | section 2.3.4, table 3.3 | births and deaths of particles | `simulate::relocation::Relocation::relocate` |
+//! | section 2.4.2 | species by number density, line by production rate | [`mean_hard_sphere_photons`](physics::emission::collisions::mean_hard_sphere_photons) |
+//! | Fang et al. (1) to (5) | ionization by altitude and energy | [`MonoenergeticBeam::ionization`](physics::precipitation::fang2010::MonoenergeticBeam::ionization) |
 //!
 //! # Data flow
 //!
@@ -50,16 +60,18 @@
 //! 8. integrates the emission along each line of sight (`integrate`), or rasterizes single collisions instead ([`single_collisions`]),
 //! 9. applies the extinction and converts to color (`shade`); pixels of any lens sample the chart (`prepared`).
 
+pub(crate) mod model;
 mod parameters;
-pub(crate) mod phenomenon;
+mod phenomenon;
 pub mod physics;
 pub mod render;
 pub mod shapes;
 pub mod simulate;
 pub mod single_collisions;
 
+pub use model::Aurora;
 pub use parameters::{
     AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, ParticleParameters,
     PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
 };
-pub use render::{Aurora, Blur, BlurParameters, DrawingParameters, Sampling, TrackModel};
+pub use render::{Blur, BlurParameters, DrawingParameters, Sampling, TrackModel};

@@ -1,16 +1,23 @@
 //! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
-use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
-use crate::physics::atmosphere::atmosphere;
-use crate::physics::emission::Emission;
-use crate::physics::extinction::Extinction;
-use crate::physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV};
-use crate::physics::precipitation::spectrum::ARC;
-use crate::physics::precipitation::{Spectrum, TrackModel};
-use bansho_base::host::once::get_or_compute;
-use bansho_base::parameters::animated::Animated;
-use bansho_base::parameters::{Auto, Length, Range};
 use std::sync::OnceLock;
+
+use bansho_base::{
+    host::once::get_or_compute,
+    parameters::{Auto, Length, Range, animated::Animated},
+};
+
+use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
+use crate::physics::{
+    atmosphere::atmosphere,
+    emission::Emission,
+    extinction::Extinction,
+    precipitation::{
+        Spectrum, TrackModel,
+        energy_grid::{HIGHEST_EV, LOWEST_EV},
+        spectrum::ARC,
+    },
+};
 
 /// Range of a fraction.
 const FRACTION: Range = Range::new(0.0, 1.0);
@@ -65,7 +72,7 @@ bansho_base::choice! {
         /// Cubic spline, eqs. (2.17) and (2.18): lets particles come close to each other, so that their own pattern stays.
         Spline = "spline",
         /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): parts close particles, and evens their pattern out. As
-        /// light is drawn, spread as far as neighbours are, both look nearly alike.
+        /// light is drawn, spread as far as neighbors are, both look nearly alike.
         Poly6Spiky = "poly6_spiky",
     }
 }
@@ -131,7 +138,7 @@ bansho_base::parameters! {
         repulsion: f64 = 1.0, limits(Range::new(0.0, 20.0));
         /// Kernels of the repulsion.
         kernel: RepulsionKernel = RepulsionKernel::Spline;
-        /// How many neighbours a particle has on average, which sets the support radius h.
+        /// How many neighbors a particle has on average, which sets the support radius h.
         neighbours: f64 = 35.0, limits(Range::new(6.0, 200.0));
         /// How fast motion through the field dies down; the thesis has none.
         friction_per_s: f64 = 6.0, limits(Range::new(0.0, 30.0)), unit("1/s");
@@ -320,7 +327,7 @@ bansho_base::parameters! {
         blur: Blur = Blur::Kilometers;
         /// Radii of the blur in pixels.
         blur_radii: BlurParameters = BlurParameters::default();
-        /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbours are, and rays stay sharp.
+        /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbors are, and rays stay sharp.
         spread_km: Auto<f64> = Auto::Auto, limits(Range::new(0.005, 100.0)), unit("km");
         /// How far a collision turns an electron from the field: rms tangent of the angle, the vector omega of (2.21) and (2.24).
         wobble: f64 = 0.002, limits(Range::new(0.0, MAX_WOBBLE));

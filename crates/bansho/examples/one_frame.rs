@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let DisplayPixels::Eight(pixels) = &shown.pixels else { return Ok(()) };
     let mut text = String::new();
     for row in pixels.chunks(shown.width) {
-        // Straight colour times alpha is the light; alpha alone is near enough for letters.
+        // Straight color times alpha is the light; alpha alone is near enough for letters.
         text.extend(row.iter().map(|pixel| char::from(b" .:-=+*#%@"[usize::from(pixel[3]) * 9 / 255])));
         text.push('\n');
     }

@@ -5,14 +5,12 @@ use std::fmt::Write;
 use bansho_base::{
     camera::CameraParameters,
     parameters::{Parameters, Table, Value},
-    world::{air::Air, sky::SkyParameters, wind::WindParameters},
+    phenomenon::kind::Describe,
+    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
-use bansho_scene::{
-    FORMAT, LightParameters, ObstacleParameters, PictureParameters, PlateParameters, Scene, SceneError,
-};
+use bansho_scene::{FORMAT, LightParameters, PictureParameters, PlateParameters, Scene, SceneError};
 
-use crate::KINDS;
-use bansho_base::phenomenon::kind::Describe;
+use crate::parse_scene;
 use bansho_environment::ground::GroundParameters;
 
 /// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
@@ -102,7 +100,7 @@ impl SceneBuilder {
     /// # Errors
     /// What a scene file would be refused for; lines are those of [`to_toml`](Self::to_toml).
     pub fn build(&self) -> Result<Scene, SceneError> {
-        Scene::parse("scene", &self.text, KINDS)
+        parse_scene("scene", &self.text)
     }
 
     fn table(mut self, header: &str, name: Option<&str>, table: Table) -> Self {

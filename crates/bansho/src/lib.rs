@@ -19,6 +19,9 @@
 //!
 //! With the feature `files` (on by default) there is also `job`: from a scene file to pictures on disk, as the program
 //! `bansho render` does it.
+//!
+//! The features `fire`, `rain` and `aurora` (all on by default) bring the kinds of phenomena. A scene that names a kind whose
+//! feature is disabled is refused with an error that says which feature to enable.
 
 use std::sync::Arc;
 
@@ -27,15 +30,19 @@ mod build;
 pub mod job;
 mod kinds;
 
+#[cfg(feature = "aurora")]
 pub use bansho_aurora as aurora;
 pub use bansho_base as base;
 pub use bansho_environment as environment;
+#[cfg(feature = "fire")]
 pub use bansho_fire as fire;
 #[cfg(feature = "files")]
 pub use bansho_media as media;
+#[cfg(feature = "rain")]
 pub use bansho_rain as rain;
 pub use bansho_render as render;
 pub use bansho_scene as scene;
+#[cfg(any(feature = "aurora", feature = "fire"))]
 pub use bansho_sph as sph;
 
 pub use bansho_base::{
@@ -52,16 +59,7 @@ pub use bansho_render::{
 };
 pub use bansho_scene::{LoopError, Scene, SceneError, SceneOptions};
 pub use build::SceneBuilder;
-pub use kinds::KINDS;
-
-/// Reads and checks a scene of every kind of phenomenon this version knows; `file` is what errors call it. [`CompiledScene::build`] then reads
-/// what it names and builds what it shows.
-///
-/// # Errors
-/// Every fault of the text, with its place, what is wrong and what is allowed.
-pub fn parse_scene(file: &str, text: &str) -> Result<Scene, SceneError> {
-    Scene::parse(file, text, KINDS)
-}
+pub use kinds::{KINDS, parse_scene};
 
 /// Reads a scene and builds all that it shows.
 ///

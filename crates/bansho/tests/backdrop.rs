@@ -22,7 +22,7 @@ fn still_water_shows_a_lamp_as_far_below_the_horizon_as_it_stands_above() {
         let total = lit(&frame, rows.clone());
         rows.map(|y| y as f64 * lit(&frame, y..y + 1)).sum::<f64>() / total
     };
-    // The lamp stands 1 m above the camera, its image 3 m below it, both 4 m away; a metre there is 77.9 / 4 pixels.
+    // The lamp stands 1 m above the camera, its image 3 m below it, both 4 m away; a meter there is 77.9 / 4 pixels.
     let metre = 45.0 / bansho_base::math::tan(std::f64::consts::PI / 6.0) / 4.0;
     assert!((44.5 - centre(0..45) - metre).abs() < 0.3, "{}", centre(0..45));
     assert!(lit(&frame, 0..45) > 0.0);

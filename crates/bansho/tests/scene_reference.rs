@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use bansho::KINDS;
-use bansho_base::phenomenon::kind::BuildContext;
 use bansho_base::{
     host::assets::MemoryAssets,
     parameters::{Descriptor, Kind, ProblemKind, TableDescriptor, Value},
+    phenomenon::kind::BuildContext,
 };
 use bansho_scene::{FORMAT, SHARED_TABLES, Scene};
 

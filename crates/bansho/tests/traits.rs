@@ -140,7 +140,7 @@ fn a_moving_lamp_leaves_a_streak_of_the_same_light_around_the_middle_of_the_expo
     };
     let (still_light, _) = moments(&render(&text(0.0), &PlanOptions::default(), 6));
     let (light, centre) = moments(&render(&text(2.0), &PlanOptions::default(), 6));
-    // Half a frame open from t = 0.25 s: the middle is at 0.25 + 1/96 s, 45 pixels a metre.
+    // Half a frame open from t = 0.25 s: the middle is at 0.25 + 1/96 s, 45 pixels a meter.
     let expected = 60.0 + 45.0 * (-0.5 + 2.0 * (0.25 + 1.0 / 96.0));
     assert!((light / still_light - 1.0).abs() < 0.05, "{light} {still_light}");
     assert!((centre - expected).abs() < 0.5, "{centre} {expected}");
@@ -265,7 +265,7 @@ fn bent_light_displaces_the_plate_around_the_lamp_and_nowhere_else() {
     }
     for (index, (a, b)) in straight.beauty.pixels().iter().zip(bent.beauty.pixels()).enumerate() {
         let (dx, dy) = ((index % 120) as f64 + 0.5 - 60.0, (index / 120) as f64 + 0.5 - 45.0);
-        // The field reaches two radii: 2 * 0.2 m * 22.5 pixels a metre.
+        // The field reaches two radii: 2 * 0.2 m * 22.5 pixels a meter.
         assert!(a == b || math::hypot(dx, dy) < 9.5, "pixel {index} moved");
     }
 }
@@ -337,7 +337,7 @@ fn work_stops_when_the_observer_asks() {
     assert_eq!(draw(&mut shot, 4), draw(&mut fresh, 4), "a stopped shot goes on");
 }
 
-/// Centre of the light, pixels.
+/// Center of the light, pixels.
 fn brightest(frame: &Frame) -> [f64; 2] {
     let (mut sum, mut place) = (0.0, [0.0; 2]);
     for y in 0..frame.beauty.height() {

@@ -137,7 +137,7 @@ pub enum MediaError {
         /// Frames that were announced.
         expected: usize,
     },
-    /// A film that an earlier error has already spoilt.
+    /// A film that an earlier error has already spoiled.
     #[error("{path}: not written, because an earlier frame failed", path = .path.display())]
     AlreadyFailed {
         /// The film.

@@ -14,24 +14,25 @@
 //!
 //! # Equations
 //!
-//! | equation | function |
-//! | --- | --- |
-//! | (1) drop size distribution `n = 8000 exp(-4.1 R^-0.21 D)` | [`DropSizeDistribution::marshall_palmer`](drops::size_distribution::DropSizeDistribution::marshall_palmer) |
-//! | number of drops of a bin, integral of `n dD` | [`SizeBin::count`](drops::size_distribution::SizeBin::count), [`stratified_count`](drops::size_distribution::stratified_count) |
-//! | (2) terminal velocity `v = sqrt(4 g D (rho_p - rho_f) / (3 rho_f C))` | [`fixed_point_velocity`](drops::terminal_velocity::fixed_point_velocity) |
-//! | (3) drag coefficient C of a sphere | [`drag_coefficient`](drops::terminal_velocity::drag_coefficient) |
-//! | (4) Reynolds number `Re = v rho_f D / mu` | [`reynolds_number`](drops::terminal_velocity::reynolds_number) |
-//! | measured terminal velocity | [`measured_velocity`](drops::terminal_velocity::measured_velocity) |
-//! | streak opacity (the paper's `2D/v`) `alpha = 2 sqrt(r^2 - b^2) / (v T)` | [`Streak::profile`](streaks::coverage::Streak::profile), [`Streak::opacity`](streaks::coverage::Streak::opacity) |
-//! | blocked area `pi D^2 / 4` | [`Streak::blocked_area`](streaks::coverage::Streak::blocked_area) |
-//! | streak texture T(R, D) | [`StreakCube::draw`](billboards::texture::StreakCube::draw) |
-//! | extinction `beta = Q (pi/4) integral of n D^2 dD` | [`extinction`](lighting::extinction::extinction()) |
-//! | meteorological visibility `3.912 / beta` | [`visibility`](lighting::extinction::visibility) |
-//! | phase function p of a drop | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
-//! | sky light through a drop, integral of `p L` | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
-//! | radiance of a drop under a lamp, `E p / (4 pi)` | `DropLighting::radiance` |
-//! | single scattering `integral of beta E p / (4 pi) e^-tau ds` | `InScatterIntegrator::segment` |
-//! | gust displacement `integral of g(s) (1 - s / memory) ds` | `gust::displacement` |
+//! | equation | what it says | function |
+//! |---|---|---|
+//! | (1) | `n = 8000 exp(-4.1 R^-0.21 D)`: drop size distribution | [`DropSizeDistribution::marshall_palmer`](drops::size_distribution::DropSizeDistribution::marshall_palmer) |
+//! | (2) | `v = sqrt(4 g D (rho_p - rho_f) / (3 rho_f C))`: terminal velocity | [`fixed_point_velocity`](drops::terminal_velocity::fixed_point_velocity) |
+//! | (3) | `C = 24 / Re`, or `(0.55 + 4.8 / sqrt(Re))^2` from `Re = 1`: drag coefficient of a sphere | [`drag_coefficient`](drops::terminal_velocity::drag_coefficient) |
+//! | (4) | `Re = v rho_f D / mu`: Reynolds number | [`reynolds_number`](drops::terminal_velocity::reynolds_number) |
+//! | section 4, opacity | `2 D / v`: opacity of a streak, replaced by `2 sqrt(r^2 - b^2) / (v T)` | [`Streak::profile`](streaks::coverage::Streak::profile), [`Streak::opacity`](streaks::coverage::Streak::opacity) |
+//! | section 4, textures | streak texture T(R, D) | [`StreakCube::draw`](billboards::texture::StreakCube::draw) |
+//! | section 5.1 | a billboard turns about the vertical to face the camera | `billboards::Billboards::billboard` |
+//! | section 5.2 | light of a lamp falls with the square of its distance; radiance of a drop `E p / (4 pi)` | `lighting::drop_lighting::DropLighting::radiance` |
+//! | drops of a bin | integral of `n dD` over the bin; the fractional part is a probability | [`SizeBin::count`](drops::size_distribution::SizeBin::count), [`stratified_count`](drops::size_distribution::stratified_count) |
+//! | measured velocity | Gunn and Kinzer (1949) | [`measured_velocity`](drops::terminal_velocity::measured_velocity) |
+//! | blocked area | `pi D^2 / 4`: integral of the opacity of a streak over its area | [`Streak::blocked_area`](streaks::coverage::Streak::blocked_area) |
+//! | extinction | `beta = Q (pi/4) integral of n D^2 dD` | [`extinction`](lighting::extinction::extinction()) |
+//! | visibility | `3.912 / beta` | [`visibility`](lighting::extinction::visibility) |
+//! | phase function | p: light that a drop scatters by angle | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
+//! | sky light through a drop | integral of `p L` over the sky | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
+//! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::single_scattering::InScatterIntegrator::segment` |
+//! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::displacement` |
 //!
 //! # Data flow
 //! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins with terminal velocities.
@@ -48,14 +49,15 @@ pub mod billboards;
 pub mod drops;
 pub(crate) mod lanes;
 pub mod lighting;
+mod model;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;
 pub(crate) mod shutter_cameras;
 pub mod streaks;
 
+pub use model::Rain;
 pub use parameters::{Method, RainParameters, SplashParameters};
-pub use phenomenon::Rain;
 
 #[cfg(test)]
 mod tests;

@@ -10,7 +10,7 @@ const PAPER_DIAMETERS_MM: [f64; 6] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0];
 bansho_base::choice! {
     /// How near rain is drawn.
     pub enum Method {
-        /// Textures of all drops of one diameter in a cubic metre, on upright billboards (Yoshida, Dobashi & Yamamoto).
+        /// Textures of all drops of one diameter in a cubic meter, on upright billboards (Yoshida, Dobashi & Yamamoto).
         Billboards = "billboards",
         /// Every drop by itself: the reference, slower the more it rains.
         Drops = "drops",

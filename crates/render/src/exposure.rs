@@ -12,7 +12,7 @@ use bansho_environment::ground::GroundParameters;
 use bansho_scene::{LightParameters, Scene};
 
 /// How many times display white the bright parts of a phenomenon are with an automatic exposure: enough for a core
-/// that nears white while its edges keep their colour.
+/// that nears white while its edges keep their color.
 const HEADROOM: f64 = 1.7;
 /// How bright beside display white what lamps light is at most, but for its brightest parts: a lit street at night is not white.
 const LIT_SHARE: f64 = 0.3;

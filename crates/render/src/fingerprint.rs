@@ -4,12 +4,13 @@ use bansho_base::{
     color::AlphaConvention,
     host::assets::Assets,
     parameters::{Parameters, Table, Value},
+    world::obstacle::ObstacleParameters,
     world::sky::SkyParameters,
 };
 use bansho_environment::ground::GroundParameters;
 
 use crate::{compiled::CompiledScene, display::BitDepth, plan::Plan};
-use bansho_scene::{Instance, LightParameters, ObstacleParameters, Scene};
+use bansho_scene::{Instance, LightParameters, Scene};
 
 /// A hash of everything that something depends on.
 pub type Fingerprint = [u8; 32];

@@ -8,7 +8,6 @@ pub mod display;
 mod exposure;
 mod faint;
 pub mod fingerprint;
-pub mod frames;
 mod loop_start;
 pub mod plan;
 pub mod remarks;

@@ -1,12 +1,11 @@
-//! What a scene must fulfil beyond the ranges of single parameters.
+//! What a scene must fulfill beyond the ranges of single parameters.
 
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},
     math,
     parameters::{Auto, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
+    phenomenon::kind::{BuildError, PhenomenonKind},
 };
-
-use bansho_base::phenomenon::kind::{BuildError, PhenomenonKind};
 
 use super::{FORMAT, Place, SHARED_TABLES, Scene, tables::picture::LightKind};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};

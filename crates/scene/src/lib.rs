@@ -17,7 +17,7 @@ use bansho_base::{
         animated::Animated,
     },
     phenomenon::kind::{CheckedParameters, PhenomenonKind},
-    world::{air::Air, sky::SkyParameters, wind::WindParameters},
+    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
 
 use bansho_environment::ground::GroundParameters;
@@ -27,7 +27,6 @@ pub use self::{
     report::SceneError,
     tables::{
         defaults::ImpliedBackdrop,
-        obstacle::{ObstacleParameters, ObstacleShape},
         picture::{self, DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
         plate::PlatePictures,
     },

@@ -22,7 +22,7 @@
 //! | pressure `p = k (rho - rho_0)` | (11) | (2.13) | [`StateEquation::pressure`] |
 //! | pressure force, and `a = f / rho` | (12), (8) | (2.14) | [`PressureForce::compute_accelerations`] |
 //! | interpolated field (6), any other sum | (6) | | [`PairTerm`] for [`Cells::sum`] |
-//! | velocity, then position | section 4.3 (5) | | [`Particles::advance`] |
+//! | velocity, then position | section 4.3, step 5 | | [`Particles::advance`] |
 //! | XSPH weights | | | [`mixing_weights`] |
 //! | Courant-Friedrichs-Lewy condition | | | [`max_stable_step`], [`substep_count`] |
 //!

@@ -1,4 +1,4 @@
-"""JPEG files of flat grey, with as many claimed pixels as one likes (ITU-T T.81)."""
+"""JPEG files of flat gray, with as many claimed pixels as one likes (ITU-T T.81)."""
 
 import struct
 
@@ -33,7 +33,7 @@ def padded(bits: int, count: int) -> bytes:
 
 
 def baseline(width: int, height: int, components: int = 1, blocks: int | None = None) -> bytes:
-    """Grey; every block is two zero bits. `blocks` of them are there, or all."""
+    """Gray; every block is two zero bits. `blocks` of them are there, or all."""
     if blocks is None:
         blocks = components * -(-width // 8) * -(-height // 8)
     tables = QUANTISATION + huffman(0x00, b"\0") + huffman(0x10, b"\0")

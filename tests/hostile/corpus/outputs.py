@@ -89,7 +89,7 @@ def _inputs() -> list[Case]:
         *over("by a linked folder", "sub/plate.png", {"sub": link(".")}),
         *over("by a hard link", "hard.png", {"hard.png": hard_link("plate.png")}),
         *over("as a contact sheet", "", None, ["render", "scene.toml", "--contact-sheet", "2", "-o", "x/../plate.png"]),
-        *over("as a colour sheet", "", {"scene.toml": plates.SCENE.format("a_colour.png"), "a_colour.png": flat}, ["flipbook", "scene.toml", "--grid", "1x2", "-o", "x/../a.png"]),
+        *over("as a color sheet", "", {"scene.toml": plates.SCENE.format("a_colour.png"), "a_colour.png": flat}, ["flipbook", "scene.toml", "--grid", "1x2", "-o", "x/../a.png"]),
         *over("as a motion sheet, by a link", "", {"a_motion.png": link("plate.png")}, ["flipbook", "scene.toml", "--grid", "1x2", "-o", "a.png"]),
         *over("as figures, by a link", "", {"a.json": link("scene.toml"), "a.0000.json": link("scene.toml")}, ["render", "scene.toml", "--figures", "-o", "a.png", *ONE]),
         *over("as a frame that is one of many", "", {"scene.toml": plates.SCENE.format("plate.####.png"), "plate.0000.png": flat, "plate.0001.png": flat}, ["render", "scene.toml", "-o", "plate.####.png"]),

@@ -72,8 +72,8 @@ def _png() -> list[Case]:
         plate("16384 x 1", "png", png.flat(16384, 1), 0),
         plate("16384 x 16384, few bytes", "png", png.with_pixels(16384, 16384, zlib.compress(bytes(1000))), words="in all|more than its"),
         plate("8192 x 8192, few bytes", "png", png.with_pixels(8192, 8192, zlib.compress(bytes(1000))), words="more than its"),
-        plate("bomb: 16384 x 8192, 16 bits, grey", "png", built(lambda: png.flat(16384, 8192, 16, png.GREY)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("bomb: 16384 x 8192, 16 bits, colour and alpha", "png", built(lambda: png.flat(16384, 8192, 16, png.RGBA)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
+        plate("bomb: 16384 x 8192, 16 bits, gray", "png", built(lambda: png.flat(16384, 8192, 16, png.GREY)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
+        plate("bomb: 16384 x 8192, 16 bits, color and alpha", "png", built(lambda: png.flat(16384, 8192, 16, png.RGBA)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
         plate("bomb: 16384 x 8192, 1 bit", "png", built(lambda: png.flat(16384, 8192, 1, png.GREY)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
         plate("8192 x 8192, 16 bits", "png", built(lambda: png.flat(8192, 8192, 16, png.RGBA)), (0, 3), "GiB|MiB|memory|allowed", signalled=True, large=True),
         plate("4096 x 4096", "png", built(lambda: png.flat(4096, 4096)), 0, signalled=True, large=True),
@@ -97,7 +97,7 @@ def _png() -> list[Case]:
         plate("palette too short for its pixels", "png", png.SIGNATURE + png.header(32, 24, 8, png.PALETTE) + png.chunk(b"PLTE", b"\1\2\3")
               + png.chunk(b"IDAT", zlib.compress((b"\0" + b"\xff" * 32) * 24)) + png.END, (0, 3), "damaged"),
         plate("7 bits", "png", png.flat(32, 24, 7), words="damaged"),
-        plate("colour type 5", "png", png.SIGNATURE + png.header(32, 24, 8, 5) + pixels + png.END, words="damaged"),
+        plate("color type 5", "png", png.SIGNATURE + png.header(32, 24, 8, 5) + pixels + png.END, words="damaged"),
         plate("interlaced", "png", png.flat(32, 24, interlace=1), (0, 3), "damaged"),
         plate("interlaced by a method of tomorrow", "png", png.flat(32, 24, interlace=9), words="damaged"),
         plate("bomb in zTXt", "png", built(lambda: with_chunk(b"zTXt", b"k\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signalled=True, large=True),
@@ -214,7 +214,7 @@ def _exr() -> list[Case]:
               (0, 3), "damaged"),
         plate("a preview of 2^32 pixels", "exr", one(exr.attributes(24, 16, more=exr.attribute(b"preview", b"preview", struct.pack("<II", 65536, 65536)))), words="damaged"),
         plate("version 99", "exr", exr.MAGIC + struct.pack("<I", 99) + bytes(100), words="damaged"),
-        plate("primaries of no colour", "exr", one(exr.attributes(24, 16, more=exr.attribute(b"chromaticities", b"chromaticities", bytes(32)))), words="damaged|colour"),
+        plate("primaries of no color", "exr", one(exr.attributes(24, 16, more=exr.attribute(b"chromaticities", b"chromaticities", bytes(32)))), words="damaged|color"),
         plate("not-a-number everywhere", "exr", exr.scan_lines(24, 16, "none", struct.pack("<I", 0x7FC00000) * 24 * 3, sample=exr.FLOAT), 0),
     ]
 
@@ -234,7 +234,7 @@ def _kinds() -> list[Case]:
     return [
         depth("PNG", "png", flat, "channel|depth|picture"),
         depth("cut off", "exr", exr.black(24, 16, "Z")[:200], "damaged"),
-        depth("of colours only", "exr", exr.black(24, 16), "channel|depth|Z"),
+        depth("of colors only", "exr", exr.black(24, 16), "channel|depth|Z"),
         depth("garbage", "exr", bytes(range(256)) * 4, "damaged"),
         named("missing", "gone.png", words="no such file"),
         named("of an unknown kind", "flat.tiff", words="not a picture Bansho reads", extra={"flat.tiff": flat}),

@@ -1,8 +1,7 @@
 //! Extinction in the atmosphere between the observer and the aurora, by wavelength and air mass.
 
-use bansho_base::{math, parameters::Range};
-
 pub use bansho_base::world::sky::air_mass;
+use bansho_base::{math, parameters::Range};
 
 /// Magnitudes of a transmittance of 1/e.
 const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;
@@ -63,7 +62,7 @@ mod tests {
         let air = Extinction::default();
         let [violet, blue, green, red] = [391.4, 427.8, 557.7, 630.0].map(|nm| air.magnitudes(nm));
         assert!(violet > blue && blue > green && green > red);
-        // Bright-star catalogues use 0.2 to 0.25 in V and about twice that in B.
+        // Bright-star catalogs use 0.2 to 0.25 in V and about twice that in B.
         assert!((0.18..0.26).contains(&green), "{green}");
         assert!((0.36..0.50).contains(&blue), "{blue}");
         assert!(air.transmittance(557.7, 0.1) < air.transmittance(557.7, 1.0));

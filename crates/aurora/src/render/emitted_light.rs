@@ -4,14 +4,15 @@ use bansho_base::{
     math::{self, DVec2, DVec3},
     phenomenon::surroundings::{Emitter, Light},
 };
-
-use super::Aurora;
-use crate::render::{
-    project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM},
-    shade::attenuation::EmitterColors,
-};
-
 use fearless_simd::{Level, dispatch};
+
+use crate::{
+    Aurora,
+    render::{
+        project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM},
+        shade::attenuation::EmitterColors,
+    },
+};
 
 /// Approximate number of particles that are sampled.
 const MAX_SAMPLED_PARTICLES: usize = 2048;

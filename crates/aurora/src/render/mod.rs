@@ -6,6 +6,7 @@
 //! meridian (`integrate`). Extinction and color are applied to the chart (`shade`), and the pixels of any lens
 //! sample it (`prepared`). The cost is linear in pixels and particles and independent of the shapes.
 
+pub(crate) mod aovs;
 pub(crate) mod bin;
 mod emitted_light;
 pub(crate) mod integrate;
@@ -17,8 +18,5 @@ pub(crate) mod shutter;
 #[cfg(test)]
 mod tests;
 
-pub use super::{
-    parameters::{Blur, BlurParameters, DrawingParameters, Sampling},
-    phenomenon::Aurora,
-};
+pub use super::parameters::{Blur, BlurParameters, DrawingParameters, Sampling};
 pub use crate::physics::precipitation::TrackModel;

@@ -12,12 +12,14 @@ use bansho_base::{
         strip::{DepthInterval, Strip, View},
     },
 };
+use fearless_simd::{Level, Simd, dispatch};
 
-use super::{Aurora, Blur, maps::CellMaps};
+use super::{Blur, maps::CellMaps};
 use crate::{
-    phenomenon::{BRIGHTNESSES, brightnesses},
+    Aurora,
     physics::emission::{Emitter, PerEmitter},
     render::{
+        aovs::{BRIGHTNESSES, brightnesses},
         bin::{source_bins::SourceBins, sources::Sources},
         integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer},
         project::{
@@ -29,7 +31,6 @@ use crate::{
     simulate::AuroraSimulation,
     single_collisions::blur::BlurredImage,
 };
-use fearless_simd::{Level, Simd, dispatch};
 
 /// Pixels per batch.
 pub(crate) const PIXEL_BATCH: usize = 16;

@@ -5,8 +5,8 @@ use bansho_base::{
     phenomenon::strip::{Shutter, View},
 };
 
-use super::Aurora;
 use crate::{
+    Aurora,
     render::{
         bin::sources::{SampleTimes, Sources},
         project::field_lines::FieldLines,

@@ -1,8 +1,11 @@
 //! Parameters of the shapes, and the default shapes.
 
+use bansho_base::{
+    math::curve::{Curve, Interpolation},
+    parameters::{AssetPath, Auto, CurveLimits, Length, Range},
+};
+
 use super::form::Form;
-use bansho_base::math::curve::{Curve, Interpolation};
-use bansho_base::parameters::{AssetPath, Auto, CurveLimits, Length, Range};
 
 /// Frame duration of the thesis, s (table 3.2: 0.0333 s); parameters in `_frames` are in this unit.
 pub const FRAME_S: f64 = 1.0 / 30.0;

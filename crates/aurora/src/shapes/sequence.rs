@@ -4,6 +4,7 @@ use bansho_base::{
     host::assets::Assets,
     math::{self, DVec2},
 };
+use rayon::prelude::*;
 
 use super::{
     Correspondence, FRAME_S, MotionParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,
@@ -17,7 +18,6 @@ use crate::shapes::{
     },
     strokes::intersection::passes,
 };
-use rayon::prelude::*;
 
 /// Weights of uniform spacing against distance, in order of preference: later ones are tried where sheets cross during
 /// a transition.

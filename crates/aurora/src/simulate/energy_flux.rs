@@ -1,6 +1,8 @@
 //! Distributes the energy flux of the sheets to the particles.
 
 use bansho_base::{math::random::Key, noise::LANES};
+use fearless_simd::Level;
+use rayon::prelude::*;
 
 use super::AuroraParticles;
 use crate::{
@@ -12,8 +14,6 @@ use crate::{
         refined_shape::{RefinedShape, SheetProjection},
     },
 };
-use fearless_simd::Level;
-use rayon::prelude::*;
 
 /// Particles per task, a multiple of the lanes.
 const TASK: usize = 4096;

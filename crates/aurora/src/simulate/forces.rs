@@ -1,12 +1,12 @@
 //! Forces and time integration (thesis, 2.3.1 to 2.3.3).
 
 use bansho_base::math::{self, MulAdd};
-
-use super::AuroraParticles;
-use crate::{AuroraParameters, RepulsionKernel, shapes::FRAME_S, simulate::field::sheet_field::ElectricField};
 use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, compute_densities};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
+
+use super::AuroraParticles;
+use crate::{AuroraParameters, RepulsionKernel, shapes::FRAME_S, simulate::field::sheet_field::ElectricField};
 
 /// Gas constant k at a repulsion of 1, cells^2 per frame^2.
 const STIFFNESS: f64 = 0.1;

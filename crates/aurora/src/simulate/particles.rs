@@ -1,7 +1,6 @@
 //! Particles as structure of arrays.
 
 use bansho_base::math::DVec2;
-
 use bansho_sph::{self, Cells};
 use rayon::prelude::*;
 

@@ -3,11 +3,11 @@
 use bansho_base::{
     geometry::point_cloud::{PointCloud, Quantity},
     math::{self, DVec2, DVec3},
+    world::sky::EARTH_RADIUS_KM,
 };
 
 use super::{AuroraParticles, AuroraSimulation};
 use crate::shapes::FOOT_ALTITUDE_KM;
-use bansho_base::world::sky::EARTH_RADIUS_KM;
 
 /// Half of the interval of the finite-difference velocity, s.
 const MOMENT_S: f64 = 1e-3;

@@ -1,13 +1,22 @@
 //! Relocation: births and deaths when the in-between shape is updated (thesis, 2.3.4 and table 3.3).
 
-use super::AuroraParticles;
-use crate::simulate::field::sheet_charge::ScatteredParticle;
-use crate::simulate::field::sheet_field::{ElectricField, full_cell_count};
-use crate::simulate::sheets::refined_shape::RefinedShape;
-use crate::{AuroraParameters, RelocationParameters};
-use bansho_base::math::DVec2;
-use bansho_base::math::random::{Key, Purpose, uniform};
+use bansho_base::math::{
+    DVec2,
+    random::{Key, Purpose, uniform},
+};
 use rayon::prelude::*;
+
+use super::AuroraParticles;
+use crate::{
+    AuroraParameters, RelocationParameters,
+    simulate::{
+        field::{
+            sheet_charge::ScatteredParticle,
+            sheet_field::{ElectricField, full_cell_count},
+        },
+        sheets::refined_shape::RefinedShape,
+    },
+};
 
 const BIRTH: Purpose = Purpose::named("aurora birth");
 const THINNING: Purpose = Purpose::named("aurora thinning");

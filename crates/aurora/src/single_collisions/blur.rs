@@ -9,6 +9,8 @@ use bansho_base::{
     math::simd::{FourLanes, Real},
     phenomenon::strip::View,
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use crate::{
     parameters::BlurParameters,
@@ -19,8 +21,6 @@ use crate::{
         shade::chart_sampler::ChartSampler,
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Support of the kernel in standard deviations.
 const KERNEL_SIGMAS: f64 = 3.0;

@@ -12,11 +12,12 @@ use bansho_base::math::{
     random::{Key, Purpose, uniform, uniform_f64},
     simd::{FourLanes, Lanes, Real},
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use super::{
     quantile_matched::QuantileMatchedTracks,
-    rasterize::TrackRasterizer,
-    rasterize::{RowRange, SPLAT_LANES, SplatBatch},
+    rasterize::{RowRange, SPLAT_LANES, SplatBatch, TrackRasterizer},
     track_table::{CollisionBatch, TrackTable},
 };
 use crate::{
@@ -45,8 +46,6 @@ use crate::{
         },
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 const SOURCE: Purpose = Purpose::named("aurora collisions");
 /// Batches of random lateral deviations.

@@ -3,10 +3,10 @@
 //! A track has about a hundred collisions in hundreds of rows, so the touched rows are recorded: only those are added
 //! and cleared.
 
-use crate::physics::emission::PerEmitter;
 use bansho_base::math::simd::{FourLanes, HalfLanes, LANES, Lanes, Real, ramp, round_to_u32};
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, u8x32, u16x16, u64x4, u64x8};
+use fearless_simd::{Simd, prelude::*, u8x32, u16x16, u64x4, u64x8};
+
+use crate::physics::emission::PerEmitter;
 
 /// Rows that are added to a column at once, two pairs.
 pub(crate) const QUAD_ROWS: usize = 4;

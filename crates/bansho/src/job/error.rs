@@ -11,7 +11,9 @@ use bansho_media::{
 use bansho_render::{PlanError, RenderError};
 use bansho_scene::{LoopError, SceneError, edit::EditError};
 
-use super::{ranges::ranges, streaks::StreaksFault};
+use super::frames::ranges;
+#[cfg(feature = "rain")]
+use super::streaks::StreaksFault;
 
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -89,9 +91,11 @@ pub enum JobError {
     #[error(transparent)]
     Tiles(#[from] SheetError),
     /// Streak textures that cannot be made.
+    #[cfg(feature = "rain")]
     #[error(transparent)]
     Streaks(#[from] StreaksFault),
     /// The observer asked to stop while streak textures were made.
+    #[cfg(feature = "rain")]
     #[error("stopped; whole textures stay, without an index")]
     StreaksCancelled,
     /// The observer asked to stop before a film or a sheet, which holds all frames, was whole.
@@ -295,7 +299,7 @@ pub enum Cause {
 
 impl JobError {
     /// What a wish to stop means where nothing is written before `what` is whole; any other error as it is.
-    pub(super) fn of_whole(self, what: &'static str) -> Self {
+    pub(crate) fn of_whole(self, what: &'static str) -> Self {
         if matches!(self, Self::Cancelled) { Self::WholeCancelled { what } } else { self }
     }
 
@@ -310,9 +314,12 @@ impl JobError {
             | Self::Conflict(_)
             | Self::Naming(_) => Cause::Usage,
             Self::Render(RenderError::Plate(_)) => Cause::Scene,
+            #[cfg(feature = "rain")]
             Self::Streaks(_) => Cause::Usage,
             Self::Cancelled | Self::WholeCancelled { .. } => Cause::Cancelled,
-            Self::ParticlesCancelled | Self::StreaksCancelled => Cause::Cancelled,
+            Self::ParticlesCancelled => Cause::Cancelled,
+            #[cfg(feature = "rain")]
+            Self::StreaksCancelled => Cause::Cancelled,
             Self::Media(MediaError::Naming(_)) => Cause::Usage,
             Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
             Self::FramesLost { .. } | Self::FilesLost { .. } => Cause::Work,

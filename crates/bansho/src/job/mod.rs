@@ -5,27 +5,16 @@
 //! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
 //! frames are in memory at once, however many there are. Every file is whole or not there at all.
 
-mod contact;
+mod checks;
 mod error;
-mod figures;
-mod finished;
-mod flight;
+mod export;
 mod flipbook;
-mod inputs;
-mod memory;
+pub mod frames;
 mod observer;
-mod output;
-mod overwriting;
-mod plates;
-mod prepare;
-mod ranges;
-mod resume;
-mod run;
+mod render;
 mod scene_file;
-mod sheet;
-mod shoot;
-mod simulate;
 mod snapshots;
+#[cfg(feature = "rain")]
 mod streaks;
 #[cfg(test)]
 mod testing;
@@ -38,14 +27,16 @@ use bansho_base::{
 };
 use bansho_render::display::BitDepth;
 
-pub use contact::ContactBackground;
 pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
-pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook};
+pub use export::point_clouds::{PreparedSimulation, Simulate};
+pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook, contact_sheet::ContactBackground};
 pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
-pub use prepare::{PreparedJob, check_scene, remarks};
-pub use run::Summary;
+pub use render::{
+    Summary,
+    prepare::{PreparedJob, check_scene, remarks},
+};
 pub use scene_file::{SCENE_BYTES, SceneFile};
-pub use simulate::{PreparedSimulation, Simulate};
+#[cfg(feature = "rain")]
 pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
 
 /// What is to be drawn, and where it goes. Begin with [`Job::new`], which takes everything from the scene.

@@ -22,7 +22,7 @@ use bansho_scene::{
 };
 
 use super::error::JobError;
-use crate::KINDS;
+use crate::{KINDS, parse_scene};
 
 /// Most bytes of a scene's text.
 pub const SCENE_BYTES: u64 = 16 << 20;
@@ -92,11 +92,11 @@ impl SceneFile {
             Err(JobError::Edit { source: EditError::Syntax(_), .. }) => self.text.clone(),
             changed => changed?,
         };
-        let error = match Scene::parse(&self.name, &changed, KINDS) {
+        let error = match parse_scene(&self.name, &changed) {
             Ok(scene) => return Ok(scene),
             Err(error) => Box::new(error),
         };
-        match Scene::parse(&self.name, &self.text, KINDS) {
+        match parse_scene(&self.name, &self.text) {
             _ if self.changes.is_empty() => Err(JobError::Scene(error)),
             Err(own) => Err(JobError::Scene(Box::new(own))),
             Ok(_) => Err(self.as_changed(*error)),
@@ -116,7 +116,7 @@ impl SceneFile {
             return Err(JobError::Scene(Box::new(errors.located(&self.name, &self.text))));
         }
         // Whose fault it is: the file's, if it has faults of its own.
-        let own = Scene::parse(&self.name, &self.text, KINDS).ok();
+        let own = parse_scene(&self.name, &self.text).ok();
         match own.map(|own| CompiledScene::build(Arc::new(own), assets.clone(), None)) {
             Some(Err(own)) => Err(JobError::Scene(Box::new(own.located(&self.name, &self.text)))),
             _ => Err(self.as_changed(errors.located(&self.name, &self.changed()?))),
@@ -128,7 +128,7 @@ impl SceneFile {
     }
 
     /// A fault of what stands at the dotted `path`, which only showed when the scene was looked at from outside its text.
-    pub(super) fn fault(&self, path: &str, kind: ProblemKind) -> JobError {
+    pub(crate) fn fault(&self, path: &str, kind: ProblemKind) -> JobError {
         let own = SceneError::at(&self.name, &self.text, path, kind.clone());
         let changed = self.changed().unwrap_or_else(|_| self.text.clone());
         let as_changed = SceneError::at(&format!("{} as changed", self.name), &changed, path, kind);

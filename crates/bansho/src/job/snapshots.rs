@@ -12,13 +12,12 @@ use bansho_render::Plan;
 use super::{
     error::JobError,
     observer::{JobObserver, Note},
-    overwriting,
-    shoot::FrameSource,
 };
+use crate::job::{checks::overwrite, render::draw_frames::FrameSource};
 
 /// Where snapshots lie and how many frames lie between them. Files are called `state.<frame>.bansho`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Snapshots {
+pub(crate) struct Snapshots {
     /// `None` where nothing has a state, or none are wanted.
     folder: Option<PathBuf>,
     first_frame: i64,
@@ -31,7 +30,7 @@ pub(super) struct Snapshots {
 
 impl Snapshots {
     /// Snapshots in `folder`, `every` so many frames from the scene's first.
-    pub(super) fn new(folder: PathBuf, plan: &Plan, every: u64, overwrite: OverwritePolicy) -> Self {
+    pub(crate) fn new(folder: PathBuf, plan: &Plan, every: u64, overwrite: OverwritePolicy) -> Self {
         let frames = plan.frames();
         let turn = plan.loop_s().map(|_| frames.end - frames.start);
         Self { folder: Some(folder), first_frame: frames.start, every, turn, overwrite }
@@ -41,12 +40,12 @@ impl Snapshots {
     ///
     /// # Errors
     /// Something is not a snapshot of Bansho, or the scene is read from it.
-    pub(super) fn check(&self) -> Result<(), JobError> {
+    pub(crate) fn check(&self) -> Result<(), JobError> {
         let Some(folder) = &self.folder else { return Ok(()) };
         // A folder that cannot be read is told when it is used.
         let mut numbers = numbers(&resolved(folder)).unwrap_or_default();
         numbers.sort_unstable();
-        overwriting::check(&self.overwrite, numbers.into_iter().map(|number| self.path(folder, number)))
+        overwrite::check(&self.overwrite, numbers.into_iter().map(|number| self.path(folder, number)))
     }
 
     /// The frame of the first turn that shows what frame `number` shows.
@@ -63,12 +62,12 @@ impl Snapshots {
     ///
     /// # Errors
     /// The observer asked to stop, or a snapshot cannot be written.
-    pub(super) fn warm_up(
+    pub(crate) fn warm_up(
         &self,
         shot: &mut dyn FrameSource,
         last: Option<i64>,
         number: i64,
-        watch: &dyn Observer,
+        stop_on_failure: &dyn Observer,
         observer: &dyn JobObserver,
     ) -> Result<(), JobError> {
         if self.folder.is_none() {
@@ -77,14 +76,14 @@ impl Snapshots {
         let (last, number) = (last.map(|last| self.in_turn(last)), self.in_turn(number));
         let past = last.filter(|&last| last <= number);
         let found = {
-            let _stage = StageGuard::begin(watch, Stage::Load);
+            let _stage = StageGuard::begin(stop_on_failure, Stage::Load);
             self.seek(shot, past, number, observer)
         };
         let earliest = found.refused.iter().copied().fold(self.first_frame, i64::min);
         let first = found.restored.or(past).map_or(earliest, |stands| stands.saturating_add(1));
         for stop in (first..number).filter(|stop| self.is_due(*stop) || found.refused.contains(stop)) {
-            shot.advance(stop, watch)?;
-            self.keep(shot, stop, watch)?;
+            shot.advance(stop, stop_on_failure)?;
+            self.keep(shot, stop, stop_on_failure)?;
         }
         Ok(())
     }
@@ -124,7 +123,7 @@ impl Snapshots {
     }
 
     /// Writes the state at frame `number` where one is due, or lies there, and it is not the very same.
-    pub(super) fn keep(&self, shot: &dyn FrameSource, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
+    pub(crate) fn keep(&self, shot: &dyn FrameSource, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let number = self.in_turn(number);
         let path = self.path(folder, number);
@@ -184,7 +183,7 @@ mod tests {
     use super::*;
     use crate::job::{
         error::Conflict,
-        shoot::shoot,
+        render::draw_frames::draw_frames,
         testing::{self, Counter, Finisher, Witness, plan},
     };
 
@@ -196,7 +195,7 @@ mod tests {
     fn steps(snapshots: &Snapshots, numbers: &[i64], witness: &Witness) -> usize {
         let counter = Counter { steps: Arc::default() };
         let finish = Finisher { each: |_, _| Ok(()), window: 4 };
-        shoot(&mut counter.shot(), numbers, snapshots, &finish, witness).unwrap();
+        draw_frames(&mut counter.shot(), numbers, snapshots, &finish, witness).unwrap();
         counter.steps.load(Ordering::Relaxed)
     }
 
@@ -268,6 +267,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "fire")]
     fn states_of_the_renderer_bear_the_mark() {
         let assets = Arc::new(MemoryAssets::default());
         let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n";

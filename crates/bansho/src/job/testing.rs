@@ -19,11 +19,11 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
 use super::{
     error::JobError,
     observer::{JobObserver, Note},
-    shoot::{Finish, FrameSource},
 };
+use crate::job::render::draw_frames::{FrameSink, FrameSource};
 
 /// A plan of a picture of one pixel with nothing in it.
-pub(super) fn plan() -> Arc<Plan> {
+pub(crate) fn plan() -> Arc<Plan> {
     let assets = Arc::new(MemoryAssets::default());
     let text = "bansho = 1\n[picture]\nsize = [1, 1]\nfps = 10\nfirst_frame = -4\n";
     let scene = crate::parse_scene("test", text).unwrap_or_else(|error| panic!("{error}"));
@@ -32,20 +32,20 @@ pub(super) fn plan() -> Arc<Plan> {
 }
 
 /// Takes a step for each frame, and counts them all.
-pub(super) struct Counter {
-    pub(super) steps: Arc<AtomicUsize>,
+pub(crate) struct Counter {
+    pub(crate) steps: Arc<AtomicUsize>,
 }
 
 /// State: the frame that was stepped to.
-pub(super) struct CounterShot {
+pub(crate) struct CounterShot {
     plan: Arc<Plan>,
     steps: Arc<AtomicUsize>,
-    pub(super) number: i64,
+    pub(crate) number: i64,
     drawn: bool,
 }
 
 impl Counter {
-    pub(super) fn shot(&self) -> CounterShot {
+    pub(crate) fn shot(&self) -> CounterShot {
         let plan = plan();
         CounterShot { number: plan.frames().start - 1, plan, steps: self.steps.clone(), drawn: false }
     }
@@ -87,16 +87,16 @@ impl FrameSource for CounterShot {
 }
 
 /// The snapshot at a frame.
-pub(super) fn state(number: i64) -> Vec<u8> {
+pub(crate) fn state(number: i64) -> Vec<u8> {
     [provenance::SNAPSHOT_MAGIC, number.to_le_bytes()].concat()
 }
 
 /// A frame of one pixel.
-pub(super) fn frame(number: i64) -> Frame {
+pub(crate) fn frame(number: i64) -> Frame {
     blank(&plan(), number)
 }
 
-pub(super) fn blank(plan: &Plan, number: i64) -> Frame {
+pub(crate) fn blank(plan: &Plan, number: i64) -> Frame {
     let beauty = Image::filled(1, 1, [number as f32; 4]);
     let header = plan.header(number, [7; 32]);
     let content = Rect::from_size(1, 1);
@@ -105,9 +105,9 @@ pub(super) fn blank(plan: &Plan, number: i64) -> Frame {
 
 /// Remembers what it is told, and stops the work when asked to.
 #[derive(Default)]
-pub(super) struct Witness {
-    pub(super) notes: Mutex<Vec<Note>>,
-    pub(super) stop: AtomicBool,
+pub(crate) struct Witness {
+    pub(crate) notes: Mutex<Vec<Note>>,
+    pub(crate) stop: AtomicBool,
 }
 
 impl Observer for Witness {
@@ -125,12 +125,12 @@ impl JobObserver for Witness {
 }
 
 /// Finishes frames by a function of their index and number, and knows how many were under way at once.
-pub(super) struct Finisher<F> {
-    pub(super) each: F,
-    pub(super) window: usize,
+pub(crate) struct Finisher<F> {
+    pub(crate) each: F,
+    pub(crate) window: usize,
 }
 
-impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> Finish for Finisher<F> {
+impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> FrameSink for Finisher<F> {
     fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
     }

@@ -1,10 +1,12 @@
 //! The codes of display pictures, beside what the definitions give in double precision.
 
-use bansho::base::{
-    color::{AlphaConvention, View},
-    math,
+use bansho::{
+    base::{
+        color::{AlphaConvention, View},
+        math,
+    },
+    render::display::BitDepth,
 };
-use bansho::render::display::BitDepth;
 
 use crate::light::{self, ALPHA_KINDS, COUNT, WIDTHS};
 
@@ -41,7 +43,7 @@ impl Case {
         if self.bits == BitDepth::Eight { 0.97 } else { 0.6 }
     }
 
-    /// Whether `codes` are those of grey light and coverage.
+    /// Whether `codes` are those of gray light and coverage.
     fn check(&self, pixel: [f32; 4], codes: [u16; 4]) {
         let [light, _, _, alpha] = pixel.map(held);
         let full = light::largest(self.bits);
@@ -62,7 +64,7 @@ impl Case {
         assert!(off <= most, "{}, alpha should be {coverage}", self.told(pixel, codes));
     }
 
-    /// Whether a color, and alpha as it was rounded, are what grey `light` gives.
+    /// Whether a color, and alpha as it was rounded, are what gray `light` gives.
     fn color(&self, light: f64, color: [f64; 3], own_alpha: f64) -> bool {
         let (shown, wanted) = match self.alpha {
             None => (color, encoded(light, self.is_raw)),

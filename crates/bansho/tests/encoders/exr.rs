@@ -1,7 +1,9 @@
 //! OpenEXR by its own library: beauty and layers in half, depth and AOVs in float.
 
-use bansho::base::{image::Frame, math};
-use bansho::render::display::BitDepth;
+use bansho::{
+    base::{image::Frame, math},
+    render::display::BitDepth,
+};
 
 use crate::{
     Writing, beside,

@@ -2,8 +2,10 @@
 
 use std::{path::Path, process::Command};
 
-use bansho::base::{color::AlphaConvention, image::Frame};
-use bansho::render::display::BitDepth;
+use bansho::{
+    base::{color::AlphaConvention, image::Frame},
+    render::display::BitDepth,
+};
 
 use crate::{Writing, light, numbers};
 

@@ -1,11 +1,13 @@
 //! Frames of light at and beyond the ends of its range.
 
-use bansho::base::{
-    camera::Lens,
-    color::{AlphaConvention, View},
-    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+use bansho::{
+    base::{
+        camera::Lens,
+        color::{AlphaConvention, View},
+        image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+    },
+    render::display::{BitDepth, display},
 };
-use bansho::render::display::{BitDepth, display};
 
 /// Components of light.
 pub(crate) const LIGHTS: [f32; 18] = [
@@ -42,7 +44,7 @@ pub(crate) const WIDTHS: std::ops::RangeInclusive<usize> = 1..=35;
 pub(crate) const ALPHA_KINDS: [Option<AlphaConvention>; 3] =
     [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)];
 
-/// Grey of the light and coverage of that number.
+/// Gray of the light and coverage of that number.
 pub(crate) fn pixel(number: usize) -> [f32; 4] {
     let light = LIGHTS[number % LIGHTS.len()];
     [light, light, light, ALPHAS[number / LIGHTS.len() % ALPHAS.len()]]

@@ -1,7 +1,9 @@
 //! PNG, APNG and GIF by Pillow, and by the PNG specification where Pillow keeps 8 bits only.
 
-use bansho::base::{color::View, image::DisplayImage};
-use bansho::render::display::BitDepth;
+use bansho::{
+    base::{color::View, image::DisplayImage},
+    render::display::BitDepth,
+};
 
 use crate::{
     Writing, beside,

@@ -67,7 +67,7 @@ fn gas_comes_evenly_from_the_whole_surface_of_a_gltf_mesh() {
     let area = |leg: f32| 0.5 * f64::from(leg) * f64::from(leg);
     let whole: f64 = TRIANGLES.iter().map(|(_, leg)| area(*leg)).sum();
     for (start, leg) in TRIANGLES {
-        // A twentieth of a second carries gas some centimetres.
+        // A twentieth of a second carries gas some centimeters.
         let on_it: Vec<usize> = (0..x.len()).filter(|index| (x[*index] - start).abs() < 5.0).collect();
         let expected = x.len() as f64 * area(leg) / whole;
         let off = (on_it.len() as f64 - expected).abs();

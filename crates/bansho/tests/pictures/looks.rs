@@ -137,7 +137,7 @@ impl Film {
         pair.map(|(a, b)| (luminance(*a) - luminance(*b)).abs()).sum::<f64>() / (self.width * self.height) as f64
     }
 
-    /// Centre of the light in the upper half of what is lit, in pixels, over all frames.
+    /// Center of the light in the upper half of what is lit, in pixels, over all frames.
     pub(crate) fn centroid_of_upper_half(&self) -> [f64; 2] {
         let lit_row =
             |row: usize| (0..self.frames.len()).any(|f| self.row(f, row).iter().any(|p| luminance(*p) > 0.02));

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::{BuildContext, BuildError, Describe};
 use bansho_base::{
     host::observer::{Cancelled, Observer},
     image::{Figure, Image, Rect},
@@ -11,6 +10,7 @@ use bansho_base::{
         random::{Key, Purpose, uniform},
     },
     parameters::Range,
+    phenomenon::kind::{BuildContext, BuildError, Describe},
     phenomenon::{
         Deflection, Phenomenon, PhenomenonInfo, Prepared, Run, SnapshotError, Stepped, Stepping,
         strip::{DepthInterval, Shutter, Strip, View},

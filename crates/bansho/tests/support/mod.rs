@@ -1,18 +1,19 @@
 //! Two phenomena that exist only to prove the traits: an absorber in closed form and a stepped emitter.
 
+#[path = "../../examples/own_phenomenon/absorber.rs"]
 mod absorber;
 mod emitter;
 mod planned;
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::{Describe, PhenomenonKind};
 use bansho_base::{
     host::{
         assets::{Assets, Encoding, MemoryAssets, Picture},
         observer::Unobserved,
     },
     image::{Frame, Image},
+    phenomenon::kind::{Describe, PhenomenonKind},
 };
 use bansho_render::{CompiledScene, PlanOptions, Shot};
 use bansho_scene::{Scene, SceneError, SceneOptions};
@@ -25,7 +26,7 @@ pub(crate) fn kinds() -> [PhenomenonKind; 2] {
     [AbsorberParameters::KIND, EmitterParameters::KIND]
 }
 
-/// A camera at the origin that looks along -z; 45 pixels a metre at 1 m when the picture is 90 pixels high.
+/// A camera at the origin that looks along -z; 45 pixels a meter at 1 m when the picture is 90 pixels high.
 pub(crate) const CAMERA: &str = "\
 bansho = 1
 [picture]
@@ -90,7 +91,7 @@ pub(crate) fn channel<'a>(frame: &'a Frame, name: &str) -> &'a [f32] {
     &named.unwrap_or_else(|| panic!("no channel {name}")).values
 }
 
-/// A checkerboard plate of 8-pixel squares with every pixel a different shade, `depth` metres away.
+/// A checkerboard plate of 8-pixel squares with every pixel a different shade, `depth` meters away.
 pub(crate) fn checkerboard(width: usize, height: usize, depth: Option<f32>) -> MemoryAssets {
     checkerboard_at(width, height, depth.map(|depth| vec![depth; width * height]))
 }

@@ -50,6 +50,14 @@ pub enum ProblemKind {
         /// All allowed keys.
         allowed: Vec<String>,
     },
+    /// A kind of phenomenon that this program was built without.
+    #[error("`{key}` is left out of this build; enable the feature `{feature}` of the crate `bansho`")]
+    FeatureDisabled {
+        /// The kind's key.
+        key: &'static str,
+        /// The feature that brings it.
+        feature: &'static str,
+    },
     /// A value has the wrong type.
     #[error("expected {expected}, found {found}")]
     WrongType {

@@ -1,7 +1,8 @@
-//! The environment shared by all phenomena of a scene: air, gravity, wind, sky and occluders.
+//! The environment shared by all phenomena of a scene: air, gravity, wind, sky and obstacles.
 
 pub mod air;
 pub mod gravity;
+pub mod obstacle;
 pub mod occluder;
 pub mod sky;
 pub mod wind;

@@ -17,7 +17,7 @@ use super::{
 /// The sheets that are wanted.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Writes NAME_colour.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as grey), NAME_motion.png (16 bits: how far \
+Writes NAME_colour.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as gray), NAME_motion.png (16 bits: how far \
 each pixel moves to the next frame) and NAME.json (grid, frame rate, rectangles, how to read the motion). As .exr: colour is \
 scene-linear with premultiplied alpha, motion is in pixels, and there is no alpha sheet.
 
@@ -52,7 +52,7 @@ pub(crate) struct FlipbookArgs {
     /// Change a setting of the scene for this once; may be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Bits of each channel of the colour and alpha sheets.
+    /// Bits of each channel of the color and alpha sheets.
     #[arg(long, default_value = "8", value_parser = values::bits_parser())]
     bits: BitDepth,
     /// What straight alpha in .png is made for: engines that blend linear light (Unity, Unreal and Godot in 3-D, as usually

@@ -49,7 +49,7 @@ pub(crate) enum Command {
     Schema,
     /// Draw a scene: files, a film, or a contact sheet.
     Render(RenderArgs),
-    /// Draw a scene as a flipbook for game engines: colour, alpha and motion sheets and a JSON.
+    /// Draw a scene as a flipbook for game engines: color, alpha and motion sheets and a JSON.
     Flipbook(FlipbookArgs),
     /// Write streak textures of rain with every drop's diameter, velocity and opacity.
     Streaks(StreaksArgs),

@@ -30,7 +30,7 @@ pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
     #[arg(long, value_name = "R,...", default_value = "1,5,10,20", allow_hyphen_values = true, value_parser = values::parse_numbers)]
     rates: Numbers,
-    /// Drop diameters D, ascending, mm. Each stands for the drops up to half way to its neighbours.
+    /// Drop diameters D, ascending, mm. Each stands for the drops up to half way to its neighbors.
     #[arg(
         long,
         value_name = "D,...",
@@ -46,7 +46,7 @@ pub(crate) struct StreaksArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 512)]
     size: usize,
     /// Edge of the cube of air, m.
-    #[arg(long = "box", value_name = "METRES", default_value_t = 1.0, allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "METERS", default_value_t = 1.0, allow_hyphen_values = true)]
     edge: f64,
     /// How fast drops fall: as measured by Gunn and Kinzer, or by the paper's formula.
     #[arg(long, default_value = "measured", value_parser = values::velocity_parser())]

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
+    job::frames::{self, FrameSpecError},
     job::{ContactBackground, FlipbookCrop, StreakFormat},
     rain::drops::terminal_velocity::VelocityLaw,
-    render::frames::{self, FrameSpecError},
     scene::picture::LARGEST_SIDE,
 };
 use clap::builder::{PossibleValuesParser, TypedValueParser};

@@ -247,7 +247,7 @@ fn gas_that_cannot_be_says_what_can() {
         let error = refused_gas(&format!("[[flame_particles.burners]]\ntemperature_k = {temperature}\n"));
         says(&error, &["scene.toml:6:17: ", "temperature_k", "is out of range", " K"]);
     }
-    // A line of one metre: a mesh without a triangle.
+    // A line of one meter: a mesh without a triangle.
     let line = "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\
         \"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"mode\":1}]}],\
         \"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[1,0,0]}],\

@@ -13,7 +13,7 @@ fn scene(tables: &str) -> Folder {
     Folder::with_scene(&format!("{PICTURE}{tables}"))
 }
 
-/// A grey picture that changes from pixel to pixel.
+/// A gray picture that changes from pixel to pixel.
 fn write_plate(folder: &Folder, size: [u32; 2]) {
     let file = fs::File::create(folder.path("plate.png")).unwrap();
     let mut encoder = png::Encoder::new(file, size[0], size[1]);

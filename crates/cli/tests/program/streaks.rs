@@ -18,7 +18,7 @@ fn entries<'a>(value: &'a Value, key: &str) -> &'a [Value] {
     value[key].as_array().unwrap()
 }
 
-/// Opacities of a grey PNG by the scale of its entry.
+/// Opacities of a gray PNG by the scale of its entry.
 fn opacities(folder: &Folder, entry: &Value) -> Vec<f64> {
     let png = decode_png(&fs::read(folder.path(&format!("out/streaks/{}", entry["file"].as_str().unwrap()))).unwrap());
     assert_eq!((png.width, png.height, png.channels, png.bits), (512, 512, 1, 16));
@@ -51,7 +51,7 @@ fn without_options_it_writes_the_papers_24_textures_and_they_measure_right() {
     let drop = &entries(heavy, "drops")[0];
     assert_eq!((number(&drop["diameter_mm"]), number(&drop["velocity_m_per_s"])), (2.0, 6.49));
     assert!((number(&drop["opacity"]) - 2e-3 / (6.49 / 30.0)).abs() < 1e-9);
-    // The rain of 20 mm/h: 1.2037e-3 per metre hidden, seen through for 1.6 km.
+    // The rain of 20 mm/h: 1.2037e-3 per meter hidden, seen through for 1.6 km.
     let rain = &entries(&about, "rain")[3];
     assert!((number(&rain["extinction_per_m"]) - 1.20367e-3).abs() < 1e-8);
     assert!((number(&rain["visibility_m"]) - 1625.0).abs() < 1.0);

@@ -41,7 +41,7 @@ fn vertex(pos: Pos2, uv: Pos2, color: Color32) -> Vertex {
     Vertex { pos, uv, color }
 }
 
-/// Triangles of one colour.
+/// Triangles of one color.
 fn triangles(color: Color32, corners: &[[f32; 2]]) -> Mesh {
     let vertices = corners.iter().map(|[x, y]| vertex(pos2(*x, *y), Pos2::ZERO, color)).collect();
     Mesh { indices: (0..corners.len() as u32).collect(), vertices, texture_id: FONT }

@@ -13,7 +13,7 @@ use bansho_base::{
 };
 
 use super::{
-    LakeFrame,
+    model::LakeFrame,
     parameters::{GroundKind, GroundParameters},
     surface::{Surface, SurfaceSample, fresnel},
     waves::WaveSlope,

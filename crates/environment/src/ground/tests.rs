@@ -2,16 +2,17 @@ use bansho_base::{
     camera::CameraParameters,
     color,
     host::observer::Unobserved,
-    image::Rect,
+    image::{Image, Rect},
     math::DVec3,
     phenomenon::{
-        strip::Strip,
-        surroundings::{Emitter, Light},
+        Phenomenon, Run,
+        strip::{DepthInterval, Shutter, Strip, View},
+        surroundings::{Emitter, Light, Surroundings},
     },
     world::wind::{Wind, WindParameters},
 };
 
-use super::*;
+use super::{Ground, GroundKind, GroundParameters, surface};
 
 const SIZE: [usize; 2] = [64, 48];
 

@@ -9,9 +9,9 @@ use bansho_base::{
     },
     world::sky::{Night, Sky},
 };
+use fearless_simd::prelude::*;
 
 use super::stars;
-use fearless_simd::prelude::*;
 
 /// Steps of elevation from the horizon to the zenith, even in the root of its sine.
 const ELEVATION_STEPS: usize = 512;

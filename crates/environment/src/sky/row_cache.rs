@@ -2,9 +2,17 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bansho_base::{camera::Camera, math::MulAdd, phenomenon::strip::Strip, world::sky::Sky};
+use bansho_base::{
+    camera::Camera,
+    math::MulAdd,
+    phenomenon::strip::{DepthInterval, Strip},
+    world::sky::Sky,
+};
 
-use super::{FAR, night::NightSky, stars::StarImage};
+use super::{night::NightSky, stars::StarImage};
+
+/// Depth of the sky: behind everything.
+pub(super) const FAR: DepthInterval = DepthInterval { near: 1e12, far: f64::INFINITY };
 
 /// Largest picture whose rows are cached, pixels: 16 bytes each.
 const MAX_CACHED_PIXELS: usize = 1 << 22;

@@ -17,22 +17,30 @@
 //!   gases" (1968): radiative cooling.
 //!
 //! # Equations
-//! | equation | number | function |
+//! | equation | what it says | function |
 //! |---|---|---|
-//! | particles are added at the burner | section 4.3 (1) | `simulate::spawning::Spawner::spawn` |
-//! | kernel `W = 315/(64 pi d^9) (d^2 - r^2)^3` | (2) | [`bansho_sph::Poly6`] |
-//! | density `rho_i = sum_j m_j W` | (3) | [`bansho_sph::compute_densities`] |
-//! | field `A(x) = sum_j m_j A_j / rho_j W`, along a ray | (6) | [`render::line_integral`] |
-//! | acceleration `a = f / rho` | (8) | [`bansho_sph::PressureForce`] |
-//! | pressure `p = k (rho - rho_0)` | (11) | [`bansho_sph::StateEquation`] |
-//! | pressure force | (12) | [`bansho_sph::PressureForce`] |
-//! | velocity, then position | section 4.3 (5) | `simulate::integrate::IntegrationStep::advance` |
-//! | Planck's law, CIE XYZ, RGB | (13) to (17) | `bansho_base::color::black_body` |
-//! | poly6 sprite, opacity by density | section 5.2, figure 2 | [`SpriteStyle::Poly6`](render::SpriteStyle::Poly6) |
-//! | squares colored by density | figure 7 | `paper_squares` |
-//! | refraction of the background | figures 5 and 6 | `render::deflection` |
-//! | flame height `L = 0.235 Q^(2/5) - 1.02 D` | Heskestad | [`heskestad`] |
-//! | puffing frequency `1.5 / sqrt(D)` | Cetegen and Ahmed | `simulate::burner::Burner::puffing_hz` |
+//! | (1) | `rho a = -grad p + f`: Euler's equation | `simulate::integrate::IntegrationStep::apply_forces` |
+//! | (2) | `W = 315/(64 pi d^9) (d^2 - r^2)^3`: poly6 kernel | [`bansho_sph::Poly6`] |
+//! | (3) | `rho_i = sum_j m_j W`: density | [`bansho_sph::compute_densities`] |
+//! | (6) | `A(x) = sum_j m_j A_j / rho_j W`: field of a quantity A, at particles and along a ray | [`bansho_sph::Cells::sum`], [`render::line_integral`] |
+//! | (7) | `grad A = sum_j m_j A_j / rho_j grad W`: its gradient; for heat haze, of the line integrals | [`bansho_sph::SmoothingKernel::gradient_factor`], `render::deflection::OpticalPathField::add_gradient` |
+//! | (8) | `a_i = f_i / rho_i`: acceleration | [`bansho_sph::PressureForce::compute_accelerations`] |
+//! | (9), (10) | `f_i = -grad p_i`, by (7): pressure force, replaced by its symmetric form (12) | [`bansho_sph::PressureForce::compute_accelerations`] |
+//! | (11) | `p = k (rho - rho_0)`: pressure | [`bansho_sph::StateEquation::pressure`] |
+//! | (12) | `f_i = -sum_j m_j (p_i + p_j) / (2 rho_j) grad W`: symmetric pressure force | [`bansho_sph::PressureForce::compute_accelerations`] |
+//! | (13) | Planck's law | [`bansho_base::color::planck_radiance_per_nm`] |
+//! | (14) to (16) | CIE XYZ of a spectrum | [`bansho_base::color::xyz_of_spectrum`] |
+//! | (17) | XYZ to RGB, here ACEScg | [`acescg_from_xyz`](bansho_base::color::space::acescg_from_xyz) |
+//! | section 4.3, step 1 | particles are added at the burner | `simulate::spawning::Spawner::spawn` |
+//! | section 4.3, step 5 | velocity, then position | `simulate::integrate::IntegrationStep::advance` |
+//! | section 5.1, figure 1 | table of color over temperature, 1 to 10,000 K | [`bansho_base::color::black_body`] |
+//! | section 5.2, figure 2 | poly6 as the sprite, opacity by density | `render::prepared::RadianceSprites::density_values` |
+//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::path`, `render::deflection::HeatHaze` |
+//! | figure 7 | squares colored by density | `paper_squares::Squares::draw` |
+//! | Heskestad 1983 | `L = 0.235 Q^(2/5) - 1.02 D`: flame height | [`heskestad`] |
+//! | Cetegen and Ahmed 1993 | `1.5 / sqrt(D)` Hz: puffing frequency | `simulate::burner::Burner::puffing_hz` |
+//!
+//! (4) and (5) are a property of kernels that integrate to 1.
 //!
 //! # Data flow
 //! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper leaves open; `fault` are their errors.
@@ -49,6 +57,7 @@
 //! 8. `render::prepared` composites layers, squares and [sparks](crate::sparks) into strips.
 
 mod fault;
+mod model;
 pub(crate) mod paper_squares;
 mod parameters;
 mod phenomenon;
@@ -58,11 +67,11 @@ pub mod simulate;
 mod tests;
 
 pub use fault::{ParticleFault, ParticleFaultKind};
+pub use model::FlameParticles;
 pub use parameters::{
     BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, LifeParameters, MotionParameters,
     TemperatureLaw, Tension, WindForce,
 };
-pub use phenomenon::FlameParticles;
 pub use simulate::{
     burner::heskestad,
     derived::check_particle_count,

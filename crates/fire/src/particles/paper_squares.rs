@@ -1,17 +1,18 @@
 //! The paper's figure 7: each particle as a square, the redder the denser the gas.
 
+use bansho_base::{
+    color,
+    image::Rect,
+    math,
+    phenomenon::strip::{DepthInterval, Strip, View},
+};
+
 use crate::particles::{
     parameters::LookParameters,
     render::{
         gas::Gas,
         project::sprite::{ProjectedParticle, SpriteKind, project_particles},
     },
-};
-use bansho_base::{
-    color,
-    image::Rect,
-    math,
-    phenomenon::strip::{DepthInterval, Strip, View},
 };
 
 /// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both.

@@ -1,8 +1,9 @@
 //! Parameters of the particle flame. Symbols and equation numbers are those of Inagaki et al.
 
-use crate::sparks::SparkParameters;
 use bansho_base::parameters::{AssetPath, Auto, Length, Range, animated::Animated};
 use bansho_sph::KernelShape;
+
+use crate::sparks::SparkParameters;
 
 const FRACTION: Range = Range::new(0.0, 1.0);
 const LENGTH: Range = Range::new(1e-3, 1e4);
@@ -96,13 +97,13 @@ bansho_base::parameters! {
         /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being
         /// pressed.
         stiffness: f64 = 1.2, limits(Range::new(0.0, 20.0));
-        /// Kernel of the pressure force, eq. (12). The paper's is `"poly6"`, whose gradient vanishes at the centre, so that particles clump.
+        /// Kernel of the pressure force, eq. (12). The paper's is `"poly6"`, whose gradient vanishes at the center, so that particles clump.
         force_kernel: KernelShape = KernelShape::Spiky;
         /// Pressure of thin gas, eq. (11).
         tension: Tension = Tension::Clamped;
-        /// How far neighbours even out their velocities in a hundredth of a second; 0 is the paper's Euler equation, eq. (1).
+        /// How far neighbors even out their velocities in a hundredth of a second; 0 is the paper's Euler equation, eq. (1).
         viscosity: f64 = 0.12, limits(FRACTION);
-        /// How far neighbours even out temperature in a hundredth of a second.
+        /// How far neighbors even out temperature in a hundredth of a second.
         conduction: f64 = 0.08, limits(FRACTION);
         /// Sub-steps that a step is cut into at most. Gas that would need more keeps its time and gives way more easily.
         sub_steps: i64 = 3, limits(Range::new(1.0, 100.0));
@@ -191,7 +192,7 @@ bansho_base::choice! {
     pub enum SpriteStyle {
         /// What a ray sees of its ball: sums are the exact line integrals of the gas, so that light and opacity follow from its soot.
         Integral = "integral",
-        /// The paper's: poly6 itself, times the colour of a black body, added; opacity from density.
+        /// The paper's: poly6 itself, times the color of a black body, added; opacity from density.
         Poly6 = "poly6",
         /// The paper's figure 7: a square, the redder the denser the gas.
         Squares = "squares",
@@ -215,7 +216,7 @@ bansho_base::parameters! {
         detail_speed: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("m/s");
         /// Light of the thin blue zone where fresh gas begins to burn.
         base_blue: f64 = 1.0, limits(Range::new(0.0, 1000.0));
-        /// Opacity of the centre of a poly6 sprite in gas of mean density.
+        /// Opacity of the center of a poly6 sprite in gas of mean density.
         opacity: f64 = 0.06, limits(FRACTION);
         /// Side of the squares of `sprite = "squares"`, in support radii.
         square_size: f64 = 0.25, limits(Range::new(0.001, 10.0));

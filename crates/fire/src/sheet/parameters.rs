@@ -26,7 +26,7 @@ bansho_base::choice! {
 }
 
 bansho_base::choice! {
-    /// How the sharpened texture T2 becomes colour.
+    /// How the sharpened texture T2 becomes color.
     pub enum Coloring {
         /// T2 gives temperature and density of glowing soot, Planck's law gives the light.
         BlackBody = "black_body",
@@ -46,7 +46,7 @@ bansho_base::choice! {
         Thresholded = "thresholded",
         /// After sharpening, T2 (picture 3).
         Sharpened = "sharpened",
-        /// Coloured, before it is mapped to the flame's shape (picture 4).
+        /// Colored, before it is mapped to the flame's shape (picture 4).
         Colored = "coloured",
     }
 }
@@ -101,7 +101,7 @@ bansho_base::parameters! {
         tongue_width: f64 = 1.0, limits(Range::new(0.1, 10.0));
         /// Length of the fractal's tongues, 1 for about half the flame's height.
         tongue_length: f64 = 1.0, limits(Range::new(0.1, 10.0));
-        /// Contrast of the texture: 1 as it is, towards 0 an even gas, as in a still candle.
+        /// Contrast of the texture: 1 as it is, toward 0 an even gas, as in a still candle.
         contrast: f64 = 1.0, limits(FRACTION);
         /// V(w), eq. (4): threshold over height.
         threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]),
@@ -117,9 +117,9 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// From the sharpened texture T2 to light, eq. (7) and beyond.
     pub struct ColorParameters {
-        /// Which colouring.
+        /// Which coloring.
         kind: Coloring = Coloring::BlackBody;
-        /// Luminance of the brightest colour.
+        /// Luminance of the brightest color.
         luminance: Animated<f64> = Animated::from(12_000.0), limits(Range::new(0.0, 1e7)), unit("cd/m^2");
         /// R(s), eq. (7), as a display shows it (sRGB-encoded); for `kind = "paper"`.
         red: Curve = curve(&[[0.0, 0.0], [0.25, 0.75], [0.5, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
@@ -213,7 +213,7 @@ bansho_base::parameters! {
         shape: ShapeParameters = ShapeParameters::default();
         /// Texture, threshold and sharpening.
         texture: TextureParameters = TextureParameters::default();
-        /// Colour and soot.
+        /// Color and soot.
         colour: ColorParameters = ColorParameters::default();
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();

@@ -17,8 +17,9 @@ use bansho_base::{
     },
     world::wind::{Wind, WindParameters},
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
-use super::*;
+use super::{render::aovs::AOVS, *};
 use crate::sheet::{
     animate::warp::{WarpState, WindLean},
     render::{
@@ -26,7 +27,6 @@ use crate::sheet::{
         shade::{SheetContent, SheetState},
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 const SIZE: [usize; 2] = [96, 80];
 

@@ -330,7 +330,7 @@ fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = 
 fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter) -> Result<Picture, AssetProblem> {
     let (width, height) = (planes.width, planes.height);
     let conversion = primaries::conversion(header.parts[selection.part].chromaticities)
-        .ok_or_else(|| damaged("its chromaticities describe no colours"))?;
+        .ok_or_else(|| damaged("its chromaticities describe no colors"))?;
     let mut color = planes.values.color.unwrap_or_else(|| {
         // A file of depth alone: shown as gray, opaque.
         let depth = planes.values.depth.iter().flatten();

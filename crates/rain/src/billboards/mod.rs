@@ -14,6 +14,7 @@ use bansho_base::{
         simd::LANES,
     },
 };
+use fearless_simd::dispatch;
 
 use crate::{
     drops::{
@@ -26,8 +27,6 @@ use crate::{
         project::{DropBatch, FADE_IN, StreakProjection},
     },
 };
-
-use fearless_simd::dispatch;
 
 const TEXTURE: Purpose = Purpose::named("rain texture");
 const OFFSET: Purpose = Purpose::named("rain billboard offset");

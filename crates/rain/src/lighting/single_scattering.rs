@@ -11,6 +11,7 @@ use bansho_base::{
         surroundings::{Emitter, Light},
     },
 };
+use fearless_simd::{Level, dispatch};
 
 use super::{
     drop_lighting::DropLighting,
@@ -18,8 +19,6 @@ use super::{
     tiles::{FINE_TILE, FINEST_TILE, TileGrid, geometric_sequence, lerp_color},
 };
 use crate::{drops::exposure::ExposureState, streaks::bin::TILE_ROWS};
-
-use fearless_simd::{Level, dispatch};
 
 /// First distance at which accumulated in-scattering is stored, m, and the ratio of successive distances.
 const FIRST_DISTANCE: f64 = 0.5;

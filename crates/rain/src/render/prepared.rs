@@ -8,6 +8,7 @@ use bansho_base::{
         surroundings::Surroundings,
     },
 };
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::{
     Rain,
@@ -27,7 +28,6 @@ use crate::{
         splashes::Splashes,
     },
 };
-use fearless_simd::{Level, Simd, dispatch};
 
 /// The AOVs of rain, in the order of a strip's planes.
 pub(crate) const AOVS: &[AovDescriptor] = &[

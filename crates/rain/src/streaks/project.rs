@@ -8,6 +8,8 @@ use bansho_base::{
     },
     phenomenon::surroundings::{Emitter, Light},
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},
@@ -24,8 +26,6 @@ use crate::{
         tiles::TileGrid,
     },
 };
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
 const DROP: Purpose = Purpose::named("rain drop");

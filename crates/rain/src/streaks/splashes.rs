@@ -13,6 +13,8 @@ use bansho_base::{
     },
     world::gravity::STANDARD_GRAVITY,
 };
+use fearless_simd::dispatch;
+use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},
@@ -20,8 +22,6 @@ use super::{
     project_lanes::DropPaths,
 };
 use crate::{drops::exposure::DropClassState, lanes::ZERO_LANES, parameters::SplashParameters};
-use fearless_simd::dispatch;
-use rayon::prelude::*;
 
 /// Side of a ground square, m.
 const SQUARE_SIZE: f64 = 0.5;

@@ -63,7 +63,7 @@ impl<'a> Behind<'a> {
         }
     }
 
-    /// Colours in a row of `rect`, traced to `sources`; `buffer` holds them if any is bent.
+    /// Colors in a row of `rect`, traced to `sources`; `buffer` holds them if any is bent.
     pub(crate) fn colour_row<'b>(
         &self,
         rect: Rect,

@@ -252,7 +252,7 @@ impl March<'_> {
         (before.pixel + (after.pixel - before.pixel) * part, sight.way(t))
     }
 
-    /// The plate's colour infinitely far along a line of sight that met nothing.
+    /// The plate's color infinitely far along a line of sight that met nothing.
     fn beyond(&self, sight: &Sight) -> Option<[f32; 4]> {
         let end = self.camera.project(sight.from + sight.toward * FAR)?.pixel;
         (self.is_inside(end) && !self.plate_depth(end).is_finite()).then(|| self.radiance(end))?
@@ -322,7 +322,7 @@ mod tests {
         [pillar, wall, ground].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// A plate whose colours are the places that it shows, exposed.
+    /// A plate whose colors are the places that it shows, exposed.
     fn plate(view: &View) -> PlateFrame {
         let mut colour = Image::filled(SIZE[0], SIZE[1], [0.0, 0.0, 0.0, 1.0]);
         let mut depth = Image::filled(SIZE[0], SIZE[1], [f32::INFINITY]);

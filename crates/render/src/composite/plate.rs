@@ -1,8 +1,7 @@
-//! The plate of a frame: its colours as the scene sees them, and the depth to hide behind.
+//! The plate of a frame: its colors as the scene sees them, and the depth to hide behind.
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::BuildError;
 use bansho_base::{
     camera::{Camera, Lens},
     color,
@@ -13,6 +12,7 @@ use bansho_base::{
     image::Image,
     math::DVec2,
     phenomenon::LevelMirror,
+    phenomenon::kind::BuildError,
 };
 
 use super::mirror;
@@ -104,7 +104,7 @@ fn load(context: &ShotContext, number: i64, camera: &Camera) -> Result<PlateFram
     Ok(PlateFrame { colour: Some(fit_colour(context, &image, &fit)), depth })
 }
 
-/// How the picture's pixels fall on the plate's: the plate fills the picture, centred, its longer side cut.
+/// How the picture's pixels fall on the plate's: the plate fills the picture, centered, its longer side cut.
 pub(crate) struct Fit {
     picture: [usize; 2],
     plate: [usize; 2],
@@ -189,7 +189,7 @@ pub(crate) fn to_scene(view: &color::View, encoding: Encoding, colour: [f32; 3])
     }
 }
 
-/// Depth is never mixed between pixels: each takes its nearest neighbour's.
+/// Depth is never mixed between pixels: each takes its nearest neighbor's.
 fn fit_depth(context: &ShotContext, camera: &Camera, depth: &[f32], plate_width: usize, fit: &Fit) -> Image<1> {
     let kind = context.plan.scene.plate.depth_kind;
     let scale = context.plan.scene.plate.depth_scale;

@@ -11,12 +11,12 @@ pub struct Slice {
     pub members: Vec<usize>,
 }
 
-/// Most slices of a picture; beyond it the thinnest neighbours are drawn as one.
+/// Most slices of a picture; beyond it the thinnest neighbors are drawn as one.
 pub const MOST_SLICES: usize = 24;
 
 /// Slices from near to far, cut wherever a phenomenon begins or ends.
 ///
-/// `intervals[i]` are the stretches that phenomenon `i` fills. Neighbouring slices with the same members stay apart
+/// `intervals[i]` are the stretches that phenomenon `i` fills. Neighboring slices with the same members stay apart
 /// only where another phenomenon begins or ends between them.
 pub fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
     let intervals: Vec<Vec<DepthInterval>> =

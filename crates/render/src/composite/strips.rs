@@ -13,11 +13,11 @@ use bansho_base::{
     },
 };
 
-use super::slices::Slice;
 use super::{
     accumulate::Accumulator,
     background::{Behind, Sources},
     plate::PlateFrame,
+    slices::Slice,
 };
 use crate::compiled::ActiveRun;
 use bansho_scene::PLATE_LAYER;

@@ -1,6 +1,5 @@
 //! Tables of the scene file that are no phenomenon, and what follows for those that a text leaves out.
 
 pub(crate) mod defaults;
-pub(crate) mod obstacle;
 pub mod picture;
 pub(crate) mod plate;

@@ -125,7 +125,7 @@ bansho_base::parameters! {
         depth: Option<AssetPath> = None;
         /// What the depth measures.
         depth_kind: DepthKind = DepthKind::Axis;
-        /// Metres for each unit of the depth channel.
+        /// Meters for each unit of the depth channel.
         depth_scale: f64 = 1.0, limits(Range::new(1e-6, 1e6)), unit("m");
         /// Exposure value at ISO 100 with which it was taken, so that its white is 1.2 * 2^EV cd/m^2: 15 in sunshine, 12 under heavy clouds, 4 in
         /// a lit street at night. "auto": as the file records it (Exif, EXR), else assumed.
@@ -154,7 +154,7 @@ bansho_base::parameters! {
         position: Animated<[f64; 3]> = Animated::from([0.0, 3.0, 0.0]), unit("m");
         /// Where it shines to (directional and spot).
         direction: [f64; 3] = [0.0, -1.0, 0.0];
-        /// Linear sRGB colour; its luminance is scaled to `intensity`.
+        /// Linear sRGB color; its luminance is scaled to `intensity`.
         colour: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
         /// Luminous intensity (candela) of points and spots, illuminance (lux) of directional lights.
         intensity: Animated<f64> = Animated::from(100.0), limits(Range::new(0.0, 1e9)), unit("cd or lx");

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use bansho_base::{
     host::assets::{AssetError, AssetProblem, Assets, Picture},
     parameters::ProblemKind,
+    phenomenon::kind::BuildError,
 };
-
-use bansho_base::phenomenon::kind::BuildError;
 
 use super::picture::PlateParameters;
 

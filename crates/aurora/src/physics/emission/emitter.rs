@@ -121,8 +121,9 @@ fn first_positive_bands() -> Vec<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bansho_base::color::luminance;
+
+    use super::*;
 
     fn luminance_of(color: [f64; 3]) -> f64 {
         luminance(color.map(|value| value as f32)) as f64

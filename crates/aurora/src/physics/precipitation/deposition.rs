@@ -1,6 +1,7 @@
 //! The ionization table: ion pairs by energy and altitude for a spectrum.
 
 use bansho_base::math::lerp;
+use rayon::prelude::*;
 
 use super::{
     energy_grid::{self, NODES, node_energy_ev},
@@ -9,7 +10,6 @@ use super::{
     spectrum::Spectrum,
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, locate_level};
-use rayon::prelude::*;
 
 /// A profile over the levels of the atmosphere.
 pub type AltitudeProfile = [f64; LEVELS];

@@ -4,6 +4,7 @@ use bansho_base::{
     math,
     math::random::{Key, Purpose, normal_pair, uniform, uniform_f64},
 };
+use rayon::prelude::*;
 
 use super::{
     COLLISION_EV,
@@ -11,7 +12,6 @@ use super::{
     energy_grid::{NODES, node_energy_ev},
 };
 use crate::physics::atmosphere::{LEVELS, level_altitude_km};
-use rayon::prelude::*;
 
 const COLLISION: Purpose = Purpose::named("aurora collision");
 const TRACK_VARIANT: Purpose = Purpose::named("aurora fall variant");

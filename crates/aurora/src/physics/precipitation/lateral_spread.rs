@@ -3,17 +3,16 @@
 use std::sync::OnceLock;
 
 use bansho_base::{host::once::get_or_compute, math, math::random::Key};
+use rayon::prelude::*;
 
-use super::TrackModel;
 use super::{
-    Deposition,
+    Deposition, TrackModel,
     electron_track::{Collision, TrackSampler, collision_count},
     energy_grid::{self, NODES, node_energy_ev},
     hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
     spectrum::ARC,
 };
 use crate::physics::atmosphere::atmosphere;
-use rayon::prelude::*;
 
 /// Approximate number of sampled collisions per energy and the minimum number of tracks: a few long tracks dominate the
 /// variance.

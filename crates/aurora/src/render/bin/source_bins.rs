@@ -10,6 +10,8 @@ use bansho_base::math::{
     self, approximations,
     simd::{FourLanes, Real},
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use crate::render::{
     integrate::columns::ENTRY_PER_STEP,
@@ -19,8 +21,6 @@ use crate::render::{
         visible_rows::VisibleRowTest,
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Sources per task.
 const TASK: usize = 4096;

@@ -4,6 +4,8 @@ use bansho_base::{
     math::{self, MulAdd, simd::LANES},
     parameters::Auto,
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::source_bins::{FieldLineSource, REACH};
 use crate::{
@@ -20,8 +22,6 @@ use crate::{
         afterglow::{Afterglow, AfterglowCell},
     },
 };
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// Sources per task.
 const TASK: usize = 4096;

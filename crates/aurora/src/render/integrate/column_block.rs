@@ -3,6 +3,7 @@
 //! The buffer fits into the cache and is written to the picture once.
 
 use bansho_base::math::{self, MulAdd, approximations, simd::FourLanes};
+use fearless_simd::Simd;
 
 use super::columns::ColumnStrip;
 use crate::{
@@ -16,7 +17,6 @@ use crate::{
     },
     single_collisions::rasterize::{QUAD_ROWS, RowQuad, TrackRasterizer},
 };
-use fearless_simd::Simd;
 
 /// Columns per block: the wider, the fewer sources are projected more than once.
 pub(crate) const BLOCK_COLUMNS: usize = 4 * STRIP_COLUMNS;

@@ -13,6 +13,8 @@ use bansho_base::{
         simd::{FourLanes, HalfLanes, Real},
     },
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS};
 use crate::{
@@ -25,8 +27,6 @@ use crate::{
         },
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Rows per batch.
 const ROWS: usize = 16;

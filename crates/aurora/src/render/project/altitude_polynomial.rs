@@ -6,10 +6,10 @@ use bansho_base::math::{
     self, approximations,
     simd::{HalfLanes, LANES, Lanes, Real},
 };
+use fearless_simd::{Simd, prelude::*};
 
 use super::{chart::ChartProjection, field_lines::EARTH_RADIUS_KM};
 use crate::physics::atmosphere::{HIGHEST_KM, LOWEST_KM};
-use fearless_simd::{Simd, prelude::*};
 
 /// Chebyshev nodes at which a line is projected exactly, and terms of the row polynomial.
 const NODES: usize = 8;
@@ -230,10 +230,10 @@ fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
 #[cfg(test)]
 mod tests {
     use bansho_base::math::DVec3;
+    use fearless_simd::{Level, dispatch};
 
     use super::*;
     use crate::render::project::field_lines::FieldLines;
-    use fearless_simd::{Level, dispatch};
 
     #[test]
     fn polynomials_place_points_where_they_are_seen() {

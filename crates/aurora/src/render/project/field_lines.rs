@@ -4,7 +4,6 @@
 //! magnetic zenith, their vanishing point: the longitude is constant along a line. The whole renderer relies on that.
 
 use bansho_base::math::{self, DVec2, DVec3, MulAdd, approximations};
-
 pub(crate) use bansho_base::world::sky::EARTH_RADIUS_KM;
 
 pub(crate) use crate::shapes::FOOT_ALTITUDE_KM;

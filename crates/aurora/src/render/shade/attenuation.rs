@@ -6,12 +6,12 @@ use bansho_base::math::{
     self, DVec3,
     simd::{FourLanes, Real},
 };
-
-use crate::{
-    physics::emission::{EMITTERS, Emitter, LINES, PerEmitter},
-    physics::extinction::Extinction,
-};
 use fearless_simd::{Simd, prelude::*};
+
+use crate::physics::{
+    emission::{EMITTERS, Emitter, LINES, PerEmitter},
+    extinction::Extinction,
+};
 
 /// Steps from the horizon to the zenith, uniform in the square root of the sine of the elevation: extinction varies
 /// rapidly near the horizon.

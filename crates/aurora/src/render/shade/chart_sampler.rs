@@ -1,10 +1,9 @@
 //! Bilinear sampling of a chart.
 
+use bansho_base::math::simd::{FourLanes, HalfLanes, Real};
 #[cfg(test)]
 use fearless_simd::{Level, dispatch};
 use fearless_simd::{Simd, prelude::*};
-
-use bansho_base::math::simd::{FourLanes, HalfLanes, Real};
 
 use crate::{
     physics::emission::PerEmitter,

@@ -6,6 +6,8 @@ use bansho_base::{
     math,
     math::simd::{FourLanes, HalfLanes, Real},
 };
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use rayon::prelude::*;
 
 use super::attenuation::EmitterColors;
 use crate::{
@@ -18,8 +20,6 @@ use crate::{
         },
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Rows per batch.
 const ROWS: usize = 16;

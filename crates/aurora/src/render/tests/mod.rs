@@ -20,18 +20,18 @@ use bansho_base::{
 };
 
 use super::{
-    Aurora, BlurParameters, DrawingParameters, Sampling, TrackModel,
+    BlurParameters, DrawingParameters, Sampling, TrackModel,
     prepared::{ChartBuilder, PixelBatch},
 };
 use crate::{
-    AuroraParameters, ParticleParameters, SpectrumShape,
-    phenomenon::{brightnesses, measured_lines},
+    Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
         atmosphere::atmosphere,
         emission::{EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
         precipitation::spectrum::ARC,
     },
     render::{
+        aovs::{brightnesses, measured_lines},
         bin::{
             source_bins::{FieldLineSource, REACH, SourceBins},
             sources::{EmitterWeights, SourceBuilder, Sources, nearest_node},

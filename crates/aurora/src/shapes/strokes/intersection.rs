@@ -1,10 +1,11 @@
 //! Crossings of sheets with themselves or one another, which are not allowed (thesis, 2.2.1), and sheets that pass
 //! through each other over time.
 
-use crate::shapes::geometry::cell_grid::CellGrid;
-use crate::shapes::{Shape, Sheet};
-use bansho_base::math::DVec2;
 use std::collections::BTreeSet;
+
+use bansho_base::math::DVec2;
+
+use crate::shapes::{Shape, Sheet, geometry::cell_grid::CellGrid};
 
 /// A segment of a sheet, indices from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

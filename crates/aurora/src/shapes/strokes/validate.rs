@@ -1,14 +1,19 @@
 //! Converts parameters to drawn sheets and validates them.
 
-use super::intersection::first_crossing;
-use crate::shapes::geometry::polyline::{Polyline, resample_by_index, smooth_sketch};
-use crate::shapes::{SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing};
-use bansho_base::geometry::strokes::Drawing;
-use bansho_base::host::assets::{AssetError, AssetProblem, Assets};
-use bansho_base::math::curve::Curve;
-use bansho_base::math::{self, DVec2, smoothstep};
-use bansho_base::parameters::Auto;
 use std::sync::Arc;
+
+use bansho_base::{
+    geometry::strokes::Drawing,
+    host::assets::{AssetError, AssetProblem, Assets},
+    math::{self, DVec2, curve::Curve, smoothstep},
+    parameters::Auto,
+};
+
+use super::intersection::first_crossing;
+use crate::shapes::{
+    SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing,
+    geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
+};
 
 /// Points closer than this are merged, km.
 const SAME_KM: f64 = 1e-6;

@@ -1,12 +1,12 @@
 //! A sparse map of power that relaxes toward the power of the particles.
 
 use bansho_base::math;
+use rayon::prelude::*;
 
 use crate::{
     physics::precipitation::energy_grid::{NODES, node_coordinate, node_energy_ev},
     simulate::AuroraParticles,
 };
-use rayon::prelude::*;
 
 /// Cells per tile side.
 const TILE_SIDE: usize = 8;

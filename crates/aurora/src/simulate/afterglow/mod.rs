@@ -5,10 +5,11 @@
 
 mod map;
 
-use super::AuroraParticles;
-use crate::physics::emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES};
 use map::DecayFactors;
 pub use map::{AfterglowCell, AfterglowMap};
+
+use super::AuroraParticles;
+use crate::physics::emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES};
 
 /// Green cells per cell of the field.
 const GREEN_FINENESS: f64 = 8.0;

@@ -7,5 +7,4 @@ pub(crate) mod sheet_field;
 mod sine_transform;
 
 pub use grid::{Gradient2, Grid2};
-pub use poisson::PoissonSolver;
-pub use poisson::{gauss_seidel_sweep, relative_residual};
+pub use poisson::{PoissonSolver, gauss_seidel_sweep, relative_residual};

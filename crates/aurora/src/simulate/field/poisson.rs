@@ -1,13 +1,13 @@
 //! Solvers of the screened Poisson equation: direct (sine transform along x, tridiagonal systems along z) and
 //! Gauss-Seidel.
 
-use super::grid::Grid2;
-use super::sine_transform::SineTransform;
+use std::{f64::consts::PI, sync::Arc};
+
 use bansho_base::math;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
-use std::f64::consts::PI;
-use std::sync::Arc;
+
+use super::{grid::Grid2, sine_transform::SineTransform};
 
 /// Rows per task of the transform, an even number.
 const TASK_ROWS: usize = 16;

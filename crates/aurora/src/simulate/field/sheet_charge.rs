@@ -1,11 +1,13 @@
 //! Charge on the sheets: scattered particles (thesis, 2.2.3) and their charge as on conductors.
 
-use super::Grid2;
-use crate::simulate::sheets::nodes::split;
-use crate::simulate::sheets::refined_shape::RefinedShape;
-use bansho_base::math::DVec2;
-use bansho_base::math::random::{Key, Purpose, uniform};
+use bansho_base::math::{
+    DVec2,
+    random::{Key, Purpose, uniform},
+};
 use rayon::prelude::*;
+
+use super::Grid2;
+use crate::simulate::sheets::{nodes::split, refined_shape::RefinedShape};
 
 /// Limits of the change per iteration, and of the charge relative to a long, straight, isolated sheet.
 const CHANGE: [f64; 2] = [0.5, 2.0];

@@ -11,17 +11,16 @@ use bansho_base::{
     noise::{Coordinate, Fractal, Noise},
     parameters::Auto,
 };
+use fearless_simd::Level;
+use rayon::prelude::*;
 
 use super::{
     Grid2, PoissonSolver, gauss_seidel_sweep,
-    sheet_charge::ScatteredParticle,
-    sheet_charge::{ChargeTarget, SheetCharge, SheetCoordinate},
+    sheet_charge::{ChargeTarget, ScatteredParticle, SheetCharge, SheetCoordinate},
 };
 use crate::{
     AuroraParameters, FieldCharge, FieldSolver, shapes::FRAME_S, simulate::sheets::refined_shape::RefinedShape,
 };
-use fearless_simd::Level;
-use rayon::prelude::*;
 
 /// Default screening length l, cells: particles are attracted from a few cells, those farther away can be removed.
 const REACH_CELLS: f64 = 3.0;

@@ -7,10 +7,10 @@ use bansho_base::{
     },
     noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
 };
+use fearless_simd::{Level, dispatch};
 
 use super::nodes::split;
 use crate::{AuroraParameters, PulsationParameters, RayParameters};
-use fearless_simd::{Level, dispatch};
 
 /// Fractal noise of the rays: groups, rays, and fine structure.
 const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };

@@ -4,6 +4,7 @@ use bansho_base::{
     math::{approximations, random::Key},
     noise::LANES,
 };
+use fearless_simd::Level;
 
 use super::*;
 use crate::{
@@ -14,7 +15,6 @@ use crate::{
         refined_shape::{FoldModel, RefinedShape},
     },
 };
-use fearless_simd::Level;
 
 const KEY: Key = Key::new(8, "arrivals");
 

@@ -16,7 +16,7 @@ use bansho_scene::picture::LARGEST_SIDE;
 use crate::job::{
     error::JobError,
     observer::JobObserver,
-    shoot::{Finish, shoot},
+    render::draw_frames::{FrameSink, draw_frames},
     snapshots::Snapshots,
 };
 
@@ -37,7 +37,7 @@ const MOST_ENLARGED: f64 = 2.0;
 
 /// A part of a picture as shares of its width and height: left, top, right, bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Region {
+pub(crate) struct Region {
     min: [f64; 2],
     max: [f64; 2],
 }
@@ -54,7 +54,7 @@ impl Region {
     }
 
     /// The pixels of a picture of `size` that hold it and its margin; an even number of columns and rows where the picture has room.
-    pub(super) fn within(&self, size: [usize; 2]) -> Rect {
+    pub(crate) fn within(&self, size: [usize; 2]) -> Rect {
         let side = |axis: usize| {
             let length = size[axis];
             let mut start = ((self.min[axis] * length as f64).floor() as usize).saturating_sub(MARGIN);
@@ -73,7 +73,7 @@ impl Region {
     }
 
     /// The size at which a picture of `size` is drawn so that its part fits a tile of `most` pixels; `None` where nothing fits.
-    pub(super) fn picture(&self, size: [usize; 2], most: [usize; 2]) -> Option<[usize; 2]> {
+    pub(crate) fn picture(&self, size: [usize; 2], most: [usize; 2]) -> Option<[usize; 2]> {
         // Rounding outward takes a pixel on each side and evenness one more.
         let room = |axis: usize| most[axis].checked_sub(2 * MARGIN + 3).filter(|&room| room > 0);
         let scale = |axis: usize| {
@@ -91,7 +91,7 @@ impl Region {
 ///
 /// # Errors
 /// Those of drawing.
-pub(super) fn lit(
+pub(crate) fn lit(
     compiled: &Arc<CompiledScene>,
     plan: &Plan,
     numbers: &[i64],
@@ -106,7 +106,7 @@ pub(super) fn lit(
     // Half a code of 8 bits, in codes of 16, of one pixel alone among those that a small one stands for.
     let least = if exact { 1 } else { (128.0 / (shrunk * shrunk)).max(1.0) as u16 };
     let probe = LitRegionProbe { lit: Mutex::default(), view: plan.display, least };
-    shoot(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &probe, observer)?;
+    draw_frames(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &probe, observer)?;
     let lit = probe.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok((!lit.is_empty()).then(|| Region::of(&lit, size)))
 }
@@ -125,7 +125,7 @@ struct LitRegionProbe {
     least: u16,
 }
 
-impl Finish for LitRegionProbe {
+impl FrameSink for LitRegionProbe {
     fn finish(&self, _index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         let own = bounds(frame, &self.view, self.least);
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);

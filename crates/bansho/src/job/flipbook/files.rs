@@ -27,21 +27,21 @@ use super::{
     FlipbookSummary,
     motion::{self, Colour, Tile},
 };
-use crate::job::{error::JobError, finished::Finished};
+use crate::job::{error::JobError, render::finished_files::Finished};
 
 use serde_json::{Value, json};
 
 /// Where a flipbook goes and what its sheets are.
-pub(super) struct Files {
+pub(crate) struct Files {
     /// `DIR/NAME`
-    pub(super) base: PathBuf,
-    pub(super) kind: OutputKind,
-    pub(super) view: View,
-    pub(super) bits: BitDepth,
+    pub(crate) base: PathBuf,
+    pub(crate) kind: OutputKind,
+    pub(crate) view: View,
+    pub(crate) bits: BitDepth,
     /// What the straight alpha of PNG sheets is made for.
-    pub(super) alpha: AlphaConvention,
+    pub(crate) alpha: AlphaConvention,
     /// Which files that are there may be written over.
-    pub(super) overwrite: OverwritePolicy,
+    pub(crate) overwrite: OverwritePolicy,
 }
 
 impl Files {
@@ -50,7 +50,7 @@ impl Files {
     }
 
     /// Whether sheets hold light that 8 bits do not.
-    pub(super) fn is_exact(&self) -> bool {
+    pub(crate) fn is_exact(&self) -> bool {
         self.is_linear() || self.bits == BitDepth::Sixteen
     }
 
@@ -65,13 +65,13 @@ impl Files {
     }
 
     /// All files, the JSON last.
-    pub(super) fn paths(&self) -> Vec<PathBuf> {
+    pub(crate) fn paths(&self) -> Vec<PathBuf> {
         let sheets: &[&str] = if self.is_linear() { &["colour", "motion"] } else { &["colour", "alpha", "motion"] };
         sheets.iter().map(|what| self.sheet_path(what)).chain([self.path(".json")]).collect()
     }
 
     /// What colour sheets keep of a frame.
-    pub(super) fn colour(&self, frame: &Frame, observer: &dyn Observer) -> Colour {
+    pub(crate) fn colour(&self, frame: &Frame, observer: &dyn Observer) -> Colour {
         if self.is_linear() {
             return Colour::Linear(frame.beauty.clone());
         }
@@ -80,7 +80,7 @@ impl Files {
     }
 
     /// Lays out the tiles and writes every file.
-    pub(super) fn write(
+    pub(crate) fn write(
         &self,
         plan: &Plan,
         sheet: &SheetLayout,
@@ -288,7 +288,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Alpha as grey.
+/// Alpha as gray.
 fn alpha(pixels: &DisplayPixels) -> DisplayPixels {
     match pixels {
         DisplayPixels::Eight(pixels) => {

@@ -1,9 +1,11 @@
 //! Flipbooks for game engines: all frames in one sheet, their alpha and motion in sheets beside it, and a JSON that says
 //! how to read them.
 
+pub(crate) mod contact_sheet;
 mod crop;
 mod files;
 mod motion;
+pub(crate) mod tiles;
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -22,22 +24,25 @@ use bansho_scene::{FrameRate, Scene, SceneOptions};
 use self::{files::Files, motion::Tile};
 use super::{
     error::{Conflict, JobError, SheetKind},
-    inputs,
-    memory::{self, MemoryRequest},
     observer::{JobObserver, Note, Outline},
-    output, overwriting, plates, prepare,
     scene_file::SceneFile,
-    sheet::{self, Gather},
-    shoot::shoot,
     snapshots::Snapshots,
 };
+use crate::job::{
+    checks::{
+        memory::{self, MemoryRequest},
+        overwrite, plates,
+    },
+    render::{draw_frames::draw_frames, output, prepare},
+};
+use tiles::Gather;
 
 pub use self::crop::FlipbookCrop;
 
 /// A flipbook that is wanted. Begin with [`Flipbook::new`].
 ///
-/// PNG: color in sRGB with straight alpha; alpha again, as grey, for engines that want it apart; motion in pixels to
-/// the next frame, in 16 bits around a middle that means none. EXR: colour scene-linear with premultiplied alpha; motion in
+/// PNG: color in sRGB with straight alpha; alpha again, as gray, for engines that want it apart; motion in pixels to
+/// the next frame, in 16 bits around a middle that means none. EXR: color scene-linear with premultiplied alpha; motion in
 /// pixels as it is.
 #[derive(Clone, Debug)]
 pub struct Flipbook {
@@ -106,7 +111,7 @@ impl Flipbook {
         let mut scene = self.scene.parse()?;
         let [columns, rows] = self.grid;
         let sheet = SheetLayout { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
-        let sheet = sheet::checked(sheet, SheetKind::Flipbook)?;
+        let sheet = tiles::checked(sheet, SheetKind::Flipbook)?;
         if let Some(seconds) = self.loop_s {
             scene.picture.fps = turn_rate(sheet.count, seconds)?;
         }
@@ -126,9 +131,9 @@ impl Flipbook {
         let frames = numbers.len();
         let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.bits), own_size: true };
         memory::check(&self.scene, &compiled, &plan, wanted)?;
-        let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &numbers), self.overwrite);
+        let overwrite = OverwritePolicy::new(overwrite::inputs(&self.scene, &plan, &numbers), self.overwrite);
         let files = self.files(overwrite)?;
-        overwriting::check(&files.overwrite, files.paths())?;
+        overwrite::check(&files.overwrite, files.paths())?;
         let (scene, own_size, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
         Ok(PreparedFlipbook { scene, compiled, plan, sheet, own_size, crop, numbers, files })
     }
@@ -183,11 +188,11 @@ impl PreparedFlipbook {
     pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
         let Self { scene, compiled, numbers, files, .. } = self;
         observer.started(&Outline { total: numbers.len(), kept: 0, size: self.sheet.cell });
-        let told = |error| plates::located(scene, error).of_whole("a flipbook");
-        let (plan, sheet) = &self.cropped(observer).map_err(told)?;
+        let located = |error| plates::located(scene, error).of_whole("a flipbook");
+        let (plan, sheet) = &self.cropped(observer).map_err(located)?;
         let gather = Gather::new(sheet.count, observer, |frame, observer| Tile::of(frame, files, observer));
         let mut shot = Shot::open(compiled.clone(), plan.clone());
-        shoot(&mut shot, numbers, &Snapshots::default(), &gather, observer).map_err(told)?;
+        draw_frames(&mut shot, numbers, &Snapshots::default(), &gather, observer).map_err(located)?;
         let tiles = gather.into_tiles();
         if !tiles.iter().any(|tile| tile.has_motion) {
             observer.note(&Note::NoMotion);
@@ -215,7 +220,7 @@ impl PreparedFlipbook {
         };
         let Some((size, part)) = region.and_then(fitting) else { return all() };
         let plan = Arc::new(self.plan.cropped(size, part)?);
-        let sheet = sheet::checked(SheetLayout { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
+        let sheet = tiles::checked(SheetLayout { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
         let frames = self.numbers.len();
         let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
         memory::check(&self.scene, &self.compiled, &plan, wanted)?;

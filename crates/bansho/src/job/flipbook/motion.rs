@@ -9,22 +9,22 @@ use bansho_base::{
 use super::files::Files;
 
 /// What a sheet needs of a frame.
-pub(super) struct Tile {
-    pub(super) header: FrameHeader,
-    pub(super) colour: Colour,
+pub(crate) struct Tile {
+    pub(crate) header: FrameHeader,
+    pub(crate) colour: Colour,
     /// Pixels to the right and down until the next frame.
-    pub(super) motion: Image<2>,
-    pub(super) has_motion: bool,
+    pub(crate) motion: Image<2>,
+    pub(crate) has_motion: bool,
 }
 
 /// A frame's colours as its format keeps them.
-pub(super) enum Colour {
+pub(crate) enum Colour {
     Shown(DisplayImage),
     Linear(Image<4>),
 }
 
 impl Tile {
-    pub(super) fn of(frame: &Frame, files: &Files, observer: &dyn Observer) -> Self {
+    pub(crate) fn of(frame: &Frame, files: &Files, observer: &dyn Observer) -> Self {
         let fields = fields(frame);
         let (width, height) = (frame.beauty.width(), frame.beauty.height());
         let motion = (0..width * height).map(|index| mean(&fields, index)).collect();
@@ -69,19 +69,19 @@ fn mean(fields: &[Field], index: usize) -> [f32; 2] {
 }
 
 /// The largest motion along either axis in any frame, pixels; 1 where nothing moves.
-pub(super) fn scale(tiles: &[Tile]) -> f32 {
+pub(crate) fn scale(tiles: &[Tile]) -> f32 {
     let largest = tiles.iter().flat_map(|tile| tile.motion.pixels().as_flattened());
     let largest = largest.fold(0.0_f32, |largest, value| largest.max(value.abs()));
     if largest > 0.0 { largest } else { 1.0 }
 }
 
 /// Code of no motion.
-pub(super) const MIDDLE: u16 = 1 << 15;
+pub(crate) const MIDDLE: u16 = 1 << 15;
 /// Codes from no motion to the largest.
-pub(super) const REACH: u16 = MIDDLE - 1;
+pub(crate) const REACH: u16 = MIDDLE - 1;
 
 /// Motion in 16 bits: red to the right, green down, [`MIDDLE`] for none.
-pub(super) fn coded(motion: [f32; 2], scale: f32) -> [u16; 4] {
+pub(crate) fn coded(motion: [f32; 2], scale: f32) -> [u16; 4] {
     let code = |value: f32| {
         let steps = (value / scale).clamp(-1.0, 1.0) * f32::from(REACH);
         (i32::from(MIDDLE) + steps.round() as i32) as u16

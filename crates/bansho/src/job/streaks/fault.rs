@@ -101,7 +101,7 @@ pub enum StreaksFault {
 const MOST_DROPS: u32 = 1_000_000;
 
 /// The first fault.
-pub(super) fn check(streaks: &Streaks) -> Result<(), StreaksFault> {
+pub(crate) fn check(streaks: &Streaks) -> Result<(), StreaksFault> {
     check_list(ListKind::Rates, &streaks.rates)?;
     check_list(ListKind::Diameters, &streaks.diameters)?;
     let cube = &streaks.cube;

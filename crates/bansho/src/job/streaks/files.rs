@@ -26,15 +26,15 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// A distant light on the drops.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lit {
+pub(crate) struct Lit {
     /// Unit vector toward it: right, up, toward the viewer.
-    pub(super) toward: DVec3,
+    pub(crate) toward: DVec3,
     /// Radiance of an opaque drop for each unit of illuminance, 1/sr: red, green, blue.
-    pub(super) radiance: [f32; 3],
+    pub(crate) radiance: [f32; 3],
 }
 
 impl Lit {
-    pub(super) fn new(toward: [f64; 3], lens: &DropPhaseFunction) -> Self {
+    pub(crate) fn new(toward: [f64; 3], lens: &DropPhaseFunction) -> Self {
         let toward = DVec3::from(toward).normalize();
         // The light travels against `toward`, and goes on to the viewer along z.
         let phase = lens.phase(-toward.z as f32);
@@ -43,32 +43,32 @@ impl Lit {
 }
 
 /// Where textures go and what they are.
-pub(super) struct Writer {
-    pub(super) folder: PathBuf,
-    pub(super) format: StreakFormat,
-    pub(super) bits: BitDepth,
-    pub(super) light: Option<Lit>,
+pub(crate) struct Writer {
+    pub(crate) folder: PathBuf,
+    pub(crate) format: StreakFormat,
+    pub(crate) bits: BitDepth,
+    pub(crate) light: Option<Lit>,
     /// Which files that are there may be written over.
-    pub(super) overwrite: OverwritePolicy,
-    pub(super) streaks: Streaks,
+    pub(crate) overwrite: OverwritePolicy,
+    pub(crate) streaks: Streaks,
 }
 
 /// What was written of one texture.
 #[derive(Clone, Debug)]
-pub(super) struct Written {
+pub(crate) struct Written {
     /// Opacity of the largest code, of a PNG.
-    pub(super) scale: Option<f32>,
+    pub(crate) scale: Option<f32>,
     /// File and scale of the lit picture, of a PNG.
-    pub(super) lit: Option<(String, f32)>,
+    pub(crate) lit: Option<(String, f32)>,
 }
 
 impl Writer {
-    pub(super) fn index_path(&self) -> PathBuf {
+    pub(crate) fn index_path(&self) -> PathBuf {
         self.folder.join("streaks.json")
     }
 
     /// `streak_RATE_DIAMETER.png`, the variant behind it where there are several.
-    pub(super) fn name(&self, texture: &Texture) -> String {
+    pub(crate) fn name(&self, texture: &Texture) -> String {
         let variant = if self.streaks.variants > 1 { format!("_{}", texture.variant) } else { String::new() };
         let extension = self.format.name();
         format!("streak_{}_{}{variant}.{extension}", texture.rate, texture.bin.diameter_mm)
@@ -80,19 +80,19 @@ impl Writer {
     }
 
     /// The files that the texture `file` becomes.
-    pub(super) fn files(&self, file: &str) -> impl Iterator<Item = PathBuf> + use<> {
+    pub(crate) fn files(&self, file: &str) -> impl Iterator<Item = PathBuf> + use<> {
         let names = [Some(file.to_owned()), self.lit_name(file)];
         let folder = self.folder.clone();
         names.into_iter().flatten().map(move |name| folder.join(name))
     }
 
     /// Writes a file, whole or not at all.
-    pub(super) fn keep(&self, path: &Path, bytes: &[u8]) -> Result<(), JobError> {
+    pub(crate) fn keep(&self, path: &Path, bytes: &[u8]) -> Result<(), JobError> {
         Ok(atomic::write_bytes_with(path, bytes, &self.overwrite)?)
     }
 
     /// Writes what a texture becomes.
-    pub(super) fn write(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+    pub(crate) fn write(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
         match self.format {
             StreakFormat::Png => self.write_png(file, opacity),
             StreakFormat::Exr => self.write_exr(file, opacity),

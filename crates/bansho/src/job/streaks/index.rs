@@ -19,13 +19,13 @@ use super::{
 use serde_json::{Value, json};
 
 /// One texture as the index tells it.
-pub(super) struct Entry {
-    pub(super) file: String,
+pub(crate) struct Entry {
+    pub(crate) file: String,
     about: Value,
 }
 
 impl Entry {
-    pub(super) fn new(
+    pub(crate) fn new(
         texture: &Texture,
         cube: &StreakCube,
         file: String,
@@ -70,7 +70,7 @@ fn describe_drop(cube: &StreakCube, drop: &FallingDrop) -> Value {
 }
 
 /// The whole index.
-pub(super) fn describe(
+pub(crate) fn describe(
     streaks: &Streaks,
     cube: &StreakCube,
     writer: &Writer,

@@ -31,9 +31,11 @@ use self::{
 };
 use super::{
     error::JobError,
-    finished::Finished,
     observer::{FrameDone, JobObserver, Outline},
-    output, overwriting,
+};
+use crate::job::{
+    checks::overwrite,
+    render::{finished_files::Finished, output},
 };
 
 use rayon::prelude::*;
@@ -43,7 +45,7 @@ pub use fault::{ListKind, StreaksFault};
 bansho_base::choice! {
     /// What streak textures are written as.
     pub enum StreakFormat {
-        /// Grey PNG, linear, with a scale; with a light, colour PNG beside it.
+        /// Gray PNG, linear, with a scale; with a light, color PNG beside it.
         Png = "png",
         /// EXR: opacity as 32-bit float; with a light, radiance in R, G, B.
         Exr = "exr",
@@ -126,7 +128,7 @@ impl Streaks {
         let writer = Writer { folder, format: self.format, bits: self.bits, light, overwrite, streaks: self.clone() };
         output::check_writable(&writer.index_path())?;
         let prepared = PreparedStreaks { streaks: self.clone(), cube, writer };
-        overwriting::check(&prepared.writer.overwrite, prepared.files())?;
+        overwrite::check(&prepared.writer.overwrite, prepared.files())?;
         Ok(prepared)
     }
 }

@@ -6,19 +6,17 @@ use bansho_base::{
 };
 
 use super::gas::Gas;
-use crate::particles::render::{
-    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-    resolve::spline,
-    splat::{
-        grid::{Grid, weighted_sum},
-        kernel::Profile,
-    },
-};
 use crate::particles::{
     parameters::LookParameters,
     render::{
-        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
-        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer, spline},
+        splat::{
+            MIN_RADIUS_CELLS, SplatSettings, Sprite,
+            grid::{Grid, weighted_sum},
+            kernel::Profile,
+            splat,
+        },
     },
 };
 

@@ -7,26 +7,24 @@ use bansho_base::{
     image::{Image, Rect},
     phenomenon::strip::{Strip, View},
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::{aovs::DEFLECTION, gas::Gas};
-use crate::particles::render::depth_layers::is_visible;
-use crate::particles::render::{
-    project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-    resolve::spline,
-    splat::{
-        grid::{Grid, weighted_sum},
-        kernel::Profile,
-    },
-};
 use crate::particles::{
     parameters::LookParameters,
     render::{
-        resolve::{PATH, PLANES},
-        splat::{MIN_RADIUS_CELLS, SplatSettings, Sprite, splat},
+        depth_layers::is_visible,
+        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{PATH, PLANES, spline},
+        splat::{
+            MIN_RADIUS_CELLS, SplatSettings, Sprite,
+            grid::{Grid, weighted_sum},
+            kernel::Profile,
+            splat,
+        },
     },
 };
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// n - 1 of air at [`REFERENCE_K`] and atmospheric pressure; proportional to 1/T (Gladstone-Dale).
 const REFRACTIVITY: f64 = 2.72e-4;

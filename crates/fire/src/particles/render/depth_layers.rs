@@ -2,17 +2,19 @@
 //!
 //! Gas in different layers has its own detail, and other phenomena can be composited between layers.
 
-use crate::particles::{
-    parameters::{LookParameters, SpriteStyle},
-    render::{gas::Gas, prepared::PARTICLES_PER_TASK, resolve::detail::DetailScale},
-};
+use std::ops::Range;
+
 use bansho_base::{
     math::DVec3,
     phenomenon::strip::{DepthInterval, View},
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
-use std::ops::Range;
+
+use crate::particles::{
+    parameters::{LookParameters, SpriteStyle},
+    render::{gas::Gas, prepared::PARTICLES_PER_TASK, resolve::detail::DetailScale},
+};
 
 /// Layers of equal thickness, at multiples of it, so that they stay in place while the gas moves.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,11 +7,11 @@ use bansho_base::{
     math::DVec3,
     phenomenon::surroundings::{Emitter, Light},
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
 use crate::particles::parameters::LookParameters;
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// Slabs of height over which emission is accumulated.
 const SLABS: usize = 48;

@@ -5,8 +5,7 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::Particles;
-use crate::particles::{parameters::LookParameters, render::splat::scratch_pool::ScratchPool};
+use crate::particles::{Particles, parameters::LookParameters, render::splat::scratch_pool::ScratchPool};
 
 /// The gas of one flame at one time, with what rendering needs of its surroundings.
 #[derive(Clone, Copy, Debug)]

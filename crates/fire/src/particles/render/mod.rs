@@ -19,7 +19,6 @@ pub(crate) mod project;
 pub(crate) mod resolve;
 pub(crate) mod splat;
 
-pub use crate::particles::parameters::{GasLightParameters, LookParameters, SpriteStyle};
 pub use aovs::AOVS;
 pub use emitted_light::point_lights_of_gas;
 pub use gas::{FadeOut, Gas, soot_absorption};
@@ -28,6 +27,8 @@ pub use splat::{
     kernel::{line_gradient, line_integral},
     scratch_pool::ScratchPool,
 };
+
+pub use crate::particles::parameters::{GasLightParameters, LookParameters, SpriteStyle};
 
 #[cfg(test)]
 mod tests;

@@ -15,6 +15,7 @@ use bansho_base::{
         surroundings::Surroundings,
     },
 };
+use fearless_simd::{Level, dispatch};
 
 use super::{
     aovs::{MotionField, min_max},
@@ -22,27 +23,23 @@ use super::{
     depth_layers::DepthLayers,
     gas::Gas,
 };
-use crate::particles::render::depth_layers::{GasStatistics, is_visible};
-use crate::particles::{
-    paper_squares::Squares,
-    parameters::{LookParameters, SpriteStyle},
-    render::{
-        resolve::{
-            BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES, TAU,
-        },
-        splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, splat},
-    },
-};
 use crate::{
     chemiluminescence_color,
-    particles::render::{
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{detail::Detail, spline, strain::Strain, upsample::RowInterpolator},
-        splat::{grid::Grid, kernel::Profile},
+    particles::{
+        paper_squares::Squares,
+        parameters::{LookParameters, SpriteStyle},
+        render::{
+            depth_layers::{GasStatistics, is_visible},
+            project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+            resolve::{
+                BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES,
+                TAU, detail::Detail, spline, strain::Strain, upsample::RowInterpolator,
+            },
+            splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, grid::Grid, kernel::Profile, splat},
+        },
     },
     sparks::{SparkEmitter, Streak},
 };
-use fearless_simd::{Level, dispatch};
 
 /// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {

@@ -3,6 +3,12 @@
 //!
 //! Sixteen particles at a time.
 
+use std::ops::Range;
+
+use bansho_base::math::simd::Real;
+use bansho_sph::KernelShape;
+use fearless_simd::Simd;
+
 use crate::particles::{
     parameters::{LifeParameters, TemperatureLaw},
     simulate::{
@@ -12,10 +18,6 @@ use crate::particles::{
         particles::Particles,
     },
 };
-use bansho_base::math::simd::Real;
-use bansho_sph::KernelShape;
-use fearless_simd::Simd;
-use std::ops::Range;
 
 /// Specific heat of hot air at constant pressure, J/(kg K).
 const SPECIFIC_HEAT: f32 = 1200.0;
@@ -320,9 +322,10 @@ impl CombustionStep<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bansho_base::math::simd::{LANES, Lanes};
     use fearless_simd::prelude::*;
+
+    use super::*;
 
     const STATE: ParticleState<f32> = ParticleState { temperature: 1200.0, fuel: 0.6, soot: 0.0, support_radius: 0.02 };
     const CONDITIONS: AmbientConditions<f32> = AmbientConditions {

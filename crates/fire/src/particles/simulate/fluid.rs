@@ -1,13 +1,14 @@
 //! The gas as a fluid: density, pressure force, and sums over neighbors.
 
-use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
-use crate::particles::parameters::{FluidParameters, Tension};
 use bansho_base::math::simd::Real;
 use bansho_sph::{
     Cells, KernelShape, Pair, PairTerm, Poly6, PressureForce, SmoothingKernel, StateEquation, compute_densities,
     max_stable_step, mixing_weights, substep_count,
 };
 use rayon::prelude::*;
+
+use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
+use crate::particles::parameters::{FluidParameters, Tension};
 
 /// Speed of gas relative to its neighbors, as a fraction of its speed.
 const RELATIVE_SPEED: f32 = 0.15;

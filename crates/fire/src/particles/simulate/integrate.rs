@@ -1,21 +1,25 @@
 //! Time integration of a sub-step: pressure, buoyancy, wind, and advection by the air; sixteen particles at a time.
 
+use std::ops::Range;
+
 use bansho_base::math::{
     Vec3,
     simd::{LANES, Lanes, Real},
 };
+use fearless_simd::{Simd, prelude::*};
 
 use super::{
     collision::Colliders,
     particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
     particles::Particles,
 };
-use crate::particles::simulate::forces::external_forces::BurnerForces;
-use crate::particles::simulate::particle_lanes::{add_scaled, clamp_length, length, subtract};
-use crate::particles::{parameters::WindForce, simulate::forces::external_forces::ExternalForces};
-use std::ops::Range;
-
-use fearless_simd::{Simd, prelude::*};
+use crate::particles::{
+    parameters::WindForce,
+    simulate::{
+        forces::external_forces::{BurnerForces, ExternalForces},
+        particle_lanes::{add_scaled, clamp_length, length, subtract},
+    },
+};
 
 /// Greatest speed of gas, m/s.
 pub(crate) const MAX_SPEED: f32 = 150.0;

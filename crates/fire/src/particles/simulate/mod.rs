@@ -3,6 +3,14 @@
 //! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` everything that the
 //! air does, `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state.
 
+use std::sync::Arc;
+
+use bansho_base::{
+    math::{Vec3, random::Key},
+    phenomenon::surroundings::Surroundings,
+};
+use rayon::prelude::*;
+
 use crate::particles::{
     parameters::FlameParticlesParameters,
     simulate::{
@@ -19,13 +27,6 @@ use crate::particles::{
         spawning::Spawner,
     },
 };
-use std::sync::Arc;
-
-use bansho_base::{
-    math::{Vec3, random::Key},
-    phenomenon::surroundings::Surroundings,
-};
-use rayon::prelude::*;
 
 pub(crate) mod burner;
 pub(crate) mod collision;

@@ -3,11 +3,13 @@
 //! Particles of all burners are mixed in memory. Within each task their row indices are sorted by burner, and batches gather and
 //! scatter rows.
 
-use crate::particles::simulate::forces::external_forces::BurnerForces;
+use std::ops::Range;
+
 use bansho_base::math::simd::{LANES, Lanes, Real};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
-use std::ops::Range;
+
+use crate::particles::simulate::forces::external_forces::BurnerForces;
 
 /// Particles per task of the thread pool.
 pub(crate) const PARTICLES_PER_TASK: usize = 512;

@@ -1,7 +1,6 @@
 //! Particles as structure of arrays.
 
 use bansho_base::math::DVec3;
-
 use bansho_sph::{Cells, retain};
 use rayon::prelude::*;
 

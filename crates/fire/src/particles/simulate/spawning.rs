@@ -1,14 +1,15 @@
 //! Spawning of particles, section 4.3 (1): each particle is a pure function of its id.
 
+use bansho_base::math::{
+    self, DVec3,
+    random::{Key, Purpose, uniform},
+};
+
 use crate::particles::simulate::{
     burner::{Burner, SpawnPoint},
     derived::DerivedConstants,
     forces::turbulence::TurbulenceTile,
     particles::{Particle, Particles},
-};
-use bansho_base::math::{
-    self, DVec3,
-    random::{Key, Purpose, uniform},
 };
 
 /// Low bits of an id that count the particles of one burner; the high bits hold the burner's index.

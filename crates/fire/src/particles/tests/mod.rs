@@ -19,8 +19,7 @@ use super::{
     parameters::FlameParticlesParameters,
     render::{FadeOut, Gas, ScratchPool},
 };
-use crate::particles::simulate::Simulation;
-use crate::particles::simulate::derived::DerivedConstants;
+use crate::particles::simulate::{Simulation, derived::DerivedConstants};
 
 fn simulation(parameters: &FlameParticlesParameters) -> Simulation {
     let constants = DerivedConstants::new(parameters, None, &MemoryAssets::default()).unwrap();

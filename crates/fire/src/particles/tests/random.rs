@@ -5,11 +5,13 @@ use bansho_base::{
     parameters::{Parameters, Reader, sample},
     world::gravity::STANDARD_GRAVITY,
 };
+use rayon::prelude::*;
 
 use super::*;
-use crate::particles::simulate::combustion::INNER_TEMPERATURE;
-use crate::particles::{parameters::WindForce, simulate::burner::Burner};
-use rayon::prelude::*;
+use crate::particles::{
+    parameters::WindForce,
+    simulate::{burner::Burner, combustion::INNER_TEMPERATURE},
+};
 
 /// How many parameter sets: [`FEW`], or what `BANSHO_RANDOM_FLAMES` says.
 fn count() -> u64 {

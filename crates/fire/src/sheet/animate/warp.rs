@@ -8,15 +8,13 @@ use bansho_base::{
     },
     world::wind::Wind,
 };
+use fearless_simd::Simd;
 
 use super::{clock::Clock, fluctuation::Fluctuation};
-use crate::sheet::render::curve_tables::ShapeTables;
 use crate::sheet::{
     parameters::{FlameSheetParameters, ShapeParameters},
-    render::curve_tables::{CurvePair, SEGMENTS, lookup_index},
+    render::curve_tables::{CurvePair, SEGMENTS, ShapeTables, lookup_index},
 };
-
-use fearless_simd::Simd;
 
 /// The fluctuations of one flame: its edges P (15), the sway of its center line and the flicker of its height.
 #[derive(Clone, Debug)]

@@ -4,13 +4,40 @@ use bansho_base::{
     color,
     image::Rect,
     math::{self, DVec3, simd::LANES},
-    phenomenon::strip::{Strip, View},
+    phenomenon::strip::{AovDescriptor, AovRule, Strip, View},
 };
+use fearless_simd::Simd;
 
 use super::shade::{SheetContent, TimeSample, shade_sample};
-use crate::sheet::FlameSheet;
-use crate::sheet::render::flame_instance::FlameInstance;
-use fearless_simd::Simd;
+use crate::sheet::{FlameSheet, render::flame_instance::FlameInstance};
+
+/// What a flame sheet can write beside its light, in the order of a strip's planes.
+pub(crate) const AOVS: &[AovDescriptor] = &[
+    AovDescriptor {
+        name: "temperature_k",
+        unit: "K",
+        doc: "Soot temperature, weighted by the luminance that it adds; 0 where there is no flame.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "optical_depth",
+        unit: "",
+        doc: "Optical depth of soot and smoke along the line of sight, summed; 0 where there is none.",
+        rule: AovRule::Sum,
+    },
+    AovDescriptor {
+        name: "motion.X",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, to the right, weighted by luminance; 0 where there is no flame.",
+        rule: AovRule::WeightedMean,
+    },
+    AovDescriptor {
+        name: "motion.Y",
+        unit: "pixels",
+        doc: "Motion of the gas to the next frame, downward, weighted by luminance; 0 where there is no flame.",
+        rule: AovRule::WeightedMean,
+    },
+];
 
 /// Indices of the planes among a strip's AOVs.
 const TEMPERATURE: usize = 0;

@@ -1,12 +1,5 @@
 //! Color ramp: sharpening, eq. (6), and color, eq. (7), tabulated over T1.
 
-use crate::{
-    chemiluminescence_color,
-    sheet::{
-        parameters::{ColorParameters, Coloring, Stage, TextureParameters},
-        render::curve_tables::{CurvePair, from_origin},
-    },
-};
 use bansho_base::{
     color,
     math::{
@@ -16,6 +9,14 @@ use bansho_base::{
     parameters::parameter_error::ParameterError,
 };
 use fearless_simd::Simd;
+
+use crate::{
+    chemiluminescence_color,
+    sheet::{
+        parameters::{ColorParameters, Coloring, Stage, TextureParameters},
+        render::curve_tables::{CurvePair, from_origin},
+    },
+};
 
 /// Entries over T1: finer than a display can show, so that nearest-neighbor lookup suffices.
 const LEVELS: usize = 4096;

@@ -2,10 +2,6 @@
 //!
 //! A table holds two curves side by side, so that one load fetches both.
 
-use crate::sheet::{
-    equations,
-    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
-};
 use bansho_base::{
     math::{
         self,
@@ -16,6 +12,11 @@ use bansho_base::{
     parameters::parameter_error::{ParameterError, ParameterErrorKind},
 };
 use fearless_simd::{Simd, prelude::*, u32x16};
+
+use crate::sheet::{
+    equations,
+    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
+};
 
 /// Linear segments of a table.
 pub(crate) const SEGMENTS: usize = 512;
@@ -443,9 +444,10 @@ pub(crate) fn instance_key(seed: u64, name: &str, variation: i64, index: usize) 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bansho_base::math::simd::ramp;
     use fearless_simd::SimdBase;
+
+    use super::*;
 
     #[test]
     fn a_table_holds_its_ends_and_is_straight_between_samples() {

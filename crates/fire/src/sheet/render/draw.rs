@@ -11,13 +11,13 @@ use bansho_base::{
     math::simd::{LANES, Lanes, Real},
     phenomenon::strip::Strip,
 };
+use fearless_simd::{Simd, prelude::*};
 
 use super::shade::{ShadedBatch, SheetContent, TimeSample, coordinates, shade_coordinates, shade_sample};
 use crate::sheet::render::{
     color_ramp::ColorRamp,
     curve_tables::{FlameCoordinates, ShapeTables},
 };
-use fearless_simd::{Simd, prelude::*};
 
 /// What is drawn of one sheet.
 #[derive(Clone, Copy)]

@@ -10,17 +10,17 @@ use bansho_base::{
         surroundings::{Emitter, Light},
     },
 };
+use fearless_simd::{Level, Simd, prelude::*};
 
 use super::{
     projection::SheetCoordinates,
     shade::{SheetState, shade},
 };
-use crate::sheet::render::flame_instance::FlameInstance;
 use crate::sheet::{
     FlameSheet,
     animate::warp::{WarpState, WindLean},
+    render::flame_instance::FlameInstance,
 };
-use fearless_simd::{Level, Simd, prelude::*};
 
 /// Rows of the grid; it is sixteen wide.
 const ROWS: usize = 32;

@@ -1,15 +1,7 @@
 //! One instance of a flame: its fluctuations, its texture, its placement, and its time samples in a view.
 
-use crate::sheet::{
-    FlameSheet,
-    animate::warp::{FlameWaves, WarpState, WindLean},
-    parameters::{Facing, Instance, Stage},
-    render::{
-        projection::{PixelToSheet, bounds},
-        shade::{SheetContent, SheetState, TimeSample},
-    },
-    texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
-};
+use std::sync::Arc;
+
 use bansho_base::{
     camera::{
         Camera,
@@ -21,7 +13,17 @@ use bansho_base::{
     phenomenon::strip::{Shutter, View},
     world::wind::Wind,
 };
-use std::sync::Arc;
+
+use crate::sheet::{
+    FlameSheet,
+    animate::warp::{FlameWaves, WarpState, WindLean},
+    parameters::{Facing, Instance, Stage},
+    render::{
+        projection::{PixelToSheet, bounds},
+        shade::{SheetContent, SheetState, TimeSample},
+    },
+    texture::{FRACTAL, FractalLayers, PaperLayer, Texture, TextureTable},
+};
 
 /// Source of a flame's texture.
 #[derive(Clone, Debug)]

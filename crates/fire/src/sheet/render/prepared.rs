@@ -10,18 +10,21 @@ use bansho_base::{
         surroundings::Surroundings,
     },
 };
+use fearless_simd::Level;
 
 use super::{
     aovs::{AovContext, write_aov_rows},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FlameInstance, pixels_per_meter};
 use crate::{
-    sheet::{FlameSheet, parameters::Stage},
+    sheet::{
+        FlameSheet,
+        parameters::Stage,
+        render::flame_instance::{FlameInstance, pixels_per_meter},
+    },
     sparks::{SparkEmitter, Streak},
 };
-use fearless_simd::Level;
 
 /// A frame, ready to be drawn into strips.
 pub(crate) struct PreparedSheet<'a> {

@@ -8,7 +8,6 @@ use bansho_base::{
         simd::{LANES, Lanes, Real, ramp},
     },
 };
-
 use fearless_simd::{Simd, prelude::*};
 
 /// Sheet coordinates of sixteen pixels of a row.

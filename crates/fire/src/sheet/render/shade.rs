@@ -4,18 +4,21 @@ use bansho_base::{
     camera::upright_quad::UprightQuad,
     math::simd::{Lanes, Real, any_positive},
 };
+use fearless_simd::Simd;
 
 use super::{
     projection::{PixelToSheet, SheetCoordinates},
     smoke::{SmokeState, shade_smoke},
 };
-use crate::sheet::render::{
-    color_ramp::ColorRamp,
-    curve_tables::{FlameCoordinates, ShapeTables},
+use crate::sheet::{
+    animate::warp::WarpState,
+    equations,
+    render::{
+        color_ramp::ColorRamp,
+        curve_tables::{FlameCoordinates, ShapeTables},
+    },
+    texture::Texture,
 };
-use crate::sheet::{animate::warp::WarpState, equations, texture::Texture};
-
-use fearless_simd::Simd;
 
 /// The state of a sheet at one time.
 pub(crate) struct SheetState {

@@ -8,18 +8,18 @@ use bansho_base::{
     },
     phenomenon::{strip::View, surroundings::Surroundings},
 };
+use fearless_simd::{Simd, prelude::*};
 
 use super::{
     projection::{PixelToSheet, SheetCoordinates, bounds},
     shade::{ShadedBatch, SheetState, TimeSample},
 };
-use crate::sheet::render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter};
 use crate::sheet::{
     FlameSheet,
     animate::warp::{FlameWaves, WarpState, WindLean},
+    render::flame_instance::{FilteredTexture, FlameInstance, pixels_per_meter},
     texture::FractalLayers,
 };
-use fearless_simd::{Simd, prelude::*};
 
 /// Heights at which the light on the smoke is sampled.
 const LIGHT_SAMPLES: usize = 17;

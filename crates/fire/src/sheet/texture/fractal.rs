@@ -185,9 +185,9 @@ impl FractalLayers {
 #[cfg(test)]
 mod tests {
     use bansho_base::{math::simd::Lanes, parameters::animated::Animated};
+    use fearless_simd::prelude::*;
 
     use super::*;
-    use fearless_simd::prelude::*;
 
     fn layers(loop_s: Option<f64>) -> (FractalLayers, Clock) {
         let clock = Clock::new(Animated::from(1.1), loop_s);

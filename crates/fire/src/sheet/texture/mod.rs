@@ -5,14 +5,11 @@ mod paper;
 
 use std::sync::{Arc, OnceLock};
 
-pub use paper::{PaperTexture, paper_texture};
-
-use fearless_simd::{Level, Simd, dispatch};
-
 use bansho_base::math::simd::{Lanes, Real, gather, wrap_split};
-
+use fearless_simd::{Level, Simd, dispatch};
 pub(crate) use fractal::{FRACTAL, FractalLayers};
 pub(crate) use paper::PaperLayer;
+pub use paper::{PaperTexture, paper_texture};
 
 /// Columns of a table, along u.
 pub(crate) const COLUMNS: usize = 256;

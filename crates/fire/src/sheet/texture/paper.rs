@@ -162,9 +162,9 @@ fn fill(texture: &PaperTexture, texels: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use bansho_base::{math::simd::Lanes, parameters::animated::Animated};
+    use fearless_simd::prelude::*;
 
     use super::*;
-    use fearless_simd::prelude::*;
 
     #[test]
     fn texture_20_has_hand_worked_values() {

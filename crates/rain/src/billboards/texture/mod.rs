@@ -9,6 +9,7 @@ use bansho_base::{
     image::Image,
     math::random::{self, Key, Purpose},
 };
+pub(super) use draw::draw_streak;
 
 use crate::{
     drops::{
@@ -17,8 +18,6 @@ use crate::{
     },
     streaks::coverage::Streak,
 };
-
-pub(super) use draw::draw_streak;
 
 /// Parameters of streak textures; the defaults are the paper's.
 #[derive(Clone, Copy, Debug, PartialEq)]

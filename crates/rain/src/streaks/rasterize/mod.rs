@@ -4,10 +4,10 @@ mod columns;
 mod packed;
 pub(crate) mod tile;
 
-use crate::shutter_cameras::PixelBounds;
+pub(crate) use packed::PackedStreak;
 use tile::Shading;
 
-pub(crate) use packed::PackedStreak;
+use crate::shutter_cameras::PixelBounds;
 
 /// A streak in the picture: its coverage and the light of its drop.
 ///
@@ -129,10 +129,10 @@ impl StreakSegment {
 #[cfg(test)]
 mod tests {
     use bansho_base::{image::Rect, phenomenon::strip::Strip};
+    use fearless_simd::{Level, dispatch};
 
     use super::{tile::TileBuffer, *};
     use crate::streaks::{bin::TILE_ROWS, coverage::Streak};
-    use fearless_simd::{Level, dispatch};
 
     /// What a drop hides that does not overlap itself.
     fn disc(radius: f32) -> f32 {

@@ -1,9 +1,9 @@
 //! The tile buffer into which streaks are composited.
 
 use bansho_base::{image::Rect, math::MulAdd, phenomenon::strip::GrayPlanes};
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 use crate::streaks::bin::{TILE_COLUMNS, TILE_ROWS};
-use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// One `f32` for each of the eight pixels of a column.
 pub(crate) type TileRows = [f32; TILE_ROWS];

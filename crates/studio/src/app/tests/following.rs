@@ -56,7 +56,7 @@ impl Fake {
         self.0.borrow_mut().events.push(event);
     }
 
-    /// Fulfils the last wish: the scene is good, and its picture took so long, s.
+    /// Fulfills the last wish: the scene is good, and its picture took so long, s.
     fn process(&self, draw_s: f64) {
         let request = self.last();
         let nowhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());

@@ -8,7 +8,7 @@ use crate::{editors::aurora::document::AuroraDrawing, scenes::new_scene::FLAME_S
 
 /// Times of the keystroke-level model, s (Card, Moran and Newell, "The keystroke-level model for user performance time with interactive
 /// systems", 1980): to think of the next step, to point at something, to press or let go a button, and to draw, for each line of a stroke
-/// and each centimetre of it. Nobody thinks again for what the last step was made for: the entries of an open menu, the place that a tool
+/// and each centimeter of it. Nobody thinks again for what the last step was made for: the entries of an open menu, the place that a tool
 /// is taken up for. They are those of hands that know the way and err never; what a newcomer needs, only newcomers can tell.
 const THINK_S: f64 = 1.35;
 const POINT_S: f64 = 1.1;
@@ -17,7 +17,7 @@ const LINE_S: f64 = 0.9;
 const CENTIMETRE_S: f64 = 0.16;
 /// How many times as long somebody thinks who looks for each step; a guess.
 const SEEKING: f64 = 3.0;
-/// Points of the screen in a centimetre, at 96 to the inch.
+/// Points of the screen in a centimeter, at 96 to the inch.
 const CENTIMETRE: f32 = 96.0 / 2.54;
 
 /// Hands that know the way, and what they did.

@@ -25,7 +25,7 @@ impl StagesView {
             });
         });
         header.header_response.on_hover_text(
-            "How the flame comes to be, live: the texture, what the threshold leaves, sharpened, coloured",
+            "How the flame comes to be, live: the texture, what the threshold leaves, sharpened, colored",
         );
         session.stages = header.body_returned.is_some().then_some(index);
     }

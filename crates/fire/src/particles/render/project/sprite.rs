@@ -5,16 +5,18 @@ use bansho_base::{
     math::{DMat2, DVec2, DVec3},
     phenomenon::strip::View,
 };
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
 
 use super::perspective::PerspectiveProjector;
-use crate::particles::render::splat::scratch_pool::PooledVec;
 use crate::particles::render::{
     gas::Gas,
     prepared::PARTICLES_PER_TASK,
-    splat::kernel::{LINE_PEAK, VARIANCE},
+    splat::{
+        kernel::{LINE_PEAK, VARIANCE},
+        scratch_pool::PooledVec,
+    },
 };
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// An ellipse in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 at its edge.
 #[derive(Clone, Copy, Debug)]
@@ -219,8 +221,10 @@ mod tests {
     };
 
     use super::*;
-    use crate::particles::render::splat::scratch_pool::ScratchPool;
-    use crate::particles::{Particle, Particles, render::gas::FadeOut};
+    use crate::particles::{
+        Particle, Particles,
+        render::{gas::FadeOut, splat::scratch_pool::ScratchPool},
+    };
 
     struct Everything;
 

@@ -10,8 +10,7 @@ use bansho_base::{
     noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
 };
 
-use crate::particles::parameters::LookParameters;
-use crate::particles::render::gas::Gas;
+use crate::particles::{parameters::LookParameters, render::gas::Gas};
 
 /// Standard deviation of the logistic distribution, pi / sqrt(3): its CDF is a sigmoid of slope 1.
 const LOGISTIC: f32 = 1.813_799_4;

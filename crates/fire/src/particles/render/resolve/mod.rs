@@ -1,5 +1,13 @@
 //! Resolves summed sprites to light and opacity, row by row and layer by layer, sixteen pixels at a time.
 
+use bansho_base::{
+    camera::Camera,
+    color,
+    image::Rect,
+    math::{DVec2, DVec3, approximations, simd::LANES},
+    phenomenon::strip::Strip,
+};
+
 use crate::particles::render::{
     resolve::{
         detail::{Detail, DetailFactors},
@@ -7,13 +15,6 @@ use crate::particles::render::{
         upsample::RowInterpolator,
     },
     splat::grid::{Grid, weighted_sum},
-};
-use bansho_base::{
-    camera::Camera,
-    color,
-    image::Rect,
-    math::{DVec2, DVec3, approximations, simd::LANES},
-    phenomenon::strip::Strip,
 };
 
 pub(crate) mod detail;

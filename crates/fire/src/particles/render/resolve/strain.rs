@@ -4,13 +4,14 @@
 //! compressed, they cross many noise cells within one support radius, which would alias. There detail fades, and the smooth sum
 //! alone is drawn.
 
+use bansho_base::math::simd::LANES;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use bansho_base::math::simd::LANES;
-
-use crate::particles::render::resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU};
-use crate::particles::render::splat::grid::Grid;
+use crate::particles::render::{
+    resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU},
+    splat::grid::Grid,
+};
 
 /// Strain, relative to undeformed detail, at which detail begins to fade, and at which it has faded out.
 const FADE_RANGE: [f32; 2] = [1.0, 3.0];

@@ -72,8 +72,7 @@ mod tests {
     use bansho_base::image::Rect;
 
     use super::{super::spline, *};
-    use crate::particles::render::splat::grid::Raster;
-    use crate::particles::render::splat::scratch_pool::ScratchPool;
+    use crate::particles::render::splat::{grid::Raster, scratch_pool::ScratchPool};
 
     #[test]
     fn sixteen_pixels_are_what_each_of_them_is() {

@@ -1,11 +1,13 @@
 //! A grid of cells over the picture, with several values per cell.
 
 use bansho_base::image::Rect;
-
-use crate::particles::render::resolve::spline;
-use crate::particles::render::splat::scratch_pool::{PooledVec, ScratchPool};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
+
+use crate::particles::render::{
+    resolve::spline,
+    splat::scratch_pool::{PooledVec, ScratchPool},
+};
 
 /// Cells around the covered area that are read: two by interpolation, one by differences, two by the prefilter.
 const MARGIN: i32 = 5;

@@ -4,6 +4,12 @@
 //! the size of sprites. Sprites of different sizes go to grids of different cell size; coarse grids are added to finer ones by
 //! cubic interpolation.
 
+use std::ops::Range;
+
+use bansho_base::{image::Rect, math::simd::LANES};
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
 use crate::particles::render::{
     project::sprite::Ellipse,
     resolve::spline,
@@ -14,10 +20,6 @@ use crate::particles::render::{
         scratch_pool::{PooledVec, ScratchPool},
     },
 };
-use bansho_base::{image::Rect, math::simd::LANES};
-use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
-use std::ops::Range;
 
 pub(crate) mod grid;
 pub(crate) mod kernel;

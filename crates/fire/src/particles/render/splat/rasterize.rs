@@ -2,9 +2,11 @@
 //!
 //! Coordinates are in cells of the whole picture, so that rounding does not depend on the window.
 
-use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
-use bansho_base::math::approximations;
 use std::ops::Range;
+
+use bansho_base::math::approximations;
+
+use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
 
 /// Cells per batch of weights: about one row of a sprite.
 pub(crate) const COLUMNS: usize = 8;

@@ -44,7 +44,7 @@ fn view(camera: CameraParameters) -> View {
     View::new(camera, Shutter { open: 1.0, close: 1.0 }, 1.04, SIZE, 0)
 }
 
-/// A litre of gas at `position`.
+/// A liter of gas at `position`.
 fn ball(id: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
     Particle {
         id,

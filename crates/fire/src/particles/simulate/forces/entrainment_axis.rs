@@ -12,9 +12,9 @@ use bansho_base::{
     },
     world::gravity::STANDARD_GRAVITY,
 };
+use fearless_simd::{Simd, prelude::*};
 
 use crate::particles::simulate::burner::Burner;
-use fearless_simd::{Simd, prelude::*};
 
 /// Layers of height.
 const LAYERS: usize = 24;

@@ -1,6 +1,18 @@
 //! External forces of a step: wind, eddies, vortex rings and inflow toward the plume axis, for each burner; sixteen particles at a
 //! time.
 
+use bansho_base::{
+    math::{
+        DVec3, Vec3,
+        random::Key,
+        simd::{Lanes, Real},
+    },
+    phenomenon::surroundings::{Occluder, Surroundings},
+    world::{air::Air, gravity::STANDARD_GRAVITY},
+};
+use fearless_simd::{Simd, prelude::*};
+use rayon::prelude::*;
+
 use super::{
     entrainment_axis::{PlumeAxis, plume_axes},
     turbulence::{EddyField, TurbulenceTile},
@@ -15,17 +27,6 @@ use crate::particles::{
         particles::Particles,
     },
 };
-use bansho_base::{
-    math::{
-        DVec3, Vec3,
-        random::Key,
-        simd::{Lanes, Real},
-    },
-    phenomenon::surroundings::{Occluder, Surroundings},
-    world::{air::Air, gravity::STANDARD_GRAVITY},
-};
-use fearless_simd::{Simd, prelude::*};
-use rayon::prelude::*;
 
 /// Age at which turbulence has grown to half its strength, as a fraction of the rise time.
 const TURBULENT_AGE: f32 = 0.1;
@@ -223,8 +224,6 @@ impl BurnerForces<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::particles::{parameters::BurnerParameters, simulate::Simulation};
     use bansho_base::{
         host::assets::MemoryAssets,
         math::{random::Key, simd::Lanes},
@@ -233,6 +232,9 @@ mod tests {
             wind::{Wind, WindParameters},
         },
     };
+
+    use super::*;
+    use crate::particles::{parameters::BurnerParameters, simulate::Simulation};
 
     #[test]
     fn each_burner_feels_the_wind_that_blows_where_it_stands() {

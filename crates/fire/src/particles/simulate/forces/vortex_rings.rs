@@ -10,12 +10,13 @@ use bansho_base::math::{
     random::{Key, Purpose, uniform},
     simd::{Lanes, Real, any_positive},
 };
+use fearless_simd::Simd;
 
 use super::entrainment_axis::PlumeAxis;
-use crate::particles::simulate::particle_lanes::dot;
-use crate::particles::{parameters::FlameParticlesParameters, simulate::burner::Burner};
-
-use fearless_simd::Simd;
+use crate::particles::{
+    parameters::FlameParticlesParameters,
+    simulate::{burner::Burner, particle_lanes::dot},
+};
 
 /// Most rings that a burner sheds side by side.
 const MAX_STREAMS: f64 = 6.0;
@@ -156,10 +157,10 @@ impl VortexShedding<'_> {
 #[cfg(test)]
 mod tests {
     use bansho_base::host::assets::MemoryAssets;
+    use fearless_simd::prelude::*;
 
     use super::*;
     use crate::particles::{parameters::BurnerParameters, simulate::forces::entrainment_axis::plume_axes};
-    use fearless_simd::prelude::*;
 
     fn velocity(ring: &VortexRing, position: Vec3) -> Vec3 {
         bansho_base::dispatch_baseline!(simd => {

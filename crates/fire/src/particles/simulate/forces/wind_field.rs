@@ -1,6 +1,5 @@
 //! The scene's wind sampled on a coarse grid around the gas: gusts are larger than flames.
 
-use crate::particles::simulate::forces::turbulence::lerp4;
 use bansho_base::{
     math::{
         DVec3, Vec3,
@@ -9,6 +8,8 @@ use bansho_base::{
     world::wind::Wind,
 };
 use fearless_simd::{Simd, prelude::*};
+
+use crate::particles::simulate::forces::turbulence::lerp4;
 
 /// Grid points along each side of the box around the gas.
 const POINTS: usize = 4;
@@ -73,8 +74,9 @@ impl WindField {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bansho_base::{parameters::animated::Animated, world::wind::WindParameters};
+
+    use super::*;
 
     #[test]
     fn it_is_the_wind_itself_within_a_few_percent() {

@@ -1,4 +1,4 @@
-//! Frame specifications as render farms write them: `0-239`, `0-239x10`, `1-9:2`, `17`, `-3-5`, `1-5,9`.
+//! Frame specifications as render farms write them: `0-239`, `0-239x10`, `1-9:2`, `17`, `-3-5`, `1-5,9`: read, and written for people.
 
 /// Most frames that one specification may name.
 pub const MOST_FRAMES: i64 = 10_000_000;
@@ -84,6 +84,26 @@ fn signed(text: &str) -> Option<i64> {
     }
 }
 
+/// The most ranges that [`ranges`] lists.
+const MOST_RANGES: usize = 100;
+
+/// `3-14, 20` for ascending numbers; what comes after a hundred ranges is counted.
+pub(crate) fn ranges(numbers: &[i64]) -> String {
+    let mut runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    let shown: Vec<String> = runs.by_ref().take(MOST_RANGES).map(range).collect();
+    match runs.map(<[i64]>::len).sum() {
+        0 => shown.join(", "),
+        others => format!("{} and {others} more", shown.join(", ")),
+    }
+}
+
+fn range(run: &[i64]) -> String {
+    match run {
+        [first, .., last] => format!("{first}-{last}"),
+        run => run.iter().map(i64::to_string).collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,5 +135,19 @@ mod tests {
         ] {
             assert_eq!(parse(spec).unwrap_err(), FrameSpecError { part: part.into(), fault }, "{spec}");
         }
+    }
+
+    #[test]
+    fn runs_are_drawn_together_and_long_lists_end() {
+        let many: Vec<i64> = (0..250).map(|number| 2 * number).collect();
+        for (numbers, expected) in [
+            (&[][..], ""),
+            (&[7], "7"),
+            (&[-3, -2, -1, 0, 4, 6, 7], "-3-0, 4, 6-7"),
+            (&[i64::MAX - 1, i64::MAX], "9223372036854775806-9223372036854775807"),
+        ] {
+            assert_eq!(ranges(numbers), expected);
+        }
+        assert!(ranges(&many).ends_with(", 196, 198 and 150 more"));
     }
 }

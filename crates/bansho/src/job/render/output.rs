@@ -25,31 +25,29 @@ use bansho_render::{
     fingerprint,
 };
 
-use super::{
+use super::{draw_frames::FrameSink, figures, finished_files::Finished};
+use crate::job::{
     error::JobError,
-    figures,
-    finished::Finished,
     observer::{FrameDone, JobObserver},
-    shoot::Finish,
 };
 
 /// How the pictures of a job are written.
 #[derive(Clone, Debug)]
-pub(super) struct Format {
-    pub(super) pattern: OutputPattern,
-    pub(super) view: View,
-    pub(super) bits: BitDepth,
+pub(crate) struct Format {
+    pub(crate) pattern: OutputPattern,
+    pub(crate) view: View,
+    pub(crate) bits: BitDepth,
     /// What straight alpha is made for.
-    pub(super) alpha: AlphaConvention,
+    pub(crate) alpha: AlphaConvention,
     /// Whether figures are written beside each picture.
-    pub(super) figures: bool,
+    pub(crate) figures: bool,
     /// Which files that are there may be written over.
-    pub(super) overwrite: OverwritePolicy,
+    pub(crate) overwrite: OverwritePolicy,
 }
 
 impl Format {
     /// What a file's fingerprint must be: that of the frame's pixels, and of how they are stored where that may differ.
-    pub(super) fn fingerprint(&self, frame: [u8; 32]) -> [u8; 32] {
+    pub(crate) fn fingerprint(&self, frame: [u8; 32]) -> [u8; 32] {
         match self.pattern.kind() {
             OutputKind::Png => fingerprint::of_png(frame, self.bits, self.alpha),
             _ => frame,
@@ -57,13 +55,13 @@ impl Format {
     }
 
     /// A picture, and the figures beside it.
-    pub(super) fn files(&self, picture: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    pub(crate) fn files(&self, picture: &Path) -> impl Iterator<Item = PathBuf> + use<> {
         let figures = self.figures.then(|| figures::path(picture));
         [Some(picture.to_path_buf()), figures].into_iter().flatten()
     }
 
     /// Opens the files for `count` frames of `size` pixels; `window` of them may be under way at once.
-    pub(super) fn open(&self, plan: &Plan, count: usize, size: [usize; 2], window: usize) -> Result<Sink, JobError> {
+    pub(crate) fn open(&self, plan: &Plan, count: usize, size: [usize; 2], window: usize) -> Result<Sink, JobError> {
         let fps = plan.fps();
         let options = SinkOptions {
             opaque: plan.scene().has_plate(),
@@ -77,7 +75,7 @@ impl Format {
     }
 
     /// Gives a frame to its sink, shown or as it is, as the sink wants it.
-    pub(super) fn write(
+    pub(crate) fn write(
         &self,
         sink: &Sink,
         index: usize,
@@ -108,23 +106,23 @@ impl Format {
     }
 
     /// The view transform.
-    pub(super) fn show(&self, frame: &Frame, observer: &dyn Observer) -> DisplayImage {
+    pub(crate) fn show(&self, frame: &Frame, observer: &dyn Observer) -> DisplayImage {
         let _stage = StageGuard::begin(observer, Stage::View);
         display(frame, &self.view, self.bits, self.alpha)
     }
 }
 
 /// Writes every frame where the sink puts it.
-pub(super) struct ToFiles<'a> {
-    pub(super) format: &'a Format,
-    pub(super) sink: Sink,
-    pub(super) window: usize,
-    pub(super) observer: &'a dyn JobObserver,
-    pub(super) drawn: AtomicUsize,
-    pub(super) finished: &'a Finished,
+pub(crate) struct ToFiles<'a> {
+    pub(crate) format: &'a Format,
+    pub(crate) sink: Sink,
+    pub(crate) window: usize,
+    pub(crate) observer: &'a dyn JobObserver,
+    pub(crate) drawn: AtomicUsize,
+    pub(crate) finished: &'a Finished,
 }
 
-impl Finish for ToFiles<'_> {
+impl FrameSink for ToFiles<'_> {
     fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
         let number = frame.header.number;
         self.format.write(&self.sink, index, frame, observer)?;
@@ -145,7 +143,7 @@ impl Finish for ToFiles<'_> {
 ///
 /// # Errors
 /// A folder stands at `path`, a file stands where a folder should be, or it is not allowed.
-pub(super) fn check_writable(path: &Path) -> Result<(), MediaError> {
+pub(crate) fn check_writable(path: &Path) -> Result<(), MediaError> {
     if path.is_dir() {
         return Err(MediaError::IsFolder { path: path.to_path_buf() });
     }

@@ -6,19 +6,15 @@ use bansho_base::{
 };
 use bansho_render::{RenderError, Shot};
 
-use super::{
-    error::JobError,
-    flight::{Flight, Landing, Watch},
-    observer::JobObserver,
-    snapshots::Snapshots,
-};
+use super::in_flight::{CompletionGuard, InFlightFrames, StopOnFailure};
+use crate::job::{error::JobError, observer::JobObserver, snapshots::Snapshots};
 
 /// What frames come from: a shot, or one whose state and pictures are known in tests. See [`Shot`] for each.
-pub(super) trait FrameSource: Send {
+pub(crate) trait FrameSource: Send {
     fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError>;
     fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError>;
     fn read(&mut self) -> Option<Frame>;
-    fn recycle(&mut self, spent: Frame);
+    fn recycle(&mut self, recycled: Frame);
     fn snapshot(&self) -> Vec<u8>;
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError>;
 }
@@ -36,8 +32,8 @@ impl FrameSource for Shot {
         Self::read(self)
     }
 
-    fn recycle(&mut self, spent: Frame) {
-        Self::recycle(self, spent);
+    fn recycle(&mut self, recycled: Frame) {
+        Self::recycle(self, recycled);
     }
 
     fn snapshot(&self) -> Vec<u8> {
@@ -50,7 +46,7 @@ impl FrameSource for Shot {
 }
 
 /// What becomes of a drawn frame.
-pub(super) trait Finish: Sync {
+pub(crate) trait FrameSink: Sync {
     /// Uses the frame at position `index` of the list, in any thread and any order within [`window`](Self::window).
     fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError>;
 
@@ -67,64 +63,64 @@ const MEMORY_IN_FLIGHT: usize = 1 << 30;
 ///
 /// # Errors
 /// The first failure of a frame, or the observer asked to stop. Frames that were finished stay.
-pub(super) fn shoot(
+pub(crate) fn draw_frames(
     shot: &mut dyn FrameSource,
     numbers: &[i64],
     snapshots: &Snapshots,
-    finish: &dyn Finish,
+    finish: &dyn FrameSink,
     observer: &dyn JobObserver,
 ) -> Result<(), JobError> {
-    let flight = Flight::default();
-    let watch = Watch { observer, flight: &flight };
+    let in_flight = InFlightFrames::default();
+    let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
     let mut last = None;
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
             let seek = last.is_none_or(|last| number != last + 1).then_some(last);
-            if let Some(spent) = flight.take_spent() {
-                shot.recycle(spent);
+            if let Some(recycled) = in_flight.take_recycled() {
+                shot.recycle(recycled);
             }
-            let mut frame = draw(shot, number, seek, snapshots, &watch, observer)?;
+            let mut frame = draw(shot, number, seek, snapshots, &stop_on_failure, observer)?;
             last = Some(number);
-            flight.depart(index, limit(&frame, finish));
-            let (flight, watch) = (&flight, &watch);
+            in_flight.submit(index, limit(&frame, finish));
+            let (in_flight, stop_on_failure) = (&in_flight, &stop_on_failure);
             scope.spawn_fifo(move |_| {
-                let _landing = Landing { flight, index };
-                if watch.cancelled() {
+                let _completion = CompletionGuard { in_flight, index };
+                if stop_on_failure.cancelled() {
                     return;
                 }
-                match finish.finish(index, &mut frame, watch) {
-                    Ok(()) => flight.keep_spent(frame),
-                    Err(error) => flight.fail(error),
+                match finish.finish(index, &mut frame, stop_on_failure) {
+                    Ok(()) => in_flight.recycle(frame),
+                    Err(error) => in_flight.fail(error),
                 }
             });
         }
         Ok(())
     });
     // A frame that failed also stops the drawing, which then only says that it was stopped.
-    flight.take_error().map_or(drawn, Err)?;
+    in_flight.take_error().map_or(drawn, Err)?;
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
-/// Draws frame `number`; `seek` holds the frame drawn before where the two are not neighbours.
+/// Draws frame `number`; `seek` holds the frame drawn before where the two are not neighbors.
 fn draw(
     shot: &mut dyn FrameSource,
     number: i64,
     seek: Option<Option<i64>>,
     snapshots: &Snapshots,
-    watch: &Watch,
+    stop_on_failure: &StopOnFailure,
     observer: &dyn JobObserver,
 ) -> Result<Frame, JobError> {
     if let Some(last) = seek {
-        snapshots.warm_up(shot, last, number, watch, observer)?;
+        snapshots.warm_up(shot, last, number, stop_on_failure, observer)?;
     }
-    shot.advance(number, watch)?;
-    snapshots.keep(shot, number, watch)?;
-    shot.draw(watch)?;
+    shot.advance(number, stop_on_failure)?;
+    snapshots.keep(shot, number, stop_on_failure)?;
+    shot.draw(stop_on_failure)?;
     shot.read().ok_or(JobError::Cancelled)
 }
 
 /// How many frames like this one may be under way: one for each thread and the next, as far as memory allows.
-fn limit(frame: &Frame, finish: &dyn Finish) -> usize {
+fn limit(frame: &Frame, finish: &dyn FrameSink) -> usize {
     let pixels = frame.beauty.width() * frame.beauty.height();
     let bytes = pixels * size_of::<f32>() * (5 + frame.channels.len());
     let most = (rayon::current_num_threads() + 1).min(finish.window()).max(2);
@@ -152,9 +148,9 @@ mod tests {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
     }
 
-    fn run(numbers: &[i64], finish: &dyn Finish, witness: &Witness) -> Result<(), JobError> {
+    fn run(numbers: &[i64], finish: &dyn FrameSink, witness: &Witness) -> Result<(), JobError> {
         let counter = Counter { steps: Arc::default() };
-        shoot(&mut counter.shot(), numbers, &Snapshots::default(), finish, witness)
+        draw_frames(&mut counter.shot(), numbers, &Snapshots::default(), finish, witness)
     }
 
     #[test]

@@ -10,14 +10,16 @@ use bansho_media::{
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
 use bansho_scene::SceneOptions;
 
-use super::{
+use crate::job::{
+    checks::overwrite,
     error::{Conflict, JobError},
-    finished::Finished,
-    inputs,
     observer::{FrameDone, JobObserver, Note, Outline},
-    output, overwriting,
-    prepare::{assets, chosen_frames, outside, snapshots},
-    run::Summary,
+    render::{
+        Summary,
+        finished_files::Finished,
+        output,
+        prepare::{assets, chosen_frames, outside, snapshots},
+    },
     scene_file::SceneFile,
     snapshots::Snapshots,
 };
@@ -72,8 +74,8 @@ impl Simulate {
         let frames = chosen_frames(self.frames.as_deref(), &plan)?;
         let pattern = NumberedPath::parse(&self.particles, "ply", frames.len())?;
         output::check_writable(&pattern.path(frames[0]))?;
-        let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &frames), self.overwrite);
-        overwriting::check(&overwrite, frames.iter().map(|&number| pattern.path(number)))?;
+        let overwrite = OverwritePolicy::new(overwrite::inputs(&self.scene, &plan, &frames), self.overwrite);
+        overwrite::check(&overwrite, frames.iter().map(|&number| pattern.path(number)))?;
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, (&compiled, &plan), &overwrite)?;
         let notes = outside(&plan, &frames).into_iter().collect();
         Ok(PreparedSimulation { compiled, plan, frames, pattern, snapshots, overwrite, notes })

@@ -1,21 +1,36 @@
 //! A slab of fog before the camera: Beer's law, and light scattered toward the camera.
+//!
+//! The smallest complete phenomenon. What it needs, in the order in which a scene meets it:
+//!
+//! 1. **Parameters** ([`AbsorberParameters`]): the table of keys with defaults, limits and units. Reading, checking, error messages, the
+//!    schema and `--set` derive from it.
+//! 2. **[`Describe`]**: the key of the table in scene files, and [`Describe::build`], which makes the phenomenon and reports parameters
+//!    that contradict each other, each by its key.
+//! 3. **[`Phenomenon`]**: what is built once and shared. It states its name and AOVs, the luminance that automatic exposure needs, and
+//!    starts runs. Here nothing changes over time, so that a run is the phenomenon itself. What is simulated returns a state of its
+//!    own, which also implements `Stepped`.
+//! 4. **[`Run`]**: what others see of it ([`Publication`]: lights, extinction, obstacles), which depths it fills, and `prepare` for a frame.
+//! 5. **[`Prepared`]**: draws strips of pixels, in any order, on any thread. A pixel must get the same value in whatever strip it comes.
+//!
+//! Random numbers, where they are needed, come from `base::math::random::Key`, which is made of seed and name, never from a state that
+//! drawing changes: the same scene then gives the same bytes on any number of threads.
 
 use std::sync::Arc;
 
-use bansho_base::phenomenon::kind::{BuildContext, BuildError, Describe};
-use bansho_base::{
+use bansho::base::{
     host::observer::{Cancelled, Observer},
     image::Rect,
     math::{self, DVec2},
-    parameters::Range,
+    parameters::{ProblemKind, Range},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
+        kind::{BuildContext, BuildError, Describe},
         strip::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },
 };
 
-bansho_base::parameters! {
+bansho::base::parameters! {
     /// A slab of fog across the whole picture.
     pub struct AbsorberParameters {
         /// Where it begins.
@@ -24,7 +39,7 @@ bansho_base::parameters! {
         far: f64 = 3.0, limits(Range::new(0.02, 1000.0)), unit("m");
         /// Extinction of red, green and blue.
         extinction: [f64; 3] = [0.5, 0.5, 0.5], limits(Range::new(0.0, 100.0)), unit("1/m");
-        /// Share of the light that falls on it that comes toward the camera, for each optical depth.
+        /// Fraction of the incident light that is scattered toward the camera, for each unit of optical depth.
         scatter: f64 = 0.0, limits(Range::new(0.0, 1.0));
     }
 }
@@ -34,7 +49,7 @@ impl Describe for AbsorberParameters {
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         if self.far <= self.near {
-            let kind = bansho_base::parameters::ProblemKind::Conflict("must lie behind `near`".into());
+            let kind = ProblemKind::Conflict("must lie behind `near`".into());
             return Err(BuildError { key: "far".into(), kind });
         }
         Ok(Arc::new(Absorber { name: context.name.to_owned(), parameters: self.clone() }))

@@ -27,7 +27,7 @@ impl FileState {
 
 /// How files were when they were finished.
 #[derive(Default)]
-pub(super) struct Finished(Mutex<HashMap<PathBuf, Option<FileState>>>);
+pub(crate) struct Finished(Mutex<HashMap<PathBuf, Option<FileState>>>);
 
 impl Finished {
     fn lock(&self) -> MutexGuard<'_, HashMap<PathBuf, Option<FileState>>> {
@@ -36,27 +36,27 @@ impl Finished {
     }
 
     /// Remembers the file at `path` as it is now.
-    pub(super) fn note(&self, path: PathBuf) {
+    pub(crate) fn note(&self, path: PathBuf) {
         let state = FileState::of(&path);
         self.lock().insert(path, state);
     }
 
     /// Whether the file at `path` was not touched since it was noted.
-    pub(super) fn is_untouched(&self, path: &Path) -> bool {
+    pub(crate) fn is_untouched(&self, path: &Path) -> bool {
         let known = self.lock().get(path).cloned().flatten();
         known.is_some() && known == FileState::of(path)
     }
 
     /// Whether the file at `path` was not touched, or is at least one of the same kind and length, as another program that makes the same
     /// leaves it.
-    pub(super) fn is_there(&self, path: &Path) -> bool {
+    pub(crate) fn is_there(&self, path: &Path) -> bool {
         let length = self.lock().get(path).and_then(|state| Some(state.as_ref()?.length));
         self.is_untouched(path)
             || length.is_some() && length == fs::metadata(path).ok().map(|found| found.len()) && is_bansho_file(path)
     }
 
     /// The files that were noted and are no longer there, in order.
-    pub(super) fn lost(&self) -> Vec<PathBuf> {
+    pub(crate) fn lost(&self) -> Vec<PathBuf> {
         let mut noted: Vec<PathBuf> = self.lock().keys().cloned().collect();
         noted.retain(|path| !self.is_there(path));
         noted.sort_unstable();

@@ -3,27 +3,27 @@
 use bansho_base::{host::memory, parameters::ProblemKind};
 use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
-use super::{
+use crate::job::{
     error::{Conflict, JobError},
     scene_file::SceneFile,
 };
 
 /// Smaller pictures than this many pixels are not asked about.
 const FEW_PIXELS: f64 = 4e6;
-/// Bytes of a pixel of a frame: colour, alpha and depth as they are drawn.
+/// Bytes of a pixel of a frame: color, alpha and depth as they are drawn.
 const FRAME_BYTES: f64 = 20.0;
 
 /// What a job asks of memory, beside its plan.
 #[derive(Clone, Copy)]
-pub(super) struct MemoryRequest {
+pub(crate) struct MemoryRequest {
     /// How many frames.
-    pub(super) frames: usize,
+    pub(crate) frames: usize,
     /// How many of them are kept for a sheet.
-    pub(super) tiles: usize,
+    pub(crate) tiles: usize,
     /// Bits of display pixels; none where frames are written as they are.
-    pub(super) display: Option<BitDepth>,
+    pub(crate) display: Option<BitDepth>,
     /// Whether the job asked for the size of the picture, rather than the scene.
-    pub(super) own_size: bool,
+    pub(crate) own_size: bool,
 }
 
 /// Bytes that a job takes, by what they grow with.
@@ -42,7 +42,7 @@ impl Need {
         let aovs: usize = infos.iter().filter(|_| plan.aovs).map(|info| info.aovs.len()).sum();
         let channels = layers + aovs;
         let frame = FRAME_BYTES + 4.0 * channels as f64;
-        // A display picture, the samples of the file and the file itself; an EXR holds half colours and single channels.
+        // A display picture, the samples of the file and the file itself; an EXR holds half colors and single channels.
         let written = match request.display {
             Some(BitDepth::Eight) => 3.0 * 4.0,
             Some(BitDepth::Sixteen) => 3.0 * 8.0,
@@ -66,7 +66,7 @@ impl Need {
 ///
 /// # Errors
 /// It would not, with the size that it would give it for: at its place in the scene, or as what was asked for.
-pub(super) fn check(
+pub(crate) fn check(
     scene: &SceneFile,
     compiled: &CompiledScene,
     plan: &Plan,
@@ -95,9 +95,9 @@ pub(super) fn check(
             memory::can_allocate(need.bytes(pixels, pixels))
         };
         let most = memory::largest_fitting_count(overscan, fits);
-        let told =
+        let message =
             format!("{} x {} pixels with this overscan {would}; allowed: up to {most}", window.width, window.height);
-        return Err(scene.fault("picture.overscan", ProblemKind::Conflict(told)));
+        return Err(scene.fault("picture.overscan", ProblemKind::Conflict(message)));
     }
     let share = memory::largest_fitting_count(1000, |share| memory::can_allocate(0.001 * share as f64 * bytes));
     let most = [window.width, window.height].map(|side| (side as f64 * (0.001 * share as f64).sqrt()).floor() as usize);

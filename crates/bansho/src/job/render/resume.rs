@@ -3,13 +3,15 @@
 use bansho_media::output::resume::existing_fingerprint;
 use bansho_render::fingerprint;
 
-use super::{error::JobError, figures, finished::Finished, prepare::PreparedJob};
+use super::{figures, finished_files::Finished, prepare::PreparedJob};
+use crate::job::error::JobError;
+
 use rayon::prelude::*;
 
 impl PreparedJob {
     /// The frames that are still to be drawn; the files of the others are noted as finished. A frame that is cut off, damaged or of another
     /// scene counts as missing.
-    pub(super) fn missing(&self, finished: &Finished) -> Vec<i64> {
+    pub(crate) fn missing(&self, finished: &Finished) -> Vec<i64> {
         if !self.resume {
             return self.frames.clone();
         }
@@ -26,7 +28,7 @@ impl PreparedJob {
     ///
     /// # Errors
     /// Some are not.
-    pub(super) fn check_all_there(&self, finished: &Finished) -> Result<(), JobError> {
+    pub(crate) fn check_all_there(&self, finished: &Finished) -> Result<(), JobError> {
         let is_lost = |&&number: &&i64| {
             let mut files = self.format.files(&self.format.pattern.path(number));
             !files.all(|file| finished.is_untouched(&file)) && !self.is_whole(number)

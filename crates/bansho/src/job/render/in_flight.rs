@@ -14,13 +14,13 @@ use bansho_base::{
     image::Frame,
 };
 
-use super::{error::JobError, observer::JobObserver};
+use crate::job::{error::JobError, observer::JobObserver};
 
-/// Frames that were drawn and are not yet where they belong.
+/// Frames that were drawn and are not yet written.
 #[derive(Default)]
-pub(super) struct Flight {
+pub(crate) struct InFlightFrames {
     state: Mutex<State>,
-    landed: Condvar,
+    completed: Condvar,
     failed: AtomicBool,
 }
 
@@ -28,13 +28,13 @@ pub(super) struct Flight {
 struct State {
     unfinished: BTreeSet<usize>,
     error: Option<JobError>,
-    spent: Option<Frame>,
+    recycled: Option<Frame>,
 }
 
-/// How long a thread that found no work sleeps before it looks again; a landing wakes it earlier.
-const NAP: Duration = Duration::from_millis(1);
+/// How long a thread that found no work sleeps before it looks again; a completed frame wakes it earlier.
+const IDLE_WAIT: Duration = Duration::from_millis(1);
 
-impl Flight {
+impl InFlightFrames {
     fn lock(&self) -> MutexGuard<'_, State> {
         // A thread that panicked held the lock only over inserts and removals, which leave no half-done state.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -42,7 +42,7 @@ impl Flight {
 
     /// Waits until frame `index` is fewer than `limit` behind the oldest unfinished one, and helps the pool meanwhile:
     /// in a pool of one thread nobody else would. Measured by index, so that a film's window never overflows.
-    pub(super) fn depart(&self, index: usize, limit: usize) {
+    pub(crate) fn submit(&self, index: usize, limit: usize) {
         loop {
             let mut state = self.lock();
             let oldest = state.unfinished.first().copied().unwrap_or(index);
@@ -53,58 +53,58 @@ impl Flight {
             drop(state);
             if rayon::yield_now() != Some(rayon::Yield::Executed) {
                 let state = self.lock();
-                drop(self.landed.wait_timeout(state, NAP));
+                drop(self.completed.wait_timeout(state, IDLE_WAIT));
             }
         }
     }
 
     /// Keeps a finished frame, so that its memory can be used again.
-    pub(super) fn keep_spent(&self, frame: Frame) {
-        self.lock().spent = Some(frame);
+    pub(crate) fn recycle(&self, frame: Frame) {
+        self.lock().recycled = Some(frame);
     }
 
     /// A finished frame, if there is one.
-    pub(super) fn take_spent(&self) -> Option<Frame> {
-        self.lock().spent.take()
+    pub(crate) fn take_recycled(&self) -> Option<Frame> {
+        self.lock().recycled.take()
     }
 
     /// Keeps the first failure; the rest of the work then stops.
-    pub(super) fn fail(&self, error: JobError) {
+    pub(crate) fn fail(&self, error: JobError) {
         self.lock().error.get_or_insert(error);
         self.failed.store(true, Ordering::Relaxed);
     }
 
     /// Whether some frame failed.
-    pub(super) fn has_failed(&self) -> bool {
+    pub(crate) fn has_failed(&self) -> bool {
         self.failed.load(Ordering::Relaxed)
     }
 
     /// The failure, if there was one.
-    pub(super) fn take_error(&self) -> Option<JobError> {
+    pub(crate) fn take_error(&self) -> Option<JobError> {
         self.lock().error.take()
     }
 }
 
 /// Marks frame `index` as finished when it is dropped, even by a panic, so that nobody waits for it in vain.
-pub(super) struct Landing<'a> {
-    pub(super) flight: &'a Flight,
-    pub(super) index: usize,
+pub(crate) struct CompletionGuard<'a> {
+    pub(crate) in_flight: &'a InFlightFrames,
+    pub(crate) index: usize,
 }
 
-impl Drop for Landing<'_> {
+impl Drop for CompletionGuard<'_> {
     fn drop(&mut self) {
-        self.flight.lock().unfinished.remove(&self.index);
-        self.flight.landed.notify_all();
+        self.in_flight.lock().unfinished.remove(&self.index);
+        self.in_flight.completed.notify_all();
     }
 }
 
 /// The caller's observer, which also wants to stop once a frame has failed.
-pub(super) struct Watch<'a> {
-    pub(super) observer: &'a dyn JobObserver,
-    pub(super) flight: &'a Flight,
+pub(crate) struct StopOnFailure<'a> {
+    pub(crate) observer: &'a dyn JobObserver,
+    pub(crate) in_flight: &'a InFlightFrames,
 }
 
-impl Observer for Watch<'_> {
+impl Observer for StopOnFailure<'_> {
     fn begin(&self, stage: Stage) {
         self.observer.begin(stage);
     }
@@ -114,6 +114,6 @@ impl Observer for Watch<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        self.flight.has_failed() || self.observer.cancelled()
+        self.in_flight.has_failed() || self.observer.cancelled()
     }
 }

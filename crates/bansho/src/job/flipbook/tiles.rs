@@ -5,23 +5,23 @@ use std::sync::{Mutex, PoisonError};
 use bansho_base::{host::observer::Observer, image::Frame};
 use bansho_media::output::sprite_sheet::SheetLayout;
 
-use super::{
+use crate::job::{
     error::{Conflict, JobError, SheetKind},
     observer::{FrameDone, JobObserver},
-    shoot::Finish,
+    render::draw_frames::FrameSink,
 };
 
 /// Most tiles of a sheet.
-pub(super) const MOST_TILES: usize = 4096;
+pub(crate) const MOST_TILES: usize = 4096;
 
 /// The sheet nearest to a square of tiles that holds `count` of them.
-pub(super) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<SheetLayout, Conflict> {
+pub(crate) fn holding(count: usize, cell: [usize; 2], gutter: usize) -> Result<SheetLayout, Conflict> {
     let columns = (1..=count).find(|columns| columns * columns >= count).unwrap_or(1);
     checked(SheetLayout { count, columns, cell, gutter }, SheetKind::Contact)
 }
 
 /// A sheet holds some tiles, and may be as large as a picture.
-pub(super) fn checked(sheet: SheetLayout, of: SheetKind) -> Result<SheetLayout, Conflict> {
+pub(crate) fn checked(sheet: SheetLayout, of: SheetKind) -> Result<SheetLayout, Conflict> {
     let most = bansho_scene::picture::LARGEST_SIDE as usize;
     if !(1..=MOST_TILES).contains(&sheet.count) {
         return Err(Conflict::Tiles { of, tiles: sheet.count, most: MOST_TILES });
@@ -31,7 +31,7 @@ pub(super) fn checked(sheet: SheetLayout, of: SheetKind) -> Result<SheetLayout, 
 }
 
 /// Gathers a tile from each frame.
-pub(super) struct Gather<'a, T, M> {
+pub(crate) struct Gather<'a, T, M> {
     make: M,
     observer: &'a dyn JobObserver,
     tiles: Mutex<Vec<Option<T>>>,
@@ -39,17 +39,17 @@ pub(super) struct Gather<'a, T, M> {
 
 impl<'a, T, M: Fn(&mut Frame, &dyn Observer) -> T> Gather<'a, T, M> {
     /// Will hold `count` tiles, each made from a frame by `make`.
-    pub(super) fn new(count: usize, observer: &'a dyn JobObserver, make: M) -> Self {
+    pub(crate) fn new(count: usize, observer: &'a dyn JobObserver, make: M) -> Self {
         Self { make, observer, tiles: Mutex::new((0..count).map(|_| None).collect()) }
     }
 
     /// The tiles in the order of the frames.
-    pub(super) fn into_tiles(self) -> Vec<T> {
+    pub(crate) fn into_tiles(self) -> Vec<T> {
         self.tiles.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect()
     }
 }
 
-impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> Finish for Gather<'_, T, M> {
+impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for Gather<'_, T, M> {
     fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
         let number = frame.header.number;
         let tile = (self.make)(frame, observer);

@@ -13,21 +13,26 @@ use bansho_media::output::{
 };
 use bansho_render::{Shot, fingerprint};
 
-use super::{error::JobError, observer::JobObserver, prepare::PreparedJob, sheet::Gather, shoot::shoot};
+use super::tiles::Gather;
+use crate::job::{
+    error::JobError,
+    observer::JobObserver,
+    render::{draw_frames::draw_frames, prepare::PreparedJob},
+};
 
 bansho_base::choice! {
     /// What the frames of a contact sheet are laid over.
     pub enum ContactBackground {
         /// Black: the light of the phenomena alone.
         Black = "black",
-        /// Squares of two greys, which show what hides the background.
+        /// Squares of two grays, which show what hides the background.
         Checkerboard = "checkerboard",
     }
 }
 
 /// Pixels between the frames of a contact sheet.
-pub(super) const GUTTER: usize = 2;
-/// What shows between frames and where the last row is not full: a grey that is told from black.
+pub(crate) const GUTTER: usize = 2;
+/// What shows between frames and where the last row is not full: a gray that can be told from black.
 const FILL: [u8; 4] = [38, 38, 38, u8::MAX];
 /// Side of the squares of a checkerboard, pixels.
 const SQUARE: usize = 8;
@@ -35,7 +40,7 @@ const SQUARE: usize = 8;
 const SQUARES: [f32; 2] = [0.051_269_46, 0.116_970_67];
 
 /// Draws all frames of `job` into one picture and writes it.
-pub(super) fn run(job: &PreparedJob, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
+pub(crate) fn run(job: &PreparedJob, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
     let sink = job.format.open(&job.plan, 1, sheet.size(), 1)?;
     let show = |frame: &mut Frame, observer: &dyn Observer| {
         lay_over(frame, job.contact_background, &job.format.view);
@@ -43,7 +48,7 @@ pub(super) fn run(job: &PreparedJob, sheet: &SheetLayout, observer: &dyn JobObse
     };
     let gather = Gather::new(sheet.count, observer, show);
     let mut shot = Shot::open(job.compiled.clone(), job.plan.clone());
-    shoot(&mut shot, &job.frames, &job.snapshots, &gather, observer)?;
+    draw_frames(&mut shot, &job.frames, &job.snapshots, &gather, observer)?;
     let _stage = StageGuard::begin(observer, Stage::Write);
     let picture = tile_display(&gather.into_tiles(), sheet.columns, sheet.gutter, FILL)?;
     sink.write(FrameSlot { index: 0, number: job.frames[0] }, Picture::Display(&picture, &own_fingerprint(job)))?;
@@ -129,9 +134,9 @@ mod tests {
         let light = [[0.0; 4], [0.2, 0.1, 0.05, 0.0], [0.2, 0.1, 0.05, 0.7], [0.0, 0.0, 0.0, 1.0]];
         for view in [View::DISPLAY, View::STANDARD] {
             let codes = shown(&light, false, ContactBackground::Black, &view, None);
-            let told = view.to_display([0.2, 0.1, 0.05]);
+            let shown = view.to_display([0.2, 0.1, 0.05]);
             is_near(codes[0], [0.0; 3]);
-            is_near(codes[1], told);
+            is_near(codes[1], shown);
             assert_eq!(codes[1], codes[2], "alpha does not matter over black");
             is_near(codes[3], [0.0; 3]);
         }

@@ -22,32 +22,38 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
 use bansho_scene::{Positions, SceneOptions};
 
 use super::{
-    Job,
-    contact::{self, ContactBackground},
-    error::{Channels, Conflict, JobError, SheetKind},
-    figures, inputs,
-    memory::{self, MemoryRequest},
-    observer::{Note, Spot},
+    figures,
     output::{self, Format},
-    overwriting, plates,
+};
+use crate::job::{
+    Job,
+    checks::{
+        memory::{self, MemoryRequest},
+        overwrite, plates,
+    },
+    error::{Channels, Conflict, JobError, SheetKind},
+    flipbook::{
+        contact_sheet::{self, ContactBackground},
+        tiles::{self, MOST_TILES},
+    },
+    observer::{Note, Spot},
     scene_file::SceneFile,
-    sheet::{self, MOST_TILES},
     snapshots::Snapshots,
 };
 
 /// A job that can be carried out, as far as can be known without doing so.
 pub struct PreparedJob {
-    pub(super) scene: SceneFile,
-    pub(super) compiled: Arc<CompiledScene>,
-    pub(super) plan: Arc<Plan>,
-    pub(super) frames: Vec<i64>,
-    pub(super) format: Format,
+    pub(crate) scene: SceneFile,
+    pub(crate) compiled: Arc<CompiledScene>,
+    pub(crate) plan: Arc<Plan>,
+    pub(crate) frames: Vec<i64>,
+    pub(crate) format: Format,
     /// Where all frames go into one picture.
-    pub(super) sheet: Option<SheetLayout>,
-    pub(super) contact_background: ContactBackground,
-    pub(super) resume: bool,
-    pub(super) snapshots: Snapshots,
-    pub(super) notes: Vec<Note>,
+    pub(crate) sheet: Option<SheetLayout>,
+    pub(crate) contact_background: ContactBackground,
+    pub(crate) resume: bool,
+    pub(crate) snapshots: Snapshots,
+    pub(crate) notes: Vec<Note>,
 }
 
 impl PreparedJob {
@@ -73,7 +79,7 @@ impl PreparedJob {
 }
 
 /// Reads the files that a scene names from the folder it lies in, within its limits.
-pub(super) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
+pub(crate) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
     Arc::new(FileAssets::with_limits(&scene.folder, scene.inputs.clone()))
 }
 
@@ -130,10 +136,10 @@ impl Job {
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
         output::check_writable(&pattern.path(frames[0]))?;
-        let overwrite = OverwritePolicy::new(inputs::inputs(&self.scene, &plan, &frames), self.overwrite);
-        overwriting::check(&overwrite, self.outputs(&pattern, &frames))?;
+        let overwrite = OverwritePolicy::new(overwrite::inputs(&self.scene, &plan, &frames), self.overwrite);
+        overwrite::check(&overwrite, self.outputs(&pattern, &frames))?;
         let tile = [plan.window().width, plan.window().height];
-        let sheet = self.contact_sheet.map(|tiles| sheet::holding(tiles, tile, contact::GUTTER)).transpose()?;
+        let sheet = self.contact_sheet.map(|tiles| tiles::holding(tiles, tile, contact_sheet::GUTTER)).transpose()?;
         memory::check(&self.scene, &compiled, &plan, self.memory_request(kind, frames.len()))?;
         let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, (&compiled, &plan), &overwrite)?;
         let mut prepared = PreparedJob {
@@ -268,7 +274,7 @@ impl Job {
 ///
 /// # Errors
 /// Encoded alpha of a view that encodes nothing.
-pub(super) fn alpha_convention(
+pub(crate) fn alpha_convention(
     asked: Option<AlphaConvention>,
     view: View,
     usual: AlphaConvention,
@@ -281,7 +287,7 @@ pub(super) fn alpha_convention(
 }
 
 /// The frames that are asked for, ascending; at least one.
-pub(super) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i64>, JobError> {
+pub(crate) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i64>, JobError> {
     let mut frames = asked.map_or_else(|| plan.frames().collect(), <[i64]>::to_vec);
     frames.sort_unstable();
     frames.dedup();
@@ -292,7 +298,7 @@ pub(super) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i6
 ///
 /// # Errors
 /// No frame between snapshots, or a file in the folder that must stay.
-pub(super) fn snapshots(
+pub(crate) fn snapshots(
     folder: Option<&Path>,
     every: Option<u64>,
     (compiled, plan): (&CompiledScene, &Plan),
@@ -312,7 +318,7 @@ pub(super) fn snapshots(
 }
 
 /// How many frames lie outside the shot's own.
-pub(super) fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
+pub(crate) fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
     let own = plan.frames();
     let count = frames.iter().filter(|frame| !own.contains(frame)).count();
     let (first, last) = (own.start, own.end - 1);

@@ -1,19 +1,26 @@
 //! Carrying out a prepared job.
 
+pub(crate) mod draw_frames;
+pub(crate) mod figures;
+pub(crate) mod finished_files;
+pub(crate) mod in_flight;
+pub(crate) mod output;
+pub(crate) mod prepare;
+pub(crate) mod resume;
+
 use std::{path::PathBuf, sync::atomic::AtomicUsize};
 
 use bansho_render::Shot;
 
 use super::{
-    contact,
     error::JobError,
-    finished::Finished,
     observer::{JobObserver, Outline},
-    output::ToFiles,
-    plates,
-    prepare::PreparedJob,
-    shoot::shoot,
 };
+use crate::job::{checks::plates, flipbook::contact_sheet};
+use draw_frames::draw_frames;
+use finished_files::Finished;
+use output::ToFiles;
+use prepare::PreparedJob;
 
 /// What a job did.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,7 +47,7 @@ impl PreparedJob {
         let size = [self.plan.window().width, self.plan.window().height];
         observer.started(&Outline { total: self.frames.len(), kept, size });
         let done = match &self.sheet {
-            Some(sheet) => contact::run(self, sheet, observer),
+            Some(sheet) => contact_sheet::run(self, sheet, observer),
             None if numbers.is_empty() => Ok(()),
             None => self.run_files(&numbers, size, &finished, observer),
         };
@@ -67,7 +74,7 @@ impl PreparedJob {
         let sink = self.format.open(&self.plan, numbers.len(), size, window)?;
         let files = ToFiles { format: &self.format, sink, window, observer, drawn: AtomicUsize::new(0), finished };
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
-        shoot(&mut shot, numbers, &self.snapshots, &files, observer)?;
+        draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
         Ok(files.sink.finish()?)
     }
 }

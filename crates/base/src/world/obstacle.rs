@@ -1,18 +1,18 @@
-//! What a scene says of its obstacles.
+//! Parameters of an obstacle, and the solid that they describe.
 
 use std::sync::Arc;
 
-use bansho_base::{
+use glam::DVec3;
+
+use super::occluder::Occluder;
+use crate::{
     geometry::{distance_field::DistanceField, transform::Transform},
-    host::assets::Assets,
-    math::DVec3,
+    host::{assets::Assets, constructions},
     parameters::{AssetPath, ProblemKind, Range},
-    phenomenon::surroundings::Occluder,
+    phenomenon::kind::BuildError,
 };
 
-use bansho_base::{host::constructions, phenomenon::kind::BuildError};
-
-bansho_base::choice! {
+crate::choice! {
     /// Shape of an obstacle.
     pub enum ObstacleShape {
         /// A ball with its middle at `position`.
@@ -26,7 +26,7 @@ bansho_base::choice! {
     }
 }
 
-bansho_base::parameters! {
+crate::parameters! {
     /// Something solid that gas flows around and drops fall on. It is not drawn: it stands for what the plate shows.
     pub struct ObstacleParameters {
         /// Its shape.

@@ -16,7 +16,7 @@ use serde_json::{Map, Value, json};
 const FINGERPRINT: &str = "fingerprint";
 
 /// Where the figures of a picture are.
-pub(super) fn path(picture: &Path) -> PathBuf {
+pub(crate) fn path(picture: &Path) -> PathBuf {
     picture.with_extension("json")
 }
 
@@ -24,12 +24,12 @@ pub(super) fn path(picture: &Path) -> PathBuf {
 ///
 /// # Errors
 /// The file cannot be written, or would take the place of one that must stay.
-pub(super) fn write(frame: &Frame, picture: &Path, overwrite: &OverwritePolicy) -> Result<(), MediaError> {
+pub(crate) fn write(frame: &Frame, picture: &Path, overwrite: &OverwritePolicy) -> Result<(), MediaError> {
     atomic::write_bytes_with(&path(picture), format!("{:#}\n", describe(frame, picture)).as_bytes(), overwrite)
 }
 
 /// Whether the figures of a picture of that fingerprint are there, whole.
-pub(super) fn are_there(picture: &Path, fingerprint: [u8; 32]) -> bool {
+pub(crate) fn are_there(picture: &Path, fingerprint: [u8; 32]) -> bool {
     let text = fs::read(path(picture)).unwrap_or_default();
     serde_json::from_slice::<Value>(&text).is_ok_and(|value| value[FINGERPRINT] == hex(fingerprint))
 }

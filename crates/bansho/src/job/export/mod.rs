@@ -1,0 +1,3 @@
+//! Simulated states as files.
+
+pub(crate) mod point_clouds;

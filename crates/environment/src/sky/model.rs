@@ -1,0 +1,72 @@
+//! The sky of a scene: what is built once from its parameters.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use bansho_base::{
+    camera::Camera,
+    host::once::get_or_compute,
+    phenomenon::strip::{DepthInterval, View},
+    world::sky::{Sky, SkyKind, SkyParameters},
+};
+
+use super::{night::NightSky, row_cache::SkyCache, skyline::Skyline, stars::Stars};
+
+/// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
+pub struct SkyBackdrop {
+    pub(super) parameters: SkyParameters,
+    seed: u64,
+    /// Made when it is first drawn, as the skyline: a scene may be built only to be checked.
+    stars: OnceLock<Option<Stars>>,
+    skyline: OnceLock<Option<Skyline>>,
+    /// What the frame before showed, which the next one shows again if neither camera nor sky change.
+    pub(super) cache: Mutex<Option<SkyCache>>,
+}
+
+impl SkyBackdrop {
+    /// The name of its layer.
+    pub const NAME: &str = "sky";
+
+    /// A sky with these parameters.
+    pub fn new(parameters: SkyParameters, seed: u64) -> Self {
+        Self { seed, stars: OnceLock::new(), skyline: OnceLock::new(), parameters, cache: Mutex::default() }
+    }
+
+    /// Its stars; none by day.
+    fn stars(&self) -> Option<&Stars> {
+        let has_stars = self.parameters.kind == SkyKind::Night && self.parameters.night.stars > 0.0;
+        get_or_compute(&self.stars, || has_stars.then(|| Stars::new(self.seed))).as_ref()
+    }
+
+    /// Its hills and trees, if they have any height.
+    pub(super) fn skyline(&self) -> Option<&Skyline> {
+        get_or_compute(&self.skyline, || Skyline::new(&self.parameters, self.seed)).as_ref()
+    }
+
+    /// The night that a sky shows in a view; none by day.
+    pub(super) fn cache(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<SkyCache> {
+        let night = sky.night()?;
+        // The lock is never held while threads work together.
+        let cached = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cache) = cached().as_mut().filter(|cache| cache.matches(cameras, view.size, sky)) {
+            cache.enable_row_cache();
+            return Some(cache.clone());
+        }
+        let star_images = self.stars().map(|stars| stars.star_images(view, night, self.parameters.night.stars));
+        let cache = SkyCache {
+            cameras: cameras.to_vec(),
+            size: view.size,
+            sky: *sky,
+            night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
+            star_images: Arc::new(star_images.unwrap_or_default()),
+            rows: None,
+        };
+        *cached() = Some(cache.clone());
+        Some(cache)
+    }
+
+    /// Where the hills stand.
+    pub(super) fn hills(&self) -> DepthInterval {
+        let near = self.parameters.hills_distance;
+        DepthInterval { near, far: near * (1.0 + 1e-4) }
+    }
+}

@@ -1,0 +1,262 @@
+//! Draws the sky: rows of radiance, hills before them, stars where nothing hides them.
+
+use std::{f64::consts::TAU, ops::Range};
+
+use bansho_base::{
+    camera::{Camera, directions::Directions},
+    image::Rect,
+    math::{DVec2, DVec3, MulAdd, approximations, simd::LANES},
+    phenomenon::{
+        Prepared,
+        strip::{DepthInterval, Strip, View},
+    },
+    world::sky::Sky,
+};
+use fearless_simd::{Level, Simd, dispatch};
+
+use super::{
+    row_cache::{FAR, SkyCache, SkyRow},
+    skyline::Skyline,
+    stars::MAX_IMAGE_WIDTH,
+};
+
+/// Radiance of hills and trees relative to the zenith.
+pub(super) const HILL_SHADE: f32 = 0.04;
+
+pub(super) struct PreparedSky<'a> {
+    pub(super) view: &'a View,
+    /// At as many instants as its motion needs, each for an equal part of the exposure.
+    pub(super) cameras: Vec<Camera>,
+    pub(super) sky: Sky,
+    /// The night; none by day.
+    pub(super) cache: Option<SkyCache>,
+    pub(super) skyline: Option<&'a Skyline>,
+    /// Where it stands.
+    pub(super) hills: DepthInterval,
+}
+
+impl PreparedSky<'_> {
+    #[inline(always)]
+    pub(super) fn draw_sky<S: Simd>(&self, simd: S, strip: &mut Strip) {
+        let rect = strip.rect;
+        let far = vec![f32::INFINITY; rect.width];
+        let mut uncached = SkyRow::default();
+        for y in rect.y..rect.bottom() {
+            let first = (y - rect.y) * rect.width;
+            let cached = if rect.width == self.view.size[0] { self.cached_row(simd, y) } else { None };
+            let row = match cached {
+                Some(row) if !strip.has_plate() => row,
+                _ => {
+                    match cached {
+                        Some(row) => uncached.clone_from(row),
+                        None => self.fill_row(simd, &mut uncached, y, rect.x..rect.right()),
+                    }
+                    uncached.mask_by_plate(strip, first);
+                    &uncached
+                }
+            };
+            let [red, green, blue] = &row.planes;
+            strip.add_row_behind(first, [red, green, blue], Some(&row.opacity), &far);
+        }
+    }
+
+    /// A complete row of the picture from the cache, if there is one.
+    #[inline(always)]
+    pub(super) fn cached_row<S: Simd>(&self, simd: S, y: usize) -> Option<&SkyRow> {
+        let row = self.cache.as_ref()?.rows.as_ref()?.get(y)?;
+        if row.get().is_none() {
+            // Not in a closure, which would be compiled without the target features of `S`.
+            let mut drawn = SkyRow::default();
+            self.fill_row(simd, &mut drawn, y, 0..self.view.size[0]);
+            return Some(row.get_or_init(|| drawn));
+        }
+        row.get()
+    }
+
+    /// Draws pixels of row `y`, ignoring the plate.
+    #[inline(always)]
+    pub(super) fn fill_row<S: Simd>(&self, simd: S, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
+        let weight = 1.0 / self.cameras.len() as f32;
+        row.clear(pixels.len());
+        // Batches are aligned to the picture, so that a crop changes no pixel.
+        let mut x = pixels.start / LANES * LANES;
+        while x < pixels.end {
+            for camera in &self.cameras {
+                let mut directions = Directions::new(camera, x, y);
+                directions.normalize();
+                let colors = self.radiance(simd, &directions);
+                for i in pixels.start.max(x) - x..pixels.end.min(x + LANES) - x {
+                    if directions.visible[i] {
+                        row.add(x + i - pixels.start, colors[i], weight);
+                    }
+                }
+            }
+            x += LANES;
+        }
+        self.add_stars(row, y, pixels);
+    }
+
+    /// Radiance in batches of directions: red, green, blue and 0.
+    #[inline(always)]
+    pub(super) fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
+        if let Some(cache) = &self.cache {
+            return cache.night.radiance(simd, directions);
+        }
+        let mut colors = [[0.0; 4]; LANES];
+        if let Some(planes) = self.sky.radiance_at_elevations(&directions.components[1]) {
+            for i in 0..LANES {
+                for c in 0..3 {
+                    colors[i][c] = planes[c][i];
+                }
+            }
+        }
+        colors
+    }
+
+    /// Adds the stars of one row where the sky is visible.
+    #[inline(always)]
+    pub(super) fn add_stars(&self, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
+        let star_images = self.cache.as_ref().map_or(&[][..], |cache| &cache.star_images);
+        let from = star_images.partition_point(|image| image.pixel.y < y as f64 - 12.0);
+        for image in &star_images[from..] {
+            if image.pixel.y >= y as f64 + 12.0 {
+                return;
+            }
+            if (y as f64 + 0.5 - image.pixel.y).abs() >= image.radius {
+                continue;
+            }
+            let low = (image.pixel.x - image.radius).floor().max(pixels.start as f64) as usize;
+            let high = (image.pixel.x + image.radius).ceil().clamp(0.0, pixels.end as f64) as usize;
+            if low >= high {
+                continue;
+            }
+            let shapes = image.psf_row(low, y);
+            for x in low..high.min(low + MAX_IMAGE_WIDTH) {
+                let at = x - pixels.start;
+                let shape = shapes[x - low] * row.opacity[at];
+                for c in 0..3 {
+                    row.planes[c][at] = image.radiance[c].fma(shape, row.planes[c][at]);
+                }
+            }
+        }
+    }
+
+    /// Draws hills and trees as a dark silhouette.
+    #[inline(always)]
+    pub(super) fn draw_hills(&self, skyline: &Skyline, strip: &mut Strip) {
+        let rect = strip.rect;
+        let shade = self.sky.radiance(DVec3::Y).map(|value| value * HILL_SHADE);
+        let near = self.hills.near as f32;
+        let highest = skyline.highest + 1.0 / self.view.camera.focal_pixels as f32;
+        let mut x = rect.x / LANES * LANES;
+        while x < rect.right() {
+            if self.is_above(rect, x, highest) {
+                x += LANES;
+                continue;
+            }
+            let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
+            for y in rect.y..rect.bottom() {
+                let mut coverage = self.coverage(skyline, x, y);
+                let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
+                if strip.has_plate() {
+                    for i in inside.clone() {
+                        coverage[i] = if strip.visible(first + i - inside.start, near) { coverage[i] } else { 0.0 };
+                    }
+                }
+                if coverage == [0.0; LANES] {
+                    continue;
+                }
+                let (mut planes, mut depths) = ([[0.0; LANES]; 3], [f32::INFINITY; LANES]);
+                for i in 0..LANES {
+                    for c in 0..3 {
+                        planes[c][i] = shade[c] * coverage[i];
+                    }
+                    depths[i] = if coverage[i] > 0.0 { near } else { f32::INFINITY };
+                }
+                let [red, green, blue] = &planes;
+                let light = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
+                strip.add_row_behind(first, light, Some(&coverage[inside.clone()]), &depths[inside.clone()]);
+            }
+            x += LANES;
+        }
+    }
+
+    /// Coverage of pixels from `x` on in row `y` by the hills, averaged over the exposure.
+    #[inline(always)]
+    pub(super) fn coverage(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+        let weight = 1.0 / self.cameras.len() as f32;
+        let mut mean = [0.0; LANES];
+        for camera in &self.cameras {
+            let coverage = hill_coverage(camera, skyline, x, y);
+            for i in 0..LANES {
+                mean[i] = coverage[i].fma(weight, mean[i]);
+            }
+        }
+        mean
+    }
+
+    /// Conservative test: whether all pixels of a strip from `x` on are above this sine of the elevation.
+    pub(super) fn is_above(&self, rect: Rect, x: usize, sine: f32) -> bool {
+        // Bound on the deviation of the sine from linear interpolation between the corners.
+        let angle = LANES as f64 / self.view.camera.focal_pixels;
+        let min_sine = f64::from(sine) + angle * angle;
+        let rows = [rect.y, rect.bottom()].map(|y| y as f64);
+        let mut corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
+        let is_above = |corner: DVec2| {
+            self.cameras
+                .iter()
+                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > min_sine * toward.length()))
+        };
+        corners.all(is_above)
+    }
+}
+
+/// Coverage of pixels from `x` on in row `y` by the hills, for one camera.
+#[inline(always)]
+pub(super) fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+    let sharpness = camera.focal_pixels as f32;
+    let mut directions = Directions::new(camera, x, y);
+    directions.normalize();
+    let Directions { components: [xs, sines, zs], visible: seen } = &directions;
+    let (mut above, mut below) = (true, true);
+    for i in 0..LANES {
+        above &= sines[i] > skyline.highest + 1.0 / sharpness;
+        below &= sines[i] < skyline.lowest - 1.0 / sharpness;
+    }
+    let (mut coverage, mut turns) = ([0.0; LANES], [0.0; LANES]);
+    if above {
+        return coverage;
+    }
+    if !below {
+        for i in 0..LANES {
+            turns[i] = approximations::atan2(xs[i], -zs[i]) * (1.0 / TAU) as f32;
+        }
+    }
+    for i in 0..LANES {
+        let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
+        let cover = (hidden - sines[i]).fma(sharpness, 0.5).clamp(0.0, 1.0);
+        coverage[i] = if seen[i] { cover } else { 0.0 };
+    }
+    coverage
+}
+
+impl Prepared for PreparedSky<'_> {
+    fn bounds(&self, slice: &DepthInterval) -> Rect {
+        let hills = self.skyline.is_some() && slice.overlaps(&self.hills);
+        if hills || slice.overlaps(&FAR) {
+            Rect::from_size(self.view.size[0], self.view.size[1])
+        } else {
+            Rect::default()
+        }
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let level = Level::new();
+        if let Some(skyline) = self.skyline.filter(|_| slice.contains(self.hills.near)) {
+            dispatch!(level, _simd => self.draw_hills(skyline, strip));
+        }
+        if slice.overlaps(&FAR) {
+            dispatch!(level, simd => self.draw_sky(simd, strip));
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The sky: radiance, stars, trails, hills, crops.
+
+use std::sync::PoisonError;
+
+use bansho_base::{
+    camera::CameraParameters,
+    host::observer::Unobserved,
+    image::Rect,
+    math,
+    math::curve::Interpolation,
+    parameters::animated::Animated,
+    phenomenon::{
+        Run,
+        strip::{DepthInterval, Shutter, Strip, View},
+        surroundings::Surroundings,
+    },
+    world::{
+        sky::{SkyKind, SkyParameters},
+        wind::{Wind, WindParameters},
+    },
+};
+
+use super::{row_cache::FAR, *};
+
+/// Light of a night as a camera sees it that turns by so many degrees while the shutter is open: green, row by row.
+fn night_seen(turn_deg: f64, hills_deg: f64) -> Vec<f32> {
+    let parameters = SkyParameters { kind: SkyKind::Night, hills_deg, ..SkyParameters::default() };
+    let backdrop = SkyBackdrop::new(parameters.clone(), 3);
+    let [x, z] = [math::sin(turn_deg.to_radians()) * 60.0, math::cos(turn_deg.to_radians()) * -60.0];
+    let keys = vec![(0.0, [0.0, 30.0, -60.0]), (1.0, [x, 30.0, z])];
+    let camera = CameraParameters {
+        position: [0.0; 3].into(),
+        target: Animated::keyed(keys, Interpolation::Linear).unwrap(),
+        vertical_fov_deg: 60.0.into(),
+        ..CameraParameters::default()
+    };
+    let view = View::new(camera, Shutter { open: 0.0, close: 1.0 }, 0.0, [240, 160], 0);
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let surroundings = Surroundings { sky: parameters.at(0.5), ..Surroundings::from_wind(&wind) };
+    let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+    let mut strip = Strip::default();
+    strip.reset(Rect::from_size(240, 160), None, 0);
+    prepared.draw(&DepthInterval::ALL, &mut strip);
+    assert!((0..strip.len()).all(|pixel| strip.transmittance(pixel)[1] < 1e-5), "the sky is opaque");
+    strip.radiance[1].clone()
+}
+
+#[test]
+fn stars_draw_trails_where_the_camera_turns() {
+    let [still, turning] = [0.0, 6.0].map(|turn| night_seen(turn, 0.0));
+    let brightest = |light: &[f32]| light.iter().fold(0.0_f32, |most, value| most.max(*value));
+    let sum = |light: &[f32]| light.iter().map(|value| f64::from(*value)).sum::<f64>();
+    // 6 degrees are some 15 pixels; a star's light is spread over them, and none is lost.
+    assert!(brightest(&turning) < 0.3 * brightest(&still), "{} {}", brightest(&turning), brightest(&still));
+    assert!((sum(&turning) / sum(&still) - 1.0).abs() < 0.15, "{}", sum(&turning) / sum(&still));
+}
+
+#[test]
+fn hills_are_soft_where_the_camera_turns() {
+    // OtherPhenomena along a row differ most at the hills' edges.
+    let steepest = |light: Vec<f32>| {
+        let rows = light.chunks(240).skip(120);
+        let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());
+        steps.fold(0.0_f32, f32::max)
+    };
+    let [still, turning] = [0.0, 6.0].map(|turn| steepest(night_seen(turn, 12.0)));
+    assert!(turning < 0.5 * still, "{turning} {still}");
+}
+
+/// Light of a night in a part of a picture, of which the plate hides every third pixel.
+fn night_in(backdrop: &SkyBackdrop, rect: Rect, has_plate: bool) -> [Vec<f32>; 3] {
+    let camera = CameraParameters {
+        position: [0.0; 3].into(),
+        target: [0.0, 30.0, -60.0].into(),
+        vertical_fov_deg: 60.0.into(),
+        ..CameraParameters::default()
+    };
+    let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [150, 90], 0);
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let surroundings = Surroundings { sky: backdrop.parameters.at(0.0), ..Surroundings::from_wind(&wind) };
+    let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).expect("nobody asks to stop");
+    let depths: Vec<f32> = (0..150 * 90).map(|pixel| if pixel % 3 == 0 { 5.0 } else { f32::INFINITY }).collect();
+    let mut strip = Strip::default();
+    let rows = |y: usize| &depths[150 * y..150 * (y + 1)];
+    strip.reset(rect, has_plate.then_some(&rows), 0);
+    prepared.draw(&DepthInterval::ALL, &mut strip);
+    strip.radiance
+}
+
+#[test]
+fn a_sky_that_is_shown_again_is_the_same() {
+    let parameters = SkyParameters { kind: SkyKind::Night, ..SkyParameters::default() };
+    let shown = SkyBackdrop::new(parameters.clone(), 3);
+    let whole = Rect::from_size(150, 90);
+    for (rect, has_plate) in [
+        (whole, false),
+        (whole, false),
+        (Rect { x: 37, y: 11, width: 50, height: 30 }, false),
+        (whole, true),
+        (Rect { y: 40, height: 8, ..whole }, false),
+    ] {
+        let first = night_in(&SkyBackdrop::new(parameters.clone(), 3), rect, has_plate);
+        assert!(night_in(&shown, rect, has_plate) == first, "{rect:?}, plate: {has_plate}");
+        assert_eq!(first[1].contains(&0.0), has_plate);
+    }
+    let cached = shown.cache.lock().unwrap_or_else(PoisonError::into_inner);
+    let rows = cached.as_ref().and_then(|cache| cache.rows.clone()).expect("it was shown again");
+    assert!(rows.iter().all(|row| row.get().is_some()));
+}
+
+#[test]
+fn it_fills_the_picture_behind_everything_and_hides_what_is_behind_it() {
+    let parameters = SkyParameters { luminance: Animated::from(300.0), ..SkyParameters::default() };
+    let backdrop = SkyBackdrop::new(parameters.clone(), 1);
+    let shutter = Shutter { open: 0.0, close: 0.0 };
+    let view = View::new(CameraParameters::default(), shutter, 0.0, [16, 8], 0);
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let surroundings = Surroundings { sky: parameters.at(0.0), ..Surroundings::from_wind(&wind) };
+    let prepared = backdrop.prepare(&view, &surroundings, &Unobserved).unwrap();
+    let mut strip = Strip::default();
+    strip.reset(Rect::from_size(16, 8), None, 0);
+    prepared.draw(&FAR, &mut strip);
+    assert!(strip.radiance[1].iter().all(|value| *value > 0.0));
+    assert_eq!(strip.transmittance(77), [0.0; 3]);
+    assert!(prepared.bounds(&DepthInterval { near: 0.0, far: 1e6 }).is_empty());
+    assert!(strip.radiance[1][0] > strip.radiance[1][16 * 7], "an overcast sky is brighter above");
+}

@@ -1,0 +1,110 @@
+//! A particle flame: what is built from its parameters, and its state.
+
+use bansho_base::{
+    host::{assets::Assets, constructions},
+    math::{DVec2, DVec3, random::Key},
+    parameters::{Auto, Parameter},
+};
+
+use super::{
+    fault::{ParticleFault, ParticleFaultKind},
+    parameters::FlameParticlesParameters,
+    render::{FadeOut, Gas, ScratchPool},
+};
+use crate::particles::simulate::{Simulation, burner::Burner, derived::DerivedConstants, particles::Particles};
+
+/// A particle flame at some moment of its life. The one that is built stands at its beginning; runs are copies of it, which share what is fixed.
+#[derive(Clone, Debug)]
+pub struct FlameParticles {
+    pub(super) name: String,
+    pub(super) key: Key,
+    pub(super) parameters: FlameParticlesParameters,
+    pub(super) simulation: Simulation,
+    /// Time of the state, s.
+    pub(super) time: f64,
+    /// Temperature of the air at the last step, K.
+    pub(super) air_temperature_k: f64,
+    /// Scratch memory of the renderer.
+    pub(super) scratch: ScratchPool,
+}
+
+impl FlameParticles {
+    /// The particle flame `name` of a scene, before its preroll. Meshes of burners come from `assets`.
+    ///
+    /// # Errors
+    /// Parameters that do not go together, a mesh that cannot be had, a flow that does not end a loop as it begins it.
+    pub fn new(
+        mut parameters: FlameParticlesParameters,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+        assets: &dyn Assets,
+    ) -> Result<Self, ParticleFault> {
+        if let Some(seconds) = loop_s {
+            close_loop(&mut parameters, seconds)?;
+        }
+        constructions::count("flame_particles");
+        let key = Key::new(seed, name);
+        let constants = DerivedConstants::new(&parameters, loop_s, assets)?;
+        let steps = (constants.preroll / parameters.step_s).round();
+        Ok(Self {
+            name: name.to_owned(),
+            key,
+            time: -steps * parameters.step_s,
+            air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
+            simulation: Simulation::new(&parameters, constants, key),
+            scratch: ScratchPool::default(),
+            parameters,
+        })
+    }
+
+    /// The gas as it is now.
+    pub fn particles(&self) -> &Particles {
+        &self.simulation.particles
+    }
+
+    /// The gas as the renderer sees it.
+    pub(super) fn gas(&self) -> Gas<'_> {
+        let tallest = self.tallest();
+        let position = DVec3::from(self.parameters.position) + tallest.position(self.time);
+        Gas {
+            particles: &self.simulation.particles,
+            time: self.time,
+            air_temperature_k: self.air_temperature_k,
+            detail_speed: match self.parameters.look.detail_speed {
+                Auto::Set(speed) => speed,
+                Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
+            },
+            base: position,
+            size: DVec2::new(tallest.diameter, tallest.height),
+            key: self.key,
+            fade_out: self.fade_out(),
+            scratch: &self.scratch,
+        }
+    }
+
+    pub(super) fn fade_out(&self) -> FadeOut {
+        /// Duration of the fade-out as a fraction of the afterlife.
+        const FADING: f64 = 0.2;
+        let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
+        FadeOut { seconds, domain: self.simulation.constants.domain.map(|corner| corner.as_vec3()) }
+    }
+
+    pub(super) fn tallest(&self) -> &Burner {
+        let burners = &self.simulation.constants.burners;
+        // There is at least one burner.
+        let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
+        burners.iter().max_by(taller).unwrap_or(&burners[0])
+    }
+}
+
+/// Makes animated values repeat with the loop.
+pub(super) fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
+    match parameters.close_loop(seconds) {
+        Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
+        None => Ok(()),
+    }
+}
+
+/// Speed of gas with isotropic detail, relative to gas half way up the flame.
+pub(super) const UNSTRETCHED: f64 = 0.35;

@@ -1,0 +1,78 @@
+//! `impl Phenomenon`: how the renderer uses a flame sheet.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    host::observer::{Cancelled, Observer, check},
+    phenomenon::{
+        Phenomenon, PhenomenonInfo, Prepared, Run,
+        kind::{BuildContext, BuildError, Describe},
+        strip::{DepthInterval, Shutter, View},
+        surroundings::{Publication, Surroundings},
+    },
+};
+
+use super::{FlameSheetParameters, model::FlameSheet, render, render::aovs::AOVS};
+
+impl Describe for FlameSheetParameters {
+    const KEY: &'static str = "flame_sheet";
+    const PLACEMENT_KEYS: &'static [&'static str] = &["position", "width", "height"];
+    // From where the flame nearly fills the height of the picture.
+    const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
+    const FIRST_KEYS: &'static [&'static str] = &[
+        "position",
+        "width",
+        "height",
+        "speed",
+        "variation",
+        "texture.contrast",
+        "colour.luminance",
+        "colour.core_temperature_k",
+        "sparks.rate",
+        "smoke.optical_depth",
+    ];
+
+    fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
+        match FlameSheet::new(self.clone(), context.name, context.seed, context.loop_s) {
+            Ok(sheet) => Ok(Arc::new(sheet)),
+            Err(fault) => Err(BuildError::new(fault.key, fault.kind)),
+        }
+    }
+}
+
+impl Phenomenon for FlameSheet {
+    fn info(&self) -> PhenomenonInfo<'_> {
+        PhenomenonInfo { aovs: AOVS, ..PhenomenonInfo::new(&self.name) }
+    }
+
+    fn luminance(&self) -> f64 {
+        /// Bright parts beside the very brightest: most of a flame is far dimmer than its hottest soot.
+        const BRIGHT: f64 = 0.28;
+        BRIGHT * self.parameters.colour.luminance.bounds()[1]
+    }
+
+    fn start(self: Arc<Self>) -> Box<dyn Run> {
+        Box::new(self)
+    }
+}
+
+impl Run for FlameSheet {
+    fn publish(&self, shutter: Shutter) -> Publication {
+        let lights = self.flames.iter().flat_map(|flame| self.point_lights(flame, shutter)).collect();
+        Publication { lights, ..Publication::default() }
+    }
+
+    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+        self.flames.iter().map(|flame| self.depth_interval(flame, view)).collect()
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        check(observer)?;
+        Ok(Box::new(render::prepared::PreparedSheet::new(self, view, surroundings, observer)?))
+    }
+}
