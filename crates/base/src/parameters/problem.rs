@@ -53,9 +53,9 @@ pub enum ProblemKind {
     /// A kind of phenomenon that this program was built without.
     #[error("`{key}` is left out of this build; enable the feature `{feature}` of the crate `bansho`")]
     FeatureDisabled {
-        /// The kind's key.
+        /// Key of the kind.
         key: &'static str,
-        /// The feature that brings it.
+        /// The feature that enables it.
         feature: &'static str,
     },
     /// A value has the wrong type.
