@@ -2,7 +2,6 @@
 
 mod args;
 mod command;
-mod examples;
 mod exit;
 mod flags;
 mod interrupt;

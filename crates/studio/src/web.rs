@@ -7,7 +7,7 @@ use bansho_studio::{
     app::{Session, Studio, function_keys},
     document::Document,
     player::{Player, PolledPlayer, WorkerPlayer},
-    scenes::examples::{Bundle, SCENES},
+    scenes::examples::Bundle,
 };
 use eframe::egui::{self, Context};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
@@ -107,9 +107,10 @@ fn player(ctx: Context) -> Box<dyn Player> {
 
 /// The example `name`, or the first one.
 fn scene(name: &str) -> Document {
-    let find = |name: &str| SCENES.iter().find(|(file, _)| file.strip_suffix(".toml") == Some(name));
-    let (file, text) = find(name).or_else(|| find(FIRST)).copied().unwrap_or(("scene.toml", "bansho = 1\n"));
-    Document::new(file, text)
+    match bansho_example_scenes::find(name).or_else(|| bansho_example_scenes::find(FIRST)) {
+        Some(scene) => Document::new(format!("{}.toml", scene.name), scene.text),
+        None => Document::new("scene.toml", "bansho = 1\n"),
+    }
 }
 
 /// A page has no folders.

@@ -4,17 +4,14 @@ use std::path::{Path, PathBuf};
 
 use bansho::{
     KINDS,
-    base::phenomenon::kind::PhenomenonKind,
-    base::{host::printable::printable, parameters::nearest},
+    base::{host::printable::printable, parameters::nearest, phenomenon::kind::PhenomenonKind},
     media::{MediaError, output::atomic},
     scene::template,
 };
 
-use crate::{
-    args::NewArgs,
-    examples::{EXAMPLES, Example},
-    output::to_stdout,
-};
+use bansho_example_scenes::{ExampleScene, SCENES};
+
+use crate::{args::NewArgs, output::to_stdout};
 
 /// There is no example or phenomenon of that name.
 #[derive(Debug, thiserror::Error)]
@@ -66,12 +63,12 @@ fn text(kind: &PhenomenonKind, all: bool) -> String {
 }
 
 fn list() -> String {
-    EXAMPLES.iter().map(|example| format!("{:18} {}\n", example.name, example.about())).collect()
+    SCENES.iter().map(|scene| format!("{:18} {}\n", scene.name, scene.summary())).collect()
 }
 
-fn find(name: &str) -> Result<&'static Example, Unknown> {
-    let names: Vec<&str> = EXAMPLES.iter().map(|example| example.name).collect();
-    EXAMPLES.iter().find(|example| example.name == name).ok_or_else(|| Unknown::new("example", name, &names))
+fn find(name: &str) -> Result<&'static ExampleScene, Unknown> {
+    let names: Vec<&str> = SCENES.iter().map(|scene| scene.name).collect();
+    bansho_example_scenes::find(name).ok_or_else(|| Unknown::new("example", name, &names))
 }
 
 /// The kind of phenomenon of that name; the first one where none is named.
@@ -86,9 +83,9 @@ fn with_extension(name: &Path) -> PathBuf {
 }
 
 /// Writes the pictures that an example names; those that are there already stay as they are.
-fn copy_assets(example: &Example, folder: &Path) -> anyhow::Result<()> {
-    for asset in example.assets {
-        match atomic::write_new(&folder.join(asset.path), asset.bytes) {
+fn copy_assets(example: &ExampleScene, folder: &Path) -> anyhow::Result<()> {
+    for (path, bytes) in example.assets() {
+        match atomic::write_new(&folder.join(path), bytes) {
             Err(MediaError::IsThere { .. }) => {}
             written => written?,
         }

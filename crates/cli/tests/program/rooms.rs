@@ -30,9 +30,10 @@ const MAY_KNOW: [(&str, &[&str]); 13] = [
             "bansho-media",
         ],
     ),
-    ("bansho-cli", &["bansho"]),
+    ("bansho-example-scenes", &[]),
+    ("bansho-cli", &["bansho", "bansho-example-scenes"]),
     ("bansho-egui-software", &[]),
-    ("bansho-studio", &["bansho", "bansho-egui-software"]),
+    ("bansho-studio", &["bansho", "bansho-example-scenes", "bansho-egui-software"]),
 ];
 
 /// Dependencies with the only crates that may have them.

@@ -3,10 +3,7 @@
 use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
-use crate::{
-    document::files::autosave::RecoveredWork,
-    scenes::{examples, new_scene::NEW_SCENES},
-};
+use crate::{document::files::autosave::RecoveredWork, scenes::new_scene::NEW_SCENES};
 
 impl Studio {
     /// The menu bar.
@@ -41,10 +38,9 @@ impl Studio {
 
     fn examples_menu_ui(&mut self, ui: &mut Ui) {
         egui::ScrollArea::vertical().show(ui, |ui| {
-            for &(name, text) in examples::SCENES {
-                let words = name.trim_end_matches(".toml").replace('_', " ");
-                if ui.button(words).clicked() {
-                    self.files.open_bundled(&mut self.session, name, text);
+            for scene in bansho_example_scenes::SCENES {
+                if ui.button(scene.name.replace('_', " ")).clicked() {
+                    self.files.open_bundled(&mut self.session, &format!("{}.toml", scene.name), scene.text);
                 }
             }
         });

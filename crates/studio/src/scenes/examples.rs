@@ -1,4 +1,4 @@
-//! The example scenes and their files, embedded in the program.
+//! The files that scenes of the page name: those of the examples, embedded in the program, and those that were added.
 
 use std::{path::Path, sync::Arc};
 
@@ -10,65 +10,6 @@ use bansho::{
     },
     media::assets::{decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing},
 };
-
-macro_rules! files {
-    ($type:ty, $include:ident, $($name:literal),* $(,)?) => {
-        &[$(($name, $include!(concat!("../../../../scenes/", $name)) as $type)),*]
-    };
-}
-
-/// Every example: its file's name and its text.
-pub const SCENES: &[(&str, &str)] = files!(
-    &str,
-    include_str,
-    "bonfire.toml",
-    "burning_mesh.toml",
-    "campfire.toml",
-    "campfire_in_rain.toml",
-    "candle.toml",
-    "corona.toml",
-    "dome_night.toml",
-    "downpour_day.toml",
-    "drizzle.toml",
-    "fire_in_court.toml",
-    "headlights.toml",
-    "headlights_ahead.toml",
-    "hearth.toml",
-    "inagaki_density.toml",
-    "inagaki_haze.toml",
-    "inagaki_paper.toml",
-    "inagaki_still.toml",
-    "inagaki_wind_left.toml",
-    "inagaki_wind_right.toml",
-    "lake.toml",
-    "ohshima_itahashi.toml",
-    "quiet_arc.toml",
-    "rain_over_plate.toml",
-    "red_aurora.toml",
-    "sekiguchi_1.toml",
-    "sekiguchi_2.toml",
-    "sekiguchi_3.toml",
-    "sekiguchi_4.toml",
-    "sekiguchi_5.toml",
-    "street_lamp.toml",
-    "street_lamp_near.toml",
-    "torch.toml",
-    "torch_in_gusts.toml",
-);
-
-/// The files that they name.
-const FILES: &[(&str, &[u8])] = files!(
-    &[u8],
-    include_bytes,
-    "meshes/ring.glb",
-    "plates/checkerboard.png",
-    "plates/court.jpg",
-    "plates/court_depth.exr",
-    "plates/grove.jpg",
-    "plates/grove_depth.exr",
-    "plates/hearth.jpg",
-    "plates/hearth_depth.exr",
-);
 
 /// The embedded files, and files added by the user.
 #[derive(Clone, Debug, Default)]
@@ -92,7 +33,7 @@ impl Bundle {
     /// The bytes of the file `name`, if it is one of these.
     pub fn bytes(&self, name: &str) -> Option<&[u8]> {
         let added_files = self.added_files.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
-        added_files.or_else(|| FILES.iter().find(|(own, _)| *own == name).map(|(_, bytes)| *bytes))
+        added_files.or_else(|| bansho_example_scenes::asset(name))
     }
 
     fn found(&self, name: &str) -> Result<&[u8], AssetError> {
@@ -179,24 +120,20 @@ impl Assets for Bundle {
 
 #[cfg(test)]
 mod tests {
+    use bansho_example_scenes::{ExampleScene, SCENES};
+
     use super::*;
     use crate::document::check;
 
     #[test]
-    fn all_scenes_are_there_and_find_what_they_name() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
-        let mut names: Vec<String> = entries.map(|name| name.into_string().unwrap()).collect();
-        names.retain(|name| name.ends_with(".toml"));
-        names.sort();
-        assert_eq!(names, SCENES.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+    fn all_examples_find_what_they_name() {
         let assets: Arc<dyn Assets> = Arc::new(Bundle::default());
-        for (name, text) in SCENES {
+        for ExampleScene { name, text, .. } in SCENES {
             let scene = bansho::compile_scene(name, text, assets.clone());
             assert!(scene.is_ok(), "{name}: {:?}", scene.err());
         }
-        let (name, text) = SCENES.iter().find(|(name, _)| *name == "inagaki_haze.toml").unwrap();
-        assert!(check(name, text, &assets).is_ok());
+        let scene = bansho_example_scenes::find("inagaki_haze").unwrap();
+        assert!(check(scene.name, scene.text, &assets).is_ok());
     }
 
     #[test]
