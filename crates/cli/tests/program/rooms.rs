@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, process::Command};
 
 /// Each crate with those of the workspace that it may depend on: the table of ARCHITECTURE.md.
-const MAY_KNOW: [(&str, &[&str]); 13] = [
+const MAY_KNOW: [(&str, &[&str]); 14] = [
     ("bansho-base", &[]),
     ("bansho-sph", &["bansho-base"]),
     // No phenomenon knows another.
