@@ -249,7 +249,7 @@ fn benches(criterion: &mut Criterion) {
     for (name, plan) in scenes {
         let mut shot = plan.open();
         group.bench_function(name, |bencher| {
-            pool.install(|| bencher.iter(|| frame_used(&mut shot, |frame| black_box(frame).content)))
+            pool.install(|| bencher.iter(|| frame_used(&mut shot, |frame| black_box(frame).content)));
         });
     }
     let mut lone = one.open();
@@ -268,7 +268,7 @@ fn benches(criterion: &mut Criterion) {
         pool.install(|| {
             bencher.iter(|| {
                 black_box(display(&drawn, &color::View::DISPLAY, BitDepth::Eight, color::AlphaConvention::Encoded))
-            })
+            });
         });
     });
     group.bench_function("composite_two_and_view", |bencher| {

@@ -104,7 +104,7 @@ fn differences(method: &Method) -> Vec<String> {
         match (implementation, code.get(equation)) {
             (Implementation::NotUsed, None) => {}
             (Implementation::NotUsed, Some(_)) => {
-                faults.push(format!("{equation}: not used by {page}, but in {module}"))
+                faults.push(format!("{equation}: not used by {page}, but in {module}"));
             }
             (Implementation::By(_), None) => faults.push(format!("{equation}: in {page}, but not in {module}")),
             (_, Some(found)) if found != implementation => {

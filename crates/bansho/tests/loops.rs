@@ -53,7 +53,7 @@ fn a_loop_comes_back_and_refuses_what_jumps() {
         support::looped(&text, 1.0)
     };
     let error = keyed(3).err().unwrap();
-    assert!(error.to_string().contains("wind.velocity"), "{error}");
+    assert!(error.contains("wind.velocity"), "{error}");
     let wind = keyed(0).unwrap().compiled.wind().clone();
     assert_eq!(wind.mean(0.25), wind.mean(-1.75), "what is keyed repeats");
 }

@@ -1,5 +1,5 @@
 //! Rows of fractal noise: 16 lanes under run-time dispatch, compared with one point at a time and the textbook permutation table.
-#![allow(missing_docs)]
+#![allow(missing_docs, reason = "criterion's macros make public functions")]
 
 use std::{hint::black_box, time::Duration};
 
@@ -89,7 +89,7 @@ where
             for out in out.chunks_exact_mut(LANES) {
                 out.copy_from_slice(&dispatch!(level, _simd => noise.lanes(black_box(&cells), &fractions)));
             }
-        })
+        });
     });
     group.bench_function("naive: one point at a time", |bencher| {
         bencher.iter(|| {
@@ -98,7 +98,7 @@ where
                 point[0] = point[0].offset_by(*along);
                 *out = noise.at(point);
             }
-        })
+        });
     });
     if let Some(table) = table {
         group.bench_function("naive: permutation table", |bencher| {
@@ -109,7 +109,7 @@ where
                     };
                     *out = (0..4).map(octave).sum();
                 }
-            })
+            });
         });
     }
     group.finish();
@@ -125,7 +125,7 @@ fn exponentials(criterion: &mut Criterion) {
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
     group.bench_function("lanes", |bencher| {
-        bencher.iter(|| dispatch!(level, _simd => apply(math::approximations::exp, black_box(&x), &mut out)))
+        bencher.iter(|| dispatch!(level, _simd => apply(math::approximations::exp, black_box(&x), &mut out)));
     });
     group.bench_function("naive: libm", |bencher| bencher.iter(|| apply(math::f32::exp, black_box(&x), &mut out)));
     group.finish();

@@ -42,7 +42,7 @@ fn step(criterion: &mut Criterion) {
                         black_box(flame.particles().len())
                     },
                     BatchSize::LargeInput,
-                )
+                );
             });
         });
     }

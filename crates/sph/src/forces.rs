@@ -31,7 +31,7 @@ pub fn compute_densities<const D: usize>(
     masses: &[f32],
     densities: &mut Vec<f32>,
 ) {
-    with_kernel!(kernel, cells.support_radius(), D, |kernel| cells.sum(&DensityTerm(kernel), [masses], [densities]))
+    with_kernel!(kernel, cells.support_radius(), D, |kernel| cells.sum(&DensityTerm(kernel), [masses], [densities]));
 }
 
 /// Equation of state `p = k (rho - rho_0)`: Inagaki et al. (11), the aurora thesis (2.13).

@@ -73,7 +73,7 @@ impl EnergyFlux {
         // Parts of at most half an interval: bridges have fewer segments than nodes.
         refined.pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64).for_each(
             |(sheet, arc_fraction, factor, length)| {
-                wanted.add(sheet as u32, arc_fraction as f32, flux * factor * length)
+                wanted.add(sheet as u32, arc_fraction as f32, flux * factor * length);
             },
         );
         wanted

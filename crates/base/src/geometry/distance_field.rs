@@ -166,7 +166,7 @@ impl GridBuilder {
 
     /// Whether each grid point is inside, by majority vote of the rays along the three axes.
     fn classify_inside(&self) -> Vec<bool> {
-        let mut votes = vec![0u8; self.distance.len()];
+        let mut votes = vec![0_u8; self.distance.len()];
         for axis in 0..3 {
             self.add_inside_votes(axis, &mut votes);
         }

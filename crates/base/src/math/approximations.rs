@@ -31,7 +31,7 @@ pub fn exp2(x: f32) -> f32 {
     let rounded = clamped + ROUNDING_MAGIC;
     let f = clamped - (rounded - ROUNDING_MAGIC);
     // 2^f = 1 + f q(f) on [-1/2, 1/2], fit 2.0e-9.
-    let q = 1.535_336e-4f32.fma(f, 1.339_887_5e-3).fma(f, 9.618_437e-3);
+    let q = 1.535_336e-4_f32.fma(f, 1.339_887_5e-3).fma(f, 9.618_437e-3);
     let q = q.fma(f, 5.550_332_5e-2).fma(f, 2.402_264_8e-1).fma(f, 6.931_472e-1);
     let result = scale(q.fma(f, 1.0), rounded);
     let result = if x < -126.0 { 0.0 } else { result };
@@ -50,7 +50,7 @@ pub fn exp(x: f32) -> f32 {
     let f = whole.fma(-0.693_359_4, clamped);
     let f = whole.fma(2.121_944_4e-4, f);
     // e^f = 1 + f + f^2 q(f) on [-ln 2 / 2, ln 2 / 2], fit 3.1e-9.
-    let q = 1.381_461_5e-3f32.fma(f, 8.368_71e-3).fma(f, 4.166_839e-2);
+    let q = 1.381_461_5e-3_f32.fma(f, 8.368_71e-3).fma(f, 4.166_839e-2);
     let q = q.fma(f, 1.666_652_1e-1).fma(f, 4.999_999_3e-1);
     let result = scale((f * f).fma(q, f) + 1.0, rounded);
     let result = if x < -87.336_54 { 0.0 } else { result };
@@ -76,7 +76,7 @@ pub fn log2(x: f32) -> f32 {
     // log2 m = s q(s^2), s = (m - 1) / (m + 1), |s| < 0.172, fit 6.7e-9.
     let s = (mantissa - 1.0) / (mantissa + 1.0);
     let s2 = s * s;
-    let q = 4.547_422e-1f32.fma(s2, 5.757_17e-1).fma(s2, 9.618_095e-1).fma(s2, 2.885_39);
+    let q = 4.547_422e-1_f32.fma(s2, 5.757_17e-1).fma(s2, 9.618_095e-1).fma(s2, 2.885_39);
     let result = s.fma(q, exponent);
     let result = if x == 0.0 { f32::NEG_INFINITY } else { result };
     let result = if x == f32::INFINITY { x } else { result };
@@ -117,7 +117,7 @@ pub fn cos_turns(x: f32) -> f32 {
 #[inline(always)]
 fn sin_quarter(r: f32) -> f32 {
     let r2 = r * r;
-    let q = 39.711_13f32.fma(r2, -76.575_02).fma(r2, 81.602_234).fma(r2, -41.341_68).fma(r2, 6.283_185_5);
+    let q = 39.711_13_f32.fma(r2, -76.575_02).fma(r2, 81.602_234).fma(r2, -41.341_68).fma(r2, 6.283_185_5);
     let sine = r * q;
     let sine = if sine > 1.0 { 1.0 } else { sine };
     if sine < -1.0 { -1.0 } else { sine }
@@ -163,7 +163,7 @@ mod tests {
         assert!(worst(126.0, 127.999_99, 1, above) < 1.4e-7);
         assert_eq!(
             (exp2(0.0), exp2(10.0), exp2(-126.0), exp2(127.0)),
-            (1.0, 1024.0, f32::MIN_POSITIVE, 2f32.powi_exact(127))
+            (1.0, 1024.0, f32::MIN_POSITIVE, 2_f32.powi_exact(127))
         );
         assert_eq!(
             (exp2(128.0), exp2(1e30), exp2(-126.01), exp2(f32::NEG_INFINITY)),
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn pow_keeps_its_bound() {
-        for y in [-3.5f32, -1.0, 0.45, 1.0, 2.4, 5.0] {
+        for y in [-3.5_f32, -1.0, 0.45, 1.0, 2.4, 5.0] {
             let excess = |x: f32| {
                 let want = math::pow(x as f64, y as f64);
                 relative(pow(x, y), want) - 3e-7 * (y as f64 * math::log2(x as f64)).abs()
@@ -252,7 +252,7 @@ mod tests {
             [x.map(exp2), x.map(exp), x.map(log2), x.map(sin_turns), x.map(cos_turns)]
         }
         let level = fearless_simd::Level::new();
-        for start in 0..4000u32 {
+        for start in 0..4000_u32 {
             let x: [f32; 16] =
                 std::array::from_fn(|i| f32::from_bits((start * 16 + i as u32).wrapping_mul(0x9e37_79b9)));
             let vector = fearless_simd::dispatch!(level, _simd => all(&x)).map(|row| row.map(canonical));

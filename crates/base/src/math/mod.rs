@@ -203,7 +203,7 @@ mod tests {
             close(f32::cos(x), cos(wide));
             close(f32::exp(x), exp(wide));
             close(f32::ln(x), ln(wide));
-            close(f32::pow(x, 2.4), pow(wide, 2.4f32 as f64));
+            close(f32::pow(x, 2.4), pow(wide, 2.4_f32 as f64));
             close(f32::cbrt(x), cbrt(wide));
             close(f32::atan2(x, 2.0), atan2(wide, 2.0));
         }

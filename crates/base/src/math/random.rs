@@ -370,7 +370,7 @@ mod tests {
     #[test]
     fn bytes_of_the_words_are_equally_frequent() {
         let key = Key::new(7, "spark");
-        let mut counts = [0u32; 256];
+        let mut counts = [0_u32; 256];
         for birth in 0..COUNT / 16 {
             let words = key.words(birth, 0, POSITION);
             words.iter().flat_map(|word| word.to_le_bytes()).for_each(|byte| counts[byte as usize] += 1);

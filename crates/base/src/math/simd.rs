@@ -63,7 +63,7 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn simd_rsqrt(self) -> Self {
-        refine_rsqrt(self, f32::from_bits(RSQRT_MAGIC - (self.to_bits() >> 1)))
+        refine_rsqrt(self, Self::from_bits(RSQRT_MAGIC - (self.to_bits() >> 1)))
     }
     #[inline(always)]
     fn simd_abs(self) -> Self {

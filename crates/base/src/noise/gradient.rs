@@ -211,7 +211,7 @@ mod tests {
     /// Every gradient a function can give, each as often as it comes up among many hashes.
     fn gradients<const N: usize>(slope: impl Fn(u32, [f32; N]) -> f32) -> Vec<[f64; N]> {
         let unit = |axis: usize| std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
-        (0..60_000u32)
+        (0..60_000_u32)
             .map(|i| std::array::from_fn(|axis| slope(hash_first(hash_coordinate(0, 1, i), 3), unit(axis)) as f64))
             .collect()
     }
@@ -250,7 +250,7 @@ mod tests {
         assert_eq!([0.0, 0.0].gradient_noise([3, 5], [4, 6], 9), 0.0);
         let hash = hash_first(hash_coordinate(9, 1, 5), 3);
         let (near, alone) = (
-            [1e-3f32, 0.0].gradient_noise([3, 5], [4, 6], 9),
+            [1e-3_f32, 0.0].gradient_noise([3, 5], [4, 6], 9),
             gradient_dot_2(hash, 1e-3, 0.0) * std::f32::consts::SQRT_2,
         );
         assert!((near - alone).abs() < 4e-8, "{near} {alone}");

@@ -26,7 +26,7 @@ where
     [f32; N]: Dimension<Cells = [u32; N]>,
 {
     let (single, count) = (noise::<N>(3, Fractal::SINGLE, [0; N]), 200_000);
-    let (mut sum, mut squares, mut extreme) = (0.0, 0.0, 0f64);
+    let (mut sum, mut squares, mut extreme) = (0.0, 0.0, 0_f64);
     for index in 0..count {
         let value = single.at(random_point(index)) as f64;
         (sum, squares, extreme) = (sum + value, squares + value * value, extreme.max(value.abs()));
@@ -52,7 +52,7 @@ fn stated_variances_are_those_of_the_formula() {
     let s2ff = 36.0 / 13.0 - 180.0 / 12.0 + 345.0 / 11.0 - 300.0 / 10.0 + 100.0 / 9.0;
     // By f -> 1 - f the integrals of (1 - s)^2 f^2 are those of s^2 (1 - f)^2.
     let (a, b) = (2.0 * (s2 - 2.0 * s2f + s2ff), 2.0 * s2);
-    for (stated, n) in VARIANCE.iter().zip([2.0f64, 3.0, 4.0]) {
+    for (stated, n) in VARIANCE.iter().zip([2.0_f64, 3.0, 4.0]) {
         let exact = 4.0 / n * a * (0..n as u32 - 1).map(|_| b).product::<f64>();
         assert!((stated - exact).abs() < 1e-6, "{n}: {exact}");
     }
@@ -163,7 +163,7 @@ fn differences_grow_alike_in_every_direction() {
         let across = [[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]
             .map(|axis| structure(&noise, axis, distance));
         let all = [along.as_slice(), &across].concat();
-        let (low, high) = all.iter().fold((f64::INFINITY, 0f64), |(low, high), &x| (low.min(x), high.max(x)));
+        let (low, high) = all.iter().fold((f64::INFINITY, 0_f64), |(low, high), &x| (low.min(x), high.max(x)));
         assert!(high / low < 1.12, "{distance}: {all:?}");
     }
 }
@@ -205,7 +205,7 @@ fn seeds_and_cells_are_uncorrelated() {
 fn coordinates_split_and_advance_without_loss() {
     assert_eq!(Coordinate::from_f64(-0.25), Coordinate { cell: -1, fraction: 0.75 });
     assert_eq!(Coordinate::from_f64(4_294_967_296.0 + 2.5), Coordinate { cell: 2, fraction: 0.5 });
-    assert_eq!(Coordinate::from_f64(3_000_000_000.5), Coordinate { cell: 3_000_000_000u32 as i32, fraction: 0.5 });
+    assert_eq!(Coordinate::from_f64(3_000_000_000.5), Coordinate { cell: 3_000_000_000_u32 as i32, fraction: 0.5 });
     assert_eq!(Coordinate::from_f64(f64::NAN), Coordinate { cell: 0, fraction: 0.0 });
     assert_eq!(Coordinate::from_f64(f64::INFINITY).fraction, 0.0);
     assert_eq!(Coordinate::from_f32(-1.5), Coordinate { cell: -2, fraction: 0.5 });

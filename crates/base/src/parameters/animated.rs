@@ -21,7 +21,7 @@ impl Animate for f64 {
         *self
     }
 
-    fn from_components(mut component: impl FnMut(usize) -> f64) -> Self {
+    fn from_components(mut component: impl FnMut(usize) -> Self) -> Self {
         component(0)
     }
 }

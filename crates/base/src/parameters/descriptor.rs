@@ -98,15 +98,15 @@ pub enum Kind {
         rising: bool,
     },
     /// The inner kind, or keyframes of it.
-    Animated(Box<Kind>),
+    Animated(Box<Self>),
     /// The inner kind, or absent.
-    Optional(Box<Kind>),
+    Optional(Box<Self>),
     /// The inner kind, or `"auto"`.
-    Auto(Box<Kind>),
+    Auto(Box<Self>),
     /// A list.
     List {
         /// Kind of each item.
-        item: Box<Kind>,
+        item: Box<Self>,
         /// Minimum number of items.
         min: usize,
         /// Maximum number of items.

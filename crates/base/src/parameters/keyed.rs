@@ -158,7 +158,7 @@ impl Parameter for Curve {
             reader.report(node, ProblemKind::NotRising { from: pair[0][0], to: pair[1][0] });
             return None;
         }
-        match Curve::new(points, interpolation) {
+        match Self::new(points, interpolation) {
             Ok(curve) => Some(curve),
             Err(error) => {
                 reader.report(node, error.into());

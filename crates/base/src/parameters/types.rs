@@ -110,7 +110,7 @@ impl Parameter for i64 {
     type Limits = Range;
 
     fn kind(limits: &Range) -> Kind {
-        Kind::Integer { min: limits.min as i64, max: limits.max as i64 }
+        Kind::Integer { min: limits.min as Self, max: limits.max as Self }
     }
 
     fn read(node: &Node, limits: &Range, unit: &'static str, reader: &mut Reader) -> Option<Self> {

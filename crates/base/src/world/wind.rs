@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn gusts_drift_with_the_mean_wind() {
         let wind = wind(None);
-        let still = Wind::new(WindParameters { gust_period_s: 600.0, ..wind.parameters.clone() }, 7, None);
+        let still = Wind::new(WindParameters { gust_period_s: 600.0, ..wind.parameters }, 7, None);
         let here = still.at(DVec3::new(1.0, 2.0, 3.0), 0.0);
         let there = still.at(DVec3::new(5.0, 2.0, 3.0), 1.0);
         assert!((here - there).length() < 0.02, "{here} {there}");

@@ -74,7 +74,7 @@ impl ChannelPlane<'_> {
         row.floats.clear();
         match self.source {
             ChannelSource::Beauty(pixels, component) => {
-                row.floats.extend(pixels[range].iter().map(|pixel| pixel[component]))
+                row.floats.extend(pixels[range].iter().map(|pixel| pixel[component]));
             }
             ChannelSource::Values(values) => row.floats.extend_from_slice(&values[range]),
         }

@@ -186,7 +186,7 @@ mod tests {
         assert_eq!(tile(&[image(1), image(2)], 1, 0, [0.0]), Err(SheetError::Sizes { index: 1, width: 2, height: 1 }));
         let pixels = DisplayPixels::Eight(vec![[0; 4]]);
         let eight = DisplayImage { width: 1, height: 1, opaque: true, alpha: AlphaConvention::Linear, pixels };
-        let sixteen = DisplayImage { pixels: DisplayPixels::Sixteen(vec![[0; 4]]), ..eight.clone() };
+        let sixteen = DisplayImage { pixels: DisplayPixels::Sixteen(vec![[0; 4]]), ..eight };
         assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(SheetError::Depths { index: 1 }));
     }
 }

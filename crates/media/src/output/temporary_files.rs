@@ -43,6 +43,7 @@ pub(crate) fn create(
 /// Removes every file that is being written but does not bear its final name yet, and lets no other be begun: whoever tries waits for ever.
 ///
 /// For a program that ends right after, without waiting for what its other threads do. Files that bear their names stay, whole.
+#[expect(clippy::mem_forget, reason = "the lock is kept until the program ends, so that no other file is begun")]
 pub fn abandon_all() {
     let unfinished = temporary_files();
     // One that just got its name is not there any more, which is as well.

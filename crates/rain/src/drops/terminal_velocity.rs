@@ -254,7 +254,7 @@ mod tests {
             match fixed_point_velocity(1e-3 * micrometre, &air) {
                 Ok(_) => {}
                 Err(NoTerminalVelocity::DragJump { .. }) => {
-                    (first, last) = (first.min(micrometre), last.max(micrometre))
+                    (first, last) = (first.min(micrometre), last.max(micrometre));
                 }
                 Err(other) => panic!("{other}"),
             }

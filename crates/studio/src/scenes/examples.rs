@@ -140,7 +140,7 @@ mod tests {
     fn given_files_come_first_and_others_are_missing() {
         let mut bundle = Bundle::default();
         assert_eq!(bundle.text("drawing.svg").unwrap_err().problem, AssetProblem::Missing);
-        bundle.add_file("drawing.svg", "<svg/>".as_bytes());
+        bundle.add_file("drawing.svg", *b"<svg/>");
         assert_eq!(&*bundle.text("drawing.svg").unwrap(), "<svg/>");
     }
 }

@@ -121,7 +121,7 @@ mod tests {
                         TrackModel::HardSphereAtmosphere => {
                             HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.05)
                                 .track(node_energy_ev(node), key, particle)
-                                .for_each(&mut add)
+                                .for_each(&mut add);
                         }
                     }
                 }

@@ -48,7 +48,7 @@ impl LinkConstraints {
             constraints.constrain_chain(change, track, to).map_err(error)?;
             match (link.at, link.arrives) {
                 (Some(_), Some(fraction)) => {
-                    constraints.points.push((track, fraction.clamp(END_MARGIN, 1.0 - END_MARGIN)))
+                    constraints.points.push((track, fraction.clamp(END_MARGIN, 1.0 - END_MARGIN)));
                 }
                 (Some(_), None) if !splits(&sheets[from], change) => {
                     return Err(error(ShapeErrorKind::PointWithoutArrival));

@@ -284,9 +284,9 @@ impl Chains {
                     // Walking toward the start, a strand entered at its end runs with the chain.
                     let link = ChainLink { strand: next, reversed: entered == end };
                     if end == 0 {
-                        chain.insert(0, link)
+                        chain.insert(0, link);
                     } else {
-                        chain.push(link)
+                        chain.push(link);
                     }
                     at = self.links[next][1 - entered];
                 }

@@ -33,7 +33,7 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     let (mut costs, mut next) = (vec![f64::INFINITY; slots + 1], vec![f64::INFINITY; slots + 1]);
     costs[0] = 0.0;
     let mut best = vec![0.0_f64; slots + 1];
-    let mut steps = vec![0u8; (slots + 1) * points.len()];
+    let mut steps = vec![0_u8; (slots + 1) * points.len()];
     for point in 1..=last {
         next.fill(f64::INFINITY);
         best.fill(0.0);

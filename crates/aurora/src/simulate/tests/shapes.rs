@@ -218,7 +218,7 @@ fn parting(kernel: RepulsionKernel) -> f64 {
     let rms = (middle.iter().map(|index| positions[*index].y * positions[*index].y).sum::<f64>() / middle.len() as f64)
         .sqrt();
     // Over an even band of that rms half width.
-    let area = 200.0 * 2.0 * rms * 3f64.sqrt();
+    let area = 200.0 * 2.0 * rms * 3_f64.sqrt();
     let random = (std::f64::consts::LN_2 / std::f64::consts::PI * area / middle.len() as f64).sqrt();
     distances[distances.len() / 2] / random
 }

@@ -311,7 +311,7 @@ mod tests {
                 // Two Gauss points are exact for a cubic.
                 let (middle, half) = (0.5 * (pair[0][0] + pair[1][0]), 0.5 * (pair[1][0] - pair[0][0]));
                 sum +=
-                    half * [-1.0, 1.0].map(|side| curve.eval(middle + side * half / 3f64.sqrt())).iter().sum::<f64>();
+                    half * [-1.0, 1.0].map(|side| curve.eval(middle + side * half / 3_f64.sqrt())).iter().sum::<f64>();
             }
             let (low, high) = (points[0][0], points[points.len() - 1][0]);
             assert!((curve.integral(low, high) - sum).abs() < 1e-12);

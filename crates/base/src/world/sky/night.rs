@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn airglow_brightens_toward_the_horizon_and_the_way_is_the_published_one() {
         // Roach & Meinel (1955): 100 km, zenith distance 80 degrees: 3.9.
-        assert!((van_rhijn(10f64.to_radians(), 100.0) - 4.0).abs() < 0.2);
+        assert!((van_rhijn(10_f64.to_radians(), 100.0) - 4.0).abs() < 0.2);
         assert_eq!(van_rhijn(std::f64::consts::FRAC_PI_2, 100.0), 1.0);
         let night = NightParameters::default().at(0.0);
         let low = DVec3::new(0.97, 0.24, 0.0).normalize();

@@ -45,10 +45,10 @@ impl StreakSegment {
         let clip_left = if touched_columns.start > 0 { None } else { Some(left) };
         match (self.is_wide(), self.steep) {
             (false, true) => {
-                self.composite_columns(touched_columns, left, SteepStreak::new(self, clip_left, top), buffer, measure)
+                self.composite_columns(touched_columns, left, SteepStreak::new(self, clip_left, top), buffer, measure);
             }
             (false, false) => {
-                self.composite_columns(touched_columns, left, ShallowStreak { segment: self, top }, buffer, measure)
+                self.composite_columns(touched_columns, left, ShallowStreak { segment: self, top }, buffer, measure);
             }
             (true, true) => self.composite_columns(
                 touched_columns,

@@ -210,7 +210,7 @@ impl Files {
                 session.set_notice(Some(notice));
             }
             ExternalChange::Changed(_) if session.document.is_modified() => {
-                self.question = Some(Question::ChangedExternally(None))
+                self.question = Some(Question::ChangedExternally(None));
             }
             ExternalChange::Changed(text) => apply_external_change(session, &text),
         }
