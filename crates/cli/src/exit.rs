@@ -5,27 +5,27 @@ use std::process::ExitCode;
 use bansho::job::{Cause, JobError};
 
 use crate::{
-    command::{new::Unknown, studio::SaidWhy},
+    command::{new::Unknown, studio::AlreadyReported},
     flags, interrupt,
     output::{self, to_stderr},
 };
 
-/// Failed on the way.
+/// The work failed.
 const FAILED: u8 = 1;
-/// What was asked for makes no sense.
+/// The command line is invalid.
 const USAGE: u8 = 2;
 /// The scene is faulty.
 const SCENE: u8 = 3;
 
-/// An error that has been told already; only its exit code is left.
+/// An error that has already been reported; only its exit code is left.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-pub(crate) struct Told(pub(crate) JobError);
+pub(crate) struct ReportedJobError(pub(crate) JobError);
 
 /// The exit code of an error.
 pub(crate) fn code(error: &anyhow::Error) -> u8 {
-    let told = || error.downcast_ref::<Told>().map(|told| &told.0);
-    match error.downcast_ref::<JobError>().or_else(told).map(JobError::cause) {
+    let reported = || error.downcast_ref::<ReportedJobError>().map(|reported| &reported.0);
+    match error.downcast_ref::<JobError>().or_else(reported).map(JobError::cause) {
         Some(Cause::Usage) => USAGE,
         Some(Cause::Scene) => SCENE,
         Some(Cause::Cancelled) => interrupt::exit_code(),
@@ -34,9 +34,9 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
     }
 }
 
-/// Tells what went wrong, one `error:` for each fault, and gives the exit code.
+/// Prints one `error:` line for each error and returns the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    if !error.is::<Told>() && !error.is::<SaidWhy>() {
+    if !error.is::<ReportedJobError>() && !error.is::<AlreadyReported>() {
         tell(error);
     }
     ExitCode::from(code(error))
@@ -44,13 +44,13 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 
 fn tell(error: &anyhow::Error) {
     match error.downcast_ref::<JobError>() {
-        Some(job) => tell_job(job),
+        Some(job) => report_job_error(job),
         None => output::tell("error", &format!("{error:#}")),
     }
 }
 
-/// Tells what went wrong with a job.
-pub(crate) fn tell_job(error: &JobError) {
+/// Prints the error of a job.
+pub(crate) fn report_job_error(error: &JobError) {
     match error.scene() {
         Some(scene) => {
             scene.faults().for_each(|fault| to_stderr(&format!("error: {fault}")));

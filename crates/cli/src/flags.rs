@@ -8,7 +8,7 @@ use bansho::{
         host::assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind},
     },
-    job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksFault},
+    job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksError},
     media::{MediaError, assets::limits::TEXT_BYTES, input::InputError},
 };
 
@@ -82,18 +82,18 @@ fn of_error(error: &JobError) -> Option<&'static str> {
     }
 }
 
-fn of_streaks(fault: &StreaksFault) -> Option<&'static str> {
+fn of_streaks(fault: &StreaksError) -> Option<&'static str> {
     Some(match fault {
-        StreaksFault::Empty(list) | StreaksFault::Value { list, .. } | StreaksFault::Order { list, .. } => match list {
+        StreaksError::Empty(list) | StreaksError::Value { list, .. } | StreaksError::Order { list, .. } => match list {
             ListKind::Rates => "--rates",
             ListKind::Diameters => "--diameters",
         },
-        StreaksFault::Exposure(_) => "--exposure",
-        StreaksFault::Size(_) => "--size",
-        StreaksFault::Edge(_) | StreaksFault::Drops { .. } => "--box",
-        StreaksFault::Variants(_) => "--variants",
-        StreaksFault::Light => "--light",
-        StreaksFault::Velocity(_) => "--velocity",
+        StreaksError::Exposure(_) => "--exposure",
+        StreaksError::Size(_) => "--size",
+        StreaksError::Edge(_) | StreaksError::Drops { .. } => "--box",
+        StreaksError::Variants(_) => "--variants",
+        StreaksError::Light => "--light",
+        StreaksError::Velocity(_) => "--velocity",
         _ => return None,
     })
 }

@@ -7,7 +7,7 @@ use bansho_base::{
     phenomenon::kind::{BuildError, PhenomenonKind},
 };
 
-use super::{FORMAT, Place, SHARED_TABLES, Scene, tables::picture::LightKind};
+use super::{FORMAT, SHARED_TABLES, Scene, ValuePath, tables::picture::LightKind};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
 /// The format number must be one that this program reads.
@@ -72,8 +72,8 @@ pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
     };
     match name_fault(name) {
         None => Some(name.clone()),
-        Some(told) => {
-            reader.report(node, ProblemKind::Conflict(told));
+        Some(reason) => {
+            reader.report(node, ProblemKind::Conflict(reason));
             None
         }
     }
@@ -141,13 +141,13 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     let Some(fov) = [widest, narrowest].into_iter().find(|fov| !is_allowed(*fov)) else { return };
     let sensor = camera.sensor_height_mm;
     let focal = |fov: f64| 0.5 * sensor / math::tan(0.5 * fov.to_radians());
-    let told = format!(
+    let reason = format!(
         "gives a field of view of {fov:.3} degrees with a sensor of {sensor} mm; allowed: {min} to {max} degrees, here {:.3} to {:.0} mm",
         focal(max),
         focal(min)
     );
     report_build_error(
-        BuildError { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(told) },
+        BuildError { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(reason) },
         "camera".into(),
         root,
         reader,
@@ -161,16 +161,16 @@ fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
         let path = format!("light.{index}");
         let fault = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
         if light.is_directed() && !light.has_direction() {
-            let told = "is no direction; allowed: any three numbers that are not all 0".to_owned();
-            report_build_error(fault("direction", told), path.clone(), root, reader);
+            let reason = "is no direction; allowed: any three numbers that are not all 0".to_owned();
+            report_build_error(fault("direction", reason), path.clone(), root, reader);
         }
-        let stated = Place::root().key("light").index(index).key("inner_deg").find(root).is_some();
+        let stated = ValuePath::root().key("light").index(index).key("inner_deg").find(root).is_some();
         if light.kind == LightKind::Spot && stated && light.inner_deg > light.outer_deg {
-            let told = format!(
+            let reason = format!(
                 "a spot that is full up to {} degrees cannot be dark beyond {}; allowed: up to `outer_deg`",
                 light.inner_deg, light.outer_deg
             );
-            report_build_error(fault("inner_deg", told), path, root, reader);
+            report_build_error(fault("inner_deg", reason), path, root, reader);
         }
     }
 }
@@ -183,9 +183,9 @@ fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
         reader.within("plate", |r| r.within("depth", |r| r.report_at(place, kind)));
     }
     if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {
-        let told = "an exposure needs an `image` that was taken with it".to_owned();
+        let reason = "an exposure needs an `image` that was taken with it".to_owned();
         report_build_error(
-            BuildError { key: "exposure_ev100".into(), kind: ProblemKind::Conflict(told) },
+            BuildError { key: "exposure_ev100".into(), kind: ProblemKind::Conflict(reason) },
             "plate".into(),
             root,
             reader,

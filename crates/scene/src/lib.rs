@@ -32,7 +32,7 @@ pub use self::{
     },
     text::{
         edit, operation,
-        path::{Place, Segment},
+        path::{Segment, ValuePath},
         positions::Positions,
     },
 };

@@ -33,8 +33,8 @@ pub struct SceneError {
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, told) in self.faults().chain(self.more()).enumerate() {
-            write!(f, "{}{told}", if index > 0 { "\n\n" } else { "" })?;
+        for (index, message) in self.faults().chain(self.more()).enumerate() {
+            write!(f, "{}{message}", if index > 0 { "\n\n" } else { "" })?;
         }
         Ok(())
     }
@@ -51,7 +51,7 @@ impl SceneError {
     /// Each fault that is listed, as a person reads it.
     pub fn faults(&self) -> impl Iterator<Item = String> + '_ {
         let mut lines = Lines::new(&self.text);
-        self.problems.iter().map(move |problem| self.told(problem, &mut lines))
+        self.problems.iter().map(move |problem| self.message(problem, &mut lines))
     }
 
     /// How many more faults there are than those that are listed, if there are more.
@@ -64,18 +64,18 @@ impl SceneError {
         Lines::new(&self.text).position(byte)
     }
 
-    fn told(&self, problem: &Problem, lines: &mut Lines) -> String {
-        let (file, told) = (printable(&self.file), problem.to_string());
-        let told = printable_excerpt(&told);
+    fn message(&self, problem: &Problem, lines: &mut Lines) -> String {
+        let (file, message) = (printable(&self.file), problem.to_string());
+        let message = printable_excerpt(&message);
         let Some(span) = &problem.span else {
-            return format!("{file}: {told}");
+            return format!("{file}: {message}");
         };
         let (line, column) = lines.position(span.start);
         let Excerpt { shown, before, marked } = lines.excerpt(span.clone());
         let gutter = " ".repeat(line.to_string().len());
         let (before, marked) = (" ".repeat(before), "^".repeat(marked));
         let shown = with_control_pictures(&shown);
-        format!("{file}:{line}:{column}: {told}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}")
+        format!("{file}:{line}:{column}: {message}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}")
     }
 }
 

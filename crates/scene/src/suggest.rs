@@ -1,14 +1,14 @@
-//! What a path that leads nowhere may have meant.
+//! Suggestions for a path that does not exist in a scene.
 
 use bansho_base::parameters::{Kind, Table, TableDescriptor, Value, nearest};
 
 use super::{PhenomenonKind, SHARED_TABLES, text::toml};
 
-/// Most paths that are suggested.
-const MOST: usize = 3;
+/// The maximum number of suggested paths.
+const MAX_SUGGESTIONS: usize = 3;
 
-/// Tables that a scene has whether it states them or not.
-const USUAL: [&str; 4] = ["picture", "camera", "wind", "air"];
+/// Tables that every scene has, even where its text does not state them.
+const IMPLICIT_TABLES: [&str; 4] = ["picture", "camera", "wind", "air"];
 
 /// Paths of the scene `text` that the `segments` of another may have meant, the likeliest first: parameters of that name in tables that the
 /// scene has, else the parameter most like it.
@@ -17,7 +17,7 @@ pub(super) fn paths(text: &str, segments: &[&str], kinds: &[PhenomenonKind]) -> 
     let known = known(&root, kinds);
     let (first, rest) = (segments[0], &segments[1..]);
     let tables = kinds.iter().map(|kind| kind.key).chain(SHARED_TABLES.iter().map(|table| table.key));
-    let tables = tables.filter(|key| root.get(key).is_some() || USUAL.contains(key));
+    let tables = tables.filter(|key| root.get(key).is_some() || IMPLICIT_TABLES.contains(key));
     if let Some(table) = nearest(first, tables).filter(|_| !rest.is_empty()) {
         return vec![format!("{table}.{}", rest.join("."))];
     }
@@ -25,7 +25,7 @@ pub(super) fn paths(text: &str, segments: &[&str], kinds: &[PhenomenonKind]) -> 
         let named = || known.iter().filter(|path| path.ends_with(wanted));
         // A parameter of a table itself rather than one of a table within it.
         let shortest = named().map(Vec::len).min();
-        named().filter(|path| Some(path.len()) == shortest).take(MOST).map(|path| path.join(".")).collect()
+        named().filter(|path| Some(path.len()) == shortest).take(MAX_SUGGESTIONS).map(|path| path.join(".")).collect()
     };
     let last = [segments[segments.len() - 1]];
     let mut meant = ending(segments);
@@ -45,7 +45,7 @@ fn known(root: &Table, kinds: &[PhenomenonKind]) -> Vec<Vec<&'static str>> {
     let kinds = kinds.iter().map(|kind| (kind.key, kind.table));
     for (key, table) in kinds.chain(SHARED_TABLES.iter().map(|shared| (shared.key, shared.table))) {
         let stated: Vec<&Value> = root.get(key).map(|node| &node.value).into_iter().collect();
-        if !stated.is_empty() || USUAL.contains(&key) {
+        if !stated.is_empty() || IMPLICIT_TABLES.contains(&key) {
             parameters(&mut known, &[key], table(), &stated);
         }
     }

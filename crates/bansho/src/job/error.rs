@@ -13,7 +13,7 @@ use bansho_scene::{LoopError, SceneError, edit::EditError};
 
 use super::frames::ranges;
 #[cfg(feature = "rain")]
-use super::streaks::StreaksFault;
+use super::streaks::StreaksError;
 
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -93,7 +93,7 @@ pub enum JobError {
     /// Streak textures that cannot be made.
     #[cfg(feature = "rain")]
     #[error(transparent)]
-    Streaks(#[from] StreaksFault),
+    Streaks(#[from] StreaksError),
     /// The observer asked to stop while streak textures were made.
     #[cfg(feature = "rain")]
     #[error("stopped; whole textures stay, without an index")]

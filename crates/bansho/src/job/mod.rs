@@ -37,7 +37,7 @@ pub use render::{
 };
 pub use scene_file::{SCENE_BYTES, SceneFile};
 #[cfg(feature = "rain")]
-pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksFault};
+pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksError};
 
 /// What is to be drawn, and where it goes. Begin with [`Job::new`], which takes everything from the scene.
 #[derive(Clone, Debug)]

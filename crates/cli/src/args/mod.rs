@@ -41,7 +41,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Write a new scene file: what one changes first, or every setting, each explained.
     New(NewArgs),
-    /// Say whether scene files are right, and where they are not.
+    /// Check scene files and print the position of every error.
     Check(CheckArgs),
     /// Rewrite a scene file of an older format for this version; comments stay.
     Upgrade(UpgradeArgs),
@@ -81,7 +81,7 @@ pub(crate) struct NewArgs {
     /// What the scene shows: flame_sheet (the default), flame_particles, rain or aurora.
     #[arg(long, value_name = "KIND", conflicts_with = "from")]
     pub(crate) phenomenon: Option<String>,
-    /// Write every setting with what it is for and what is allowed, not only those that one changes first.
+    /// Write every setting with its purpose and allowed values, not only those that are changed most often.
     #[arg(long, conflicts_with_all = ["from", "list"])]
     pub(crate) all: bool,
     /// Copy an example that comes with the program.

@@ -9,7 +9,7 @@ use bansho::{
 
 use crate::{
     args::{CheckArgs, InputArgs},
-    exit::{self, Told},
+    exit::{self, ReportedJobError},
     output::{self, to_stdout},
 };
 
@@ -20,12 +20,12 @@ pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
         match describe(path, &args.inputs) {
             Ok(line) => to_stdout(&line)?,
             Err(error) => {
-                exit::tell_job(&error);
+                exit::report_job_error(&error);
                 last_fault = Some(error);
             }
         }
     }
-    last_fault.map_or(Ok(()), |error| Err(Told(error).into()))
+    last_fault.map_or(Ok(()), |error| Err(ReportedJobError(error).into()))
 }
 
 fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {

@@ -37,7 +37,7 @@ enum StudioError {
 /// The studio failed, and has said why.
 #[derive(Debug, thiserror::Error)]
 #[error("{PROGRAM} failed")]
-pub(crate) struct SaidWhy;
+pub(crate) struct AlreadyReported;
 
 /// Starts the studio and waits until its window is closed.
 pub(crate) fn run(args: &StudioArgs) -> anyhow::Result<()> {
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &StudioArgs) -> anyhow::Result<()> {
     })?;
     match status.code() {
         Some(0) => Ok(()),
-        Some(1) => Err(SaidWhy.into()),
+        Some(1) => Err(AlreadyReported.into()),
         _ => Err(StudioError::Failed(status).into()),
     }
 }

@@ -12,7 +12,7 @@ use bansho::{
 
 use self::{bar::Bar, json::Json};
 use crate::{
-    exit::{self, Told},
+    exit::{self, ReportedJobError},
     flags, interrupt,
     output::{self, to_stderr},
     stats::Stats,
@@ -44,7 +44,7 @@ pub(crate) struct Watcher {
     since: Instant,
 }
 
-/// All work was done, but not all of its progress could be told.
+/// All work was done, but not all of its progress could be reported.
 #[derive(Debug, thiserror::Error)]
 #[error("progress was lost: {0}; all files are written")]
 struct Unwritten(std::io::Error);
@@ -108,11 +108,11 @@ impl Watcher {
         if let Shown::Bar(bar) = &*self.shown {
             bar.clear();
         }
-        exit::tell_job(&error);
+        exit::report_job_error(&error);
         let message = flags::error(&error);
-        let told = anyhow::Error::new(Told(error));
+        let reported = anyhow::Error::new(ReportedJobError(error));
         if let Shown::Json(json) = &*self.shown {
-            json.failed(&message, exit::code(&told));
+            json.failed(&message, exit::code(&reported));
         }
         told
     }

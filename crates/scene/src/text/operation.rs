@@ -5,7 +5,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Tab
 
 use super::{
     edit::{self, EditError},
-    path::{Place, Segment},
+    path::{Segment, ValuePath},
 };
 
 /// One change of a scene.
@@ -14,26 +14,26 @@ pub enum Operation {
     /// States `value` at `place`, in stead of any that stands there. Tables on the way are made, and lists with one table in them.
     Set {
         /// Where.
-        place: Place,
+        place: ValuePath,
         /// What.
         value: Value,
     },
     /// Takes out what stands at `place`, so that a parameter has its default and an item of a list is gone.
     Remove {
         /// Where.
-        place: Place,
+        place: ValuePath,
     },
     /// Adds an item at the end of the list at `place`, which is made where there is none.
     Append {
         /// The list.
-        place: Place,
+        place: ValuePath,
         /// The item.
         value: Value,
     },
     /// Keys the value at `place`: at `time` it is `value`. A constant becomes keyed, by this one key.
     SetKeyframe {
         /// What is keyed.
-        place: Place,
+        place: ValuePath,
         /// When, s.
         time: f64,
         /// What it then is.
@@ -42,7 +42,7 @@ pub enum Operation {
     /// Takes out the key at `time`. The last key leaves a constant of its value.
     RemoveKeyframe {
         /// What is keyed.
-        place: Place,
+        place: ValuePath,
         /// When, s.
         time: f64,
     },
@@ -50,7 +50,7 @@ pub enum Operation {
 
 impl Operation {
     /// The place that it changes.
-    pub fn place(&self) -> &Place {
+    pub fn place(&self) -> &ValuePath {
         match self {
             Self::Set { place, .. }
             | Self::Remove { place }
@@ -147,7 +147,7 @@ impl<'a> Slot<'a> {
     }
 }
 
-fn nowhere(place: &Place, segment: &Segment) -> EditError {
+fn nowhere(place: &ValuePath, segment: &Segment) -> EditError {
     let segment = match segment {
         Segment::Key(key) => key.clone(),
         Segment::Index(index) => index.to_string(),
@@ -157,7 +157,7 @@ fn nowhere(place: &Place, segment: &Segment) -> EditError {
 }
 
 /// What holds the value at `place`, and the last step to that; tables on the way, and first items of lists, are made where `make` says so.
-fn holder<'a, 'p>(root: &'a mut Table, place: &'p Place, make: bool) -> Result<(Slot<'a>, &'p Segment), EditError> {
+fn holder<'a, 'p>(root: &'a mut Table, place: &'p ValuePath, make: bool) -> Result<(Slot<'a>, &'p Segment), EditError> {
     let Some((last, way)) = place.segments().split_last() else {
         return Err(EditError::NoAssignment(String::new()));
     };
@@ -185,7 +185,7 @@ fn holder<'a, 'p>(root: &'a mut Table, place: &'p Place, make: bool) -> Result<(
     Ok((slot, last))
 }
 
-fn set(root: &mut Table, place: &Place, value: Written) -> Result<(), EditError> {
+fn set(root: &mut Table, place: &ValuePath, value: Written) -> Result<(), EditError> {
     let (slot, last) = holder(root, place, true)?;
     match (slot, last) {
         (Slot::Value(Written::Array(items)), Segment::Index(index)) if *index < items.len() => {
@@ -213,7 +213,7 @@ fn replace(old: &mut Written, value: Written) {
     *old.decor_mut() = decor;
 }
 
-fn remove(root: &mut Table, place: &Place) -> Result<(), EditError> {
+fn remove(root: &mut Table, place: &ValuePath) -> Result<(), EditError> {
     let (slot, last) = holder(root, place, false)?;
     let removed = match (slot, last) {
         (Slot::Headed(table), Segment::Key(key)) => table.remove(key).is_some(),
@@ -231,7 +231,7 @@ fn remove(root: &mut Table, place: &Place) -> Result<(), EditError> {
     if removed { Ok(()) } else { Err(nowhere(place, last)) }
 }
 
-fn append(root: &mut Table, place: &Place, value: &Value) -> Result<(), EditError> {
+fn append(root: &mut Table, place: &ValuePath, value: &Value) -> Result<(), EditError> {
     let (slot, last) = holder(root, place, true)?;
     let headed_holder = matches!(slot, Slot::Headed(_));
     let (Some(table), Segment::Key(key)) = (slot.table(), last) else { return Err(nowhere(place, last)) };
@@ -311,7 +311,7 @@ fn headed(values: &Values) -> Result<Table, EditError> {
 }
 
 /// The keys of the value at `place`, where it is keyed.
-fn keys<'a>(root: &'a mut Table, place: &Place) -> Option<&'a mut Array> {
+fn keys<'a>(root: &'a mut Table, place: &ValuePath) -> Option<&'a mut Array> {
     let (slot, last) = holder(root, place, false).ok()?;
     slot.into(last)?.table()?.get_mut("keys")?.as_array_mut()
 }
@@ -335,7 +335,7 @@ fn space(items: &mut Array) {
     }
 }
 
-fn set_keyframe(root: &mut Table, place: &Place, time: f64, value: &Written) -> Result<(), EditError> {
+fn set_keyframe(root: &mut Table, place: &ValuePath, time: f64, value: &Written) -> Result<(), EditError> {
     let key = Array::from_iter([Written::from(time), value.clone()]);
     let Some(keys) = keys(root, place) else {
         let mut keyed = InlineTable::new();
@@ -358,7 +358,7 @@ fn set_keyframe(root: &mut Table, place: &Place, time: f64, value: &Written) -> 
     Ok(())
 }
 
-fn remove_keyframe(root: &mut Table, place: &Place, time: f64) -> Result<(), EditError> {
+fn remove_keyframe(root: &mut Table, place: &ValuePath, time: f64) -> Result<(), EditError> {
     let missing = || EditError::NoKeyframe { path: place.to_string(), time };
     let keys = keys(root, place).ok_or_else(missing)?;
     let index = keys.iter().position(|key| is_at(key, time)).ok_or_else(missing)?;

@@ -1,10 +1,10 @@
-//! Places in a scene: which value of which table.
+//! Paths of values in a scene: which value of which table.
 
 use std::fmt;
 
 use bansho_base::parameters::{Node, Table, Value};
 
-/// One step of a [`Place`].
+/// One step of a [`ValuePath`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Segment {
     /// Into the value of a key.
@@ -15,21 +15,21 @@ pub enum Segment {
 
 /// A value of a scene, from the root inward, such as `flame_particles.0.burners.1.diameter`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Place(Vec<Segment>);
+pub struct ValuePath(Vec<Segment>);
 
-impl Place {
+impl ValuePath {
     /// The scene itself.
     pub fn root() -> Self {
         Self::default()
     }
 
-    /// The value of `key` within this place.
+    /// The value of `key` within this value.
     #[must_use]
     pub fn key(&self, key: &str) -> Self {
         self.then(Segment::Key(key.to_owned()))
     }
 
-    /// Item `index` of the list at this place.
+    /// Item `index` of the list at this path.
     #[must_use]
     pub fn index(&self, index: usize) -> Self {
         self.then(Segment::Index(index))
@@ -56,7 +56,7 @@ impl Place {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for ValuePath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (step, segment) in self.0.iter().enumerate() {
             let dot = if step > 0 { "." } else { "" };

@@ -8,7 +8,7 @@ use std::{path::Path, sync::Arc, thread, time::Duration};
 use bansho::{
     Assets,
     base::parameters::Value,
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use crate::{
@@ -155,13 +155,13 @@ fn change(session: &mut Session, bench_scene: &BenchScene, way: f64) -> Result<(
     let Some((keys, [from, to])) = bench_scene.number else {
         let points =
             [[-240.0, -180.0], [0.0, -150.0 - 60.0 * way], [240.0, -180.0]].map(|point| Value::numbers(point).into());
-        let sheets = Place::root().key("aurora").index(0).key("shapes").index(0).key("sheets");
+        let sheets = ValuePath::root().key("aurora").index(0).key("shapes").index(0).key("sheets");
         let place = sheets.index(0).key("points");
         session.edit_shapes("move point", &[Operation::Set { place, value: Value::List(points.into()) }], 0)?;
         return Ok(());
     };
     let (kind, keys) = keys.split_first().unwrap_or((&"", &[]));
-    let place = keys.iter().fold(Place::root().key(kind).index(0), |place, key| place.key(key));
+    let place = keys.iter().fold(ValuePath::root().key(kind).index(0), |place, key| place.key(key));
     session.set("slider", &place, Value::Number(from + (to - from) * way));
     Ok(())
 }

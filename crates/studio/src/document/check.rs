@@ -9,7 +9,7 @@ use bansho::{
         parameters::{Problem, ProblemKind, Span, Table, Value},
     },
     scene::{
-        Place, Scene,
+        Scene, ValuePath,
         operation::{self, Operation},
         values,
     },
@@ -159,7 +159,7 @@ fn fewer_particles(root: &Table) -> Vec<Operation> {
     for (kind, keys, most) in DRAFT {
         let Some(Value::List(all)) = root.get(kind).map(|node| &node.value) else { continue };
         for index in 0..all.len() {
-            let place = keys.iter().fold(Place::root().key(kind).index(index), |place, key| place.key(key));
+            let place = keys.iter().fold(ValuePath::root().key(kind).index(index), |place, key| place.key(key));
             let stated = place.find(root).and_then(|node| node.value.as_number());
             if stated.or_else(|| usual(kind, keys)).is_some_and(|count| count > most as f64) {
                 operations.push(Operation::Set { place, value: Value::Integer(most) });

@@ -9,11 +9,11 @@ use bansho::{
         },
         parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
     },
-    scene::{Place, SHARED_TABLES, Segment},
+    scene::{SHARED_TABLES, Segment, ValuePath},
 };
 
 /// Whether what stands at `place` of a scene may be keyed over time.
-pub(crate) fn animatable(place: &Place) -> bool {
+pub(crate) fn animatable(place: &ValuePath) -> bool {
     let keys: Vec<&str> = place.segments().iter().filter_map(key).collect();
     let [root, inner @ .., last] = keys.as_slice() else { return false };
     let shared = SHARED_TABLES.iter().find(|table| table.key == *root).map(|table| (table.table)());
@@ -83,7 +83,7 @@ pub(crate) fn at(value: &Value, time: f64) -> Option<Value> {
 }
 
 /// The three numbers at `place` of the scene `root` at `time`, if it states them.
-pub(crate) fn vector(root: &Table, place: &Place, time: f64) -> Option<DVec3> {
+pub(crate) fn vector(root: &Table, place: &ValuePath, time: f64) -> Option<DVec3> {
     let Value::List(items) = at(&place.find(root)?.value, time)? else { return None };
     let numbers: Vec<f64> = items.iter().map(|item| item.value.as_number()).collect::<Option<_>>()?;
     Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?))
@@ -112,12 +112,13 @@ mod tests {
 
     #[test]
     fn places_know_whether_they_may_be_keyed() {
-        let within = |root: &str, keys: &[&str]| keys.iter().fold(Place::root().key(root), |place, key| place.key(key));
+        let within =
+            |root: &str, keys: &[&str]| keys.iter().fold(ValuePath::root().key(root), |place, key| place.key(key));
         assert!(animatable(&within("wind", &["velocity"])) && animatable(&within("camera", &["position"])));
-        assert!(animatable(&Place::root().key("light").index(3).key("position")));
-        assert!(animatable(&Place::root().key("flame_sheet").index(0).key("colour").key("luminance")));
-        assert!(!animatable(&Place::root().key("flame_sheet").index(0).key("height")));
-        assert!(!animatable(&within("picture", &["size"])) && !animatable(&Place::root()));
+        assert!(animatable(&ValuePath::root().key("light").index(3).key("position")));
+        assert!(animatable(&ValuePath::root().key("flame_sheet").index(0).key("colour").key("luminance")));
+        assert!(!animatable(&ValuePath::root().key("flame_sheet").index(0).key("height")));
+        assert!(!animatable(&within("picture", &["size"])) && !animatable(&ValuePath::root()));
         assert!(!animatable(&within("no_such_table", &["at_all"])));
     }
 }

@@ -3,16 +3,16 @@
 use bansho::{
     KINDS,
     base::parameters::{Kind, Node, Table, TableDescriptor, Value},
-    scene::{Place, SHARED_TABLES},
+    scene::{SHARED_TABLES, ValuePath},
 };
 
 /// Each parameter of the scene `root` that names a file, and the name.
-pub fn named_files(root: &Table) -> Vec<(Place, String)> {
+pub fn named_files(root: &Table) -> Vec<(ValuePath, String)> {
     let shared = SHARED_TABLES.iter().map(|table| (table.key, (table.table)()));
     let kinds = KINDS.iter().map(|kind| (kind.key, (kind.table)()));
     let mut found = Vec::new();
     for (key, descriptor) in shared.chain(kinds) {
-        let place = Place::root().key(key);
+        let place = ValuePath::root().key(key);
         match root.get(key).map(|node| &node.value) {
             Some(Value::Table(table)) => in_table(&place, table, descriptor, &mut found),
             Some(Value::List(items)) => {
@@ -28,7 +28,7 @@ pub fn named_files(root: &Table) -> Vec<(Place, String)> {
     found
 }
 
-fn in_table(place: &Place, table: &Table, descriptor: &TableDescriptor, found: &mut Vec<(Place, String)>) {
+fn in_table(place: &ValuePath, table: &Table, descriptor: &TableDescriptor, found: &mut Vec<(ValuePath, String)>) {
     for parameter in &descriptor.parameters {
         if let Some(node) = table.get(parameter.key) {
             in_value(&place.key(parameter.key), node, &parameter.kind, found);
@@ -36,7 +36,7 @@ fn in_table(place: &Place, table: &Table, descriptor: &TableDescriptor, found: &
     }
 }
 
-fn in_value(place: &Place, node: &Node, kind: &Kind, found: &mut Vec<(Place, String)>) {
+fn in_value(place: &ValuePath, node: &Node, kind: &Kind, found: &mut Vec<(ValuePath, String)>) {
     match (kind, &node.value) {
         (Kind::Asset, Value::Text(name)) => found.push((place.clone(), name.clone())),
         (Kind::Optional(inner) | Kind::Auto(inner), _) => in_value(place, node, inner, found),

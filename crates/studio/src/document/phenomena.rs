@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::{Table, Value},
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use super::Document;
@@ -23,8 +23,8 @@ pub struct PhenomenonEntry {
 
 impl PhenomenonEntry {
     /// Where it stands.
-    pub fn place(&self) -> Place {
-        Place::root().key(self.kind).index(self.index)
+    pub fn place(&self) -> ValuePath {
+        ValuePath::root().key(self.kind).index(self.index)
     }
 }
 
@@ -74,7 +74,7 @@ pub mod operations {
     pub fn add(document: &Document, kind: &str) -> Vec<Operation> {
         let mut table = Table::default();
         table.push("name", Value::Text(free_name(kind, &document.phenomena())));
-        vec![Operation::Append { place: Place::root().key(kind), value: Value::Table(table) }]
+        vec![Operation::Append { place: ValuePath::root().key(kind), value: Value::Table(table) }]
     }
 
     /// Adds a phenomenon like `original` under a name of its own.
@@ -86,7 +86,7 @@ pub mod operations {
         copy.push("name", Value::Text(free_name(&original.name, &document.phenomena())));
         let others = table.entries.iter().filter(|entry| entry.key != "name");
         others.for_each(|entry| copy.push(entry.key.clone(), entry.node.value.clone()));
-        vec![Operation::Append { place: Place::root().key(original.kind), value: Value::Table(copy) }]
+        vec![Operation::Append { place: ValuePath::root().key(original.kind), value: Value::Table(copy) }]
     }
 
     /// Draws it, or does not.

@@ -12,7 +12,7 @@ use bansho::{
     },
     fire::sheet::{FlameSheetParameters, Stage},
     scene::{
-        Instance, Place, PlateParameters, Scene,
+        Instance, PlateParameters, Scene, ValuePath,
         operation::{self, Operation},
         values,
     },
@@ -47,7 +47,7 @@ fn plan(
     assets: &Arc<dyn Assets>,
     index: usize,
 ) -> Option<PlannedScene> {
-    let place = Place::root().key(FlameSheetParameters::KEY).index(index);
+    let place = ValuePath::root().key(FlameSheetParameters::KEY).index(index);
     let Value::Table(table) = &place.find(root)?.value else { return None };
     let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
     let stated = |key: &str| place.key(key).find(root).is_some();

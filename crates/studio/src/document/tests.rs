@@ -3,7 +3,7 @@ use std::{fs, sync::Arc};
 use bansho::{
     Assets, MemoryAssets,
     base::parameters::{ProblemKind, Value},
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use super::{
@@ -34,7 +34,7 @@ fn assets() -> Arc<dyn Assets> {
 }
 
 fn height(value: f64) -> Operation {
-    Operation::Set { place: Place::root().key("flame_sheet").index(0).key("height"), value: Value::Number(value) }
+    Operation::Set { place: ValuePath::root().key("flame_sheet").index(0).key("height"), value: Value::Number(value) }
 }
 
 #[test]

@@ -19,7 +19,7 @@ use bansho::{
         camera::CameraParameters,
         parameters::{Parameters, Value},
     },
-    scene::{Place, Segment, edit::EditError, operation::Operation},
+    scene::{Segment, ValuePath, edit::EditError, operation::Operation},
 };
 
 use crate::{
@@ -234,15 +234,15 @@ impl Session {
     }
 
     /// Sets the value at `place`. Where it is animated, sets a keyframe at the current time; while recording, wherever keyframes are allowed.
-    pub fn set(&mut self, label: &str, place: &Place, value: Value) {
+    pub fn set(&mut self, label: &str, place: &ValuePath, value: Value) {
         self.set_all(label, [(place.clone(), value)]);
     }
 
     /// Sets several values in one undo step.
-    pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (Place, Value)>) {
+    pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (ValuePath, Value)>) {
         let keyed =
-            |place: &Place| place.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
-        let operation = |(place, value): (Place, Value)| {
+            |place: &ValuePath| place.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
+        let operation = |(place, value): (ValuePath, Value)| {
             if keyed(&place) || (self.recording && keyframes::animatable(&place)) {
                 self.keyframe(&place, value)
             } else {
@@ -254,14 +254,14 @@ impl Session {
     }
 
     /// Sets a keyframe of `value` at `place` at the current time.
-    pub fn key(&mut self, place: &Place, value: Value) {
+    pub fn key(&mut self, place: &ValuePath, value: Value) {
         let key = self.keyframe(place, value);
         self.edit_keeping_view("key", vec![key]);
     }
 
     /// The value at `place` that the scene derives where the text does not state it and it is not the parameter's default: a camera
     /// without a target may look up at the sky.
-    pub fn implied_value(&self, place: &Place) -> Option<Value> {
+    pub fn implied_value(&self, place: &ValuePath) -> Option<Value> {
         let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
         let camera = &self.plan().filter(|_| root == CAMERA)?.scene().camera;
         camera.to_table().get(key).map(|node| node.value.clone())
@@ -270,7 +270,7 @@ impl Session {
     /// Applies `operations`, and states derived camera values that they would change: the camera's default orientation depends on
     /// whether its position or target is stated.
     fn edit_keeping_view(&mut self, label: &str, operations: Vec<Operation>) {
-        let camera = Place::root().key(CAMERA);
+        let camera = ValuePath::root().key(CAMERA);
         let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
         let told = [&position, &target].map(|place| place.find(self.document.values()).is_some());
         let tells = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
@@ -289,7 +289,7 @@ impl Session {
     }
 
     /// The operation that sets a keyframe at `place` at the current time.
-    pub fn keyframe(&self, place: &Place, value: Value) -> Operation {
+    pub fn keyframe(&self, place: &ValuePath, value: Value) -> Operation {
         Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
     }
 

@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::TableDescriptor,
-    scene::{Place, SHARED_TABLES},
+    scene::{SHARED_TABLES, ValuePath},
 };
 
 use crate::document::Document;
@@ -36,8 +36,8 @@ impl Selection {
     }
 
     /// Its path in the document.
-    pub(crate) fn place(&self) -> Place {
-        let place = Place::root().key(self.key);
+    pub(crate) fn place(&self) -> ValuePath {
+        let place = ValuePath::root().key(self.key);
         self.index.map_or(place.clone(), |index| place.index(index))
     }
 

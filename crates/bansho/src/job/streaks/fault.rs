@@ -39,7 +39,7 @@ impl ListKind {
 /// Why streak textures cannot be made as asked for.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum StreaksFault {
+pub enum StreaksError {
     /// A list without values.
     #[error("{0}: the list is empty")]
     Empty(ListKind),
@@ -101,55 +101,55 @@ pub enum StreaksFault {
 const MOST_DROPS: u32 = 1_000_000;
 
 /// The first fault.
-pub(crate) fn check(streaks: &Streaks) -> Result<(), StreaksFault> {
+pub(crate) fn check(streaks: &Streaks) -> Result<(), StreaksError> {
     check_list(ListKind::Rates, &streaks.rates)?;
     check_list(ListKind::Diameters, &streaks.diameters)?;
     let cube = &streaks.cube;
     if !(1e-6..=10.0).contains(&cube.exposure) {
-        return Err(StreaksFault::Exposure(cube.exposure));
+        return Err(StreaksError::Exposure(cube.exposure));
     }
     if !(8..=4096).contains(&cube.size) {
-        return Err(StreaksFault::Size(cube.size));
+        return Err(StreaksError::Size(cube.size));
     }
     if !(1e-3..=100.0).contains(&cube.edge) {
-        return Err(StreaksFault::Edge(cube.edge));
+        return Err(StreaksError::Edge(cube.edge));
     }
     if !(1..=1000).contains(&streaks.variants) {
-        return Err(StreaksFault::Variants(streaks.variants));
+        return Err(StreaksError::Variants(streaks.variants));
     }
     if streaks.light.is_some_and(|light| !light.iter().map(|x| x * x).sum::<f64>().is_normal()) {
-        return Err(StreaksFault::Light);
+        return Err(StreaksError::Light);
     }
     check_counts(streaks)
 }
 
-fn check_list(list: ListKind, values: &[f64]) -> Result<(), StreaksFault> {
+fn check_list(list: ListKind, values: &[f64]) -> Result<(), StreaksError> {
     let [least, most] = list.limits();
     if values.is_empty() {
-        return Err(StreaksFault::Empty(list));
+        return Err(StreaksError::Empty(list));
     }
     for (index, &value) in values.iter().enumerate() {
         let place = index + 1;
         if !(least..=most).contains(&value) {
-            return Err(StreaksFault::Value { list, place, value });
+            return Err(StreaksError::Value { list, place, value });
         }
         if let Some(&before) = index.checked_sub(1).and_then(|before| values.get(before))
             && value <= before
         {
-            return Err(StreaksFault::Order { list, place, value, before });
+            return Err(StreaksError::Order { list, place, value, before });
         }
     }
     Ok(())
 }
 
-fn check_counts(streaks: &Streaks) -> Result<(), StreaksFault> {
+fn check_counts(streaks: &Streaks) -> Result<(), StreaksError> {
     let bins = SizeBin::around(&streaks.diameters);
     for &rate in &streaks.rates {
         let sizes = DropSizeDistribution::marshall_palmer(rate);
         for bin in &bins {
             let drops = streaks.cube.mean_count(&sizes, bin);
             if drops > f64::from(MOST_DROPS) {
-                return Err(StreaksFault::Drops { rate, diameter_mm: bin.diameter_mm, drops });
+                return Err(StreaksError::Drops { rate, diameter_mm: bin.diameter_mm, drops });
             }
         }
     }

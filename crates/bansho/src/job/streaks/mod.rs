@@ -40,7 +40,7 @@ use crate::job::{
 
 use rayon::prelude::*;
 
-pub use fault::{ListKind, StreaksFault};
+pub use fault::{ListKind, StreaksError};
 
 bansho_base::choice! {
     /// What streak textures are written as.
@@ -118,7 +118,7 @@ impl Streaks {
             let bins = SizeBin::around(&self.diameters);
             let ends = bins.iter().filter(|_| self.cube.spread).flat_map(|bin| bin.range_mm);
             for diameter_mm in self.diameters.iter().copied().chain(ends) {
-                fixed_point_velocity(diameter_mm, &air).map_err(StreaksFault::Velocity)?;
+                fixed_point_velocity(diameter_mm, &air).map_err(StreaksError::Velocity)?;
             }
         }
         let cube = StreakCube { terminal_velocity: TerminalVelocity { law: self.law, air }, ..self.cube };

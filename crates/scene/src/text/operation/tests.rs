@@ -19,8 +19,8 @@ sparks = { rate = 3.0 }
 name = \"right log\"
 ";
 
-fn at(path: &str) -> Place {
-    path.split('.').fold(Place::root(), |place, part| match part.parse() {
+fn at(path: &str) -> ValuePath {
+    path.split('.').fold(ValuePath::root(), |place, part| match part.parse() {
         Ok(index) => place.index(index),
         Err(_) => place.key(part),
     })
@@ -147,7 +147,7 @@ fn places_find_values_as_the_reader_sees_them() {
     let root = crate::values(SCENE).unwrap();
     assert_eq!(at("flame_sheet.0.sparks.rate").find(&root).unwrap().value, Value::Number(3.0));
     assert_eq!(at("wind.velocity.0").find(&root).unwrap().value, Value::Number(0.5));
-    assert!(at("flame_sheet.2").find(&root).is_none() && Place::root().find(&root).is_none());
+    assert!(at("flame_sheet.2").find(&root).is_none() && ValuePath::root().find(&root).is_none());
     assert_eq!(at("flame_sheet.0.sparks.rate").to_string(), "flame_sheet.0.sparks.rate");
 }
 

@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use bansho::scene::Place;
+use bansho::scene::ValuePath;
 
 use super::{
     Files,
@@ -48,7 +48,7 @@ impl Files {
     }
 
     /// Asks which file `place` shall name.
-    pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, place: Place) {
+    pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, place: ValuePath) {
         self.question = Some(Question::Relink(place, FileDialog::in_folder_of(session.path.as_deref()).for_assets()));
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 #[cfg(not(target_arch = "wasm32"))]
-use bansho::scene::Place;
+use bansho::scene::ValuePath;
 use eframe::egui::Ui;
 
 #[cfg(not(target_arch = "wasm32"))]
@@ -18,7 +18,7 @@ pub(super) enum Question {
     Open(FileDialog),
     /// Which file this place shall name.
     #[cfg(not(target_arch = "wasm32"))]
-    Relink(Place, FileDialog),
+    Relink(ValuePath, FileDialog),
     /// Which file to save to, and where to then.
     #[cfg(not(target_arch = "wasm32"))]
     SaveAs(FileDialog, Option<PendingAction>),

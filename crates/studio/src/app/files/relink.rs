@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bansho::{
     base::parameters::{Table, Value},
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use crate::{
@@ -20,7 +20,7 @@ const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
 
 impl Session {
     /// Lets `place` name the file `file`.
-    pub fn relink(&mut self, place: &Place, file: &Path) {
+    pub fn relink(&mut self, place: &ValuePath, file: &Path) {
         let value = self.named(file);
         self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
         self.reload_assets();
@@ -47,7 +47,7 @@ impl Session {
         } else if is_one_of(&MESHES) {
             self.add_mesh_burner(file, selection.index_of(KIND_WITH_BURNERS));
         } else if is_one_of(&PICTURES) {
-            let place = Place::root().key("plate").key("image");
+            let place = ValuePath::root().key("plate").key("image");
             self.edit("plate", &[Operation::Set { place, value: self.named(file) }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
@@ -66,7 +66,7 @@ impl Session {
     }
 
     fn add_mesh_burner(&mut self, file: &Path, index: usize) {
-        let flame = Place::root().key(KIND_WITH_BURNERS).index(index);
+        let flame = ValuePath::root().key(KIND_WITH_BURNERS).index(index);
         if flame.find(self.document.values()).is_none() {
             self.set_notice(Some("a mesh burns in a particle flame, which this scene lacks: add one first".into()));
             return;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bansho::{
     media::{output::naming, zip::ZipWriter},
-    scene::Place,
+    scene::ValuePath,
 };
 
 use super::{
@@ -24,7 +24,7 @@ pub(super) struct PlatformFiles {
     /// Files that came by way of the browser.
     inbox: Inbox,
     /// The parameter that shall name the next file that arrives.
-    relink: Option<Place>,
+    relink: Option<ValuePath>,
     rendering: Option<Rendering>,
 }
 
@@ -55,7 +55,7 @@ impl Files {
     }
 
     /// Asks which file `place` shall name.
-    pub(in crate::app) fn ask_to_relink(&mut self, ctx: &Context, session: &mut Session, place: Place) {
+    pub(in crate::app) fn ask_to_relink(&mut self, ctx: &Context, session: &mut Session, place: ValuePath) {
         self.platform.relink = Some(place);
         self.ask_for_file(ctx, session);
     }

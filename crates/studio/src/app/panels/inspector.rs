@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use crate::{
@@ -78,7 +78,13 @@ impl SearchFilter {
     }
 }
 
-fn table_ui(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &TableDescriptor, filter: &SearchFilter) {
+fn table_ui(
+    ui: &mut Ui,
+    session: &mut Session,
+    place: &ValuePath,
+    descriptor: &TableDescriptor,
+    filter: &SearchFilter,
+) {
     // Where the section itself matches, all of it is shown.
     let all = SearchFilter(String::new());
     let filter = if filter.is_in(descriptor) { filter } else { &all };
@@ -93,14 +99,14 @@ fn table_ui(ui: &mut Ui, session: &mut Session, place: &Place, descriptor: &Tabl
 }
 
 /// A collapsing header that is open while searching.
-fn header(title: &str, place: &Place, filter: &SearchFilter) -> CollapsingHeader {
+fn header(title: &str, place: &ValuePath, filter: &SearchFilter) -> CollapsingHeader {
     CollapsingHeader::new(words(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
 }
 
 fn section_ui(
     ui: &mut Ui,
     session: &mut Session,
-    place: &Place,
+    place: &ValuePath,
     title: &str,
     descriptor: &TableDescriptor,
     filter: &SearchFilter,
@@ -115,7 +121,7 @@ fn section_ui(
 fn list_ui(
     ui: &mut Ui,
     session: &mut Session,
-    place: &Place,
+    place: &ValuePath,
     parameter: &Descriptor,
     item: &Kind,
     filter: &SearchFilter,
@@ -150,7 +156,7 @@ fn list_ui(
 fn list_item_ui(
     ui: &mut Ui,
     session: &mut Session,
-    place: &Place,
+    place: &ValuePath,
     kind: &Kind,
     value: &Value,
     filter: &SearchFilter,
@@ -176,7 +182,7 @@ fn list_item_ui(
 }
 
 /// One parameter: its name, its value at the current time, its keyframe button and its reset button.
-fn row_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
+fn row_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor) {
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let time = session.transport.time_s();
     let implied_value = session.implied_value(place).or_else(|| parameter.default.clone());
@@ -225,7 +231,7 @@ fn name_ui(ui: &mut Ui, name: RichText) -> Response {
     .inner
 }
 
-fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor, stated: bool) {
+fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor, stated: bool) {
     let name = format!("Default of {}", words(parameter.key));
     if stated && icon::button(ui, Icon::Reset, &name).clicked() {
         session.edit("default", &[Operation::Remove { place: place.clone() }]);
@@ -233,7 +239,7 @@ fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter:
 }
 
 /// A diamond that adds or removes the keyframe at the current time; filled where there is one.
-fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &Place, stated: Option<&Value>, present: Value) {
+fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, stated: Option<&Value>, present: Value) {
     let time = session.transport.time_s();
     let half = 0.5 * session.transport.frame_s();
     let keys = stated.map(keyframes::keys).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::{ProblemKind, Span},
-    scene::Place,
+    scene::ValuePath,
 };
 
 use crate::session::Session;
@@ -14,7 +14,7 @@ pub(crate) enum ProblemAction {
     /// Show it in the text.
     ShowInText(Span),
     /// Choose another file for one that is missing.
-    Relink(Place),
+    Relink(ValuePath),
 }
 
 /// Shows the problems, if there are any. Returns the action that was clicked.
@@ -47,8 +47,8 @@ pub(crate) fn problems_ui(ui: &mut Ui, session: &Session) -> Option<ProblemActio
 }
 
 /// The place that a problem's path names.
-fn place(path: &str) -> Place {
-    path.split('.').fold(Place::root(), |place, segment| match segment.parse() {
+fn place(path: &str) -> ValuePath {
+    path.split('.').fold(ValuePath::root(), |place, segment| match segment.parse() {
         Ok(index) => place.index(index),
         Err(_) => place.key(segment),
     })

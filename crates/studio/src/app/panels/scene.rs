@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::{Table, Value},
-    scene::{Place, SHARED_TABLES, operation::Operation},
+    scene::{SHARED_TABLES, ValuePath, operation::Operation},
 };
 
 use crate::{
@@ -66,7 +66,7 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
         ui.separator();
         for shared in SHARED_TABLES.iter().filter(|table| table.many) {
             if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
-                let place = Place::root().key(shared.key);
+                let place = ValuePath::root().key(shared.key);
                 session.edit("add", &[Operation::Append { place, value: Value::Table(Table::default()) }]);
                 ui.close();
             }

@@ -5,7 +5,7 @@ use bansho::{
         math::DVec3,
         parameters::{Table, Value},
     },
-    scene::{Place, Segment},
+    scene::{Segment, ValuePath},
 };
 
 use crate::{document::keyframes, session::Session};
@@ -14,7 +14,7 @@ use crate::{document::keyframes, session::Session};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Handle {
     /// The parameter of the position.
-    pub(super) place: Place,
+    pub(super) place: ValuePath,
     /// The origin of its parameter, m.
     pub(super) origin: DVec3,
     /// Its position at the current time, m.
@@ -28,7 +28,7 @@ pub(super) struct Handle {
 const POSITIONED_KINDS: [(&str, &str); 2] = [("flame_sheet", "instances"), ("flame_particles", "burners")];
 
 /// Whether the list at `place` implies one default item where it is not stated.
-pub(crate) fn implies_one_item(place: &Place) -> bool {
+pub(crate) fn implies_one_item(place: &ValuePath) -> bool {
     let [Segment::Key(kind), Segment::Index(_), Segment::Key(parts)] = place.segments() else { return false };
     POSITIONED_KINDS.contains(&(kind, parts))
 }
@@ -48,7 +48,7 @@ fn positioned_handles(session: &Session) -> Vec<Handle> {
     let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.stands());
     let mut handles: Vec<Handle> = lights
         .map(|(index, light)| Handle {
-            place: Place::root().key("light").index(index).key("position"),
+            place: ValuePath::root().key("light").index(index).key("position"),
             origin: DVec3::ZERO,
             point: DVec3::from(light.position.at(time)),
             name: format!("light {}", index + 1),
@@ -78,6 +78,6 @@ fn positioned_handles(session: &Session) -> Vec<Handle> {
 }
 
 /// The `position` of the table at `place`; the origin where it states none.
-fn position(root: &Table, place: &Place, time: f64) -> DVec3 {
+fn position(root: &Table, place: &ValuePath, time: f64) -> DVec3 {
     keyframes::vector(root, &place.key("position"), time).unwrap_or_default()
 }

@@ -10,7 +10,7 @@ use bansho::{
         math::{DVec2, DVec3},
         parameters::Value,
     },
-    scene::Place,
+    scene::ValuePath,
 };
 
 use crate::{
@@ -47,7 +47,7 @@ pub(super) struct Viewport {
     pixels: [usize; 2],
     pub(super) tool: ViewportTool,
     wind_drag: Option<WindDrag>,
-    held: Option<Place>,
+    held: Option<ValuePath>,
     /// Whether curves lie on top of the picture.
     curves: bool,
 }
@@ -230,7 +230,7 @@ impl Viewport {
 }
 
 fn move_camera(session: &mut Session, pose: CameraPose) {
-    let camera = Place::root().key("camera");
+    let camera = ValuePath::root().key("camera");
     let value = |key: &str, to: DVec3| (camera.key(key), Value::numbers(rounded(to)));
     session.set_all("camera", [value("position", pose.position), value("target", pose.target)]);
 }
@@ -238,7 +238,7 @@ fn move_camera(session: &mut Session, pose: CameraPose) {
 /// The exposure of the scene; a change replaces the automatic one.
 fn exposure_ui(ui: &mut Ui, session: &mut Session) {
     let Some(mut ev100) = session.plan().map(|plan| f64::from(plan.exposure_ev100)) else { return };
-    let place = Place::root().key("picture").key("exposure_ev100");
+    let place = ValuePath::root().key("picture").key("exposure_ev100");
     let label = ui.label("Exposure").on_hover_text("Exposure value at ISO 100; less is brighter").id;
     let drag = egui::DragValue::new(&mut ev100)
         .clamp_existing_to_range(false)

@@ -7,7 +7,7 @@ use bansho::{
         math::{self, DVec2, DVec3},
         parameters::Table,
     },
-    scene::Place,
+    scene::ValuePath,
 };
 
 use crate::document::keyframes::vector;
@@ -32,7 +32,7 @@ impl CameraPose {
     /// Where the camera stands at `time`: as the scene `root` states it, for hands are faster than plans, else as `plan` has it.
     pub(super) fn of(plan: &Plan, root: &Table, time: f64) -> Self {
         let camera = &plan.scene().camera;
-        let stated = |key: &str| vector(root, &Place::root().key("camera").key(key), time);
+        let stated = |key: &str| vector(root, &ValuePath::root().key("camera").key(key), time);
         let or = |stated: Option<DVec3>, planned: [f64; 3]| stated.unwrap_or(DVec3::from(planned));
         Self {
             position: or(stated("position"), camera.position.at(time)),

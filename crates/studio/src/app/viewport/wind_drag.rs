@@ -2,7 +2,7 @@
 
 use bansho::{
     base::{math::DVec3, parameters::Value},
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use super::pointer::rounded;
@@ -20,8 +20,8 @@ pub(super) struct WindDrag {
 /// The name of the step in the history.
 const LABEL: &str = "blow";
 
-fn place() -> Place {
-    Place::root().key("wind").key("velocity")
+fn place() -> ValuePath {
+    ValuePath::root().key("wind").key("velocity")
 }
 
 impl WindDrag {

@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::Value,
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use super::{AuroraEditor, document::AuroraDrawing, pointer::DragState};
@@ -80,7 +80,7 @@ fn lengthen_shot(session: &mut Session, until_s: f64) {
     let needed = (until_s / session.transport.frame_s()).ceil() as i64 + 1;
     let frames = session.transport.frames();
     if frames.end() - frames.start() + 1 < needed {
-        let place = Place::root().key("picture").key("frames");
+        let place = ValuePath::root().key("picture").key("frames");
         session.edit("add shape", &[Operation::Set { place, value: Value::Integer(needed) }]);
     }
 }

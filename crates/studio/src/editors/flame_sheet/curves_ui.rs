@@ -2,7 +2,7 @@
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
-    scene::Place,
+    scene::ValuePath,
 };
 
 use crate::{
@@ -67,7 +67,11 @@ pub(crate) fn curves_ui(ui: &mut Ui, session: &mut Session, selection: &Selectio
 }
 
 /// Every curve of a table and of those within it.
-fn collect_curves(place: &Place, table: &'static TableDescriptor, curves: &mut Vec<(Place, &'static Descriptor)>) {
+fn collect_curves(
+    place: &ValuePath,
+    table: &'static TableDescriptor,
+    curves: &mut Vec<(ValuePath, &'static Descriptor)>,
+) {
     for parameter in &table.parameters {
         let own = place.key(parameter.key);
         match &parameter.kind {
@@ -78,7 +82,7 @@ fn collect_curves(place: &Place, table: &'static TableDescriptor, curves: &mut V
     }
 }
 
-fn curve_ui(ui: &mut Ui, session: &mut Session, place: &Place, parameter: &Descriptor) {
+fn curve_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor) {
     let Kind::Curve { x, y, rising } = parameter.kind else { return };
     let stated = place.find(session.document.values()).map(|node| node.value.clone());
     let present: Option<Value> = stated.or_else(|| parameter.default.clone());

@@ -6,7 +6,7 @@ use bansho::{
         math::{DVec2, curve::Curve},
         parameters::{Node, Parameters, Table, Value},
     },
-    scene::{Place, operation::Operation},
+    scene::{ValuePath, operation::Operation},
 };
 
 use super::{
@@ -236,7 +236,7 @@ impl AuroraDrawing {
         self.parameters.motion.correspondence == Correspondence::Automatic
     }
 
-    pub(super) fn shape(&self, shape: usize) -> Place {
+    pub(super) fn shape(&self, shape: usize) -> ValuePath {
         self.place.key("shapes").index(shape)
     }
 
@@ -315,7 +315,7 @@ impl AuroraDrawing {
 
 /// The operations that turn the list at `place` from `old` into `new` entry by entry, which keeps comments; `None` where entries would
 /// have to be inserted.
-fn list_edits(place: &Place, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
+fn list_edits(place: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
     if old.is_empty() {
         return None;
     }
@@ -355,7 +355,7 @@ fn sheet_list(sheets: &[SheetParameters]) -> Value {
 }
 
 /// The keys to set and to remove so that `old` becomes `new`.
-fn differences(place: &Place, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
+fn differences(place: &ValuePath, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
     let [old, new] = [non_default(old), non_default(new)];
     let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
     let change = |key: &'static str| match (old.get(key), new.get(key)) {

@@ -23,7 +23,7 @@ use bansho::{
         parameters::{Parameters, ProblemKind, Reader, Table, Value},
     },
     scene::{
-        Place,
+        ValuePath,
         edit::EditError,
         operation::{self, Operation},
         values,
@@ -39,7 +39,7 @@ pub use sheets::Factor;
 /// The shapes of one aurora of a scene.
 #[derive(Clone, Debug)]
 pub struct AuroraDrawing {
-    place: Place,
+    place: ValuePath,
     parameters: AuroraParameters,
     sequence: Sequence,
 }
@@ -73,7 +73,7 @@ impl AuroraDrawing {
     /// # Errors
     /// There is no such aurora, or its parameters or shapes are faulty.
     pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, ShapeEditError> {
-        let place = Place::root().key("aurora").index(index);
+        let place = ValuePath::root().key("aurora").index(index);
         let Some(Value::Table(table)) = place.find(root).map(|node| &node.value) else {
             return Err(ShapeEditError::Missing);
         };
