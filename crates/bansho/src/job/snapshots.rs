@@ -173,12 +173,8 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
 mod tests {
     use std::sync::{Arc, atomic::Ordering};
 
-    use bansho_base::{
-        host::{assets::MemoryAssets, observer::Unobserved},
-        phenomenon::SnapshotError,
-    };
-    use bansho_media::output::provenance;
-    use bansho_render::{PlanOptions, RenderError, Shot};
+    use bansho_base::{host::observer::Unobserved, phenomenon::SnapshotError};
+    use bansho_render::RenderError;
 
     use super::*;
     use crate::job::{
@@ -269,6 +265,10 @@ mod tests {
     #[test]
     #[cfg(feature = "fire")]
     fn states_of_the_renderer_bear_the_mark() {
+        use bansho_base::host::assets::MemoryAssets;
+        use bansho_media::output::provenance;
+        use bansho_render::{PlanOptions, Shot};
+
         let assets = Arc::new(MemoryAssets::default());
         let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n";
         let compiled = crate::compile_scene("test", text, assets).unwrap();

@@ -114,7 +114,7 @@ impl Watcher {
         if let Shown::Json(json) = &*self.shown {
             json.failed(&message, exit::code(&reported));
         }
-        told
+        reported
     }
 }
 
