@@ -1,7 +1,7 @@
 //! A horizontal ground plane: land, a plate's own ground, or a lake; lit by lamps, fires and the sky, dry or wet.
 //!
 //! Wet ground and lakes mirror the scene. The renderer draws a picture with a camera mirrored at the plane
-//! ([`Surroundings::reflection`]); puddles show it sharply, lakes displaced by waves and blurred by those too short to
+//! ([`Surroundings::reflection`](bansho_base::phenomenon::surroundings::Surroundings::reflection)); puddles show it sharply, lakes displaced by waves and blurred by those too short to
 //! be resolved, and rough films of water show lamps and sky through microfacets.
 //!
 //! # References

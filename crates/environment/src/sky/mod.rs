@@ -1,7 +1,7 @@
 //! The sky as a background, where there is no plate: by day, at twilight or at night, with a skyline of hills and
 //! trees.
 //!
-//! The radiance model itself is [`Sky`], since it also lights other things; this module draws it. By night it adds
+//! The radiance model itself is [`Sky`](bansho_base::world::sky::Sky), since it also lights other things; this module draws it. By night it adds
 //! stars and the Milky Way.
 //!
 //! # References
@@ -12,7 +12,7 @@
 //!
 //! | equation | function |
 //! | --- | --- |
-//! | radiance by day, by elevation | [`Sky::radiance_at_elevations`] |
+//! | radiance by day, by elevation | [`Sky::radiance_at_elevations`](bansho_base::world::sky::Sky::radiance_at_elevations) |
 //! | radiance by night: an almucantar's even part, twilight glow and Milky Way | `night::NightSky::radiance` |
 //! | number of stars brighter than a magnitude | `stars::log_count`, `stars::magnitude_of_rank` |
 //! | illuminance of a star, `2.54e-6 lux * 10^(-0.4 m)` | `stars::star` |
