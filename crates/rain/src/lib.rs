@@ -23,7 +23,7 @@
 //! | section 4, opacity | `2 D / v`: opacity of a streak, replaced by `2 sqrt(r^2 - b^2) / (v T)` | [`Streak::profile`](streaks::coverage::Streak::profile), [`Streak::opacity`](streaks::coverage::Streak::opacity) |
 //! | section 4, textures | streak texture T(R, D) | [`StreakCube::draw`](billboards::texture::StreakCube::draw) |
 //! | section 5.1 | a billboard turns about the vertical to face the camera | `billboards::Billboards::billboard` |
-//! | section 5.2 | light of a lamp falls with the square of its distance; radiance of a drop `E p / (4 pi)` | `lighting::drop_lighting::DropLighting::radiance` |
+//! | section 5.2 | light of a lamp falls with the square of its distance; radiance of a drop `E p / (4 pi)` | `lighting::drop_lighting::DropLighting::radiance`, `lighting::drop_lighting::DropLighting::add` |
 //! | drops of a bin | integral of `n dD` over the bin; the fractional part is a probability | [`SizeBin::count`](drops::size_distribution::SizeBin::count), [`stratified_count`](drops::size_distribution::stratified_count) |
 //! | measured velocity | Gunn and Kinzer (1949) | [`measured_velocity`](drops::terminal_velocity::measured_velocity) |
 //! | blocked area | `pi D^2 / 4`: integral of the opacity of a streak over its area | [`Streak::blocked_area`](streaks::coverage::Streak::blocked_area) |

@@ -274,6 +274,10 @@ impl Prepared for Mixed<'_> {
         self.present.figures().into_iter().zip(self.passing.figures()).map(mix).collect()
     }
 
+    fn may_bend(&self) -> bool {
+        self.present.may_bend() || self.passing.may_bend()
+    }
+
     fn deflection(&self) -> Option<Deflection<'_>> {
         self.bend.as_ref().map(|bend| Deflection { depth: bend.depth, rect: bend.rect, angle: &bend.angle })
     }

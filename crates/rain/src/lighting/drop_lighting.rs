@@ -119,7 +119,7 @@ impl DropLighting<'_> {
     }
 }
 
-/// [`Light::arriving`] in single precision, for sixteen drops at a time.
+/// [`Light::incident_light`] in single precision, for sixteen drops at a time.
 pub(crate) struct PreparedLight {
     /// Position relative to the camera, m; for a directional light, the direction toward it.
     position: [f32; 3],
