@@ -31,9 +31,9 @@ def chunks(data):
 def decode(path):
     """Whether any byte of the inflated picture is not zero."""
     found = list(chunks(path.read_bytes()))
-    width, height, bits, colour = struct.unpack(">IIBB", found[0][1][:10])
+    width, height, bits, color = struct.unpack(">IIBB", found[0][1][:10])
     pixels = zlib.decompress(b"".join(body for kind, body in found if kind == b"IDAT"))
-    row = 1 + (width * CHANNELS[colour] * bits + 7) // 8
+    row = 1 + (width * CHANNELS[color] * bits + 7) // 8
     if len(pixels) != row * height:
         raise ValueError(f"{len(pixels)} bytes of pixels, expected {row * height}")
     return any(pixels)

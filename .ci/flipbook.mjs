@@ -153,7 +153,7 @@ function makeSheet(alpha) {
   execFileSync(bansho, ["flipbook", "scenes/torch.toml", ...options], { stdio: "inherit" });
   const info = JSON.parse(readFileSync(join(out, `${alpha}.json`), "utf8"));
   if (info.crop.width >= info.picture[0]) throw new Error(`the sheet is not cropped: ${JSON.stringify(info.crop)}`);
-  return { info, png: readPng(join(out, info.colour.file)) };
+  return { info, png: readPng(join(out, info.color.file)) };
 }
 
 function writePages() {

@@ -15,8 +15,8 @@ use bansho::compile_scene;
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
 use bansho_fuzz::one_thread;
 
-const GAS: &str = "bansho = 1\n[picture]\nsize = [8, 6]\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.0\n";
-const AURORA: &str = "bansho = 1\n[picture]\nsize = [8, 6]\n[[aurora]]\npreroll_s = 0.0\nparticles = { count = 100 }\nfield = { cells = 16 }\n";
+const GAS: &str = "bansho = 2\n[picture]\nsize = [8, 6]\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.0\n";
+const AURORA: &str = "bansho = 2\n[picture]\nsize = [8, 6]\n[[aurora]]\npreroll_s = 0.0\nparticles = { count = 100 }\nfield = { cells = 16 }\n";
 
 /// Bytes before the state of the first phenomenon: magic, version, key, number of phenomena.
 const HEADER: usize = 8 + 4 + 32 + 8;

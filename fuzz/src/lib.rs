@@ -133,7 +133,7 @@ fn check_plate(picture: Picture) {
     if width.max(height) <= 256 {
         let mut assets = MemoryAssets::default();
         assets.insert_picture("plate", picture);
-        let scene = "bansho = 1\n[picture]\nsize = [16, 9]\n[plate]\nimage = \"plate\"\n[[flame_sheet]]\n";
+        let scene = "bansho = 2\n[picture]\nsize = [16, 9]\n[plate]\nimage = \"plate\"\n[[flame_sheet]]\n";
         let scene = Scene::parse("plate.toml", scene, KINDS).expect("a scene is valid");
         assert!(draw_small(scene, assets), "a scene with its plate is valid");
     }

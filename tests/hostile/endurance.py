@@ -19,7 +19,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 
-PICTURE = "bansho = 1\n[picture]\nsize = [96, 64]\nframes = {frames}\n"
+PICTURE = "bansho = 2\n[picture]\nsize = [96, 64]\nframes = {frames}\n"
 SCENES = {
     "flame_sheet": "[[flame_sheet]]\n",
     "flame_particles": "[[flame_particles]]\nparticles = 400\npreroll_s = 0.1\n",

@@ -79,11 +79,11 @@ def _wait(process: subprocess.Popen, started: float, stop_after: float | None) -
     descriptor = os.pidfd_open(process.pid)
     poll = select.poll()
     poll.register(descriptor, select.POLLIN)
-    signalled, timed_out = None, False
+    signaled, timed_out = None, False
     if stop_after is not None and not poll.poll(1000 * stop_after):
-        signalled = time.monotonic()
+        signaled = time.monotonic()
         process.send_signal(signal.SIGTERM)
-    limit = SECONDS if signalled is None else STOP_SECONDS
+    limit = SECONDS if signaled is None else STOP_SECONDS
     if not poll.poll(1000 * limit):
         timed_out = True
         process.kill()
@@ -97,7 +97,7 @@ def _wait(process: subprocess.Popen, started: float, stop_after: float | None) -
         "seconds": ended - started,
         "resident_bytes": usage.ru_maxrss << 10,
         "timed_out": timed_out,
-        "stopping_seconds": None if signalled is None else ended - signalled,
+        "stopping_seconds": None if signaled is None else ended - signaled,
         "orphans": _end_group(process.pid),
     }
 

@@ -99,7 +99,7 @@ def _to_stop(cases: list[Case], results: dict[int, Result]) -> list[int]:
     chosen = []
     for index, case in enumerate(cases):
         slow = index in results and results[index].seconds > SLOW_SECONDS
-        if case.signalled or slow or case.kind not in kinds:
+        if case.signaled or slow or case.kind not in kinds:
             chosen.append(index)
         kinds.add(case.kind)
     return chosen
@@ -112,7 +112,7 @@ def _run_all(cases: list[Case], asked: argparse.Namespace, within: str) -> tuple
     with multiprocessing.get_context("fork").Pool(asked.jobs) as pool:
         plain = [] if asked.stop_only else [(index, None) for index, case in enumerate(cases) if not case.endless]
         # The longest begin first, as far as that is known, so that none goes on alone at the end.
-        plain.sort(key=lambda task: not cases[task[0]].signalled)
+        plain.sort(key=lambda task: not cases[task[0]].signaled)
         results = dict(pool.imap_unordered(work, plain))
         chosen = [] if asked.no_stop else _to_stop(cases, results)
         stopped = dict(pool.imap_unordered(work, [(index, chance.uniform(0.05, 0.5)) for index in chosen]))

@@ -23,7 +23,7 @@ class Misbehaving(unittest.TestCase):
             with open(program, "w", encoding="utf-8") as file:
                 file.write("#!/bin/sh\n" + script)
             os.chmod(program, stat.S_IRWXU)
-            given = {"code": 3, "says": "^error: scene.toml:1:1: ", "files": {"scene.toml": "bansho = 1\n"}, **case}
+            given = {"code": 3, "says": "^error: scene.toml:1:1: ", "files": {"scene.toml": "bansho = 2\n"}, **case}
             return "; ".join(carry_out(Case("kind", "name", ["check", "scene.toml"], **given), program, within, stop_after).faults)
 
     def test_a_good_program_has_no_faults(self):

@@ -22,7 +22,7 @@ use bansho_base::{
     world::wind::{Wind, WindParameters},
 };
 
-use bansho_aurora::{Aurora, AuroraParameters, DrawingParameters, ParticleParameters, Sampling};
+use bansho_aurora::{Aurora, AuroraParameters, ParticleParameters, RenderingParameters, Sampling};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const STRIP_ROWS: usize = 8;
@@ -36,7 +36,7 @@ fn aurora(sampling: Sampling) -> Aurora {
     let parameters = AuroraParameters {
         energy_ev: Animated::from(10_000.0),
         particles: ParticleParameters { count: 120_000, ..ParticleParameters::default() },
-        drawing: DrawingParameters { sampling, ..DrawingParameters::default() },
+        rendering: RenderingParameters { sampling, ..RenderingParameters::default() },
         ..AuroraParameters::default()
     };
     Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).expect("the usual shapes are an aurora's")
@@ -97,11 +97,11 @@ fn splat(aurora: &Aurora, view: &View) -> f32 {
 
 fn draw(criterion: &mut Criterion) {
     let north = view(Lens::Perspective, [0.0, 25.0, -60.0], [1280, 720]);
-    let mean = aurora(Sampling::Profile);
+    let mean = aurora(Sampling::MeanProfile);
     let mut group = criterion.benchmark_group("aurora 1280x720, 120,000 particles");
     group.sample_size(10).measurement_time(Duration::from_secs(3));
     group.bench_function("profile", |bencher| bencher.iter(|| frame(black_box(&mean), &north)));
-    let single = aurora(Sampling::CollisionRenderer);
+    let single = aurora(Sampling::SingleCollisions);
     group.bench_function("collisions", |bencher| bencher.iter(|| frame(black_box(&single), &north)));
     group.bench_function("naive: a Gaussian for each point", |bencher| {
         bencher.iter_custom(|iterations| {

@@ -7,16 +7,16 @@ use bansho_aurora::{AuroraParameters, FieldSolver, shapes::Sequence, simulate::A
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// The aurora of a scene that says nothing, developed and in motion; renewed every so many frames.
-fn simulation(renew_frames: f64, solver: FieldSolver) -> Option<AuroraSimulation> {
+fn simulation(update_interval_frames: f64, solver: FieldSolver) -> Option<AuroraSimulation> {
     let mut parameters = AuroraParameters::default();
     parameters.particles.count = 120_000;
-    parameters.motion.renew_frames = renew_frames;
+    parameters.morphing.update_interval_frames = update_interval_frames;
     parameters.field.solver = solver;
     // As near to the exact answer as the transform comes in a scene: no cell changes by a thousandth of a sheet's depth.
     parameters.field.tolerance = 1e-3;
     parameters.field.sweeps = 2000;
     let assets = MemoryAssets::default();
-    let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, &assets, None).ok()?;
+    let sequence = Sequence::new(&parameters.shapes, &parameters.morphing, parameters.extent_km, &assets, None).ok()?;
     let mut simulation = AuroraSimulation::new(parameters, sequence, "bench", 1);
     (0..30).for_each(|_| simulation.step());
     Some(simulation)
@@ -25,12 +25,12 @@ fn simulation(renew_frames: f64, solver: FieldSolver) -> Option<AuroraSimulation
 fn steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("aurora step 120,000");
     group.sample_size(20);
-    for (name, renew_frames, solver) in [
+    for (name, update_interval_frames, solver) in [
         ("every sixth renewed", 6.0, FieldSolver::SineTransform),
         ("renewed", 1.0, FieldSolver::SineTransform),
         ("renewed, naive: Gauss-Seidel", 1.0, FieldSolver::GaussSeidel),
     ] {
-        let Some(mut simulation) = simulation(renew_frames, solver) else { continue };
+        let Some(mut simulation) = simulation(update_interval_frames, solver) else { continue };
         group.bench_function(name, |bencher| bencher.iter(|| simulation.step()));
     }
     group.finish();

@@ -11,7 +11,7 @@ use bansho_base::{
     },
 };
 
-use bansho_aurora::shapes::{MotionParameters, NearestSegmentGrid, Sequence, Shape, SheetSampler, first_crossing};
+use bansho_aurora::shapes::{MorphingParameters, NearestSegmentGrid, Sequence, Shape, SheetSampler, first_crossing};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// A spiral of `count` points that nowhere meets itself.
@@ -46,7 +46,7 @@ fn strokes(criterion: &mut Criterion) {
 
 /// The aurora of a scene that says nothing, in mid-motion.
 fn shape() -> Shape {
-    let sequence = Sequence::new(&[], &MotionParameters::default(), 1000.0, &MemoryAssets::default(), None);
+    let sequence = Sequence::new(&[], &MorphingParameters::default(), 1000.0, &MemoryAssets::default(), None);
     sequence.map(|sequence| sequence.at(7.0)).unwrap_or_default()
 }
 
@@ -90,14 +90,14 @@ fn rejection(shape: &Shape) -> f64 {
     (0..).map(random).filter(|&point| near(point)).take(PARTICLES as usize).map(|point| point.x).sum()
 }
 
-fn neighbourhood(criterion: &mut Criterion) {
+fn neighborhood(criterion: &mut Criterion) {
     let shape = shape();
     let mut group = criterion.benchmark_group("aurora in-between shape");
-    group.bench_function("neighbourhood of reach 6 km", |bencher| {
+    group.bench_function("neighborhood of reach 6 km", |bencher| {
         bencher.iter(|| NearestSegmentGrid::new(black_box(&shape), REACH_KM));
     });
     group.finish();
 }
 
-criterion_group!(benches, strokes, scatter, neighbourhood);
+criterion_group!(benches, strokes, scatter, neighborhood);
 criterion_main!(benches);

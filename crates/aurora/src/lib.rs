@@ -74,4 +74,4 @@ pub use parameters::{
     AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, ParticleParameters,
     PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
 };
-pub use render::{Blur, BlurParameters, DrawingParameters, Sampling, TrackModel};
+pub use render::{Blur, BlurParameters, RenderingParameters, Sampling, TrackModel};

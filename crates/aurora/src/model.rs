@@ -102,12 +102,12 @@ impl Aurora {
         assets: &dyn Assets,
     ) -> Result<Self, ShapeError> {
         constructions::count("aurora");
-        let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, assets, loop_s)?;
+        let sequence = Sequence::new(&parameters.shapes, &parameters.morphing, parameters.extent_km, assets, loop_s)?;
         let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
         check_energies(&parameters)?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
-        let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);
+        let emission = parameters.rendering.energy_deposition.shared_emission(parameters.spectrum);
         Ok(Self {
             name: name.to_owned(),
             seed,
@@ -128,17 +128,17 @@ impl Aurora {
     pub(super) fn set_to_work(&self) -> Working {
         let simulation = AuroraSimulation::new(self.parameters.clone(), self.sequence.clone(), &self.name, self.seed);
         let (parameters, emission) = (simulation.parameters(), simulation.emission());
-        let by_collisions = parameters.drawing.sampling == Sampling::CollisionRenderer;
+        let by_collisions = parameters.rendering.sampling == Sampling::SingleCollisions;
         let hardest = self.sequence.factors().fold(1.0, |most: f64, [_, energy]| most.max(energy));
         let hardest = (hardest * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
         let hardest = nearest_node(hardest) + SPECTRUM_NODES;
         let key = Key::new(self.seed, &self.name);
-        let collisions = || CollisionRenderer::new(emission, &parameters.drawing, hardest, key);
+        let collisions = || CollisionRenderer::new(emission, &parameters.rendering, hardest, key);
         Working {
             collisions: by_collisions.then(|| Arc::new(collisions())),
             profiles: Arc::new(EmissionProfiles::new(emission)),
             red_profiles: Arc::new(EmissionProfiles::red_by_altitude(emission)),
-            emitter_colors: Arc::new(EmitterColors::new(&parameters.drawing.air)),
+            emitter_colors: Arc::new(EmitterColors::new(&parameters.rendering.extinction)),
             simulation,
         }
     }
@@ -186,10 +186,14 @@ impl Aurora {
             particles: simulation.particles(),
             afterglow: simulation.afterglow(),
             emission: simulation.emission(),
-            parameters: &parameters.drawing,
+            parameters: &parameters.rendering,
             spacing_km: simulation.spacing_km(),
             energy_ev,
-            lateral_spread_km: lateral_spread_km(parameters.drawing.fall, parameters.drawing.wobble, energy_ev),
+            lateral_spread_km: lateral_spread_km(
+                parameters.rendering.energy_deposition,
+                parameters.rendering.collision_deflection,
+                energy_ev,
+            ),
         }
     }
 }

@@ -7,7 +7,7 @@ use bansho_base::{
     parameters::{Auto, Length, Range, animated::Animated},
 };
 
-use super::shapes::{MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
+use super::shapes::{MorphingParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
 use crate::physics::{
     atmosphere::atmosphere,
     emission::Emission,
@@ -26,11 +26,11 @@ bansho_base::choice! {
     /// How the energies of the electrons are spread.
     pub enum SpectrumShape {
         /// About one energy, as in arcs: a third wide.
-        Arc = "arc",
+        Gaussian = "gaussian",
         /// A hot plasma's, as in diffuse auroras; `energy_ev` is its characteristic energy.
         Maxwellian = "maxwellian",
         /// All alike.
-        Single = "single",
+        Monoenergetic = "monoenergetic",
     }
 }
 
@@ -39,9 +39,9 @@ impl SpectrumShape {
     #[must_use]
     pub fn spectrum(self) -> Spectrum {
         match self {
-            Self::Arc => ARC,
+            Self::Gaussian => ARC,
             Self::Maxwellian => Spectrum::Maxwellian,
-            Self::Single => Spectrum::Monoenergetic,
+            Self::Monoenergetic => Spectrum::Monoenergetic,
         }
     }
 }
@@ -62,7 +62,7 @@ bansho_base::choice! {
         /// As on conductors: all sheets are at one potential, and particles stay where they are along them.
         Conductor = "conductor",
         /// All scattered particles have the same, eq. (2.2): particles draw away from the ends of sheets and into spirals.
-        Even = "even",
+        Uniform = "uniform",
     }
 }
 
@@ -70,7 +70,7 @@ bansho_base::choice! {
     /// Kernels of the repulsion.
     pub enum RepulsionKernel {
         /// Cubic spline, eqs. (2.17) and (2.18): lets particles come close to each other, so that their own pattern stays.
-        Spline = "spline",
+        CubicSpline = "cubic_spline",
         /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): parts close particles, and evens their pattern out. As
         /// light is drawn, spread as far as neighbors are, both look nearly alike.
         Poly6Spiky = "poly6_spiky",
@@ -91,17 +91,17 @@ bansho_base::parameters! {
         /// Greatest change at which Gauss-Seidel sweeps stop, as a share of the potential of a sheet.
         tolerance: f64 = 1e-4, limits(Range::new(0.0, 1.0));
         /// How far the sheets reach out for particles (screening length); `"auto"` is three cells.
-        reach_km: Auto<f64> = Auto::Auto, limits(Range::new(0.05, 20_000.0)), unit("km");
+        screening_length_km: Auto<f64> = Auto::Auto, limits(Range::new(0.05, 20_000.0)), unit("km");
         /// Strength of the pull; 1 draws a particle in from three cells within about half a second.
-        pull: f64 = 1.0, limits(Range::new(0.0, 20.0));
+        attraction: f64 = 1.0, limits(Range::new(0.0, 20.0));
         /// Magnetic field across the plane: how far it turns a particle's way in a frame. Particles drift along the sheet, east on one side and west on the other.
-        turn_deg_per_frame: f64 = 4.0, limits(Range::new(-60.0, 60.0)), unit("degrees");
+        gyration_deg_per_frame: f64 = 4.0, limits(Range::new(-60.0, 60.0)), unit("degrees");
         /// Strength of the noise in the potential, as a share of the depth of a sheet.
         noise: f64 = 0.08, limits(Range::new(0.0, 4.0));
         /// Size of the noise's swirls.
         noise_scale_km: f64 = 30.0, limits(Range::new(0.1, 20_000.0)), unit("km");
         /// Time in which the noise becomes another.
-        noise_life_s: f64 = 1.5, limits(Range::new(0.01, 1e5)), unit("s");
+        noise_correlation_time_s: f64 = 1.5, limits(Range::new(0.01, 1e5)), unit("s");
     }
 }
 
@@ -109,19 +109,19 @@ bansho_base::parameters! {
     /// When particles are born and die as the shape changes (2.3.4, table 3.3).
     pub struct RelocationParameters {
         /// A cell is near the shape if its scatter count is at least this share of the mean of all cells.
-        count: f64 = 0.10, limits(Range::new(0.0, 100.0));
+        scatter_count_threshold: f64 = 0.10, limits(Range::new(0.0, 100.0));
         /// And if its potential is below this multiple of the mean of all cells.
-        potential: f64 = 0.25, limits(Range::new(0.0, 100.0));
+        potential_threshold: f64 = 0.25, limits(Range::new(0.0, 100.0));
         /// Below this many particles, some are born in a near cell.
         births_below: f64 = 50.0, limits(Range::new(0.0, 1e6));
         /// At most this many at a time.
-        births_at_most: f64 = 10.0, limits(Range::new(0.0, 1e6));
+        max_births: f64 = 10.0, limits(Range::new(0.0, 1e6));
         /// Above this many particles, those farthest from the shape die in a near cell.
         deaths_above: f64 = 500.0, limits(Range::new(1.0, 1e6));
         /// At most this many at a time.
-        deaths_at_most: f64 = 100.0, limits(Range::new(0.0, 1e6));
+        max_deaths: f64 = 100.0, limits(Range::new(0.0, 1e6));
         /// Takes the four counts as those of a near cell that holds 75 particles on average, and scales them to as many as there are, so that the look does not depend on `count` of the particles; births then go by stretches of the sheets, to those that lack most, and deaths to those that hold too many. If not, they are taken as they are, cell by cell.
-        scaled: bool = true;
+        scale_counts: bool = true;
     }
 }
 
@@ -131,15 +131,15 @@ bansho_base::parameters! {
         /// About how many there are.
         count: i64 = 60_000, limits(Range::new(100.0, 1e6));
         /// Weight w_L of the Lorentz force, eq. (2.20).
-        pull_weight: f64 = 0.6, limits(Range::new(0.0, 10.0));
+        lorentz_weight: f64 = 0.6, limits(Range::new(0.0, 10.0));
         /// Weight w_P of the repulsion, eq. (2.20).
         repulsion_weight: f64 = 0.4, limits(Range::new(0.0, 10.0));
         /// Gas constant k of the repulsion, eq. (2.13): 1 fills the sheet's thickness against the pull.
         repulsion: f64 = 1.0, limits(Range::new(0.0, 20.0));
         /// Kernels of the repulsion.
-        kernel: RepulsionKernel = RepulsionKernel::Spline;
+        kernel: RepulsionKernel = RepulsionKernel::CubicSpline;
         /// How many neighbors a particle has on average, which sets the support radius h.
-        neighbours: f64 = 35.0, limits(Range::new(6.0, 200.0));
+        neighbor_count: f64 = 35.0, limits(Range::new(6.0, 200.0));
         /// How fast motion through the field dies down; the thesis has none.
         friction_per_s: f64 = 6.0, limits(Range::new(0.0, 30.0)), unit("1/s");
         /// Holds the sum of kinetic and potential energy, so that particles do not speed up without end.
@@ -157,17 +157,17 @@ bansho_base::parameters! {
         /// How much the brightness varies along the sheet: the standard deviation of its logarithm.
         contrast: f64 = 0.7, limits(Range::new(0.0, 3.0));
         /// Distance from ray to ray.
-        scale_km: f64 = 2.5, limits(Range::new(0.05, 1000.0)), unit("km");
+        spacing_km: f64 = 2.5, limits(Range::new(0.05, 1000.0)), unit("km");
         /// How fast rays run along the sheet, one way on its one side and the other way on the other.
         shear_km_per_s: f64 = 1.5, limits(Range::new(-100.0, 100.0)), unit("km/s");
         /// How long a ray lives.
-        life_s: f64 = 3.0, limits(Range::new(0.01, 1e5)), unit("s");
+        lifetime_s: f64 = 3.0, limits(Range::new(0.01, 1e5)), unit("s");
         /// How much the energy of the electrons varies with the rays: bright ones reach lower. The standard deviation of its logarithm.
-        energy: f64 = 0.05, limits(Range::new(0.0, 2.0));
+        energy_variation: f64 = 0.05, limits(Range::new(0.0, 2.0));
         /// Depth of black rays: thin gaps that run along the sheet.
-        black_rays: f64 = 0.0, limits(FRACTION);
+        black_ray_depth: f64 = 0.0, limits(FRACTION);
         /// Distance from one black ray to the next.
-        black_scale_km: f64 = 8.0, limits(Range::new(0.1, 1000.0)), unit("km");
+        black_ray_spacing_km: f64 = 8.0, limits(Range::new(0.1, 1000.0)), unit("km");
     }
 }
 
@@ -177,11 +177,11 @@ bansho_base::parameters! {
         /// How far they swing to each side of the drawn line.
         amplitude_km: f64 = 3.0, limits(Range::new(0.0, 500.0)), unit("km");
         /// Distance from fold to fold.
-        scale_km: f64 = 40.0, limits(Range::new(0.5, 10_000.0)), unit("km");
+        wavelength_km: f64 = 40.0, limits(Range::new(0.5, 10_000.0)), unit("km");
         /// How fast they travel along the sheet.
         speed_km_per_s: f64 = 2.0, limits(Range::new(-100.0, 100.0)), unit("km/s");
         /// How long a fold lives.
-        life_s: f64 = 8.0, limits(Range::new(0.01, 1e5)), unit("s");
+        lifetime_s: f64 = 8.0, limits(Range::new(0.01, 1e5)), unit("s");
         /// How far their crests lean over: 0 for waves, 1 for curls.
         curl: f64 = 0.3, limits(Range::new(0.0, 2.0));
     }
@@ -191,11 +191,11 @@ bansho_base::parameters! {
     /// Patches of the sheet that brighten and fade.
     pub struct PulsationParameters {
         /// How far they fade: 0 not at all, 1 to nothing.
-        depth: f64 = 0.0, limits(FRACTION);
+        modulation_depth: f64 = 0.0, limits(FRACTION);
         /// Time from bright to bright.
         period_s: f64 = 8.0, limits(Range::new(0.05, 1e5)), unit("s");
         /// Length of a patch along the sheet.
-        patch_km: f64 = 60.0, limits(Range::new(0.1, 20_000.0)), unit("km");
+        patch_length_km: f64 = 60.0, limits(Range::new(0.1, 20_000.0)), unit("km");
     }
 }
 
@@ -210,7 +210,7 @@ bansho_base::parameters! {
         /// it is held to what the tables of the air know, 100 eV to 100 keV.
         energy_ev: Animated<f64> = Animated::from(5000.0), limits(Range::new(100.0, 100_000.0)), unit("eV");
         /// How their energies are spread.
-        spectrum: SpectrumShape = SpectrumShape::Arc;
+        spectrum: SpectrumShape = SpectrumShape::Gaussian;
         /// Thickness of a sheet, twice L_thr; `"auto"` is two cells of the field.
         thickness_km: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("km");
         /// Dip of the magnetic field: 90 is upright, rays lean to the south (north of the equator) by what is missing. Field lines flatter than 30
@@ -226,7 +226,7 @@ bansho_base::parameters! {
         /// The shapes that it takes one after the other; two curtains that wave where the list is empty.
         shapes: Vec<ShapeParameters> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
         /// How one shape becomes the next.
-        motion: MotionParameters = MotionParameters::default();
+        morphing: MorphingParameters = MorphingParameters::default();
         /// The electric field that draws particles to the shapes.
         field: FieldParameters = FieldParameters::default();
         /// The particles that stand for the electrons.
@@ -238,7 +238,7 @@ bansho_base::parameters! {
         /// Patches that brighten and fade.
         pulsation: PulsationParameters = PulsationParameters::default();
         /// How light is drawn.
-        drawing: DrawingParameters = DrawingParameters::default();
+        rendering: RenderingParameters = RenderingParameters::default();
     }
 }
 
@@ -263,9 +263,9 @@ bansho_base::choice! {
     /// How the falls of the electrons become light.
     pub enum Sampling {
         /// By the mean of infinitely many falls: no noise.
-        Profile = "profile",
+        MeanProfile = "mean_profile",
         /// By single collisions, as in the thesis (2.4).
-        CollisionRenderer = "collisions",
+        SingleCollisions = "single_collisions",
     }
 }
 
@@ -274,7 +274,7 @@ impl TrackModel {
     #[must_use]
     pub fn emission(self, spectrum: Spectrum) -> Emission {
         match self {
-            Self::Fang => Emission::new(atmosphere(), spectrum),
+            Self::Fang2010 => Emission::new(atmosphere(), spectrum),
             Self::HardSphereAtmosphere => Emission::from_hard_spheres(atmosphere(), spectrum),
         }
     }
@@ -291,10 +291,10 @@ impl TrackModel {
 bansho_base::choice! {
     /// How single collisions are smoothed to light.
     pub enum Blur {
-        /// On the sky, across the field, as far as `spread_km` says: a near ray is wider than a far one.
-        Kilometers = "km",
+        /// On the sky, across the field, as far as `blur_radius_km` says: a near ray is wider than a far one.
+        World = "world",
         /// In the picture, by `blur_radii`, wherever they are, as in the thesis (2.28).
-        Pixels = "pixels",
+        Screen = "screen",
     }
 }
 
@@ -314,25 +314,25 @@ bansho_base::parameters! {
 
 /// Maximum deflection by a collision. Collisions spread by a few long steps at high altitude, the mean profile by a
 /// Gaussian patch of the same width; where it exceeds a few km the two pictures differ.
-pub(crate) const MAX_WOBBLE: f64 = 0.05;
+pub(crate) const MAX_COLLISION_DEFLECTION: f64 = 0.05;
 
 bansho_base::parameters! {
     /// How the light of an aurora is drawn.
-    pub struct DrawingParameters {
+    pub struct RenderingParameters {
         /// By the mean fall, or by collisions.
-        sampling: Sampling = Sampling::Profile;
+        sampling: Sampling = Sampling::MeanProfile;
         /// What stops the electrons: measured air, or the thesis's hard spheres.
-        fall: TrackModel = TrackModel::Fang;
+        energy_deposition: TrackModel = TrackModel::Fang2010;
         /// Where light is smoothed: on the sky in km, or in the picture in pixels.
-        blur: Blur = Blur::Kilometers;
+        blur_space: Blur = Blur::World;
         /// Radii of the blur in pixels.
         blur_radii: BlurParameters = BlurParameters::default();
         /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbors are, and rays stay sharp.
-        spread_km: Auto<f64> = Auto::Auto, limits(Range::new(0.005, 100.0)), unit("km");
+        blur_radius_km: Auto<f64> = Auto::Auto, limits(Range::new(0.005, 100.0)), unit("km");
         /// How far a collision turns an electron from the field: rms tangent of the angle, the vector omega of (2.21) and (2.24).
-        wobble: f64 = 0.002, limits(Range::new(0.0, MAX_WOBBLE));
+        collision_deflection: f64 = 0.002, limits(Range::new(0.0, MAX_COLLISION_DEFLECTION));
         /// The air below, which dims what is low in the sky.
-        air: Extinction = Extinction::default();
+        extinction: Extinction = Extinction::default();
     }
 }
 
@@ -349,7 +349,7 @@ pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeE
     for (shape, of) in parameters.shapes.iter().enumerate() {
         for (entry, sheet) in of.sheets.iter().enumerate() {
             if let Some((point, kind)) = outside(sheet, entry + 1, energy_ev) {
-                return Err(ShapeError { key: format!("shapes.{shape}.sheets.{entry}.energy.{point}"), kind });
+                return Err(ShapeError { key: format!("shapes.{shape}.sheets.{entry}.energy_factor.{point}"), kind });
             }
         }
     }
@@ -369,5 +369,5 @@ fn outside(sheet: &SheetParameters, number: usize, [low, high]: [f64; 2]) -> Opt
         };
         Some((point, ShapeErrorKind::EnergyOutside { sheet: number, at: *at, energy_ev }))
     };
-    sheet.energy.points().iter().enumerate().find_map(of_point)
+    sheet.energy_factor.points().iter().enumerate().find_map(of_point)
 }

@@ -158,7 +158,7 @@ fn plan(text: &str) -> Planned {
         Picture { color, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
     );
     let assets = Arc::new(assets);
-    let text = format!("bansho = 1\n[picture]\nsize = [1920, 1080]\n{text}");
+    let text = format!("bansho = 2\n[picture]\nsize = [1920, 1080]\n{text}");
     let scene = Scene::parse("bench.toml", &text, &[PatchParameters::KIND]).expect("a valid scene");
     let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets, None).expect("a valid scene"));
     let plan = Arc::new(Plan::new(&compiled, &PlanOptions::default()).expect("a valid plan"));
@@ -182,16 +182,16 @@ fn frame_used<T>(shot: &mut Shot, with: impl Fn(&Frame) -> T) -> T {
 fn naive(exposure: f64) -> Vec<[u8; 4]> {
     let pixel = |index: usize| {
         let (x, y) = (index % SIZE[0], index / SIZE[0]);
-        let mut colour = [0.0_f64; 3];
+        let mut color = [0.0_f64; 3];
         let mut transmittance = [1.0_f64; 3];
         for absorbed in [0.9, 1.0] {
             for (c, share) in [1.0, 0.4, 0.1].into_iter().enumerate() {
-                colour[c] += transmittance[c] * f64::from(radiance(x, y / 68 * 67)) * share;
+                color[c] += transmittance[c] * f64::from(radiance(x, y / 68 * 67)) * share;
                 transmittance[c] *= absorbed;
             }
         }
         let alpha = 1.0 - transmittance.iter().sum::<f64>() / 3.0;
-        let light = color::View::DISPLAY.to_display(colour.map(|value| (value * exposure) as f32));
+        let light = color::View::DISPLAY.to_display(color.map(|value| (value * exposure) as f32));
         let alpha = light.iter().fold(alpha as f32, |alpha, value| alpha.max(*value));
         let code = |value: f32| (encode_srgb(if alpha > 0.0 { value / alpha } else { 0.0 }) * 255.0).round() as u8;
         [code(light[0]), code(light[1]), code(light[2]), (alpha * 255.0).round() as u8]

@@ -17,7 +17,7 @@ use bansho::{MemoryAssets, Observer, Plan, PlanOptions, RenderError, Shot, compi
 
 /// A particle flame that has to be simulated for 100 s before its frame 3000.
 const SCENE: &str =
-    "bansho = 1\n[picture]\nsize = [320, 180]\nexposure_ev100 = 10.0\nframes = 4000\n[[flame_particles]]\n";
+    "bansho = 2\n[picture]\nsize = [320, 180]\nexposure_ev100 = 10.0\nframes = 4000\n[[flame_particles]]\n";
 
 /// Asked by the renderer at least once for each strip of a picture and each step of a simulation.
 #[derive(Default)]

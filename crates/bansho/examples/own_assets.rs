@@ -19,7 +19,7 @@ use bansho::{
 };
 
 const SCENE: &str =
-    "bansho = 1\n[picture]\nsize = [160, 90]\n[plate]\nimage = \"gradient\"\n[[rain]]\nrate_mm_per_h = 20.0\n";
+    "bansho = 2\n[picture]\nsize = [160, 90]\n[plate]\nimage = \"gradient\"\n[[rain]]\nrate_mm_per_h = 20.0\n";
 
 /// Knows one picture, `gradient`, and nothing else.
 struct Procedural;

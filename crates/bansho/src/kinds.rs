@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_kind_that_is_left_out_names_its_feature() {
         for (key, feature) in FEATURES {
-            let result = parse_scene("scene.toml", &format!("bansho = 1\n[[{key}]]\n"));
+            let result = parse_scene("scene.toml", &format!("bansho = 2\n[[{key}]]\n"));
             if KINDS.iter().any(|kind| kind.key == key) {
                 assert!(result.is_ok(), "{key}");
             } else {

@@ -8,7 +8,7 @@
 //! use std::sync::Arc;
 //! use bansho::{MemoryAssets, Plan, PlanOptions, Shot, Unobserved, compile_scene};
 //!
-//! let text = "bansho = 1\n[picture]\nsize = [64, 36]\n";
+//! let text = "bansho = 2\n[picture]\nsize = [64, 36]\n";
 //! let compiled = compile_scene("fire", text, Arc::new(MemoryAssets::default()))?;
 //! let plan = Plan::new(&compiled, &PlanOptions::default())?;
 //! let mut shot = Shot::open(compiled, Arc::new(plan));

@@ -35,11 +35,11 @@ fn assets() -> MemoryAssets {
 fn sequence_of(text: &str) -> Sequence {
     let scene = Scene::parse("test.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let aurora = AuroraParameters::read_table(&scene.instances[0].parameters.canonical(), &mut Reader::new(), &[]);
-    Sequence::new(&aurora.shapes, &aurora.motion, aurora.extent_km, &assets(), None).unwrap()
+    Sequence::new(&aurora.shapes, &aurora.morphing, aurora.extent_km, &assets(), None).unwrap()
 }
 
 fn fault(text: &str) -> String {
-    match bansho::compile_scene("test.toml", &format!("bansho = 1\n[[aurora]]\n{text}"), Arc::new(assets())) {
+    match bansho::compile_scene("test.toml", &format!("bansho = 2\n[[aurora]]\n{text}"), Arc::new(assets())) {
         Ok(_) => panic!("accepted: {text}"),
         Err(error) => error.to_string(),
     }
@@ -229,17 +229,17 @@ fn faults_stand_at_their_sheet_and_point() {
             "aurora.0.shapes.1.split.0 (shape 2, split 1): sheet 1 has no segment 99; allowed: 1 to 95",
         ),
         (
-            "[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n[[aurora.shapes]]\nmerge = [{ at = [0.5, 0] }]\n",
+            "[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n[[aurora.shapes]]\nmerge = [{ ends = [0.5, 0] }]\n",
             "the point at 0.5 of sheet 1 is not an end",
         ),
         ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split (shape 1): the first shape has none before it"),
         (
-            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", stroke = \"middle\" }]\n",
-            "test.toml:4:43: aurora.0.shapes.0.sheets.0.stroke (shape 1, sheet 1): shapes.svg: has no stroke of the id `middle`",
+            "[[aurora.shapes]]\nsheets = [{ svg_file = \"shapes.svg\", svg_path_id = \"middle\" }]\n",
+            "test.toml:4:52: aurora.0.shapes.0.sheets.0.svg_path_id (shape 1, sheet 1): shapes.svg: has no stroke of the id `middle`",
         ),
         (
-            "[[aurora.shapes]]\nsheets = [{ stroke = \"left\" }]\n",
-            "sheets.0.stroke (shape 1, sheet 1): names a path of an SVG file, but no file",
+            "[[aurora.shapes]]\nsheets = [{ svg_path_id = \"left\" }]\n",
+            "sheets.0.svg_path_id (shape 1, sheet 1): names a path of an SVG file, but no file",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[-200, -290], [-100, -200], [0, -299], [100, -299], [200, -200]] }]\n",
@@ -249,37 +249,40 @@ fn faults_stand_at_their_sheet_and_point() {
             "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n[[aurora.shapes]]\nlink = [{ to = 5 }]\nsheets = [{ form = \"arc\" }]\n",
             "shapes.1.link.0 (shape 2, link 1): there is no sheet 5 in this shape; allowed: 1 to 1",
         ),
-        ("[[aurora.shapes]]\nsheets = [{ path = \"gone.svg\" }]\n", "gone.svg: no such file"),
+        ("[[aurora.shapes]]\nsheets = [{ svg_file = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
-            "[[aurora.shapes]]\nafter_s = 3\n[[aurora.shapes]]\n",
-            "test.toml:4:11: aurora.0.shapes.0.after_s (shape 1): the first shape is there at the beginning",
+            "[[aurora.shapes]]\ntransition_s = 3\n[[aurora.shapes]]\n",
+            "test.toml:4:16: aurora.0.shapes.0.transition_s (shape 1): the first shape is there at the beginning",
         ),
         (
-            "[[aurora.shapes]]\n[[aurora.shapes]]\nlink = [{ at = 0.5 }]\n",
-            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): says `at`, but not where that point arrives",
+            "[[aurora.shapes]]\n[[aurora.shapes]]\nlink = [{ from_length_fraction = 0.5 }]\n",
+            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): says `from_length_fraction`, but not where that point arrives",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nmerge = [{ sheets = [1, 2.5] }]\n",
             "test.toml:5:25: aurora.0.shapes.1.merge.0.sheets (shape 2, merge 1): expected a whole number from 1 to 1000, found a number",
         ),
         (
-            "[[aurora.shapes]]\nsheets = [{ path = \"shapes.svg\", form = \"arc\" }]\n",
-            "says more than one of `points`, `path` and `form`",
+            "[[aurora.shapes]]\nsheets = [{ svg_file = \"shapes.svg\", form = \"arc\" }]\n",
+            "says more than one of `points`, `svg_file` and `form`",
         ),
         ("[[aurora.shapes]]\nsheets = [{ form = \"arcc\" }]\n", "`arcc` is not known, did you mean `arc`?"),
-        ("[[aurora.shapes]]\nafter_s = 3\nafter_frames = 3\n", "says both `after_s` and `after_frames`"),
+        (
+            "[[aurora.shapes]]\ntransition_s = 3\ntransition_frames = 3\n",
+            "says both `transition_s` and `transition_frames`",
+        ),
         ("energy_ev = 0\n", "test.toml:3:13: aurora.0.energy_ev: 0 is out of range; allowed: 100 to 100000 eV"),
         ("energy_ev = 1e6\n", "test.toml:3:13: aurora.0.energy_ev: 1000000 is out of range; allowed: 100 to 100000 eV"),
         (
-            "[[aurora.shapes]]\nsheets = [{ form = \"arc\", energy = [[0, 1], [1, 0]] }]\n",
-            "test.toml:4:49: aurora.0.shapes.0.sheets.0.energy.1 (shape 1, sheet 1, energy 2): 0 is out of range; allowed: 0.05 to 20",
+            "[[aurora.shapes]]\nsheets = [{ form = \"arc\", energy_factor = [[0, 1], [1, 0]] }]\n",
+            "test.toml:4:56: aurora.0.shapes.0.sheets.0.energy_factor.1 (shape 1, sheet 1, energy_factor 2): 0 is out of range; allowed: 0.05 to 20",
         ),
         (
-            "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy = [[0, 1], [0.5, 1], [1, 20]] }]\n",
-            "test.toml:5:68: aurora.0.shapes.0.sheets.1.energy.2 (shape 1, sheet 2, energy 3): at 1 of its length sheet 2 has electrons of 200000 eV",
+            "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy_factor = [[0, 1], [0.5, 1], [1, 20]] }]\n",
+            "test.toml:5:75: aurora.0.shapes.0.sheets.1.energy_factor.2 (shape 1, sheet 2, energy_factor 3): at 1 of its length sheet 2 has electrons of 200000 eV",
         ),
         (
-            "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy = [[0.5, 0.1]] }]\n",
+            "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy_factor = [[0.5, 0.1]] }]\n",
             "at 0.5 of its length sheet 1 has electrons of 50 eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
         ),
     ] {
@@ -292,7 +295,7 @@ fn faults_stand_at_their_sheet_and_point() {
 fn sheets_that_would_pass_through_each_other_are_told() {
     let remarks = |link: &str| {
         let sheets = "sheets = [{ form = \"arc\" }, { form = \"arc\", position_km = [0, 90] }]\n";
-        let text = format!("bansho = 1\n[[aurora]]\n[[aurora.shapes]]\n{sheets}[[aurora.shapes]]\n{sheets}{link}");
+        let text = format!("bansho = 2\n[[aurora]]\n[[aurora.shapes]]\n{sheets}[[aurora.shapes]]\n{sheets}{link}");
         let assets = Arc::new(assets());
         let scene = Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"));
         Planned::new(scene, &PlanOptions::default(), assets).remarks()
@@ -307,7 +310,7 @@ fn sheets_that_would_pass_through_each_other_are_told() {
 
 #[test]
 fn three_lines_make_an_aurora() {
-    for text in ["bansho = 1\n[[aurora]]\n", "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]\n"]
+    for text in ["bansho = 2\n[[aurora]]\n", "bansho = 2\n[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]\n"]
     {
         let sequence = sequence_of(text);
         // Half the side of the drawn square and more.
@@ -338,14 +341,14 @@ fn a_camera_looks_up_where_all_is_in_the_sky_unless_it_is_told() {
         let camera = scene.camera.at(0.0, [160, 90]);
         (camera.position, -camera.world_from_camera.z_axis)
     };
-    let (place, up) = camera("bansho = 1\n[[aurora]]\n");
+    let (place, up) = camera("bansho = 2\n[[aurora]]\n");
     assert!(place.y == 1.7 && (0.4..0.6).contains(&up.y) && up.z < -0.8, "{place} {up}");
-    let (_, zenith) = camera("bansho = 1\n[camera]\nlens = \"fisheye\"\n[[aurora]]\n");
+    let (_, zenith) = camera("bansho = 2\n[camera]\nlens = \"fisheye\"\n[[aurora]]\n");
     assert!(zenith.y > 0.999, "{zenith}");
     for text in [
-        "bansho = 1\n[camera]\ntarget = [0.0, 0.9, 0.0]\n[[aurora]]\n",
-        "bansho = 1\n[[aurora]]\n[[flame_sheet]]\n",
-        "bansho = 1\n",
+        "bansho = 2\n[camera]\ntarget = [0.0, 0.9, 0.0]\n[[aurora]]\n",
+        "bansho = 2\n[[aurora]]\n[[flame_sheet]]\n",
+        "bansho = 2\n",
     ] {
         assert!(camera(text).0.y == 1.2, "{text}");
     }
@@ -353,10 +356,11 @@ fn a_camera_looks_up_where_all_is_in_the_sky_unless_it_is_told() {
 
 #[test]
 fn a_drawing_is_fitted_to_the_square() {
-    let text = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\", stroke = \"right\" }] }]\n";
+    let text =
+        "bansho = 2\n[[aurora]]\nshapes = [{ sheets = [{ svg_file = \"shapes.svg\", svg_path_id = \"right\" }] }]\n";
     let shape = sequence_of(text).at(0.0);
     let points = &shape.sheets[0].points;
     assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(60.0, 0.0), DVec2::new(240.0, 0.0)));
-    let all = "bansho = 1\n[[aurora]]\nshapes = [{ sheets = [{ path = \"shapes.svg\" }] }]\n";
+    let all = "bansho = 2\n[[aurora]]\nshapes = [{ sheets = [{ svg_file = \"shapes.svg\" }] }]\n";
     assert_eq!(sequence_of(all).at(0.0).sheets.len(), 2);
 }

@@ -8,7 +8,7 @@ use bansho_render::PlanOptions;
 use support::*;
 
 /// A camera 1 m above the ground that looks level at a lamp 4 m away, 1 m above the ground too.
-const LAKE: &str = "bansho = 1\n[picture]\nsize = [120, 90]\nexposure_ev100 = 0\n[camera]\nposition = [0, 1, 0]\ntarget = [0, 1, -1]\n\
+const LAKE: &str = "bansho = 2\n[picture]\nsize = [120, 90]\nexposure_ev100 = 0\n[camera]\nposition = [0, 1, 0]\ntarget = [0, 1, -1]\n\
                     vertical_fov_deg = 60\n[[emitter]]\nposition = [0, 2, -4]\nradius = 0.4\n";
 
 fn lit(frame: &bansho_base::image::Frame, rows: std::ops::Range<usize>) -> f64 {
@@ -18,13 +18,13 @@ fn lit(frame: &bansho_base::image::Frame, rows: std::ops::Range<usize>) -> f64 {
 #[test]
 fn still_water_shows_a_lamp_as_far_below_the_horizon_as_it_stands_above() {
     let frame = render(&format!("{LAKE}[ground]\nkind = \"water\"\nwaves = 0\n"), &PlanOptions::default(), 0);
-    let centre = |rows: std::ops::Range<usize>| {
+    let center = |rows: std::ops::Range<usize>| {
         let total = lit(&frame, rows.clone());
         rows.map(|y| y as f64 * lit(&frame, y..y + 1)).sum::<f64>() / total
     };
     // The lamp stands 1 m above the camera, its image 3 m below it, both 4 m away; a meter there is 77.9 / 4 pixels.
-    let metre = 45.0 / bansho_base::math::tan(std::f64::consts::PI / 6.0) / 4.0;
-    assert!((44.5 - centre(0..45) - metre).abs() < 0.3, "{}", centre(0..45));
+    let meter = 45.0 / bansho_base::math::tan(std::f64::consts::PI / 6.0) / 4.0;
+    assert!((44.5 - center(0..45) - meter).abs() < 0.3, "{}", center(0..45));
     assert!(lit(&frame, 0..45) > 0.0);
     let low = render(
         &format!("{LAKE}[ground]\nkind = \"water\"\nwaves = 0\n").replace("[0, 2, -4]", "[0, 1.2, -8]"),
@@ -33,7 +33,7 @@ fn still_water_shows_a_lamp_as_far_below_the_horizon_as_it_stands_above() {
     );
     let below = (50..90).max_by(|&a, &b| luminance(&low, 60, a).total_cmp(&luminance(&low, 60, b))).unwrap();
     // 2.2 m below the camera at 8 m.
-    assert!((below as f64 - (44.5 + 2.2 * metre / 2.0)).abs() < 4.5, "{below}");
+    assert!((below as f64 - (44.5 + 2.2 * meter / 2.0)).abs() < 4.5, "{below}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use bansho::{
 
 /// One of each phenomenon, and a solid of each kind.
 const SCENE: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [32, 18]
 frames = 6

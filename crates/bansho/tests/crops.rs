@@ -58,38 +58,41 @@ fn assert_parts_agree(text: &str, frame: i64) {
 #[test]
 fn of_flame_sheets_with_sparks_and_smoke() {
     let sheet = "[[flame_sheet]]\nsparks = { rate = 60 }\nsmoke = { optical_depth = 0.6 }\n";
-    assert_parts_agree(&format!("bansho = 1\n{sheet}"), 9);
-    assert_parts_agree(&format!("bansho = 1\n{sheet}texture = {{ kind = \"ohshima_itahashi\" }}\n"), 9);
+    assert_parts_agree(&format!("bansho = 2\n{sheet}"), 9);
+    assert_parts_agree(&format!("bansho = 2\n{sheet}texture = {{ kind = \"ohshima_itahashi\" }}\n"), 9);
 }
 
 #[test]
 fn of_particle_flames() {
     // Fine sprites, which many columns hold nothing of, and coarse ones.
-    for lines in ["burners = [{ diameter = 0.3 }]\n", "look = { haze_gain = 2.0 }\n", "look = { sprite = \"poly6\" }\n"]
-    {
+    for lines in [
+        "burners = [{ diameter = 0.3 }]\n",
+        "rendering = { heat_haze_gain = 2.0 }\n",
+        "rendering = { sprite = \"poly6\" }\n",
+    ] {
         let text =
-            format!("bansho = 1\n[[flame_particles]]\nparticles = 3000\npreroll_s = 1\n{lines}[sky]\n[ground]\n");
+            format!("bansho = 2\n[[flame_particles]]\nparticles = 3000\npreroll_s = 1\n{lines}[sky]\n[ground]\n");
         assert_parts_agree(&text, 4);
     }
     let far = "[camera]\nposition = [0.0, 1.0, 14.0]\ntarget = [0.3, 0.8, 0.0]\n";
-    assert_parts_agree(&format!("bansho = 1\n[[flame_particles]]\nparticles = 2000\npreroll_s = 1\n{far}"), 4);
+    assert_parts_agree(&format!("bansho = 2\n[[flame_particles]]\nparticles = 2000\npreroll_s = 1\n{far}"), 4);
 }
 
 #[test]
 fn of_rain_among_lamps_over_wet_ground() {
-    assert_parts_agree("bansho = 1\n[[rain]]\n", 3);
-    assert_parts_agree("bansho = 1\n[[rain]]\nmethod = \"billboards\"\n[camera]\nlens = \"fisheye\"\n", 3);
+    assert_parts_agree("bansho = 2\n[[rain]]\n", 3);
+    assert_parts_agree("bansho = 2\n[[rain]]\nmethod = \"billboards\"\n[camera]\nlens = \"fisheye\"\n", 3);
 }
 
 #[test]
 fn of_auroras() {
     let small = "[[aurora]]\npreroll_s = 0.2\nparticles = { count = 4000 }\nfield = { cells = 96 }\n";
-    assert_parts_agree(&format!("bansho = 1\n{small}"), 2);
+    assert_parts_agree(&format!("bansho = 2\n{small}"), 2);
 }
 
 #[test]
 fn of_phenomena_that_interleave() {
-    let text = "bansho = 1\n[[flame_sheet]]\n[[flame_particles]]\nposition = [0.3, 0, 0.2]\nparticles = 1500\npreroll_s = 1\n\
+    let text = "bansho = 2\n[[flame_sheet]]\n[[flame_particles]]\nposition = [0.3, 0, 0.2]\nparticles = 1500\npreroll_s = 1\n\
                 [[rain]]\n[ground]\nwetness = 0.9\n[sky]\n[[light]]\nvisible = true\nposition = [0.5, 1, -2]\n";
     assert_parts_agree(text, 4);
 }

@@ -5,7 +5,7 @@ use bansho_base::parameters::{Auto, Value};
 use bansho_scene::{ImpliedBackdrop, Scene, SceneOptions};
 
 fn read(text: &str) -> Scene {
-    let text = format!("bansho = 1\n{text}");
+    let text = format!("bansho = 2\n{text}");
     Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -16,7 +16,7 @@ const DUSK: ImpliedBackdrop = ImpliedBackdrop { sky: true, ground: true, lights:
 #[test]
 fn every_setting_is_a_scene() {
     for kind in KINDS {
-        let text = format!("bansho = 1\n{}[[{}]]\n", kind.setting, kind.key);
+        let text = format!("bansho = 2\n{}[[{}]]\n", kind.setting, kind.key);
         let scene = Scene::parse("setting", &text, KINDS).unwrap_or_else(|error| panic!("{}: {error}", kind.key));
         assert_eq!(scene.implied, NONE, "{}: states all of it", kind.key);
         let setting = bansho_scene::values(kind.setting).unwrap();

@@ -34,7 +34,7 @@ fn plate(exposure_ev100: Option<f64>) -> Arc<MemoryAssets> {
 }
 
 fn planned(text: &str, assets: Arc<MemoryAssets>, options: &PlanOptions) -> Planned {
-    let text = format!("bansho = 1\n[picture]\nsize = [160, 90]\nframes = 3\n{text}");
+    let text = format!("bansho = 2\n[picture]\nsize = [160, 90]\nframes = 3\n{text}");
     let scene = Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     Planned::new(scene, options, assets)
 }
@@ -77,14 +77,14 @@ fn a_plates_exposure_is_the_stated_one_then_the_recorded_one_then_an_assumed_one
     // The picture's own exposure goes before all; a sky is nearly white, a flame neither dull nor white.
     assert_eq!(ev(&format!("exposure_ev100 = 7.0\n{PLATE}{RAIN}"), Some(3.0)), (7.0, None));
     assert_eq!(ev(&format!("{PLATE}[sky]\nluminance = 1536.0\n{RAIN}"), None), (10.6, assumed(10.6)));
-    let fire = "[[flame_sheet]]\ncolour = { luminance = 12000.0 }\n";
+    let fire = "[[flame_sheet]]\ncolor = { luminance = 12000.0 }\n";
     assert_eq!(ev(&format!("{PLATE}{fire}"), None), (10.7, assumed(10.7)));
     assert_eq!(ev(&format!("{PLATE}exposure_ev100 = \"auto\"\n{fire}"), Some(8.0)), (8.0, None));
 }
 
 #[test]
 fn an_exposure_needs_a_plate() {
-    let text = "bansho = 1\n[plate]\nexposure_ev100 = 9.0\n";
+    let text = "bansho = 2\n[plate]\nexposure_ev100 = 9.0\n";
     let error = Scene::parse("test.toml", text, KINDS).err().unwrap().to_string();
     assert!(error.starts_with("test.toml:3:18: plate.exposure_ev100: an exposure needs an `image`"), "{error}");
 }

@@ -17,7 +17,7 @@ use bansho_scene::{SHARED_TABLES, Scene, SceneOptions, SharedTable};
 use support::*;
 
 /// A shaken lamp that travels while a turn of one second, 24 frames, passes; all of it is dissolve.
-const TRAVELLER: &str =
+const TRAVELER: &str =
     "[[emitter]]\nposition = [-1.6, 0, -2]\nvelocity = [1.6, 0, 0]\nshake = 3\nradius = 0.4\npreroll_s = 0.1\n";
 
 fn turn() -> SceneOptions {
@@ -43,7 +43,7 @@ fn difference(a: &Frame, b: &Frame) -> f64 {
 
 #[test]
 fn a_loop_comes_back_and_refuses_what_jumps() {
-    let looped = looped(TRAVELLER);
+    let looped = looped(TRAVELER);
     assert_eq!(looped.frames(), 0..24);
     assert_eq!(looped.time(24), looped.time(0));
     let keyed = |last: u32| {
@@ -122,7 +122,7 @@ fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
     for (header, table) in shared.chain(kinds) {
         for (open, closed) in keyed(table, false).iter().zip(keyed(table, true)) {
             let [open, closed] = [open.as_str(), closed.as_str()]
-                .map(|text| format!("bansho = 1\n[picture]\nsize = [16, 9]\n{header}\n{text}\n{}", goes_with(text)));
+                .map(|text| format!("bansho = 2\n[picture]\nsize = [16, 9]\n{header}\n{text}\n{}", goes_with(text)));
             if let Err(error) = plan(&closed).map(|_| ()) {
                 // What needs more than its own key to be valid says so; it must not be the loop.
                 assert!(!error.contains("jumps"), "{closed}{error}");
@@ -137,7 +137,7 @@ fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
 
 #[test]
 fn what_is_stepped_dissolves_into_its_next_run_without_a_jump() {
-    let film = frames(&looped(TRAVELLER), 0..24);
+    let film = frames(&looped(TRAVELER), 0..24);
     for (number, frame) in film.iter().enumerate() {
         assert!((light(frame) / light(&film[12]) - 1.0).abs() < 0.03, "the light of frame {number} is kept");
     }
@@ -155,7 +155,7 @@ fn what_is_stepped_dissolves_into_its_next_run_without_a_jump() {
 
 #[test]
 fn frames_of_a_loop_alone_from_snapshots_or_of_a_later_turn_are_those_of_the_whole() {
-    let looped = looped(TRAVELLER);
+    let looped = looped(TRAVELER);
     let film = frames(&looped, 0..24);
     for number in [0, 2, 11, 13, 22] {
         assert_eq!(frames(&looped, [number].into_iter())[0], film[number as usize], "frame {number} alone");

@@ -108,7 +108,7 @@ fn scene(seed: u64) -> String {
         drawn += 1;
         f64::from(uniform(key.words(drawn, 0, Purpose(0))[0]))
     };
-    let mut text = String::from("bansho = 1\n");
+    let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = sample((shared.table)(), &mut uniform);

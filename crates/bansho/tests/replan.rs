@@ -16,7 +16,7 @@ fn plan(compiled: &Arc<CompiledScene>) -> Arc<Plan> {
 #[test]
 fn only_what_changed_is_built_anew() {
     let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-    let text = "bansho = 1\n[wind]\n[sky]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nheight = 1.0\n";
+    let text = "bansho = 2\n[wind]\n[sky]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nheight = 1.0\n";
     let addresses = |compiled: &CompiledScene| -> Vec<usize> {
         compiled.phenomena().map(|phenomenon| Arc::as_ptr(phenomenon).cast::<()>().addr()).collect()
     };
@@ -28,7 +28,7 @@ fn only_what_changed_is_built_anew() {
         (addresses(&first)[..].try_into().unwrap(), addresses(&taller)[..].try_into().unwrap());
     assert_eq!([a, c], [d, f]);
     assert_ne!(b, e);
-    let alone = "bansho = 1\n[sky]\n[[flame_sheet]]\nname = \"second\"\nheight = 2.0\n";
+    let alone = "bansho = 2\n[sky]\n[[flame_sheet]]\nname = \"second\"\nheight = 2.0\n";
     let alone = build(alone, &assets, Some(&taller));
     assert_eq!(addresses(&alone), [e, f]);
     let elsewhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
@@ -39,7 +39,7 @@ fn only_what_changed_is_built_anew() {
 #[test]
 fn gas_burns_on_when_its_flame_is_changed_also_where_it_would_burn_in_longer() {
     let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-    let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n[[flame_particles.burners]]\nheight = 0.8\n";
+    let text = "bansho = 2\n[[flame_particles]]\nparticles = 60\n[[flame_particles.burners]]\nheight = 0.8\n";
     let short = build(text, &assets, None);
     let mut shot = Shot::open(short.clone(), plan(&short));
     shot.advance(3, &Unobserved).unwrap();

@@ -10,7 +10,7 @@ fn set(text: &str, assignment: &str) -> Result<String, EditError> {
 }
 
 const SCENE: &str =
-    "bansho = 1\n[picture]\nsize = [64, 36] # small\n[[flame_sheet]]\nname = \"left log\"\n[[flame_sheet]]\n";
+    "bansho = 2\n[picture]\nsize = [64, 36] # small\n[[flame_sheet]]\nname = \"left log\"\n[[flame_sheet]]\n";
 
 #[test]
 fn values_are_replaced_and_comments_survive() {
@@ -50,9 +50,9 @@ fn places_that_are_not_there_are_named() {
 
 #[test]
 fn lists_of_tables_within_tables_are_reached_in_both_ways_of_writing_them() {
-    let headed = "bansho = 1\n[[flame_particles]]\n[[flame_particles.burners]]\nspeed = 1 # slow\n\
+    let headed = "bansho = 2\n[[flame_particles]]\n[[flame_particles.burners]]\nspeed = 1 # slow\n\
                   [[flame_particles.burners]]\n";
-    let in_a_line = "bansho = 1\n[[flame_particles]]\nburners = [{ speed = 1 }, { }]\n";
+    let in_a_line = "bansho = 2\n[[flame_particles]]\nburners = [{ speed = 1 }, { }]\n";
     for scene in [headed, in_a_line] {
         let text = set(scene, "flame_particles.0.burners.0.speed=2.5").unwrap();
         assert_eq!((text.matches("speed = 2.5").count(), text.matches("speed").count()), (1, 1), "{text}");
@@ -65,7 +65,7 @@ fn lists_of_tables_within_tables_are_reached_in_both_ways_of_writing_them() {
         assert!(matches!(whole, Err(EditError::NoAssignment(_))), "{whole:?}");
     }
     assert!(set(headed, "flame_particles.0.burners.0.speed=2").unwrap().contains("speed = 2 # slow"));
-    let none = set("bansho = 1\n[[flame_particles]]\nsmoke = 1\n", "flame_particles.0.burners.0.speed=1");
+    let none = set("bansho = 2\n[[flame_particles]]\nsmoke = 1\n", "flame_particles.0.burners.0.speed=1");
     let none = none.unwrap_err().to_string();
     assert!(none.contains("burners is not in the scene; there is: smoke"), "{none}");
 }
@@ -87,7 +87,7 @@ fn a_path_without_its_table_gets_the_tables_that_have_such_a_parameter() {
         height,
         "`height` is not in the scene, did you mean `flame_sheet.height`?; there is: bansho, picture, flame_sheet"
     );
-    let both = "bansho = 1\n[[rain]]\n[[flame_particles]]\nburners = [{}]\n";
+    let both = "bansho = 2\n[[rain]]\n[[flame_particles]]\nburners = [{}]\n";
     for (scene, assignment, expected) in [
         (SCENE, "gust=1", "did you mean `wind.gust`?"),
         (SCENE, "flame_sheat.height=2", "did you mean `flame_sheet.height`?"),
@@ -102,14 +102,14 @@ fn a_path_without_its_table_gets_the_tables_that_have_such_a_parameter() {
     }
     assert!(!told(SCENE, "rate_mm_per_h=2").contains("rain"), "there is no rain in that scene");
     assert!(!told(SCENE, "zzzzqqq=2").contains("did you mean"));
-    assert!(set(SCENE, "bansho=1").is_ok() && set(SCENE, "wind={ gust = 1 }").is_ok());
+    assert!(set(SCENE, "bansho=2").is_ok() && set(SCENE, "wind={ gust = 1 }").is_ok());
 }
 
 #[test]
 fn upgrade_states_the_format_once() {
     assert_eq!(upgrade(SCENE).unwrap(), None);
     let upgraded = upgrade("# mine\n[picture]\nframes = 3\n").unwrap().unwrap();
-    assert!(upgraded.starts_with("bansho = 1\n# mine"), "{upgraded}");
+    assert!(upgraded.starts_with("bansho = 2\n# mine"), "{upgraded}");
     assert_eq!(upgrade(&upgraded).unwrap(), None);
     assert_eq!(upgrade("bansho = 99").unwrap_err(), EditError::NewerFormat { found: 99 });
 }

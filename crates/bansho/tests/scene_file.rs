@@ -25,93 +25,93 @@ fn fault(text: &str) -> String {
 fn faults_name_their_place_and_what_is_allowed() {
     for (text, expected) in [
         (
-            "bansho = 1\n[picture]\nexposre_ev100 = 3\n",
+            "bansho = 2\n[picture]\nexposre_ev100 = 3\n",
             "test.toml:3:1: picture: unknown key `exposre_ev100`, \
           did you mean `exposure_ev100`?",
         ),
-        ("bansho = 1\n[pictre]\n", "test.toml:2:2: unknown key `pictre`, did you mean `picture`?"),
+        ("bansho = 2\n[pictre]\n", "test.toml:2:2: unknown key `pictre`, did you mean `picture`?"),
         (
-            "bansho = 1\n[picture]\nsize = \"big\"\n",
+            "bansho = 2\n[picture]\nsize = \"big\"\n",
             "test.toml:3:8: picture.size: expected a list of 2 numbers from 1 to 16384, \
           found a string",
         ),
         (
-            "bansho = 1\n[picture]\nsize = [0, 100]\n",
+            "bansho = 2\n[picture]\nsize = [0, 100]\n",
             "test.toml:3:9: picture.size: 0 is out of range; allowed: 1 to 16384 pixels",
         ),
-        ("bansho = 1\n[picture]\nsize = [100, 1000000000]\n", "1000000000 is out of range; allowed: 1 to 16384 pixels"),
-        ("bansho = 1\n[picture]\nsize = [100]\n", "has 1 item; allowed: exactly 2 items"),
-        ("bansho = 1\n[picture]\nfps = \"24000/0\"\n", "inf is out of range; allowed: 0.1 to 1000"),
-        ("bansho = 1\n[picture]\nfps = \"fast\"\n", "or a fraction such as \"24000/1001\", found a string"),
+        ("bansho = 2\n[picture]\nsize = [100, 1000000000]\n", "1000000000 is out of range; allowed: 1 to 16384 pixels"),
+        ("bansho = 2\n[picture]\nsize = [100]\n", "has 1 item; allowed: exactly 2 items"),
+        ("bansho = 2\n[picture]\nfps = \"24000/0\"\n", "inf is out of range; allowed: 0.1 to 1000"),
+        ("bansho = 2\n[picture]\nfps = \"fast\"\n", "or a fraction such as \"24000/1001\", found a string"),
         (
-            "bansho = 1\n[picture]\nexposure_ev100 = \"bright\"\n",
+            "bansho = 2\n[picture]\nexposure_ev100 = \"bright\"\n",
             "expected \"auto\" or a number from -40 to 40, found a string",
         ),
-        ("bansho = 1\n[picture]\nframes = 1.5\n", "expected a whole number from 1 to 10000000, found a number"),
+        ("bansho = 2\n[picture]\nframes = 1.5\n", "expected a whole number from 1 to 10000000, found a number"),
         (
-            "bansho = 1\n[camera]\nlens = \"fishey\"\n",
+            "bansho = 2\n[camera]\nlens = \"fishey\"\n",
             "test.toml:3:8: camera.lens: `fishey` is not known, did you mean `fisheye`?; \
           allowed: perspective, fisheye, panorama",
         ),
         (
-            "bansho = 1\n[wind]\nvelocity = { keys = [[1, [0, 0, 0]], [1, [1, 0, 0]]] }\n",
+            "bansho = 2\n[wind]\nvelocity = { keys = [[1, [0, 0, 0]], [1, [1, 0, 0]]] }\n",
             "wind.velocity: point 2 must lie after point 1",
         ),
-        ("bansho = 1\n[wind]\nvelocity = { kes = [] }\n", "unknown key `kes`, did you mean `keys`?"),
-        ("bansho = 1\n[wind]\nvelocity = nan\n", "expected a list of 3 numbers"),
-        ("bansho = 1\n[wind]\ngust = nan\n", "NaN is out of range; allowed: 0 to 2"),
-        ("bansho = 1\n[emitter]\n", "expected tables [[emitter]], with double brackets"),
+        ("bansho = 2\n[wind]\nvelocity = { kes = [] }\n", "unknown key `kes`, did you mean `keys`?"),
+        ("bansho = 2\n[wind]\nvelocity = nan\n", "expected a list of 3 numbers"),
+        ("bansho = 2\n[wind]\ngust = nan\n", "NaN is out of range; allowed: 0 to 2"),
+        ("bansho = 2\n[emitter]\n", "expected tables [[emitter]], with double brackets"),
         (
-            "bansho = 1\n[[emitter]]\nradius = -1\n",
+            "bansho = 2\n[[emitter]]\nradius = -1\n",
             "test.toml:3:10: emitter.0.radius: -1 is out of range; allowed: 0 to 100 m",
         ),
         (
-            "bansho = 1\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n",
+            "bansho = 2\n[[emitter]]\nname = \"a\"\n[[absorber]]\nname = \"a\"\n",
             "test.toml:5:8: absorber.0: the name \"a\" is taken",
         ),
-        ("bansho = 1\n[[emitter]]\nname = 3\n", "name: expected a name of 1 to 63 bytes of text without dots"),
-        ("bansho = 1\n[picture]\nfps = nan\n", "test.toml:3:7: picture.fps: NaN is out of range; allowed: 0.1 to 1000"),
+        ("bansho = 2\n[[emitter]]\nname = 3\n", "name: expected a name of 1 to 63 bytes of text without dots"),
+        ("bansho = 2\n[picture]\nfps = nan\n", "test.toml:3:7: picture.fps: NaN is out of range; allowed: 0.1 to 1000"),
         (
-            "bansho = 1\n[[light]]\nkind = \"spot\"\ndirection = [0, 0, 0]\n",
+            "bansho = 2\n[[light]]\nkind = \"spot\"\ndirection = [0, 0, 0]\n",
             "test.toml:4:13: light.0.direction: is no direction; allowed: ",
         ),
         (
-            "bansho = 1\n[[light]]\nkind = \"spot\"\ninner_deg = 80\nouter_deg = 10\n",
-            "test.toml:4:13: light.0.inner_deg: a spot that is full up to 80 degrees cannot be dark beyond 10; allowed: ",
+            "bansho = 2\n[[light]]\nkind = \"spot\"\ninner_cone_deg = 80\nouter_cone_deg = 10\n",
+            "test.toml:4:18: light.0.inner_cone_deg: a spot that is full up to 80 degrees cannot be dark beyond 10; allowed: ",
         ),
         (
-            "bansho = 1\n[[emitter]]\nname = \"a.b\"\n",
+            "bansho = 2\n[[emitter]]\nname = \"a.b\"\n",
             "cannot be a name, which begins the names of EXR channels; allowed: 1 to 63 bytes of text without dots",
         ),
         (
-            "bansho = 1\n[[emitter]]\nname = \"Z\"\n",
+            "bansho = 2\n[[emitter]]\nname = \"Z\"\n",
             "test.toml:3:8: emitter.0.name: cannot be a name, since programs that read EXR files take such a layer for the picture itself; \
              allowed: any but R, G, B, ",
         ),
         (
-            "bansho = 1\n[[emitter]]\nname = \"ein Nordlicht über dem Fjord, gesehen vom Ufer gegenüber im Mai\"\n",
+            "bansho = 2\n[[emitter]]\nname = \"ein Nordlicht über dem Fjord, gesehen vom Ufer gegenüber im Mai\"\n",
             "is a name of 65 bytes, which programs that read EXR files would cut; allowed: 1 to 63 bytes",
         ),
-        ("bansho = 1\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
-        ("bansho = 1\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
+        ("bansho = 2\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
+        ("bansho = 2\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
         (
-            "bansho = 1\n[air]\ntemperature_k = 0\n",
+            "bansho = 2\n[air]\ntemperature_k = 0\n",
             "test.toml:3:17: air.temperature_k: 0 is out of range; allowed: 150 to 400 K",
         ),
-        ("bansho = 1\n[obstacle]\n", "expected tables [[obstacle]], with double brackets"),
+        ("bansho = 2\n[obstacle]\n", "expected tables [[obstacle]], with double brackets"),
         (
-            "bansho = 1\n[[obstacle]]\nradius = 1\n[[obstacle]]\nshape = \"mesh\"\n",
+            "bansho = 2\n[[obstacle]]\nradius = 1\n[[obstacle]]\nshape = \"mesh\"\n",
             "obstacle.1.file (obstacle 2): an obstacle of shape \"mesh\" needs a `file`",
         ),
         (
-            "bansho = 1\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n",
+            "bansho = 2\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n",
             "test.toml:4:8: obstacle.0.file: gone.glb: no such file",
         ),
-        ("bansho = 2\n", "test.toml:1:10: bansho: format 2 is newer than this program knows; known: up to 1"),
+        ("bansho = 3\n", "test.toml:1:10: bansho: format 3 is newer than this program knows; known: up to 2"),
         ("bansho = 0\n", "`bansho upgrade` rewrites the file"),
-        ("[picture]\n", "the scene must begin with `bansho = 1`"),
-        ("bansho = 1\n[picture\n", "test.toml:2:"),
-        ("", "the scene must begin with `bansho = 1`"),
+        ("[picture]\n", "the scene must begin with `bansho = 2`"),
+        ("bansho = 2\n[picture\n", "test.toml:2:"),
+        ("", "the scene must begin with `bansho = 2`"),
     ] {
         let shown = fault(text);
         assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
@@ -121,14 +121,17 @@ fn faults_name_their_place_and_what_is_allowed() {
 #[test]
 fn faults_of_a_particle_flame_are_located() {
     let fault = |body: &str| {
-        let text = format!("bansho = 1\n[[flame_particles]]\n{body}");
+        let text = format!("bansho = 2\n[[flame_particles]]\n{body}");
         let scene = compiled("test.toml", &text, bansho::KINDS, MemoryAssets::default());
         scene.err().unwrap_or_else(|| panic!("accepted: {text}")).to_string()
     };
     for (body, expected) in [
         ("particles = 100000000\n", "test.toml:3:13: flame_particles.0.particles: 100000000 particles would take"),
-        ("life = { flame_temperature_k = 0 }\n", "life.flame_temperature_k: 0 is out of range; allowed: 250 to 4000 K"),
-        ("life = { flame_temperature_k = 1e6 }\n", "1000000 is out of range"),
+        (
+            "combustion = { flame_temperature_k = 0 }\n",
+            "combustion.flame_temperature_k: 0 is out of range; allowed: 250 to 4000 K",
+        ),
+        ("combustion = { flame_temperature_k = 1e6 }\n", "1000000 is out of range"),
         (
             "burners = [{}, { position = [0, 99, 0] }]\ndomain_max = [5, 5, 5]\n",
             "test.toml:3:29: flame_particles.0.burners.1.position (burner 2): the burner stands at",
@@ -150,14 +153,14 @@ fn faults_of_a_particle_flame_are_located() {
 
 #[test]
 fn a_focal_length_is_held_to_the_field_of_view_that_may_be_stated() {
-    let camera = |lines: &str| format!("bansho = 1\n[camera]\nsensor_height_mm = 51\n{lines}\n");
+    let camera = |lines: &str| format!("bansho = 2\n[camera]\nsensor_height_mm = 51\n{lines}\n");
     let allowed = "allowed: 0.1 to 170 degrees, here 2.231 to 29221 mm";
     let shown = fault(&camera("focal_length_mm = 0.49"));
     assert!(shown.starts_with("test.toml:4:19: camera.focal_length_mm: gives a field of view of 177.79"), "{shown}");
     assert!(shown.contains(allowed), "{shown}");
     let keyed = fault(&camera("focal_length_mm = { keys = [[0, 35], [1, 2], [2, 35]] }"));
     assert!(keyed.contains("gives a field of view of 171.0") && keyed.contains(allowed), "{keyed}");
-    let narrow = fault("bansho = 1\n[camera]\nsensor_height_mm = 0.1\nfocal_length_mm = 100\n");
+    let narrow = fault("bansho = 2\n[camera]\nsensor_height_mm = 0.1\nfocal_length_mm = 100\n");
     assert!(narrow.contains("allowed: 0.1 to 170 degrees"), "{narrow}");
     for lines in ["focal_length_mm = 2.24", "lens = \"fisheye\"\nfocal_length_mm = 0.49"] {
         parse(&camera(lines)).unwrap_or_else(|error| panic!("{error}"));
@@ -166,7 +169,7 @@ fn a_focal_length_is_held_to_the_field_of_view_that_may_be_stated() {
 
 #[test]
 fn of_many_faults_the_first_are_listed_and_the_rest_counted() {
-    let text = format!("bansho = 1\n{}", "[[absorber]]\nnear = -1\n".repeat(20_000));
+    let text = format!("bansho = 2\n{}", "[[absorber]]\nnear = -1\n".repeat(20_000));
     let error = parse(&text).err().unwrap();
     assert_eq!((error.problems.len(), error.omitted), (100, 19_900));
     let faults: Vec<String> = error.faults().collect();
@@ -176,14 +179,14 @@ fn of_many_faults_the_first_are_listed_and_the_rest_counted() {
 
 #[test]
 fn names_are_compared_in_one_pass() {
-    let text = format!("bansho = 1\n{}", "[[absorber]]\nname = \"mist\"\n".repeat(50_000));
+    let text = format!("bansho = 2\n{}", "[[absorber]]\nname = \"mist\"\n".repeat(50_000));
     let error = parse(&text).err().unwrap();
     assert_eq!((error.problems.len(), error.omitted), (100, 49_899));
 }
 
 #[test]
 fn two_faults_are_two_errors_in_the_order_of_the_file() {
-    let text = "bansho = 1\n[camera]\nnear = 0\n[picture]\nframes = 0\n";
+    let text = "bansho = 2\n[camera]\nnear = 0\n[picture]\nframes = 0\n";
     let error = parse(text).err().unwrap();
     let paths: Vec<&str> = error.problems.iter().map(|problem| problem.path.as_str()).collect();
     assert_eq!(paths, ["camera.near", "picture.frames"]);
@@ -201,13 +204,13 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
 /// A random valid scene with a tiny picture.
 fn random_scene(seed: u64) -> String {
     let mut uniform = random(seed);
-    let mut text = String::from("bansho = 1\n");
+    let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
         let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = parameters::sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; a spot may not be full beyond its end.
         // Most random lenses are beyond the field of view that they may have.
-        let left_out = [("obstacle", "shape"), ("light", "inner_deg"), ("camera", "focal_length_mm")];
+        let left_out = [("obstacle", "shape"), ("light", "inner_cone_deg"), ("camera", "focal_length_mm")];
         table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
         text += &table_text(&header, &table);
     }
@@ -240,7 +243,7 @@ fn what_a_scene_says_is_written_back_and_read_alike() {
         let first = parse(&text).unwrap_or_else(|error| panic!("{error}"));
         let canonical: Vec<String> =
             first.instances.iter().map(|instance| Value::Table(instance.parameters.canonical()).to_string()).collect();
-        let again = "bansho = 1\n".to_owned()
+        let again = "bansho = 2\n".to_owned()
             + &first
                 .instances
                 .iter()
@@ -306,7 +309,7 @@ fn a_template_states_all_of_its_kinds_setting() {
             let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
             compiled.unwrap_or_else(|error| panic!("{error}")).scene().clone()
         };
-        let stated = parse(&format!("bansho = 1\n{}\n[[{}]]\n", kind.setting, kind.key));
+        let stated = parse(&format!("bansho = 2\n{}\n[[{}]]\n", kind.setting, kind.key));
         let new = parse(&template::commented(kind));
         assert_eq!((&new.picture, &new.camera, &new.wind), (&stated.picture, &stated.camera, &stated.wind));
         assert_eq!((&new.sky, &new.ground, &new.lights), (&stated.sky, &stated.ground, &stated.lights));
@@ -348,7 +351,7 @@ fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
 fn a_models_fault_stays_what_it_is() {
     use bansho_base::parameters::ProblemKind;
     use bansho_fire::particles::ParticleFaultKind;
-    let text = "bansho = 1\n[[flame_particles]]\nparticles = 900000000\n";
+    let text = "bansho = 2\n[[flame_particles]]\nparticles = 900000000\n";
     let kinds = bansho::KINDS;
     let error = compiled("new.toml", text, kinds, MemoryAssets::default()).err().unwrap();
     let ProblemKind::Model(fault) = &error.problems[0].kind else { panic!("{error}") };
@@ -360,7 +363,7 @@ fn a_models_fault_stays_what_it_is() {
 fn flames_together_may_not_have_more_particles_than_fit() {
     let flame = |count: i64, enabled: bool| format!("[[flame_particles]]\nparticles = {count}\nenabled = {enabled}\n");
     let check = |flames: [String; 3]| {
-        let text = format!("bansho = 1\n{}", flames.concat());
+        let text = format!("bansho = 2\n{}", flames.concat());
         let kinds = bansho::KINDS;
         compiled("new.toml", &text, kinds, MemoryAssets::default()).err().map(|error| error.to_string())
     };

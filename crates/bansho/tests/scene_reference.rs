@@ -35,7 +35,7 @@ fn every_scene_in_readme_and_book_is_right() {
         let text = std::fs::read_to_string(&page).unwrap();
         for block in text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()) {
             // Excerpts leave out the first line of a scene.
-            let scene = if block.contains("bansho = ") { block.to_owned() } else { format!("bansho = 1\n{block}") };
+            let scene = if block.contains("bansho = ") { block.to_owned() } else { format!("bansho = 2\n{block}") };
             scenes += 1;
             let Err(error) = Scene::parse("example", &scene, KINDS) else { continue };
             // The plates of the examples are not there.
@@ -51,7 +51,7 @@ fn the_guide_tells_of_every_aov() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/guide/output.md");
     let page = std::fs::read_to_string(page).unwrap();
     for kind in KINDS {
-        let scene = format!("bansho = 1\n[[{}]]\n", kind.key);
+        let scene = format!("bansho = 2\n[[{}]]\n", kind.key);
         let scene = Scene::parse("aovs", &scene, KINDS).unwrap_or_else(|error| panic!("{error}"));
         let opening = BuildContext { name: "any", seed: 0, loop_s: None, assets: &MemoryAssets::default() };
         let phenomenon = scene.instances[0].parameters.build(&opening).unwrap_or_else(|fault| panic!("{fault:?}"));

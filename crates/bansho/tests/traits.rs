@@ -139,11 +139,11 @@ fn a_moving_lamp_leaves_a_streak_of_the_same_light_around_the_middle_of_the_expo
         (light, first / light)
     };
     let (still_light, _) = moments(&render(&text(0.0), &PlanOptions::default(), 6));
-    let (light, centre) = moments(&render(&text(2.0), &PlanOptions::default(), 6));
+    let (light, center) = moments(&render(&text(2.0), &PlanOptions::default(), 6));
     // Half a frame open from t = 0.25 s: the middle is at 0.25 + 1/96 s, 45 pixels a meter.
     let expected = 60.0 + 45.0 * (-0.5 + 2.0 * (0.25 + 1.0 / 96.0));
     assert!((light / still_light - 1.0).abs() < 0.05, "{light} {still_light}");
-    assert!((centre - expected).abs() < 0.5, "{centre} {expected}");
+    assert!((center - expected).abs() < 0.5, "{center} {expected}");
 }
 
 const SHAKEN: &str = "[[emitter]]\nname = \"lamp\"\nshake = 3\nacceleration = [0, -1, 0]\npreroll_s = 0.5\n";

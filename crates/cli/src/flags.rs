@@ -38,7 +38,7 @@ pub(crate) fn for_scene(error: &SceneError) -> Option<&'static str> {
         Some(AssetProblem::FileSize { limit, .. }) => *limit > TEXT_BYTES,
         _ => false,
     };
-    let hint = "--input-memory allows the files of a scene to take more";
+    let hint = "--max-asset-memory allows the files of a scene to take more";
     error.problems.iter().any(needs_memory).then_some(hint)
 }
 
@@ -69,7 +69,7 @@ fn of_error(error: &JobError) -> Option<&'static str> {
         JobError::Edit { .. } => Some("--set"),
         JobError::Conflict(Conflict::NoChannels { what: Channels::Layers, .. }) => Some("--layers"),
         JobError::Conflict(Conflict::NoChannels { what: Channels::Aovs, .. }) => Some("--aovs"),
-        JobError::Conflict(Conflict::NoFigures { .. }) => Some("--figures"),
+        JobError::Conflict(Conflict::NoFigures { .. }) => Some("--metadata"),
         JobError::Conflict(Conflict::RawAlpha) => Some("--alpha"),
         JobError::Conflict(Conflict::FewFrames { .. }) => Some("--contact-sheet"),
         JobError::Conflict(Conflict::Tiles { of, .. } | Conflict::SheetSize { of, .. }) => Some(match of {
@@ -88,12 +88,12 @@ fn of_streaks(fault: &StreaksError) -> Option<&'static str> {
             ListKind::Rates => "--rates",
             ListKind::Diameters => "--diameters",
         },
-        StreaksError::Exposure(_) => "--exposure",
+        StreaksError::Exposure(_) => "--exposure-time",
         StreaksError::Size(_) => "--size",
-        StreaksError::Edge(_) | StreaksError::Drops { .. } => "--box",
+        StreaksError::Edge(_) | StreaksError::Drops { .. } => "--cube-size",
         StreaksError::Variants(_) => "--variants",
-        StreaksError::Light => "--light",
-        StreaksError::Velocity(_) => "--velocity",
+        StreaksError::Light => "--light-direction",
+        StreaksError::Velocity(_) => "--terminal-velocity",
         _ => return None,
     })
 }

@@ -26,7 +26,9 @@ use bansho_base::{
 
 use bansho_fire::particles::{
     Particles,
-    render::{FadeOut, Gas, LookParameters, PreparedGas, ScratchPool, line_gradient, line_integral, soot_absorption},
+    render::{
+        FadeOut, Gas, PreparedGas, RenderingParameters, ScratchPool, line_gradient, line_integral, soot_absorption,
+    },
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use rayon::prelude::*;
@@ -70,7 +72,7 @@ struct Subject {
 }
 
 /// Prepares the gas and hands it to `each`.
-fn prepared(subject: &Subject, look: &LookParameters, each: impl FnOnce(&PreparedGas)) {
+fn prepared(subject: &Subject, look: &RenderingParameters, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let gas = gas(&subject.particles, &subject.scratch);
@@ -80,7 +82,7 @@ fn prepared(subject: &Subject, look: &LookParameters, each: impl FnOnce(&Prepare
 }
 
 /// Draws the gas, and hands it to `before` before.
-fn draw(subject: &Subject, look: &LookParameters, before: impl Fn(&PreparedGas) + Sync) {
+fn draw(subject: &Subject, look: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
     prepared(subject, look, |prepared| {
         before(prepared);
         (0..SIZE[1].div_ceil(STRIP)).into_par_iter().for_each_init(Strip::default, |strip, index| {
@@ -118,7 +120,7 @@ fn gas_720p(criterion: &mut Criterion) {
     let subject =
         Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), scratch: ScratchPool::default() };
     let Subject { particles, view, .. } = &subject;
-    let look = LookParameters::default();
+    let look = RenderingParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
     let mut group = criterion.benchmark_group("flame gas 1280x720");
     group.sample_size(10);
@@ -130,7 +132,7 @@ fn gas_720p(criterion: &mut Criterion) {
             bencher.iter(|| draw(&subject, &look, |prepared| assert!(prepared.deflection().is_some())));
         });
     });
-    let smooth = LookParameters { detail: 0.0, ..look.clone() };
+    let smooth = RenderingParameters { detail: 0.0, ..look.clone() };
     group.bench_function("sums alone", |bencher| {
         pool.install(|| bencher.iter(|| draw(&subject, &smooth, |_| ())));
     });
@@ -146,7 +148,7 @@ fn gas_720p(criterion: &mut Criterion) {
         });
     });
     // Of gas that neither shines nor hides only the haze is summed.
-    let clear = LookParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
+    let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
     group.bench_function("haze of clear gas", |bencher| {
         pool.install(|| {
             bencher.iter(|| {

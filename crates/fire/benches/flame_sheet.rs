@@ -77,7 +77,7 @@ fn naive_pixel(parameters: &FlameSheetParameters, x: f64, y: f64, scroll: f64) -
     let vertical = parameters.texture.threshold.eval(w.into()) as f32;
     let limit = equations::threshold(vertical, parameters.texture.threshold_across.eval(across.into()) as f32);
     let sharp = parameters.texture.sharpen.eval(equations::above_threshold(texture as f32, limit).into());
-    [&parameters.colour.red, &parameters.colour.green, &parameters.colour.blue].map(|curve| curve.eval(sharp))
+    [&parameters.color.red, &parameters.color.green, &parameters.color.blue].map(|curve| curve.eval(sharp))
 }
 
 /// Eq. (20) as it stands.

@@ -19,19 +19,19 @@ use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEqua
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use support::pinned_pool;
 
-const NEIGHBOURS: f64 = 35.0;
+const NEIGHBORS: f64 = 35.0;
 const SUPPORT: f32 = 0.1;
 const STATE: StateEquation = StateEquation { rest_density: 0.0, negative_pressure: false };
 const STIFFNESS: f32 = 1.0;
 /// So short that the cloud stays as it is however often it is stepped.
 const SECONDS: f32 = 1e-6;
 
-/// Random particles of mass 1 in a box in which [`NEIGHBOURS`] lie within the support radius.
+/// Random particles of mass 1 in a box in which [`NEIGHBORS`] lie within the support radius.
 fn cloud<const D: usize>(count: u64) -> Particles<D> {
     use std::f64::consts::PI;
     let support = f64::from(SUPPORT);
     let ball = if D == 2 { PI * support * support } else { 4.0 / 3.0 * PI * support * support * support };
-    let volume = count as f64 / (NEIGHBOURS / ball);
+    let volume = count as f64 / (NEIGHBORS / ball);
     let side = if D == 2 { volume.sqrt() } else { bansho_base::math::cbrt(volume) };
     let key = Key::new(1, "cloud");
     let mut particles = Particles::default();
@@ -152,7 +152,7 @@ struct DetailFactors {
 impl DetailFactors {
     fn new(particles: i64) -> Option<Self> {
         let mut parameters = FlameParticlesParameters { particles, ..Default::default() };
-        parameters.fluid.sub_steps = 1;
+        parameters.fluid.max_substeps = 1;
         let flame = FlameParticles::new(parameters, "bench", 1, None, &MemoryAssets::default()).ok()?;
         let wind = Wind::new(WindParameters { velocity: [0.5, 0.0, 0.0].into(), ..Default::default() }, 1, None);
         let mut burning = Self { flame, wind, steps: 0 };

@@ -185,7 +185,7 @@ fn first_frame(path: &Path, decoder: &[&str]) -> Vec<[u8; 4]> {
 
 #[test]
 #[ignore = "needs ffmpeg"]
-fn films_carry_their_frames_colours_and_tags() {
+fn films_carry_their_frames_colors_and_tags() {
     let folder = tempfile::tempdir().unwrap();
     let vp9: &[&str] = &["-c:v", "libvpx-vp9"];
     let cases: [(&str, WebmCodec, &str, usize, &[&str]); 4] = [
@@ -205,12 +205,12 @@ fn films_carry_their_frames_colours_and_tags() {
         for part in colors.iter().chain(&["nb_read_frames=5", "24000/1001", &format!("codec_name={codec}")]) {
             assert!(said.contains(part), "{name}: no {part} in\n{said}");
         }
-        check_colours(name, &first_frame(&path, decoder), width, has_alpha);
+        check_colors(name, &first_frame(&path, decoder), width, has_alpha);
     }
     assert_eq!(names(folder.path()), ["a.mov", "a.mp4", "a.webm", "b.webm"]);
 }
 
-fn check_colours(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
+fn check_colors(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
     let original = picture(65, 67, 0);
     let expected = if has_alpha { original } else { bansho_media::output::flatten::over_black(&original) };
     let DisplayPixels::Eight(expected) = expected.pixels else { unreachable!() };

@@ -36,9 +36,9 @@ fn view() -> View {
     View::new(camera, Shutter { open: 3.0, close: 3.0 + 1.0 / 60.0 }, 3.03, SIZE, 0)
 }
 
-fn rain(method: Method, rate: f64, distance: f64, veil_distance: f64) -> Rain {
+fn rain(method: Method, rate: f64, distance: f64, airlight_distance: f64) -> Rain {
     let parameters =
-        RainParameters { rate_mm_per_h: rate.into(), method, distance, veil_distance, ..RainParameters::default() };
+        RainParameters { rate_mm_per_h: rate.into(), method, distance, airlight_distance, ..RainParameters::default() };
     Rain::new(parameters, "bench", 1, None).expect("the parameters go together")
 }
 

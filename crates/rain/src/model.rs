@@ -77,7 +77,7 @@ impl Rain {
             return Err(ParameterError { key: "diameters_mm", kind });
         }
         constructions::count("rain");
-        let velocity = TerminalVelocity { law: parameters.velocity, air: Air::default() };
+        let velocity = TerminalVelocity { law: parameters.terminal_velocity, air: Air::default() };
         let [_, heaviest] = parameters.rate_mm_per_h.bounds();
         let sizes = DropSizeDistribution::marshall_palmer(heaviest);
         let class = |bin: SizeBin| Class { bin, speed: velocity.speed(bin.diameter_mm), most: bin.count(&sizes) };
@@ -135,12 +135,13 @@ impl Rain {
 
     /// How far from the camera there is any rain before a plate, m.
     pub(super) fn near_reach(&self) -> f64 {
-        1.2 * self.parameters.distance + self.parameters.veil_distance
+        1.2 * self.parameters.distance + self.parameters.airlight_distance
     }
 
     /// How far from the camera there is any rain, m: over ground that leads to the horizon as far as it.
     pub(super) fn reach(&self, surroundings: &Surroundings) -> f64 {
-        let horizon = self.parameters.veil_distance > 0.0 && ground_height(&surroundings.others.occluders).is_some();
+        let horizon =
+            self.parameters.airlight_distance > 0.0 && ground_height(&surroundings.others.occluders).is_some();
         if horizon { HORIZON.max(self.near_reach()) } else { self.near_reach() }
     }
 

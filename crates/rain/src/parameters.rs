@@ -21,9 +21,9 @@ bansho_base::parameters! {
     /// What drops do where they hit the ground.
     pub struct SplashParameters {
         /// Share of the drops that are seen to splash; 0 for none.
-        amount: f64 = 1.0, limits(Range::new(0.0, 1.0));
+        fraction: f64 = 1.0, limits(Range::new(0.0, 1.0));
         /// Speed of the droplets that a splash throws up, beside the usual.
-        speed: f64 = 1.0, limits(Range::new(0.1, 3.0));
+        speed_scale: f64 = 1.0, limits(Range::new(0.1, 3.0));
         /// Splashes further away than this are not drawn.
         distance: f64 = 8.0, limits(Range::new(0.0, 30.0)), unit("m");
     }
@@ -39,11 +39,11 @@ bansho_base::parameters! {
         /// Diameters that stand for all drops that are seen one by one, ascending; all others only veil.
         diameters_mm: Vec<f64> = PAPER_DIAMETERS_MM.to_vec(), limits(Length { min: 1, max: 12, item: Range::new(0.1, 8.0) }), unit("mm");
         /// Where terminal velocities come from.
-        velocity: VelocityLaw = VelocityLaw::Measured;
+        terminal_velocity: VelocityLaw = VelocityLaw::GunnKinzer;
         /// How far from the camera streaks are drawn; rain further away only veils.
         distance: f64 = 5.0, limits(Range::new(1.0, 40.0)), unit("m");
         /// How far it rains beyond, over a `[ground]` without a plate to the horizon; 0 for no veil at all.
-        veil_distance: f64 = 100.0, limits(Range::new(0.0, 5000.0)), unit("m");
+        airlight_distance: f64 = 100.0, limits(Range::new(0.0, 5000.0)), unit("m");
         /// Height of the ground, where drops end, in a scene without `[ground]`.
         ground_height: f64 = 0.0, unit("m");
         /// Opacity beside what optics gives.

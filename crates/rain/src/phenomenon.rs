@@ -17,16 +17,17 @@ use crate::render::prepared::{AOVS, PreparedRain};
 
 impl Describe for RainParameters {
     const KEY: &'static str = "rain";
-    const FIRST_KEYS: &'static [&'static str] = &["rate_mm_per_h", "distance", "veil_distance", "splashes.amount"];
+    const FIRST_KEYS: &'static [&'static str] =
+        &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"];
     // Lamps at dusk along a wet street: drops only show the light of others.
     const SETTING: &'static str = "\
         camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
         sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
         ground = { wetness = 0.9, puddles = 0.4 }\n\
         light = [\
-        { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
-        { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }, \
-        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, colour = [1.0, 0.68, 0.36] }]\n";
+        { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, color = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, color = [1.0, 0.68, 0.36] }, \
+        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, color = [1.0, 0.68, 0.36] }]\n";
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match Rain::new(self.clone(), context.name, context.seed, context.loop_s) {

@@ -48,9 +48,9 @@ impl<'a> Moment<'a> {
         let published =
             |other: usize| get_or_compute(&self.published[other], || self.runs[other].run.publish(self.shutter));
         let count = self.runs.len();
-        let neighbours =
+        let neighbors =
             OtherPhenomena { scene: &self.scene, count, published: &published, own_index: index, sky: &self.sky };
-        self.runs[index].participant.phenomenon.remark(&neighbours)
+        self.runs[index].participant.phenomenon.remark(&neighbors)
     }
 }
 

@@ -10,12 +10,13 @@ use bansho_base::{
 use super::{FORMAT, SHARED_TABLES, Scene, ValuePath, tables::picture::LightKind};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
-/// The format number must be one that this program reads.
-pub(super) fn format(root: &Table, reader: &mut Reader) {
+/// Checks that the format number is one that this program reads. Returns whether the rest is worth reading: in an older format, other keys
+/// are valid, and each would be one more problem.
+pub(super) fn format(root: &Table, reader: &mut Reader) -> bool {
     let Some(node) = root.get("bansho") else {
         let kind = ProblemKind::Conflict(format!("the scene must begin with `bansho = {FORMAT}`, its format version"));
         reader.report_at(Some(0..0), kind);
-        return;
+        return true;
     };
     reader.within("bansho", |reader| match node.value {
         Value::Integer(FORMAT) => {}
@@ -28,6 +29,7 @@ pub(super) fn format(root: &Table, reader: &mut Reader) {
             reader.report(node, ProblemKind::WrongType { expected: format!("the format version, {FORMAT}"), found });
         }
     });
+    !matches!(node.value, Value::Integer(found) if found < FORMAT)
 }
 
 /// Only shared tables and known kinds of phenomena may stand at the root.
@@ -164,13 +166,13 @@ fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
             let reason = "is no direction; allowed: any three numbers that are not all 0".to_owned();
             report_build_error(fault("direction", reason), path.clone(), root, reader);
         }
-        let stated = ValuePath::root().key("light").index(index).key("inner_deg").find(root).is_some();
-        if light.kind == LightKind::Spot && stated && light.inner_deg > light.outer_deg {
+        let stated = ValuePath::root().key("light").index(index).key("inner_cone_deg").find(root).is_some();
+        if light.kind == LightKind::Spot && stated && light.inner_cone_deg > light.outer_cone_deg {
             let reason = format!(
-                "a spot that is full up to {} degrees cannot be dark beyond {}; allowed: up to `outer_deg`",
-                light.inner_deg, light.outer_deg
+                "a spot that is full up to {} degrees cannot be dark beyond {}; allowed: up to `outer_cone_deg`",
+                light.inner_cone_deg, light.outer_cone_deg
             );
-            report_build_error(fault("inner_deg", reason), path, root, reader);
+            report_build_error(fault("inner_cone_deg", reason), path, root, reader);
         }
     }
 }
@@ -209,4 +211,17 @@ pub(super) fn place(root: &Table, path: &str) -> Option<Span> {
         value = Some(&node.value);
     }
     span
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_of_an_older_format_is_one_error() {
+        let text = format!("bansho = {}\n[[light]]\nno_key = 1\n[nothing]\n", FORMAT - 1);
+        let error = Scene::parse("old.toml", &text, &[]).err().expect("an old scene is refused");
+        assert_eq!((error.problems.len(), error.omitted), (1, 0));
+        assert!(error.to_string().contains("`bansho upgrade` rewrites the file"), "{error}");
+    }
 }

@@ -39,7 +39,7 @@ pub use self::{
 use self::{tables::defaults, text::toml};
 
 /// The scene format that this version reads and writes.
-pub const FORMAT: i64 = 1;
+pub const FORMAT: i64 = 2;
 
 /// What the TOML `text` says, with the place of every value, unchecked.
 ///
@@ -186,6 +186,9 @@ impl Scene {
         };
         let root = toml::parse(text).map_err(|problem| fail(Problems { listed: vec![problem], omitted: 0 }))?;
         let mut reader = Reader::new();
+        if !check::format(&root, &mut reader) {
+            return Err(fail(reader.into_problems()));
+        }
         let scene = Self::read(&root, kinds, &mut reader);
         if reader.is_clean() {
             check::values(&scene, &root, &mut reader);
@@ -215,7 +218,6 @@ impl Scene {
     }
 
     fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
-        check::format(root, reader);
         check::root_keys(root, kinds, reader);
         let (completed, implied) = defaults::complete(root, kinds);
         Self::read_completed(&completed, kinds, implied, reader).looking_up(&completed)

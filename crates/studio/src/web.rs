@@ -109,7 +109,7 @@ fn player(ctx: Context) -> Box<dyn Player> {
 fn scene(name: &str) -> Document {
     match bansho_example_scenes::find(name).or_else(|| bansho_example_scenes::find(FIRST)) {
         Some(scene) => Document::new(format!("{}.toml", scene.name), scene.text),
-        None => Document::new("scene.toml", "bansho = 1\n"),
+        None => Document::new("scene.toml", "bansho = 2\n"),
     }
 }
 

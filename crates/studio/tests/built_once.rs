@@ -6,7 +6,7 @@ use bansho::{Assets, MemoryAssets, Shot, Unobserved, base::host::constructions};
 use bansho_studio::document::Checker;
 
 const SCENE: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [32, 18]
 frames = 6

@@ -17,7 +17,7 @@ trap 'kill "$xvfb" "${window:-$xvfb}" 2>/dev/null || true' EXIT
 
 cat >"$folder/sky.toml" <<'SCENE'
 # An empty sky.
-bansho = 1
+bansho = 2
 [picture]
 size = [320, 180]
 frames = 2

@@ -199,7 +199,7 @@ console.log("what a page left unsaved is recovered by the next one");
 await heir.close();
 
 // A scene of the user's own is opened through the browser, and its still and its shot come back.
-const small = `bansho = 1
+const small = `bansho = 2
 [picture]
 size = [64, 36]
 frames = 4
@@ -219,7 +219,7 @@ async function rendered(keys) {
   return { path, name: download.suggestedFilename() };
 }
 // Faults, as of a plate that is missing beside a flame of many particles, are told by the worker: nothing heavy is made here.
-const faulty = `bansho = 1\n[plate]\nimage = "gone.png"\n[[flame_particles]]\nparticles = 30000\n[[aurora]]\n`;
+const faulty = `bansho = 2\n[plate]\nimage = "gone.png"\n[[flame_particles]]\nparticles = 30000\n[[aurora]]\n`;
 for (const [what, name, scene] of [
   ["a faulty scene", "faulty.toml", faulty],
   ["a heavy scene", "heavy.toml", faulty.replace(/\[plate\]\nimage.*\n/, "")],

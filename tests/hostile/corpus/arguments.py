@@ -56,13 +56,13 @@ def _numbers() -> list[Case]:
         *[_render(f"seed {text!r}", ["--seed", text], words="allowed: a whole number") for text in ("-1", "18446744073709551616", "1.5", "")],
         *[_render(f"contact sheet of {text}", [f"--contact-sheet={text}"], words="contact-sheet") for text in ("0", "4097", "18446744073709551615", "-1")],
         *[_render(f"snapshot every {text}", ["--snapshots", "states", f"--snapshot-every={text}"], words="allowed|snapshot") for text in ("0", "-1", "99999999999999999999")],
-        *[_render(f"memory for inputs of {text!r}", [f"--input-memory={text}"], words="input-memory") for text in ("0", "-1", "many", "1e400GiB", "99999999999999999999GiB", "nanGiB", "")],
-        _render("16384 x 16384", ["--size", "16384x16384", "--frames", "0"], (2, 3), "GiB|allowed", signalled=True),
-        _render("16384 x 16384 in 16 bits", ["--size", "16384x16384", "--frames", "0", "--bits", "16"], (2, 3), "GiB|allowed", signalled=True),
-        _render("8192 x 8192", ["--size", "8192x8192", "--frames", "0"], 2, "GiB|allowed", signalled=True),
-        _render("16384 x 16384 by the scene", ["--frames", "0"], 3, "picture.size.*(GiB|allowed)", FLAME.replace("[32, 24]", "[16384, 16384]"), signalled=True),
+        *[_render(f"memory for inputs of {text!r}", [f"--max-asset-memory={text}"], words="max-asset-memory") for text in ("0", "-1", "many", "1e400GiB", "99999999999999999999GiB", "nanGiB", "")],
+        _render("16384 x 16384", ["--size", "16384x16384", "--frames", "0"], (2, 3), "GiB|allowed", signaled=True),
+        _render("16384 x 16384 in 16 bits", ["--size", "16384x16384", "--frames", "0", "--bits", "16"], (2, 3), "GiB|allowed", signaled=True),
+        _render("8192 x 8192", ["--size", "8192x8192", "--frames", "0"], 2, "GiB|allowed", signaled=True),
+        _render("16384 x 16384 by the scene", ["--frames", "0"], 3, "picture.size.*(GiB|allowed)", FLAME.replace("[32, 24]", "[16384, 16384]"), signaled=True),
         _render("an overscan of 4096 pixels", ["--frames", "0", "-o", "out/a.exr"], 2, "", FLAME.replace("frames = 2", "frames = 2\noverscan = 4096")),
-        _render("10,000,000 frames", ["--size", "1x1", "--progress", "none"], 143, "", FLAME.replace("frames = 2", "frames = 10000000"), signalled=True, endless=True),
+        _render("10,000,000 frames", ["--size", "1x1", "--progress", "none"], 143, "", FLAME.replace("frames = 2", "frames = 10000000"), signaled=True, endless=True),
     ]
 
 
@@ -102,7 +102,7 @@ def _words() -> list[Case]:
         Case("arguments", "a shell that is none", ["completions", "csh"], 2, r"^error: .*csh"),
         Case("arguments", "schema of something", ["schema", "extra"], 2, r"^error: .*extra"),
         Case("arguments", "an example that is none", ["new", "a", "--from", "../../etc/passwd"], 2, r"^error: there is no example"),
-        Case("arguments", "a phenomenon that is none", ["new", "a", "--phenomenon", "snow"], 2, r"^error: there is no phenomenon `snow`"),
+        Case("arguments", "a phenomenon that is none", ["new", "a", "--kind", "snow"], 2, r"^error: there is no phenomenon `snow`"),
         Case("arguments", "a new scene in /proc", ["new", "/proc/a"], 1, r"^error: /proc/a\.toml: (cannot be written|not allowed)"),
         Case("arguments", "a new scene without a name", ["new", ""], (1, 2), r"^error: "),
         Case("arguments", "a new scene named ..", ["new", ".."], (1, 2), r"^error: "),
@@ -122,25 +122,25 @@ def _others() -> list[Case]:
         flipbook("65 x 64", ["--grid", "65x64"], "up to 4096"),
         flipbook("2^32 x 2^32", ["--grid", "4294967296x4294967296"], "up to 4096"),
         flipbook("a sheet of 131072 pixels", ["--grid", "8x8", "--size", "16384x16384"], "16384"),
-        flipbook("a sheet of 16384 x 16384", ["--grid", "2x2", "--size", "8192x8192"], "GiB|allowed", (2, 3), signalled=True),
+        flipbook("a sheet of 16384 x 16384", ["--grid", "2x2", "--size", "8192x8192"], "GiB|allowed", (2, 3), signaled=True),
         flipbook("a loop of an hour's tenth", ["--grid", "1x2", "--loop", "1e-9"], "loop"),
         flipbook("a first frame at the end of 64 bits", ["--grid", "1x2", "--size", "4x4", "--first-frame", "9223372036854775807"], "", (0, 2)),
         flipbook("a film", ["--grid", "1x2", "-o", "a.gif"], r"multiple times|\.gif"),
         *[streaks(f"rates {text!r}", ["--rates", text], "allowed|ascend|empty|list") for text in ("", "x", "-1", "501", "nan", "5,1", "1,1", "1e308", ",".join(["1"] * 10_000))],
         *[streaks(f"diameters {text!r}", ["--diameters", text], "allowed|ascend|empty|list") for text in ("0", "1e308", "2,1", "inf")],
         *[streaks(f"size {text}", ["--size", text], "allowed|size") for text in ("0", "4097", "99999999999999999999")],
-        *[streaks(f"exposure {text!r}", ["--exposure", text], "allowed") for text in ("0", "1/0", "0/0", "1e308", "-1/30")],
-        *[streaks(f"box {text}", ["--box", text], "allowed|box") for text in ("0", "1e300", "nan")],
-        streaks("half a billion drops", ["--box", "99", "--rates", "500"], "drops"),
-        streaks("10,000 rates", ["--rates", ",".join(f"{1 + index / 100:.2f}" for index in range(10_000)), "--size", "8", "--box", "0.01"], "", (0, 2), endless=True, signalled=True),
-        streaks("no light", ["--light", "0,0,0"], "light"),
-        streaks("light from not-a-number", ["--light", "nan,0,0"], "allowed"),
-        streaks("light from very far", ["--light", "1e308,1e308,1e308"], "light", (0, 2)),
+        *[streaks(f"exposure {text!r}", ["--exposure-time", text], "allowed") for text in ("0", "1/0", "0/0", "1e308", "-1/30")],
+        *[streaks(f"box {text}", ["--cube-size", text], "allowed|cube") for text in ("0", "1e300", "nan")],
+        streaks("half a billion drops", ["--cube-size", "99", "--rates", "500"], "drops"),
+        streaks("10,000 rates", ["--rates", ",".join(f"{1 + index / 100:.2f}" for index in range(10_000)), "--size", "8", "--cube-size", "0.01"], "", (0, 2), endless=True, signaled=True),
+        streaks("no light", ["--light-direction", "0,0,0"], "light"),
+        streaks("light from not-a-number", ["--light-direction", "nan,0,0"], "allowed"),
+        streaks("light from very far", ["--light-direction", "1e308,1e308,1e308"], "light", (0, 2)),
         streaks("0 variants", ["--variants", "0"], "variants"),
-        streaks("a folder that is a file", ["--rates", "5", "--diameters", "2", "--size", "8", "--box", "0.1", "-o", "/dev/null"], "", (1, 2)),
+        streaks("a folder that is a file", ["--rates", "5", "--diameters", "2", "--size", "8", "--cube-size", "0.1", "-o", "/dev/null"], "", (1, 2)),
         Case("arguments", "simulate: nothing with particles", ["simulate", "scene.toml", "--particles", "a.ply"], 2, r"^error: nothing in this scene has particles", {"scene.toml": FLAME}),
         Case("arguments", "simulate: another extension", ["simulate", "scene.toml", "--particles", "a.obj"], 2, r"^error: ", {"scene.toml": FLAME}),
-        Case("arguments", "simulate: 10^12 particles", ["simulate", "scene.toml", "--particles", "a.ply"], 3, r"^error: scene\.toml:3:13: .*GiB", {"scene.toml": "bansho = 1\n[[flame_particles]]\nparticles = 1000000000000\n"}),
+        Case("arguments", "simulate: 10^12 particles", ["simulate", "scene.toml", "--particles", "a.ply"], 3, r"^error: scene\.toml:3:13: .*GiB", {"scene.toml": "bansho = 2\n[[flame_particles]]\nparticles = 1000000000000\n"}),
     ]
 
 
@@ -157,11 +157,11 @@ def _standard_output() -> list[Case]:
         "--version": ["--version"],
         "render --help": ["render", "--help"],
         "progress": ["render", "scene.toml", "-o", "out/a.png", "--progress", "json", "--threads", "2"],
-        "progress of streaks": ["streaks", "--rates", "5", "--diameters", "2", "--size", "8", "--box", "0.1", "-o", "s", "--progress", "json"],
+        "progress of streaks": ["streaks", "--rates", "5", "--diameters", "2", "--size", "8", "--cube-size", "0.1", "-o", "s", "--progress", "json"],
         "progress of a simulation": ["simulate", "gas.toml", "--particles", "p/a.ply", "--progress", "json"],
         "progress of a flipbook": ["flipbook", "scene.toml", "--grid", "1x2", "--size", "8x8", "-o", "b/a.png", "--progress", "json"],
     }
-    gas = "bansho = 1\n[picture]\nsize = [32, 24]\nframes = 2\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.0\n"
+    gas = "bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.0\n"
     files: dict[str, Content] = {"scene.toml": FLAME, "gas.toml": gas}
     leaves = ["out/*", "s/*", "p/*", "b/*", "a.toml"]
     full_cases = [Case("standard output", f"full: {name}", line, 1, full, files, stdout="/dev/full", leaves=leaves) for name, line in lines.items()]

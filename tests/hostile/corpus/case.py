@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 Content = bytes | str | Callable[[str], None]
 
 # Flags, and `-` for a scene, that programs before 0.3 lack.
-NEW = ("--overwrite", "--input-memory", "--root", "-")
+NEW = ("--overwrite", "--max-asset-memory", "--asset-root", "-")
 
 # A standard input that nobody writes to and nobody closes: a program that reads it waits until it is stopped.
 OPEN_PIPE = "an open pipe"
@@ -49,7 +49,7 @@ class Case:
     # Names (globs) of files that may be changed.
     changes: Sequence[str] = ()
     # Whether it is stopped by a signal in a second run too.
-    signalled: bool = False
+    signaled: bool = False
     # Whether it works for so long that it is only run to be stopped.
     endless: bool = False
     # Files so large that another process makes them, since the memory of this one would count as the program's.

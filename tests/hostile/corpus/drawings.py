@@ -2,14 +2,14 @@
 
 from .case import Case, Content, lines, parts
 
-SCENE = 'bansho = 1\n[picture]\nsize = [32, 24]\nframes = 2\n[[aurora]]\n[[aurora.shapes]]\n[[aurora.shapes.sheets]]\npath = "drawing.svg"\n'
+SCENE = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[[aurora]]\n[[aurora.shapes]]\n[[aurora.shapes.sheets]]\nsvg_file = "drawing.svg"\n'
 MEGA = 1_000_000
 LINE = '<path d="M1 5L9 5"/>'
 
 
 def _drawing(name: str, content: Content, code: int | tuple[int, ...] = 3, words: str = "", **more) -> Case:
     # What only shows once the strokes are laid out is told at the sheet, or at the list of them.
-    says = rf"^error: scene\.toml:(8:8: aurora\.0\.shapes\.0\.sheets\.0\.path .*drawing\.svg.*({words})|7:\d+: aurora\.0\.shapes\.0\.sheets.*allowed|7:\d+: aurora\.0\.shapes\.0\.sheets.*crosses itself)"
+    says = rf"^error: scene\.toml:(8:8: aurora\.0\.shapes\.0\.sheets\.0\.svg_file .*drawing\.svg.*({words})|7:\d+: aurora\.0\.shapes\.0\.sheets.*allowed|7:\d+: aurora\.0\.shapes\.0\.sheets.*crosses itself)"
     return Case("svg", name, ["check", "scene.toml"], code, says, {"scene.toml": SCENE, "drawing.svg": content}, **more)
 
 
@@ -50,9 +50,9 @@ def cases() -> list[Case]:
         _drawing("an unclosed attribute", "<svg><path d='M0 0", words="does not end"),
         _drawing("an attribute without quotes", "<svg a=1/>", words="quotes"),
         _drawing("tags that close what is not open", "</svg>" * 1000 + _svg(LINE), (0, 3)),
-        _drawing("1,000,000 tags that close nothing", parts(("</svg>", MEGA), (_svg(LINE), 1)), (0, 3), signalled=True, large=True),
-        _drawing("groups 100,000 deep", parts((head, 1), ("<g>", 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signalled=True),
-        _drawing("transforms 100,000 deep", parts((head, 1), ('<g transform="rotate(1) scale(1)">', 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signalled=True),
+        _drawing("1,000,000 tags that close nothing", parts(("</svg>", MEGA), (_svg(LINE), 1)), (0, 3), signaled=True, large=True),
+        _drawing("groups 100,000 deep", parts((head, 1), ("<g>", 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signaled=True),
+        _drawing("transforms 100,000 deep", parts((head, 1), ('<g transform="rotate(1) scale(1)">', 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signaled=True),
         _drawing("transforms that grow without end", parts((head, 1), ('<g transform="scale(10)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), words="infinitely far|transform"),
         _drawing("transforms that shrink to nothing", parts((head, 1), ('<g transform="scale(0.1)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), (0, 3)),
         _drawing("a transform of 100,000 parts", _svg(f'<path transform="{"rotate(1) " * 100_000}" d="M1 5L9 5"/>'), (0, 3)),
@@ -76,15 +76,15 @@ def cases() -> list[Case]:
         _path("a number of 100,000 digits", "M1 5L" + "9" * 100_000 + " 5", words="path"),
         _path("100,000 spaces", "M1 5L9" + " " * 100_000 + "5", 0),
         _path("100,000 closes", "M1 5L9 5" + "Z" * 100_000, (0, 3)),
-        _drawing("1,000,000 segments", lines(MEGA // 2, lambda index: f"L{index % 97} {index % 89}", head + '<path d="M1 5', '"/>' + tail), (0, 3), "points", signalled=True, large=True),
-        _drawing("3,000,000 segments", parts((head + '<path d="M1 5', 1), ("l1 0", 3 * MEGA), ('"/>' + tail, 1)), 3, "points", signalled=True, large=True),
-        _drawing("1,000,000 curves", parts((head + '<path d="M1 5', 1), ("c1 1 2 2 3 0", MEGA), ('"/>' + tail, 1)), 3, "points", signalled=True, large=True),
-        _drawing("100,000 strokes", parts((head, 1), (LINE, 100_000), (tail, 1)), (0, 3), signalled=True),
+        _drawing("1,000,000 segments", lines(MEGA // 2, lambda index: f"L{index % 97} {index % 89}", head + '<path d="M1 5', '"/>' + tail), (0, 3), "points", signaled=True, large=True),
+        _drawing("3,000,000 segments", parts((head + '<path d="M1 5', 1), ("l1 0", 3 * MEGA), ('"/>' + tail, 1)), 3, "points", signaled=True, large=True),
+        _drawing("1,000,000 curves", parts((head + '<path d="M1 5', 1), ("c1 1 2 2 3 0", MEGA), ('"/>' + tail, 1)), 3, "points", signaled=True, large=True),
+        _drawing("100,000 strokes", parts((head, 1), (LINE, 100_000), (tail, 1)), (0, 3), signaled=True),
         _drawing("100,000 attributes", parts((head + "<path ", 1), ("a='1' ", 100_000), ("d='M1 5L9 5'/>" + tail, 1)), 0),
         _drawing("10,000 bracketed declarations", parts(("<!DOCTYPE svg [ ] >", 10_000), (_svg(LINE), 1)), (0, 3)),
-        _drawing("1,000,000 declarations without brackets", parts(("<!a>", MEGA), (_svg(LINE), 1)), (0, 3), signalled=True, large=True),
-        _drawing("15 MB of text", parts((head, 1), ("a" * 1000, 15_000), (LINE + tail, 1)), 0, signalled=True, large=True),
+        _drawing("1,000,000 declarations without brackets", parts(("<!a>", MEGA), (_svg(LINE), 1)), (0, 3), signaled=True, large=True),
+        _drawing("15 MB of text", parts((head, 1), ("a" * 1000, 15_000), (LINE + tail, 1)), 0, signaled=True, large=True),
         _drawing("an id of a megabyte", _svg(f'<path id="{"a" * MEGA}" d="L"/>'), words="path"),
-        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:10: aurora\.0\.shapes\.0\.sheets\.0\.stroke .*no stroke of the id `gone`",
-             {"scene.toml": SCENE + 'stroke = "gone"\n', "drawing.svg": _svg(LINE)}),
+        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:10: aurora\.0\.shapes\.0\.sheets\.0\.svg_path_id .*no stroke of the id `gone`",
+             {"scene.toml": SCENE + 'svg_path_id = "gone"\n', "drawing.svg": _svg(LINE)}),
     ]

@@ -7,7 +7,7 @@ def segment(marker: int, contents: bytes) -> bytes:
     return struct.pack(">BBH", 0xFF, marker, len(contents) + 2) + contents
 
 
-QUANTISATION = segment(0xDB, b"\0" + b"\1" * 64)
+QUANTIZATION = segment(0xDB, b"\0" + b"\1" * 64)
 
 
 def huffman(table: int, symbols: bytes) -> bytes:
@@ -36,7 +36,7 @@ def baseline(width: int, height: int, components: int = 1, blocks: int | None = 
     """Gray; every block is two zero bits. `blocks` of them are there, or all."""
     if blocks is None:
         blocks = components * -(-width // 8) * -(-height // 8)
-    tables = QUANTISATION + huffman(0x00, b"\0") + huffman(0x10, b"\0")
+    tables = QUANTIZATION + huffman(0x00, b"\0") + huffman(0x10, b"\0")
     data = padded(0, 2 * blocks)
     return b"\xff\xd8" + tables + frame(0xC0, width, height, components) + scan(components, 0, 63, 0, data) + b"\xff\xd9"
 
@@ -44,7 +44,7 @@ def baseline(width: int, height: int, components: int = 1, blocks: int | None = 
 def progressive_bomb(width: int, height: int, scans: int) -> bytes:
     """Scans that each visit all blocks of a large picture: one code says that the next 32767 are empty."""
     blocks = -(-width // 8) * -(-height // 8)
-    tables = QUANTISATION + huffman(0x00, b"\0") + huffman(0x10, b"\xe0")
+    tables = QUANTIZATION + huffman(0x00, b"\0") + huffman(0x10, b"\xe0")
     bits, count = 0, 0
     for _ in range(-(-blocks // 32767)):
         # The code of one bit, then fourteen ones: a run of 2^14 + 16383 blocks.

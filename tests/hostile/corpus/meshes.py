@@ -6,7 +6,7 @@ import struct
 from . import gltf
 from .case import Case, Content, built, lines, parts
 
-SCENE = 'bansho = 1\n[picture]\nsize = [32, 24]\nframes = 2\n[[flame_sheet]]\n[[obstacle]]\nshape = "mesh"\nfile = "{}"\n'
+SCENE = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[[flame_sheet]]\n[[obstacle]]\nshape = "mesh"\nfile = "{}"\n'
 MEGA = 1_000_000
 
 
@@ -47,9 +47,9 @@ def _nodes() -> list[Case]:
         nodes("a scale of 1e30", [{"mesh": 0, "scale": [1e30] * 3}], "", (0, 3)),
         nodes("a scale of 1e-30", [{"mesh": 0, "scale": [1e-30] * 3}], "", (0, 3)),
         nodes("a rotation of no length", [{"mesh": 0, "rotation": [0, 0, 0, 0]}], "", (0, 3)),
-        _text("100,000 nodes deep", lines(99_999, lambda index: f'{{"children": [{index + 1}]}},', head, '{"mesh": 0}' + tail), (0, 3), "nodes", signalled=True),
+        _text("100,000 nodes deep", lines(99_999, lambda index: f'{{"children": [{index + 1}]}},', head, '{"mesh": 0}' + tail), (0, 3), "nodes", signaled=True),
         _text("200,000 nodes", parts((head, 1), ("{},", 199_999), ('{"mesh": 0}' + tail, 1)), 3, "nodes"),
-        _text("3,000,000 nodes", parts((head, 1), ("{},", 2_999_999), ('{"mesh": 0}' + tail, 1)), 3, "nodes|values", signalled=True, large=True),
+        _text("3,000,000 nodes", parts((head, 1), ("{},", 2_999_999), ('{"mesh": 0}' + tail, 1)), 3, "nodes|values", signaled=True, large=True),
     ]
 
 
@@ -73,19 +73,19 @@ def _bombs() -> list[Case]:
 
     all_nodes = [{"nodes": list(range(2000))}]
     return [
-        _text("1,000,000 points on 2,000 nodes", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}], nodes=shown, scenes=all_nodes), 3, "triangles", extra=zeros, signalled=True),
-        _text("1,000,000 vertices on 2,000 nodes", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}], nodes=shown, scenes=all_nodes), 3, "triangles|vertices", extra=zeros, signalled=True),
-        _text("1,000,000 vertices", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}]), (0, 3), "triangles", extra=zeros, signalled=True),
-        _text("1,000,000 strips on one accessor", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}] * 2000}]), 3, "triangles|vertices", extra=zeros, signalled=True),
-        _text("2,000 buffers of one file", gltf.changed(buffers=[buffer] * 2000, bufferViews_0_buffer=1999), 3, "", extra=zeros, signalled=True),
-        _text("2,000 buffers of one file by 2,000 names", built(lambda: gltf.changed(buffers=[{"byteLength": 12 * MEGA, "uri": "./" * index + "zeros.bin"} for index in range(2000)]).encode()), 3, "bytes|allowed|memory", extra=zeros, signalled=True),
-        _text("a buffer of 12 MB, in each of 100 nodes", big(nodes=[{"mesh": index} for index in range(100)], meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}] * 100, scenes=[{"nodes": list(range(100))}]), 3, "triangles|vertices", extra=zeros, signalled=True),
-        _text("bufferViews of 2,000,000 elements", parts((views[0], 1), ("{},", 1_999_000), ("{}" + views[1], 1)), 3, "", signalled=True, large=True),
+        _text("1,000,000 points on 2,000 nodes", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}], nodes=shown, scenes=all_nodes), 3, "triangles", extra=zeros, signaled=True),
+        _text("1,000,000 vertices on 2,000 nodes", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}], nodes=shown, scenes=all_nodes), 3, "triangles|vertices", extra=zeros, signaled=True),
+        _text("1,000,000 vertices", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}]), (0, 3), "triangles", extra=zeros, signaled=True),
+        _text("1,000,000 strips on one accessor", big(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}] * 2000}]), 3, "triangles|vertices", extra=zeros, signaled=True),
+        _text("2,000 buffers of one file", gltf.changed(buffers=[buffer] * 2000, bufferViews_0_buffer=1999), 3, "", extra=zeros, signaled=True),
+        _text("2,000 buffers of one file by 2,000 names", built(lambda: gltf.changed(buffers=[{"byteLength": 12 * MEGA, "uri": "./" * index + "zeros.bin"} for index in range(2000)]).encode()), 3, "bytes|allowed|memory", extra=zeros, signaled=True),
+        _text("a buffer of 12 MB, in each of 100 nodes", big(nodes=[{"mesh": index} for index in range(100)], meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}] * 100, scenes=[{"nodes": list(range(100))}]), 3, "triangles|vertices", extra=zeros, signaled=True),
+        _text("bufferViews of 2,000,000 elements", parts((views[0], 1), ("{},", 1_999_000), ("{}" + views[1], 1)), 3, "", signaled=True, large=True),
         _text("lists 100,000 deep", "[" * 100_000 + "]" * 100_000, 3, "JSON"),
         _text("objects 100,000 deep", '{"a":' * 100_000 + "1" + "}" * 100_000, 3, "JSON"),
-        _text("15 MB of spaces", parts((gltf.changed(), 1), (" ", 15 * MEGA)), 0, signalled=True, large=True),
-        _text("a base64 buffer of 15 MB", parts((strings[0] + "data:;base64,", 1), ("AAAA", 4 * MEGA), (strings[1], 1)), 3, "", signalled=True, large=True),
-        _text("an unknown extension of 2,000,000 keys", lines(1_900_000, lambda index: f'"{index}":0,', gltf.changed()[:-1] + ', "extras": {', '"a":0}}'), 0, signalled=True, large=True),
+        _text("15 MB of spaces", parts((gltf.changed(), 1), (" ", 15 * MEGA)), 0, signaled=True, large=True),
+        _text("a base64 buffer of 15 MB", parts((strings[0] + "data:;base64,", 1), ("AAAA", 4 * MEGA), (strings[1], 1)), 3, "", signaled=True, large=True),
+        _text("an unknown extension of 2,000,000 keys", lines(1_900_000, lambda index: f'"{index}":0,', gltf.changed()[:-1] + ', "extras": {', '"a":0}}'), 0, signaled=True, large=True),
     ]
 
 
@@ -168,7 +168,7 @@ def _files() -> list[Case]:
         _mesh("text by the name of a binary", "glb", whole, 3, "binary glTF"),
         _mesh("binary by the name of a text", "gltf", glb, 3, "JSON"),
         Case("gltf", "burner without triangles", ["check", "scene.toml"], 3, r"^error: scene\.toml:5:8: flame_particles\.0\.burners\.0\.file.*mesh\.gltf",
-             {"scene.toml": 'bansho = 1\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = "mesh"\nfile = "mesh.gltf"\n', "mesh.gltf": gltf.changed(nodes=[])}),
+             {"scene.toml": 'bansho = 2\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = "mesh"\nfile = "mesh.gltf"\n', "mesh.gltf": gltf.changed(nodes=[])}),
         Case("gltf", "a mesh of an unknown kind", ["check", "scene.toml"], 3, r"^error: scene\.toml:8:8: obstacle\.0\.file.*mesh\.obj.*not a mesh Bansho reads", {"scene.toml": SCENE.format("mesh.obj"), "mesh.obj": "v 0 0 0\n"}),
         Case("gltf", "a mesh without a file", ["check", "scene.toml"], 3, r"^error: scene\.toml:\d+:\d+: obstacle\.0\.", {"scene.toml": SCENE.replace('file = "{}"\n', "")}),
     ]

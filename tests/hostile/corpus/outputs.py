@@ -7,7 +7,7 @@ from .scene_text import FLAME
 ONE = ["--frames", "0", "--threads", "2"]
 THERE = "somebody's own work\n"
 INPUT = r"is a file that the scene is read from; allowed: "
-GAS = "bansho = 1\n[picture]\nsize = [32, 24]\nframes = 3\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.0\n"
+GAS = "bansho = 2\n[picture]\nsize = [32, 24]\nframes = 3\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.0\n"
 
 
 def _out(name: str, path: str, code: int | tuple[int, ...], says: str, files: dict[str, Content] | None = None, **more) -> Case:
@@ -47,8 +47,8 @@ def _places() -> list[Case]:
         _out("a link to /dev/null", "a.png", (1, 2), no_file.format(r"a\.png"), {"a.png": link("/dev/null")}),
         _out("a link to /dev/full", "a.png", (1, 2), no_file.format(r"a\.png"), {"a.png": link("/dev/full")}),
         _out("a link to /dev/zero", "a.png", (1, 2), no_file.format(r"a\.png"), {"a.png": link("/dev/zero")}),
-        _out("a pipe", "a.png", (1, 2), no_file.format(r"a\.png"), {"a.png": pipe}, signalled=True),
-        _out("a pipe as a film", "a.gif", (1, 2), no_file.format(r"a\.gif"), {"a.gif": pipe}, signalled=True),
+        _out("a pipe", "a.png", (1, 2), no_file.format(r"a\.png"), {"a.png": pipe}, signaled=True),
+        _out("a pipe as a film", "a.gif", (1, 2), no_file.format(r"a\.gif"), {"a.gif": pipe}, signaled=True),
         _out("a folder", "a.png", (1, 2), r"^error: a\.png: is a folder", {"a.png": folder}),
         _out("a folder that is a file", "scene.toml/a.png", (1, 2), r"^error: scene\.toml/a\.png: "),
         _out("a link to itself", "a.png", (1, 2), r"^error: a\.png: ", {"a.png": link("a.png")}),
@@ -62,7 +62,7 @@ def _places() -> list[Case]:
         Case("output", "a film by an ffmpeg that fails", ["render", "scene.toml", "-o", "a.mp4", *ONE], 1, r"^error: a\.mp4: ffmpeg failed", {"scene.toml": FLAME, "bin/ffmpeg": with_mode("#!/bin/sh\nexit 3\n", 0o755)}, environment={"PATH": "bin:/nowhere"}),
         Case("output", "a film by an ffmpeg that reads nothing", ["render", "scene.toml", "-o", "a.mp4", "--threads", "2"], (0, 1), r"^error: a\.mp4: ", {"scene.toml": FLAME, "bin/ffmpeg": with_mode("#!/bin/sh\nexit 0\n", 0o755)}, environment={"PATH": "bin:/nowhere"}),
         Case("output", "a film by an ffmpeg that never ends", ["render", "scene.toml", "-o", "a.mp4", "--threads", "2"], 143, "", {"scene.toml": FLAME, "bin/ffmpeg": with_mode("#!/bin/sh\nexec sleep 30\n", 0o755)},
-             environment={"PATH": "bin:/usr/bin:/bin"}, signalled=True, endless=True),
+             environment={"PATH": "bin:/usr/bin:/bin"}, signaled=True, endless=True),
         Case("output", "no home", ["render", "scene.toml", "-o", "a.png", *ONE], 0, "", {"scene.toml": FLAME}, environment={"HOME": None, "XDG_CONFIG_HOME": None, "TMPDIR": "/nowhere"}),
         Case("output", "an empty environment", ["render", "scene.toml", "-o", "a.png", *ONE], 0, "", {"scene.toml": FLAME}, environment={"PATH": None, "HOME": None, "LANG": None, "TERM": None}),
         Case("output", "a locale that is not there", ["check", "scene.toml"], 0, "", {"scene.toml": FLAME}, environment={"LANG": "xx_XX.nothing", "LC_ALL": "xx"}),
@@ -89,9 +89,9 @@ def _inputs() -> list[Case]:
         *over("by a linked folder", "sub/plate.png", {"sub": link(".")}),
         *over("by a hard link", "hard.png", {"hard.png": hard_link("plate.png")}),
         *over("as a contact sheet", "", None, ["render", "scene.toml", "--contact-sheet", "2", "-o", "x/../plate.png"]),
-        *over("as a color sheet", "", {"scene.toml": plates.SCENE.format("a_colour.png"), "a_colour.png": flat}, ["flipbook", "scene.toml", "--grid", "1x2", "-o", "x/../a.png"]),
+        *over("as a color sheet", "", {"scene.toml": plates.SCENE.format("a_color.png"), "a_color.png": flat}, ["flipbook", "scene.toml", "--grid", "1x2", "-o", "x/../a.png"]),
         *over("as a motion sheet, by a link", "", {"a_motion.png": link("plate.png")}, ["flipbook", "scene.toml", "--grid", "1x2", "-o", "a.png"]),
-        *over("as figures, by a link", "", {"a.json": link("scene.toml"), "a.0000.json": link("scene.toml")}, ["render", "scene.toml", "--figures", "-o", "a.png", *ONE]),
+        *over("as figures, by a link", "", {"a.json": link("scene.toml"), "a.0000.json": link("scene.toml")}, ["render", "scene.toml", "--metadata", "-o", "a.png", *ONE]),
         *over("as a frame that is one of many", "", {"scene.toml": plates.SCENE.format("plate.####.png"), "plate.0000.png": flat, "plate.0001.png": flat}, ["render", "scene.toml", "-o", "plate.####.png"]),
         Case("over an input", "particles over a scene, by a link", ["simulate", "scene.toml", "--particles", "a.ply", "--frames", "0"], 2, "^error: .*" + INPUT, {"scene.toml": GAS, "a.ply": link("scene.toml")}),
         Case("over an input", "a snapshot over a scene, by a link", ["render", "scene.toml", "-o", "out/a.png", "--snapshots", "states", "--snapshot-every", "1", "--threads", "2"], (0, 1, 2), r"^error: ",
@@ -122,12 +122,12 @@ def _others() -> list[Case]:
         *[case for extension in ("png", "exr", "apng", "gif") for case in other(f"a .{extension}", render(f"a.{extension}"), f"a.{extension}")],
         *other("a picture of somebody", render("a.png"), "a.png", png.flat(32, 24)),
         *other("one frame of two", ["render", "scene.toml", "-o", "a.png", "--threads", "2"], "a.0001.png"),
-        *other("figures", render("a.png", "--figures"), "a.json"),
+        *other("figures", render("a.png", "--metadata"), "a.json"),
         *other("a contact sheet", ["render", "scene.toml", "--contact-sheet", "2", "-o", "a.png", "--threads", "2"], "a.png"),
         *other("a flipbook's JSON", ["flipbook", "scene.toml", "--grid", "1x2", "--size", "8x8", "-o", "a.png"], "a.json"),
         *other("a flipbook's motion", ["flipbook", "scene.toml", "--grid", "1x2", "--size", "8x8", "-o", "a.png"], "a_motion.png"),
         *other("particles", ["simulate", "scene.toml", "--particles", "a.ply", "--frames", "0"], "a.ply", THERE, GAS),
-        *other("an index of streaks", ["streaks", "--rates", "5", "--diameters", "2", "--size", "8", "--box", "0.1", "-o", "s"], "s/streaks.json"),
+        *other("an index of streaks", ["streaks", "--rates", "5", "--diameters", "2", "--size", "8", "--cube-size", "0.1", "-o", "s"], "s/streaks.json"),
         *other("with --resume", render("a.png", "--resume"), "a.png"),
         # Nobody's work is in it: it may be replaced or kept.
         Case("somebody's file", "an empty file", render("a.png"), (0, 2), r"^error: .*a\.png", {"scene.toml": FLAME, "a.png": ""}, changes=["a.png"]),

@@ -7,8 +7,8 @@ import zlib
 from . import exr, jpeg, png
 from .case import Case, Content, built
 
-SCENE = 'bansho = 1\n[picture]\nsize = [32, 24]\nframes = 2\n[plate]\nimage = "{}"\n[[flame_sheet]]\n'
-DEPTH = 'bansho = 1\n[picture]\nsize = [32, 24]\nframes = 2\n[plate]\nimage = "flat.png"\ndepth = "{}"\n[[flame_sheet]]\n'
+SCENE = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[plate]\nimage = "{}"\n[[flame_sheet]]\n'
+DEPTH = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[plate]\nimage = "flat.png"\ndepth = "{}"\n[[flame_sheet]]\n'
 MEGA = 1_000_000
 LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
@@ -30,7 +30,7 @@ def cut(extension: str, whole: bytes, keep: int, count: int = 40) -> Case:
     return Case(extension, f"cut off at {len(places)} places", ["check", *(f"{place}.toml" for place in places)], 3, says, files, errors=len(places))
 
 
-def spoilt(extension: str, whole: bytes, step: int) -> Case:
+def spoiled(extension: str, whole: bytes, step: int) -> Case:
     """A plate with one wrong byte at every so many places: some of them are refused, none ends the program."""
     places = range(0, len(whole), step)
     files: dict[str, Content] = {}
@@ -57,7 +57,7 @@ def _png() -> list[Case]:
     return [
         plate("whole", "png", flat, 0),
         cut("png", small, 16),
-        spoilt("png", small, 7),
+        spoiled("png", small, 7),
         plate("empty", "png", b"", words="damaged"),
         plate("signature alone", "png", png.SIGNATURE, words="damaged"),
         plate("text", "png", "no picture\n" * 100, words="damaged"),
@@ -72,14 +72,14 @@ def _png() -> list[Case]:
         plate("16384 x 1", "png", png.flat(16384, 1), 0),
         plate("16384 x 16384, few bytes", "png", png.with_pixels(16384, 16384, zlib.compress(bytes(1000))), words="in all|more than its"),
         plate("8192 x 8192, few bytes", "png", png.with_pixels(8192, 8192, zlib.compress(bytes(1000))), words="more than its"),
-        plate("bomb: 16384 x 8192, 16 bits, gray", "png", built(lambda: png.flat(16384, 8192, 16, png.GREY)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("bomb: 16384 x 8192, 16 bits, color and alpha", "png", built(lambda: png.flat(16384, 8192, 16, png.RGBA)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("bomb: 16384 x 8192, 1 bit", "png", built(lambda: png.flat(16384, 8192, 1, png.GREY)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("8192 x 8192, 16 bits", "png", built(lambda: png.flat(8192, 8192, 16, png.RGBA)), (0, 3), "GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("4096 x 4096", "png", built(lambda: png.flat(4096, 4096)), 0, signalled=True, large=True),
-        Case("png", "bomb with more memory for inputs", ["check", "--input-memory", "64KiB", "scene.toml"], (2, 3), r"^error: ",
+        plate("bomb: 16384 x 8192, 16 bits, gray", "png", built(lambda: png.flat(16384, 8192, 16, png.GREY)), words="GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("bomb: 16384 x 8192, 16 bits, color and alpha", "png", built(lambda: png.flat(16384, 8192, 16, png.RGBA)), words="GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("bomb: 16384 x 8192, 1 bit", "png", built(lambda: png.flat(16384, 8192, 1, png.GREY)), words="GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("8192 x 8192, 16 bits", "png", built(lambda: png.flat(8192, 8192, 16, png.RGBA)), (0, 3), "GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("4096 x 4096", "png", built(lambda: png.flat(4096, 4096)), 0, signaled=True, large=True),
+        Case("png", "bomb with more memory for inputs", ["check", "--max-asset-memory", "64KiB", "scene.toml"], (2, 3), r"^error: ",
              {"scene.toml": SCENE.format("plate.png"), "plate.png": png.flat(512, 512)}),
-        plate("pixels that inflate to more", "png", built(lambda: png.with_pixels(32, 24, compressed(600 * MEGA))), (0, 3), "damaged", signalled=True, large=True),
+        plate("pixels that inflate to more", "png", built(lambda: png.with_pixels(32, 24, compressed(600 * MEGA))), (0, 3), "damaged", signaled=True, large=True),
         plate("pixels that inflate to less", "png", png.with_pixels(32, 24, zlib.compress(bytes(100))), words="damaged"),
         plate("pixels that are no zlib", "png", png.with_pixels(32, 24, b"\xff" * 5000), words="damaged"),
         plate("zlib with a dictionary", "png", png.with_pixels(32, 24, b"\x78\xbb" + bytes(50)), words="damaged"),
@@ -92,17 +92,17 @@ def _png() -> list[Case]:
         plate("two headers", "png", png.SIGNATURE + header + png.header(9, 9) + pixels + png.END, (0, 3), "damaged"),
         plate("pixels before the header", "png", png.SIGNATURE + pixels + header + png.END, words="damaged"),
         plate("an unknown critical chunk", "png", png.flat(32, 24, extra=png.chunk(b"ABCD", b"x")), (0, 3), "damaged"),
-        plate("palette missing", "png", png.flat(32, 24, colour=png.PALETTE), words="damaged"),
-        plate("palette of nothing", "png", png.flat(32, 24, colour=png.PALETTE, extra=png.chunk(b"PLTE", b"")), (0, 3), "damaged"),
+        plate("palette missing", "png", png.flat(32, 24, color=png.PALETTE), words="damaged"),
+        plate("palette of nothing", "png", png.flat(32, 24, color=png.PALETTE, extra=png.chunk(b"PLTE", b"")), (0, 3), "damaged"),
         plate("palette too short for its pixels", "png", png.SIGNATURE + png.header(32, 24, 8, png.PALETTE) + png.chunk(b"PLTE", b"\1\2\3")
               + png.chunk(b"IDAT", zlib.compress((b"\0" + b"\xff" * 32) * 24)) + png.END, (0, 3), "damaged"),
         plate("7 bits", "png", png.flat(32, 24, 7), words="damaged"),
         plate("color type 5", "png", png.SIGNATURE + png.header(32, 24, 8, 5) + pixels + png.END, words="damaged"),
         plate("interlaced", "png", png.flat(32, 24, interlace=1), (0, 3), "damaged"),
         plate("interlaced by a method of tomorrow", "png", png.flat(32, 24, interlace=9), words="damaged"),
-        plate("bomb in zTXt", "png", built(lambda: with_chunk(b"zTXt", b"k\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signalled=True, large=True),
-        plate("bomb in iTXt", "png", built(lambda: with_chunk(b"iTXt", b"k\0\1\0\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signalled=True, large=True),
-        plate("bomb in iCCP", "png", built(lambda: with_chunk(b"iCCP", b"icc\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signalled=True, large=True),
+        plate("bomb in zTXt", "png", built(lambda: with_chunk(b"zTXt", b"k\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signaled=True, large=True),
+        plate("bomb in iTXt", "png", built(lambda: with_chunk(b"iTXt", b"k\0\1\0\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signaled=True, large=True),
+        plate("bomb in iCCP", "png", built(lambda: with_chunk(b"iCCP", b"icc\0\0" + compressed(400 * MEGA))), (0, 3), "damaged", signaled=True, large=True),
         plate("1,000 times a text of 60 kB", "png", built(lambda: png.flat(32, 24, extra=png.chunk(b"tEXt", b"k\0" + b"a" * 60_000) * 1000)), (0, 3), "damaged", large=True),
         plate("Exif of nothing", "png", with_chunk(b"eXIf", b""), 0),
         plate("Exif that names itself", "png", with_chunk(b"eXIf", tiff + struct.pack("<HHII", 0x8769, 4, 1, 8) + struct.pack("<I", 8)), 0),
@@ -118,7 +118,7 @@ def _png() -> list[Case]:
 
 def _jpeg() -> list[Case]:
     whole = jpeg.baseline(64, 48)
-    tables = jpeg.QUANTISATION + jpeg.huffman(0x00, b"\0") + jpeg.huffman(0x10, b"\0")
+    tables = jpeg.QUANTIZATION + jpeg.huffman(0x00, b"\0") + jpeg.huffman(0x10, b"\0")
     exif = jpeg.segment(0xE1, b"Exif\0\0II*\0" + struct.pack("<IH", 8, 65535) + bytes(100))
     frame, scan = jpeg.frame(0xC0, 64, 48, 1), jpeg.scan(1, 0, 63, 0, jpeg.padded(0, 2 * 48))
     start, end = b"\xff\xd8", b"\xff\xd9"
@@ -128,17 +128,17 @@ def _jpeg() -> list[Case]:
         plate("cut off within its tables", "jpg", whole[:50], words="damaged"),
         plate("cut off within its frame", "jpg", whole[:125], words="damaged"),
         plate("cut off before its pixels", "jpg", whole[: -len(end) - 12], (0, 3), "damaged"),
-        spoilt("jpg", whole, 3),
+        spoiled("jpg", whole, 3),
         plate("CMYK", "jpg", jpeg.baseline(64, 48, 4), (0, 3), "damaged"),
         plate("nine components", "jpg", start + tables + jpeg.frame(0xC0, 64, 48, 9) + scan + end, words="damaged"),
         plate("65535 x 65535", "jpg", jpeg.baseline(65535, 65535, 1, 100), words="16384"),
-        plate("16000 x 8000, few bytes", "jpg", jpeg.baseline(16000, 8000, 1, 100), words="GiB|MiB|memory|more than|damaged", signalled=True),
-        plate("bomb: 16000 x 8000", "jpg", built(lambda: jpeg.baseline(16000, 8000)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("8000 x 8000, whole", "jpg", built(lambda: jpeg.baseline(8000, 8000)), (0, 3), "GiB|MiB|memory|allowed", signalled=True, large=True),
+        plate("16000 x 8000, few bytes", "jpg", jpeg.baseline(16000, 8000, 1, 100), words="GiB|MiB|memory|more than|damaged", signaled=True),
+        plate("bomb: 16000 x 8000", "jpg", built(lambda: jpeg.baseline(16000, 8000)), words="GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("8000 x 8000, whole", "jpg", built(lambda: jpeg.baseline(8000, 8000)), (0, 3), "GiB|MiB|memory|allowed", signaled=True, large=True),
         plate("0 x 48", "jpg", jpeg.baseline(0, 48, 1, 1), words="damaged"),
         plate("64 x 0", "jpg", jpeg.baseline(64, 0, 1, 48), words="damaged"),
-        plate("progressive, 3,000 scans of 8000 x 8000", "jpg", built(lambda: jpeg.progressive_bomb(8000, 8000, 3000)), (0, 3), "damaged|scans|GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("progressive, 100,000 scans of 64 x 48", "jpg", built(lambda: jpeg.progressive_bomb(64, 48, 100_000)), (0, 3), "damaged|scans", signalled=True, large=True),
+        plate("progressive, 3,000 scans of 8000 x 8000", "jpg", built(lambda: jpeg.progressive_bomb(8000, 8000, 3000)), (0, 3), "damaged|scans|GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("progressive, 100,000 scans of 64 x 48", "jpg", built(lambda: jpeg.progressive_bomb(64, 48, 100_000)), (0, 3), "damaged|scans", signaled=True, large=True),
         plate("no tables", "jpg", start + frame + scan + end, words="damaged"),
         plate("tables of a bad length", "jpg", start + b"\xff\xdb\0\1" + frame + scan + end, words="damaged"),
         plate("a table of too many codes", "jpg", start + jpeg.segment(0xC4, b"\0" + b"\xff" * 16 + bytes(255)) + frame + scan + end, words="damaged"),
@@ -177,7 +177,7 @@ def _exr() -> list[Case]:
     return [
         plate("whole", "exr", whole, 0),
         cut("exr", whole, 1, 30),
-        spoilt("exr", whole[:400], 5),
+        spoiled("exr", whole[:400], 5),
         *[_garbage(compression) for compression in exr.COMPRESSIONS],
         plate("compression 77", "exr", one(exr.attributes(24, 16, compression=77)), words="damaged|compress"),
         plate("no channels", "exr", listed(b"\0"), words="damaged|channel"),
@@ -191,11 +191,11 @@ def _exr() -> list[Case]:
         plate("a window turned inside out", "exr", one(exr.attributes(24, 16, window=struct.pack("<iiii", 9, 9, 0, 0))), words="damaged|0 x 0"),
         plate("a window far away", "exr", one(exr.attributes(24, 16, window=struct.pack("<iiii", 2**31 - 20, 0, 2**31 - 1, 9))), (0, 3), "damaged|16384"),
         plate("16384 x 16384, few bytes", "exr", one(exr.attributes(16384, 16384)), words="in all|more than|damaged"),
-        plate("bomb: 16384 x 8192, zip", "exr", built(lambda: exr.zip_bomb(16384, 8192)), words="GiB|MiB|memory|allowed", signalled=True, large=True),
-        plate("bomb: 8192 x 8192, zip", "exr", built(lambda: exr.zip_bomb(8192, 8192)), (0, 3), "GiB|MiB|memory|allowed", signalled=True, large=True),
+        plate("bomb: 16384 x 8192, zip", "exr", built(lambda: exr.zip_bomb(16384, 8192)), words="GiB|MiB|memory|allowed", signaled=True, large=True),
+        plate("bomb: 8192 x 8192, zip", "exr", built(lambda: exr.zip_bomb(8192, 8192)), (0, 3), "GiB|MiB|memory|allowed", signaled=True, large=True),
         plate("bomb: 2048 x 2048 of 52 channels", "exr", built(lambda: exr.zip_bomb(2048, 2048, LETTERS)),
-              (0, 3), "GiB|MiB|memory|allowed|damaged", signalled=True, large=True),
-        plate("a block inflates to more", "exr", built(lambda: exr.scan_lines(64, 48, "zip", png.zeros_deflated(300 * MEGA))), words="damaged", signalled=True, large=True),
+              (0, 3), "GiB|MiB|memory|allowed|damaged", signaled=True, large=True),
+        plate("a block inflates to more", "exr", built(lambda: exr.scan_lines(64, 48, "zip", png.zeros_deflated(300 * MEGA))), words="damaged", signaled=True, large=True),
         plate("blocks beyond the file", "exr", exr.version() + exr.attributes(24, 16) + b"\0" + struct.pack("<Q", 2**63) * 16, words="damaged"),
         plate("all blocks at one place", "exr", exr.version() + exr.attributes(24, 16) + b"\0" + struct.pack("<Q", 1) * 16 + bytes(5000), words="damaged"),
         plate("a block of 2^31 - 1 bytes", "exr", exr.version() + exr.attributes(24, 16) + b"\0" + struct.pack("<Q", 500) * 16 + struct.pack("<ii", 0, 2**31 - 1) * 100, words="damaged"),

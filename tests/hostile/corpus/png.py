@@ -13,8 +13,8 @@ def chunk(kind: bytes, contents: bytes) -> bytes:
     return struct.pack(">I", len(contents)) + kind + contents + struct.pack(">I", zlib.crc32(contents, zlib.crc32(kind)))
 
 
-def header(width: int, height: int, bits: int = 8, colour: int = RGB, interlace: int = 0) -> bytes:
-    return chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, interlace))
+def header(width: int, height: int, bits: int = 8, color: int = RGB, interlace: int = 0) -> bytes:
+    return chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, color, 0, 0, interlace))
 
 
 def zeros_deflated(count: int) -> bytes:
@@ -31,11 +31,11 @@ def zeros_deflated(count: int) -> bytes:
     return head + block * (count // block_bytes - 1) + tail + struct.pack(">I", adler)
 
 
-def flat(width: int, height: int, bits: int = 8, colour: int = RGB, extra: bytes = b"", interlace: int = 0) -> bytes:
+def flat(width: int, height: int, bits: int = 8, color: int = RGB, extra: bytes = b"", interlace: int = 0) -> bytes:
     """A whole black picture, with chunks of `extra` before its pixels."""
-    row = 1 + (width * bits * CHANNELS[colour] + 7) // 8
+    row = 1 + (width * bits * CHANNELS[color] + 7) // 8
     pixels = zeros_deflated(row * height) if not interlace else zlib.compress(bytes(row * height * 2))
-    return SIGNATURE + header(width, height, bits, colour, interlace) + extra + chunk(b"IDAT", pixels) + END
+    return SIGNATURE + header(width, height, bits, color, interlace) + extra + chunk(b"IDAT", pixels) + END
 
 
 def gradient(side: int = 24) -> bytes:
@@ -44,6 +44,6 @@ def gradient(side: int = 24) -> bytes:
     return SIGNATURE + header(side, side) + chunk(b"IDAT", zlib.compress(rows)) + END
 
 
-def with_pixels(width: int, height: int, contents: bytes, bits: int = 8, colour: int = RGB) -> bytes:
+def with_pixels(width: int, height: int, contents: bytes, bits: int = 8, color: int = RGB) -> bytes:
     """A picture whose IDAT holds whatever is given."""
-    return SIGNATURE + header(width, height, bits, colour) + chunk(b"IDAT", contents) + END
+    return SIGNATURE + header(width, height, bits, color) + chunk(b"IDAT", contents) + END

@@ -36,10 +36,10 @@ def _scenes() -> list[Case]:
             continue
         says = r"^error: scene\.toml(:\d+:\d+)?: "
         files: dict[str, Content] = {**_beside(), "scene.toml": content}
-        made.append(Case("scene file", name, ["check", "scene.toml"], 3, says, files, signalled=waits))
+        made.append(Case("scene file", name, ["check", "scene.toml"], 3, says, files, signaled=waits))
     for command in (["render", "scene.toml", "-o", "out/a.png"], ["flipbook", "scene.toml", "--grid", "2x2"], ["simulate", "scene.toml", "--particles", "a.ply"], ["upgrade", "scene.toml"]):
         for name, content in (("a pipe", pipe), ("an endless device", link("/dev/zero"))):
-            made.append(Case("scene file", f"{command[0]}: {name}", command, 3, r"^error: scene\.toml: ", {"scene.toml": content}, signalled=True))
+            made.append(Case("scene file", f"{command[0]}: {name}", command, 3, r"^error: scene\.toml: ", {"scene.toml": content}, signaled=True))
     if os.geteuid() != 0:
         # Whoever is root may read everything.
         made.append(Case("scene file", "unreadable", ["check", "scene.toml"], 3, r"^error: scene\.toml: the scene cannot be read", {"scene.toml": with_mode(FLAME, 0)}))
@@ -70,10 +70,10 @@ def _standard_input() -> list[Case]:
         read("nothing", "", 3, place),
         read("no UTF-8", b"\xff\xfe", 3, place),
         read("17 MB", parts((FLAME, 1), ("#" * 99 + "\n", 180_000)), 3, place + r".*(16(\.0)? MiB|16777216|allowed)", large=True),
-        read("endless", link("/dev/zero"), 3, place + r".*(16(\.0)? MiB|16777216|allowed|UTF-8)", signalled=True),
+        read("endless", link("/dev/zero"), 3, place + r".*(16(\.0)? MiB|16777216|allowed|UTF-8)", signaled=True),
         read("closed", None, 3, place, CLOSED),
         read("a folder", folder, 3, place),
-        read("a pipe that nobody writes to", None, 3, place, OPEN_PIPE, endless=True, signalled=True),
+        read("a pipe that nobody writes to", None, 3, place, OPEN_PIPE, endless=True, signaled=True),
         Case("standard input", "two scenes from it", ["check", "-", "-"], (0, 2, 3), r"^error: ", {"scene": FLAME}, stdin="scene"),
         Case("standard input", "render", ["render", "-", "-o", "out/a.png", "--frames", "0", "--threads", "2"], 0, "", {"scene": FLAME}, stdin="scene"),
         Case("standard input", "a plate beside it that is missing", ["check", "-"], 3, r"^error: .*:6:9: plate\.image: .*gone\.png: no such file", {"scene": plates.SCENE.format("gone.png")}, stdin="scene"),
@@ -93,7 +93,7 @@ def _assets() -> list[Case]:
         ("mesh", "mesh.gltf", r"scene\.toml:8:8: obstacle\.0\.file.*: ", {"scene.toml": meshes.SCENE.format("mesh.gltf")}),
         ("mesh", "mesh.glb", r"scene\.toml:8:8: obstacle\.0\.file.*: ", {"scene.toml": meshes.SCENE.format("mesh.glb")}),
         ("buffer", "a.bin", r"scene\.toml:8:8: obstacle\.0\.file.*: ", {"scene.toml": meshes.SCENE.format("mesh.gltf"), "mesh.gltf": gltf.changed(buffers_0_uri="a.bin")}),
-        ("drawing", "drawing.svg", r"scene\.toml:8:8: aurora\.0\.shapes\.0\.sheets\.0\.path .*", {"scene.toml": drawings.SCENE}),
+        ("drawing", "drawing.svg", r"scene\.toml:8:8: aurora\.0\.shapes\.0\.sheets\.0\.svg_file .*", {"scene.toml": drawings.SCENE}),
     ]
     made = []
     for what, file, place, files in wanted:
@@ -102,7 +102,7 @@ def _assets() -> list[Case]:
             # Of frames after the first, a check looks only whether they are there.
             code = (0, 3) if file == "plate.0001.png" and callable(content) and name.startswith("a sparse") else 3
             if waits or file in ("plate.png", "mesh.gltf", "drawing.svg", "a.bin"):
-                made.append(Case(f"{what} file", f"{file}: {name}", ["check", "scene.toml"], code, rf"^error: {place}", {**_beside(), **files, file: content}, signalled=waits))
+                made.append(Case(f"{what} file", f"{file}: {name}", ["check", "scene.toml"], code, rf"^error: {place}", {**_beside(), **files, file: content}, signaled=waits))
     return made
 
 
@@ -112,7 +112,7 @@ def _confined() -> list[Case]:
 
     def confined(name: str, path: str, extra: dict[str, Content] | None = None, code: int = 3) -> Case:
         files: dict[str, Content] = {"inside/scene.toml": plates.SCENE.format(path), "outside.png": flat, "inside/here.png": flat, **(extra or {})}
-        return Case("root", name, ["check", "--root", "inside", "inside/scene.toml"], code, r"^error: inside/scene\.toml:6:9: plate\.image: ", files)
+        return Case("root", name, ["check", "--asset-root", "inside", "inside/scene.toml"], code, r"^error: inside/scene\.toml:6:9: plate\.image: ", files)
 
     mesh = {"inside/scene.toml": meshes.SCENE.format("mesh.gltf"), "inside/mesh.gltf": gltf.changed(buffers_0_uri="../a.bin"), "a.bin": gltf.BUFFER}
     return [
@@ -126,13 +126,13 @@ def _confined() -> list[Case]:
         confined("a folder that is not there", "gone/../../outside.png"),
         confined("a sequence of links", "l.#.png", {"inside/l.0.png": link("here.png"), "inside/l.1.png": link("../outside.png")}),
         confined("a folder of a like name", "../inside2/a.png", {"inside2/a.png": flat}),
-        Case("root", "a buffer outside", ["check", "--root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:8: obstacle\.0\.file", mesh),
-        Case("root", "a drawing outside", ["check", "--root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:8: aurora\.0\.shapes\.0\.sheets\.0\.path ",
+        Case("root", "a buffer outside", ["check", "--asset-root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:8: obstacle\.0\.file", mesh),
+        Case("root", "a drawing outside", ["check", "--asset-root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:8: aurora\.0\.shapes\.0\.sheets\.0\.svg_file ",
              {"inside/scene.toml": drawings.SCENE.replace("drawing.svg", "../drawing.svg"), "drawing.svg": '<svg><path d="M0 0L1 1"/></svg>'}),
-        Case("root", "rendered", ["render", "--root", "inside", "inside/scene.toml", "-o", "out/a.png", "--frames", "0"], 3, r"^error: inside/scene\.toml:6:9: plate\.image: ",
+        Case("root", "rendered", ["render", "--asset-root", "inside", "inside/scene.toml", "-o", "out/a.png", "--frames", "0"], 3, r"^error: inside/scene\.toml:6:9: plate\.image: ",
              {"inside/scene.toml": plates.SCENE.format("../outside.png"), "outside.png": flat}),
-        Case("root", "a root that is not there", ["check", "--root", "gone", "scene.toml"], (1, 2, 3), r"^error: .*gone", {"scene.toml": FLAME}),
-        Case("root", "a root that is a file", ["check", "--root", "scene.toml", "scene.toml"], (1, 2, 3), r"^error: ", {"scene.toml": plates.SCENE.format("here.png"), "here.png": flat}),
+        Case("root", "a root that is not there", ["check", "--asset-root", "gone", "scene.toml"], (1, 2, 3), r"^error: .*gone", {"scene.toml": FLAME}),
+        Case("root", "a root that is a file", ["check", "--asset-root", "scene.toml", "scene.toml"], (1, 2, 3), r"^error: ", {"scene.toml": plates.SCENE.format("here.png"), "here.png": flat}),
     ]
 
 
@@ -140,12 +140,12 @@ def _lengths() -> list[Case]:
     """Ordinary files that begin well and then have no end worth waiting for."""
     long = 3_900_000_000
     return [
-        Case("plate file", "a whole PNG and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:6:9: ", {"scene.toml": plates.SCENE.format("plate.png"), "plate.png": sparse(long, png.flat(32, 24))}, signalled=True),
-        Case("plate file", "a whole EXR and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:6:9: ", {"scene.toml": plates.SCENE.format("plate.exr"), "plate.exr": sparse(long, exr.black(24, 16))}, signalled=True),
-        Case("mesh file", "a whole binary glTF and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:8:8: ", {"scene.toml": meshes.SCENE.format("mesh.glb"), "mesh.glb": sparse(long, gltf.binary())}, signalled=True),
+        Case("plate file", "a whole PNG and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:6:9: ", {"scene.toml": plates.SCENE.format("plate.png"), "plate.png": sparse(long, png.flat(32, 24))}, signaled=True),
+        Case("plate file", "a whole EXR and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:6:9: ", {"scene.toml": plates.SCENE.format("plate.exr"), "plate.exr": sparse(long, exr.black(24, 16))}, signaled=True),
+        Case("mesh file", "a whole binary glTF and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:8:8: ", {"scene.toml": meshes.SCENE.format("mesh.glb"), "mesh.glb": sparse(long, gltf.binary())}, signaled=True),
         Case("buffer file", "a buffer and 3.9 GB behind it", ["check", "scene.toml"], (0, 3), r"^error: scene\.toml:8:8: ",
-             {"scene.toml": meshes.SCENE.format("mesh.gltf"), "mesh.gltf": gltf.changed(buffers_0_uri="a.bin"), "a.bin": sparse(long, gltf.BUFFER)}, signalled=True),
-        Case("scene file", "a scene and 3.9 GB behind it", ["check", "scene.toml"], 3, r"^error: scene\.toml: .*(16(\.0)? MiB|16777216|allowed)", {"scene.toml": sparse(long, FLAME.encode())}, signalled=True),
+             {"scene.toml": meshes.SCENE.format("mesh.gltf"), "mesh.gltf": gltf.changed(buffers_0_uri="a.bin"), "a.bin": sparse(long, gltf.BUFFER)}, signaled=True),
+        Case("scene file", "a scene and 3.9 GB behind it", ["check", "scene.toml"], 3, r"^error: scene\.toml: .*(16(\.0)? MiB|16777216|allowed)", {"scene.toml": sparse(long, FLAME.encode())}, signaled=True),
     ]
 
 

@@ -82,7 +82,7 @@ def _text(schema: dict, what: str, index: int) -> str | None:
 
 def _lines(tables: list[tuple[Path, dict]], choose) -> tuple[list[str], list[int]]:
     """The lines of a scene with a value for each parameter, and the numbers of those lines."""
-    text, stated, index = ["bansho = 1"], [], 0
+    text, stated, index = ["bansho = 2"], [], 0
     for path, table in tables:
         text.append(_header(path))
         for key, schema in table["properties"].items():

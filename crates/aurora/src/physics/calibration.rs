@@ -91,10 +91,10 @@ struct SpectrumBounds {
 }
 
 const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
-    SpectrumBounds { name: "arc", spectrum: ARC, mean_ratio: 1.0, peak_flux_ratio: 1.0, low_green_kev: 3.0 },
+    SpectrumBounds { name: "gaussian", spectrum: ARC, mean_ratio: 1.0, peak_flux_ratio: 1.0, low_green_kev: 3.0 },
     // 3 keV alone peaks at 122 km; only a spread of energies moves the green peak below 120 km.
     SpectrumBounds {
-        name: "single",
+        name: "monoenergetic",
         spectrum: Spectrum::Monoenergetic,
         mean_ratio: 1.0,
         peak_flux_ratio: 1.0,

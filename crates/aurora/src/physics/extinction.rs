@@ -18,7 +18,7 @@ bansho_base::parameters! {
         /// Aerosols at 550 nm, overhead; 0.3 is haze.
         aerosol: f64 = 0.09, limits(MAGNITUDES), unit("mag");
         /// Angstrom's exponent of the aerosols: how much more they take from shorter waves.
-        angstrom: f64 = 1.3, limits(Range::new(0.0, 4.0));
+        angstrom_exponent: f64 = 1.3, limits(Range::new(0.0, 4.0));
         /// Ozone at its visible maximum near 600 nm, overhead.
         ozone: f64 = 0.04, limits(MAGNITUDES), unit("mag");
     }
@@ -30,10 +30,11 @@ impl Extinction {
     pub fn magnitudes(&self, wavelength_nm: f64) -> f64 {
         let ratio = 550.0 / wavelength_nm;
         // The exponent 4.08 includes the dispersion of air in the visible.
-        let scattered = self.rayleigh * math::pow(ratio, 4.08) + self.aerosol * math::pow(ratio, self.angstrom);
+        let scattered =
+            self.rayleigh * math::pow(ratio, 4.08) + self.aerosol * math::pow(ratio, self.angstrom_exponent);
         // The Chappuis band, approximately a Gaussian about 595 nm.
-        let from_centre = (wavelength_nm - 595.0) / 50.0;
-        scattered + self.ozone * math::exp(-0.5 * from_centre * from_centre)
+        let from_center = (wavelength_nm - 595.0) / 50.0;
+        scattered + self.ozone * math::exp(-0.5 * from_center * from_center)
     }
 
     /// Transmittance at `elevation` radians above the horizon.

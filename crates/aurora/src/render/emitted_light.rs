@@ -77,8 +77,8 @@ mod tests {
     fn lamp(energy_ev: f64, factor: f64, north_km: f64) -> Option<Light> {
         let sheet = SheetParameters {
             points: Some(vec![[-90.0, -north_km], [90.0, -north_km]]),
-            energy: Curve::new(vec![[0.0, factor]], Interpolation::Linear).unwrap(),
-            fade: 0.0,
+            energy_factor: Curve::new(vec![[0.0, factor]], Interpolation::Linear).unwrap(),
+            end_taper: 0.0,
             ..SheetParameters::default()
         };
         let parameters = AuroraParameters {

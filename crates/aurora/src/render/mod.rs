@@ -18,5 +18,5 @@ pub(crate) mod shutter;
 #[cfg(test)]
 mod tests;
 
-pub use super::parameters::{Blur, BlurParameters, DrawingParameters, Sampling};
+pub use super::parameters::{Blur, BlurParameters, RenderingParameters, Sampling};
 pub use crate::physics::precipitation::TrackModel;

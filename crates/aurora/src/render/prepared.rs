@@ -81,9 +81,9 @@ impl<'a> PreparedAurora<'a> {
         let charts = ChartBuilder { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
-        let drawing = &aurora.simulation().parameters().drawing;
+        let drawing = &aurora.simulation().parameters().rendering;
         let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);
-        let displayed = if drawing.blur == Blur::Pixels {
+        let displayed = if drawing.blur_space == Blur::Screen {
             let samplers = [sharp.sampler(), soft.sampler()];
             DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &drawing.blur_radii))
         } else {

@@ -142,7 +142,7 @@ pub enum ShapeErrorKind {
         count: usize,
     },
     /// A split said in two ways.
-    #[error("says both `segment` and `at`; allowed: one of them")]
+    #[error("says both `segment` and `length_fraction`; allowed: one of them")]
     SegmentAndPosition,
     /// Two splits of one segment.
     #[error("segment {segment} of sheet {sheet} is split already; allowed: one split a segment")]
@@ -183,11 +183,11 @@ pub enum ShapeErrorKind {
         sheet: usize,
     },
     /// A link that says where a point arrives and not where it leaves.
-    #[error("says `arrives`, but not which point does; allowed: together with `at`")]
+    #[error("says `to_length_fraction`, but not which point does; allowed: together with `from_length_fraction`")]
     ArrivalWithoutPoint,
     /// A link that says where a point leaves and not where it arrives, of a sheet that is all one.
     #[error(
-        "says `at`, but not where that point arrives; allowed: together with `arrives`, or alone where the sheet splits"
+        "says `from_length_fraction`, but not where that point arrives; allowed: together with `to_length_fraction`, or alone where the sheet splits"
     )]
     PointWithoutArrival,
     /// Linked points that change their order.
@@ -197,16 +197,16 @@ pub enum ShapeErrorKind {
     #[error("sheets and points go in drawing order here; allowed with `correspondence = \"automatic\"`")]
     LinkInOrder,
     /// A sheet that is said in several ways.
-    #[error("sheet {sheet} says more than one of `points`, `path` and `form`; allowed: one of them")]
+    #[error("sheet {sheet} says more than one of `points`, `svg_file` and `form`; allowed: one of them")]
     SeveralSources {
         /// The sheet.
         sheet: usize,
     },
     /// A path of an SVG file that is not named.
-    #[error("names a path of an SVG file, but no file; allowed: together with `path`")]
+    #[error("names a path of an SVG file, but no file; allowed: together with `svg_file`")]
     StrokeWithoutFile,
     /// A time that is said in two ways.
-    #[error("says both `after_s` and `after_frames`; allowed: one of them")]
+    #[error("says both `transition_s` and `transition_frames`; allowed: one of them")]
     SecondsAndFrames,
     /// A time before the first shape.
     #[error(

@@ -7,17 +7,17 @@ bansho_base::choice! {
     pub enum Form {
         /// A quiet arc, its middle to the north.
         Arc = "arc",
-        /// A band with shallow waves (`count`).
+        /// A band with shallow waves (`wave_count`).
         Band = "band",
         /// An S whose middle runs back.
         SShape = "s_shape",
         /// A band that winds up at its eastern end (`bend_deg` 630 is one turn and three quarters).
         Spiral = "spiral",
-        /// A band with `count` folds whose flanks run back.
+        /// A band with `wave_count` folds whose flanks run back.
         Fold = "fold",
         /// A substorm's surge: a band that rises to the north and curls over.
         Surge = "surge",
-        /// A row of `count` tongues, wide at the top: omega bands.
+        /// A row of `wave_count` tongues, wide at the top: omega bands.
         Omega = "omega",
         /// A band whose eastern end peels off and folds back.
         Peel = "peel",

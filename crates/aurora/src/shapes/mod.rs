@@ -24,7 +24,7 @@ pub use geometry::{
 };
 pub use interpolation::gap::Bridge;
 pub use parameters::{
-    Correspondence, FRAME_S, LinkParameters, MergeParameters, MotionParameters, ShapeParameters, SheetParameters,
+    Correspondence, FRAME_S, LinkParameters, MergeParameters, MorphingParameters, ShapeParameters, SheetParameters,
     Spacing, SplitParameters,
 };
 pub(crate) use sequence::ControlPointIds;

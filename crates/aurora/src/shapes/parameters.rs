@@ -45,22 +45,22 @@ bansho_base::choice! {
 }
 
 bansho_base::parameters! {
-    /// One sheet of the aurora, seen from above, x east and z south of the point under the observer's zenith: a stroke (`points`), the strokes of an SVG file (`path`), or a named form.
+    /// One sheet of the aurora, seen from above, x east and z south of the point under the observer's zenith: a stroke (`points`), the paths of an SVG file (`svg_file`), or a named form.
     pub struct SheetParameters {
         /// Points [east, south] of the stroke.
         points: Option<Vec<[f64; 2]>> = None, limits(Length { min: 0, max: 100_000, item: KM }), unit("km");
         /// An SVG file whose paths are the strokes. Its view box is fitted to the drawn square.
-        path: Option<AssetPath> = None;
+        svg_file: Option<AssetPath> = None;
         /// The id of the one path of the SVG file that is meant; all of them where it is not given.
-        stroke: Option<String> = None;
-        /// A named form; an arc where neither `points` nor `path` is given.
+        svg_path_id: Option<String> = None;
+        /// A named form; an arc where neither `points` nor `svg_file` is given.
         form: Option<Form> = None;
         /// Length of the form along the sheet; `"auto"` is 0.6 of the drawn square.
         length_km: Auto<f64> = Auto::Auto, limits(Range::new(1.0, 20_000.0)), unit("km");
         /// How far the form bends; `"auto"` is what looks like its name.
         bend_deg: Auto<f64> = Auto::Auto, limits(Range::new(-1440.0, 1440.0)), unit("degrees");
         /// How many waves or folds the form has; `"auto"` is what looks like its name.
-        count: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 40.0));
+        wave_count: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 40.0));
         /// How many such sheets lie side by side.
         copies: i64 = 1, limits(Range::new(1.0, 32.0));
         /// How far apart they lie, toward the south.
@@ -76,11 +76,11 @@ bansho_base::parameters! {
         /// Draws a smooth line through the points of a sketch; strokes of 256 points and more are taken as they are.
         smooth: bool = true;
         /// Flux along the sheet as a factor of the aurora's, over the share of its length.
-        flux: Curve = even(), limits(CurveLimits::unit_to(0.0, 100.0));
+        flux_factor: Curve = even(), limits(CurveLimits::unit_to(0.0, 100.0));
         /// Share of the sheet's length over which its flux rises from nothing, at both ends; 0 lets it begin at once, as in the thesis.
-        fade: f64 = 0.3, limits(Range::new(0.0, 0.5));
+        end_taper: f64 = 0.3, limits(Range::new(0.0, 0.5));
         /// Energy along the sheet as a factor of the aurora's, over the share of its length.
-        energy: Curve = even(), limits(CurveLimits::unit_to(0.05, 20.0));
+        energy_factor: Curve = even(), limits(CurveLimits::unit_to(0.05, 20.0));
     }
 }
 
@@ -92,7 +92,7 @@ bansho_base::parameters! {
         /// The segment between two control points that opens, counted from 1.
         segment: Option<i64> = None, limits(Range::new(1.0, 100_000.0));
         /// Or the share of the sheet's length where it opens; the middle where neither is given.
-        at: Option<f64> = None, limits(Range::new(0.0, 1.0));
+        length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
     }
 }
 
@@ -102,7 +102,7 @@ bansho_base::parameters! {
         /// The two sheets, counted from 1.
         sheets: [i64; 2] = [1, 2], limits(Range::new(1.0, 1000.0));
         /// Which end of each: 0 its start, 1 its end; `"auto"` takes the two that are nearest to each other.
-        at: Auto<[f64; 2]> = Auto::Auto, limits(Range::new(0.0, 1.0));
+        ends: Auto<[f64; 2]> = Auto::Auto, limits(Range::new(0.0, 1.0));
     }
 }
 
@@ -114,9 +114,9 @@ bansho_base::parameters! {
         /// The sheet of this shape that it becomes, counted from 1.
         to: i64 = 1, limits(Range::new(1.0, 1000.0));
         /// Share of the first one's length at which a point leaves; where that sheet splits, the part that is meant.
-        at: Option<f64> = None, limits(Range::new(0.0, 1.0));
+        from_length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
         /// Share of the second one's length at which that point arrives; the whole sheet is linked where it is not given. Ends of sheets go to ends.
-        arrives: Option<f64> = None, limits(Range::new(0.0, 1.0));
+        to_length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
     }
 }
 
@@ -124,9 +124,9 @@ bansho_base::parameters! {
     /// The aurora's shape at a moment: its sheets, and what splits or merges on the way there.
     pub struct ShapeParameters {
         /// Time since the shape before was left; 4.667 s (140 frames of the thesis) where nothing is said. The first shape is there at the beginning.
-        after_s: Option<f64> = None, limits(Range::new(0.01, 1e5)), unit("s");
+        transition_s: Option<f64> = None, limits(Range::new(0.01, 1e5)), unit("s");
         /// The same in frames of 1/30 s.
-        after_frames: Option<f64> = None, limits(Range::new(1.0, 1e6));
+        transition_frames: Option<f64> = None, limits(Range::new(1.0, 1e6));
         /// How long it stays as it is.
         hold_s: f64 = 0.0, limits(Range::new(0.0, 1e5)), unit("s");
         /// Its sheets; one arc where the list is empty.
@@ -142,19 +142,19 @@ bansho_base::parameters! {
 
 bansho_base::parameters! {
     /// How one shape becomes the next.
-    pub struct MotionParameters {
+    pub struct MorphingParameters {
         /// Which point becomes which.
         correspondence: Correspondence = Correspondence::Automatic;
         /// Control points n of a sheet. `"auto"` is 32 in drawing order, as in the thesis, and 96 by place, so that folds that grow stay round.
         control_points: Auto<i64> = Auto::Auto, limits(Range::new(4.0, 512.0));
         /// How they lie on a drawn stroke.
-        spacing: Spacing = Spacing::ArcLength;
+        control_point_spacing: Spacing = Spacing::ArcLength;
         /// Frames of 1/30 s from one in-between shape to the next; the thesis takes 5 to 10.
-        renew_frames: f64 = 6.0, limits(Range::new(1.0, 60.0));
+        update_interval_frames: f64 = 6.0, limits(Range::new(1.0, 60.0));
     }
 }
 
-impl MotionParameters {
+impl MorphingParameters {
     /// Control points n of a sheet.
     pub fn point_count(&self) -> usize {
         match (self.control_points, self.correspondence) {
@@ -223,9 +223,9 @@ pub(super) fn default_shapes(extent_km: f64) -> Vec<ShapeParameters> {
         ..SheetParameters::default()
     };
     let shape = |strokes: &[[[f64; 2]; 8]; 2]| ShapeParameters {
-        after_s: Some(20.0),
+        transition_s: Some(20.0),
         sheets: strokes.iter().map(curtain).collect(),
         ..ShapeParameters::default()
     };
-    vec![ShapeParameters { after_s: None, ..shape(&DEFAULT_FIRST) }, shape(&DEFAULT_SECOND), shape(&DEFAULT_FIRST)]
+    vec![ShapeParameters { transition_s: None, ..shape(&DEFAULT_FIRST) }, shape(&DEFAULT_SECOND), shape(&DEFAULT_FIRST)]
 }

@@ -7,7 +7,7 @@ use bansho_base::{
 use rayon::prelude::*;
 
 use super::{
-    Correspondence, FRAME_S, MotionParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,
+    Correspondence, FRAME_S, MorphingParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,
     parameters::TRANSITION_S,
 };
 use crate::shapes::{
@@ -82,7 +82,7 @@ impl Sequence {
     /// Invalid shapes, with sheet and point; see [`ShapeErrorKind`].
     pub fn new(
         shapes: &[ShapeParameters],
-        motion: &MotionParameters,
+        motion: &MorphingParameters,
         extent_km: f64,
         assets: &dyn Assets,
         loop_s: Option<f64>,
@@ -282,13 +282,14 @@ fn timing(shapes: &[ShapeParameters]) -> Result<ShapeTiming, ShapeError> {
     let mut timing = ShapeTiming { arrivals: Vec::new(), departures: Vec::new() };
     for (index, shape) in shapes.iter().enumerate() {
         let error = |key: &str, kind| ShapeError { key: format!("shapes.{index}.{key}"), kind };
-        let after = match (shape.after_s, shape.after_frames) {
-            (Some(_), Some(_)) => return Err(error("after_frames", ShapeErrorKind::SecondsAndFrames)),
+        let after = match (shape.transition_s, shape.transition_frames) {
+            (Some(_), Some(_)) => return Err(error("transition_frames", ShapeErrorKind::SecondsAndFrames)),
             (Some(seconds), None) => seconds,
             (None, Some(frames)) => frames * FRAME_S,
             (None, None) => TRANSITION_S,
         };
-        let timed = [("after_s", shape.after_s.is_none()), ("after_frames", shape.after_frames.is_none())];
+        let timed =
+            [("transition_s", shape.transition_s.is_none()), ("transition_frames", shape.transition_frames.is_none())];
         if let Some((key, _)) = timed.into_iter().find(|(_, none)| index == 0 && !none) {
             return Err(error(key, ShapeErrorKind::TimeBeforeFirstShape));
         }

@@ -15,17 +15,17 @@ use super::*;
 const EXTENT_KM: f64 = 1000.0;
 
 fn sheet(points: &[[f64; 2]]) -> SheetParameters {
-    SheetParameters { points: Some(points.to_vec()), smooth: false, fade: 0.0, ..SheetParameters::default() }
+    SheetParameters { points: Some(points.to_vec()), smooth: false, end_taper: 0.0, ..SheetParameters::default() }
 }
 
 fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
-    ShapeParameters { after_s: Some(4.0), sheets, ..ShapeParameters::default() }
+    ShapeParameters { transition_s: Some(4.0), sheets, ..ShapeParameters::default() }
 }
 
 /// The first of the shapes is there at the beginning.
 fn begun(shapes: &[ShapeParameters]) -> Vec<ShapeParameters> {
     let mut shapes = shapes.to_vec();
-    shapes[0].after_s = None;
+    shapes[0].transition_s = None;
     shapes
 }
 
@@ -33,15 +33,15 @@ fn straight(from: f64, to: f64, z: f64) -> SheetParameters {
     sheet(&[[from, z], [to, z]])
 }
 
-fn in_order(control_points: i64) -> MotionParameters {
-    MotionParameters {
+fn in_order(control_points: i64) -> MorphingParameters {
+    MorphingParameters {
         correspondence: Correspondence::DrawingOrder,
         control_points: Auto::Set(control_points),
-        ..MotionParameters::default()
+        ..MorphingParameters::default()
     }
 }
 
-fn sequence(shapes: &[ShapeParameters], motion: &MotionParameters) -> Sequence {
+fn sequence(shapes: &[ShapeParameters], motion: &MorphingParameters) -> Sequence {
     Sequence::new(&begun(shapes), motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap()
 }
 
@@ -105,7 +105,7 @@ fn automatic_splits_and_merges_need_only_source_and_target() {
     two.split = vec![SplitParameters::default()];
     let mut again = shape(vec![sheet(&[[-200.0, 10.0], [0.0, 20.0], [200.0, 0.0]])]);
     again.merge = vec![MergeParameters::default()];
-    let sequence = sequence(&[one, two, again], &MotionParameters::default());
+    let sequence = sequence(&[one, two, again], &MorphingParameters::default());
     assert_no_jump(&sequence);
     // The gap opens and closes little by little.
     let gap = |t: f64| {
@@ -128,7 +128,7 @@ fn automatic_splits_and_merges_need_only_source_and_target() {
 fn sheets_have_the_order_in_which_they_were_drawn() {
     let first = shape(vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 100.0)]);
     let second = shape(vec![straight(200.0, -200.0, 110.0), straight(-200.0, 200.0, 10.0)]);
-    let sequence = sequence(&[first, second], &MotionParameters::default());
+    let sequence = sequence(&[first, second], &MorphingParameters::default());
     let last = points(&sequence.at(4.0));
     assert_eq!((last[0][0], last[1][0]), ([200.0, 110.0], [-200.0, 10.0]));
     let half = sequence.at(2.0);
@@ -143,11 +143,15 @@ fn sheets_have_the_order_in_which_they_were_drawn() {
 #[test]
 fn flux_and_energy_travel_with_the_sheet() {
     let curve = |from: f64, to: f64| Curve::new(vec![[0.0, from], [1.0, to]], Interpolation::Linear).unwrap();
-    let bright = SheetParameters { flux: curve(0.0, 2.0), energy: curve(1.0, 3.0), ..straight(-200.0, 200.0, 0.0) };
-    let dim = |from: f64, to: f64| SheetParameters { flux: curve(0.5, 0.5), ..straight(from, to, 0.0) };
+    let bright = SheetParameters {
+        flux_factor: curve(0.0, 2.0),
+        energy_factor: curve(1.0, 3.0),
+        ..straight(-200.0, 200.0, 0.0)
+    };
+    let dim = |from: f64, to: f64| SheetParameters { flux_factor: curve(0.5, 0.5), ..straight(from, to, 0.0) };
     let mut split = shape(vec![dim(-220.0, -20.0), dim(20.0, 220.0)]);
     split.split = vec![SplitParameters::default()];
-    let sequence = sequence(&[shape(vec![bright]), split], &MotionParameters::default());
+    let sequence = sequence(&[shape(vec![bright]), split], &MorphingParameters::default());
     let first = sequence.at(0.0);
     let flux = &first.sheets[0].flux;
     assert_eq!((flux[0], flux[flux.len() - 1]), (0.0, 2.0));
@@ -163,7 +167,7 @@ fn loops_close_whether_the_sequence_returns_or_not() {
     let shapes = [straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 80.0), straight(-150.0, 250.0, 20.0)];
     let mut shapes: Vec<ShapeParameters> = shapes.map(|sheet| shape(vec![sheet])).to_vec();
     let looped = |shapes: &[ShapeParameters]| {
-        Sequence::new(&begun(shapes), &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(6.0))
+        Sequence::new(&begun(shapes), &MorphingParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(6.0))
             .unwrap()
     };
     let there_and_back = looped(&shapes);
@@ -183,7 +187,7 @@ fn loops_close_whether_the_sequence_returns_or_not() {
     assert!((there_and_back.at(3.0).sheets[0].points[0].y - 20.0).abs() < 1e-9);
     assert!((round.at(2.0).sheets[0].points[0].y - 80.0).abs() < 1e-9);
     let error =
-        Sequence::new(&begun(&shapes), &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
+        Sequence::new(&begun(&shapes), &MorphingParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
     assert_eq!(error.unwrap_err().to_string(), "loop: a loop of 0 s; allowed: more than 0");
 }
 
@@ -197,7 +201,7 @@ fn random_shape(key: Key, case: u64, step: u32, sheets: usize) -> ShapeParameter
             form: Form::from_name(choice),
             length_km: Auto::Set(120.0 + 250.0 * length),
             bend_deg: if bend < 0.5 { Auto::Auto } else { Auto::Set(120.0 * (bend - 0.5)) },
-            count: if points < 0.7 { Auto::Auto } else { Auto::Set(1 + (points * 4.0) as i64) },
+            wave_count: if points < 0.7 { Auto::Auto } else { Auto::Set(1 + (points * 4.0) as i64) },
             mirror: mirror < 0.5,
             position_km: [200.0 * (x - 0.5), 200.0 * row as f64 - 300.0],
             rotation_deg: 30.0 * (turn - 0.5),
@@ -214,10 +218,11 @@ fn random_sequences_stay_finite_and_inside() {
     let mut made = 0;
     for case in 0..60 {
         let mut shapes: Vec<ShapeParameters> = (0..4).map(|step| random_shape(key, case, step, 4)).collect();
-        shapes[2].split = vec![SplitParameters { sheet: 1, at: Some((case % 11) as f64 / 10.0), segment: None }];
+        shapes[2].split =
+            vec![SplitParameters { sheet: 1, length_fraction: Some((case % 11) as f64 / 10.0), segment: None }];
         shapes[2].merge = vec![MergeParameters { sheets: [3, 4], ..MergeParameters::default() }];
         let motion =
-            MotionParameters { control_points: Auto::Set(8 + (case % 40) as i64), ..MotionParameters::default() };
+            MorphingParameters { control_points: Auto::Set(8 + (case % 40) as i64), ..MorphingParameters::default() };
         let loop_s = (case % 3 == 0).then_some(7.0);
         let Ok(sequence) = Sequence::new(&begun(&shapes), &motion, EXTENT_KM, &MemoryAssets::default(), loop_s) else {
             continue;
@@ -251,13 +256,13 @@ fn long_strokes_are_checked() {
         [radius * cos, radius * sin]
     };
     let spiral: Vec<[f64; 2]> = (0..10_000).map(|index| turn(index, 20.0 + index as f64 * 0.04)).collect();
-    let smooth = sequence(&[shape(vec![sheet(&spiral)])], &MotionParameters::default());
+    let smooth = sequence(&[shape(vec![sheet(&spiral)])], &MorphingParameters::default());
     assert!(smooth.at(0.0).length() > 1000.0);
     let crossed: Vec<[f64; 2]> =
         (0..10_000).map(|index| turn(index, 300.0 - (index as f64 - 5000.0).abs() * 0.04)).collect();
     let error = Sequence::new(
         &begun(&[shape(vec![sheet(&crossed)])]),
-        &MotionParameters::default(),
+        &MorphingParameters::default(),
         EXTENT_KM,
         &MemoryAssets::default(),
         None,
@@ -270,9 +275,9 @@ fn long_strokes_are_checked() {
 #[test]
 fn a_shape_that_returns_with_another_flux_is_another() {
     let flux = |value: f64| Curve::new(vec![[0.0, value]], Interpolation::Linear).unwrap();
-    let bright = SheetParameters { flux: flux(3.0), energy: flux(2.0), ..straight(-200.0, 200.0, 0.0) };
+    let bright = SheetParameters { flux_factor: flux(3.0), energy_factor: flux(2.0), ..straight(-200.0, 200.0, 0.0) };
     let shapes = [straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0), bright].map(|sheet| shape(vec![sheet]));
-    for motion in [in_order(9), MotionParameters::default()] {
+    for motion in [in_order(9), MorphingParameters::default()] {
         let once = sequence(&shapes, &motion);
         let last = &once.at(once.duration()).sheets[0];
         assert!(last.flux.iter().all(|flux| *flux == 3.0) && last.energy.iter().all(|energy| *energy == 2.0));
@@ -282,7 +287,7 @@ fn a_shape_that_returns_with_another_flux_is_another() {
     }
     // Said in other words it is the same still.
     let same = SheetParameters {
-        flux: Curve::new(vec![[0.0, 1.0], [1.0, 1.0]], Interpolation::Linear).unwrap(),
+        flux_factor: Curve::new(vec![[0.0, 1.0], [1.0, 1.0]], Interpolation::Linear).unwrap(),
         ..straight(-200.0, 200.0, 0.0)
     };
     let shapes = [shapes[0].clone(), shapes[1].clone(), shape(vec![same])];
@@ -305,7 +310,7 @@ fn sheets_that_cross_are_known_to_however_long_shapes_stay() {
         let first = ShapeParameters { hold_s, ..shape(sheets.clone()) };
         let second = ShapeParameters { link: vec![link(1, 2, None)], hold_s, ..shape(sheets.clone()) };
         let stays = [first.clone(), ShapeParameters { link: vec![], ..second.clone() }];
-        let motion = MotionParameters { control_points: Auto::Set(11), ..MotionParameters::default() };
+        let motion = MorphingParameters { control_points: Auto::Set(11), ..MorphingParameters::default() };
         assert_eq!(sequence(&[first, second], &motion).crossing(), Some(1), "held {hold_s} s");
         assert_eq!(sequence(&stays, &motion).crossing(), None);
     }
@@ -339,7 +344,7 @@ fn more_control_points_than_can_be_held_are_refused() {
     let row =
         |index: usize| SheetParameters { copies: 32, spacing_km: 1.0, ..straight(-200.0, 200.0, 33.0 * index as f64) };
     let full = shape((0..8).map(row).collect());
-    let motion = MotionParameters { control_points: Auto::Set(512), ..MotionParameters::default() };
+    let motion = MorphingParameters { control_points: Auto::Set(512), ..MorphingParameters::default() };
     let error = Sequence::new(&begun(&vec![full; 32]), &motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
     assert_eq!(error.key, "shapes.30.sheets");
     assert_eq!(error.kind, ShapeErrorKind::TooManyPoints { found: 31 * 256 * 512, most: 4_000_000 });
@@ -349,12 +354,17 @@ fn more_control_points_than_can_be_held_are_refused() {
 fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeError> {
     let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
     let shapes = [shape(sheets.clone()), ShapeParameters { link, ..shape(sheets) }];
-    let motion = MotionParameters { control_points: Auto::Set(11), ..MotionParameters::default() };
+    let motion = MorphingParameters { control_points: Auto::Set(11), ..MorphingParameters::default() };
     Sequence::new(&begun(&shapes), &motion, EXTENT_KM, &MemoryAssets::default(), None)
 }
 
 fn link(from: i64, to: i64, point: Option<[f64; 2]>) -> LinkParameters {
-    LinkParameters { from, to, at: point.map(|point| point[0]), arrives: point.map(|point| point[1]) }
+    LinkParameters {
+        from,
+        to,
+        from_length_fraction: point.map(|point| point[0]),
+        to_length_fraction: point.map(|point| point[1]),
+    }
 }
 
 #[test]
@@ -391,27 +401,27 @@ fn impossible_links_are_refused() {
     );
     let twice = refused(&[link(1, 2, None), link(2, 2, None)]);
     assert_eq!((twice.key.as_str(), twice.kind), ("shapes.1.link.1", ShapeErrorKind::LinkedTwice { sheet: 2 }));
-    let half = LinkParameters { arrives: Some(0.5), ..LinkParameters::default() };
+    let half = LinkParameters { to_length_fraction: Some(0.5), ..LinkParameters::default() };
     assert_eq!(refused(&[half]).kind, ShapeErrorKind::ArrivalWithoutPoint);
-    let nowhere = refused(&[link(1, 1, None), LinkParameters { at: Some(0.5), ..link(2, 2, None) }]);
+    let nowhere = refused(&[link(1, 1, None), LinkParameters { from_length_fraction: Some(0.5), ..link(2, 2, None) }]);
     assert_eq!((nowhere.key.as_str(), nowhere.kind), ("shapes.1.link.1", ShapeErrorKind::PointWithoutArrival));
     let passing = [[0.2, 0.3], [0.5, 0.8], [0.8, 0.6]].map(|point| link(1, 1, Some(point)));
     assert_eq!(refused(&passing).kind, ShapeErrorKind::LinksCross);
     let first =
-        [ShapeParameters { link: vec![link(1, 1, None)], after_s: None, ..shape(vec![straight(0.0, 9.0, 0.0)]) }];
+        [ShapeParameters { link: vec![link(1, 1, None)], transition_s: None, ..shape(vec![straight(0.0, 9.0, 0.0)]) }];
     let error =
-        Sequence::new(&first, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
+        Sequence::new(&first, &MorphingParameters::default(), EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
     assert_eq!(error.kind, ShapeErrorKind::ChangeBeforeFirstShape);
 }
 
 #[test]
 fn the_first_shape_takes_no_time_to_come() {
     for (key, first) in [
-        ("shapes.0.after_s", ShapeParameters { after_s: Some(2.0), ..ShapeParameters::default() }),
-        ("shapes.0.after_frames", ShapeParameters { after_frames: Some(2.0), ..ShapeParameters::default() }),
+        ("shapes.0.transition_s", ShapeParameters { transition_s: Some(2.0), ..ShapeParameters::default() }),
+        ("shapes.0.transition_frames", ShapeParameters { transition_frames: Some(2.0), ..ShapeParameters::default() }),
     ] {
         let shapes = [first, ShapeParameters::default()];
-        let error = Sequence::new(&shapes, &MotionParameters::default(), EXTENT_KM, &MemoryAssets::default(), None);
+        let error = Sequence::new(&shapes, &MorphingParameters::default(), EXTENT_KM, &MemoryAssets::default(), None);
         let error = error.unwrap_err();
         assert_eq!((error.key.as_str(), error.kind), (key, ShapeErrorKind::TimeBeforeFirstShape));
     }

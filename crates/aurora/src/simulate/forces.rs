@@ -39,7 +39,7 @@ impl Repulsion {
     pub(super) fn new(parameters: &AuroraParameters) -> Self {
         let particles = &parameters.particles;
         let [density_kernel, force_kernel] = match particles.kernel {
-            RepulsionKernel::Spline => [KernelShape::CubicSpline; 2],
+            RepulsionKernel::CubicSpline => [KernelShape::CubicSpline; 2],
             RepulsionKernel::Poly6Spiky => [KernelShape::Poly6, KernelShape::Spiky],
         };
         let cell = parameters.cell_km();
@@ -48,7 +48,7 @@ impl Repulsion {
             force: PressureForce::new(force_kernel),
             density_kernel,
             stiffness: (particles.repulsion * STIFFNESS * cell * cell / (FRAME_S * FRAME_S)) as f32,
-            neighbors: particles.neighbours,
+            neighbors: particles.neighbor_count,
             bounds_km: SUPPORT_CELLS.map(|cells| cells * cell),
             masses: Vec::new(),
             densities: Vec::new(),
@@ -112,7 +112,7 @@ fn add_missing_self_density(densities: &mut [f32], masses: &[f32], whole: f32) {
 /// Integration constants that all particles share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Integrator {
-    pull_weight: f32,
+    lorentz_weight: f32,
     repulsion_weight: f32,
     /// Cosine and sine of the rotation of the velocity by the magnetic field per step.
     rotation: [f32; 2],
@@ -124,9 +124,9 @@ pub(super) struct Integrator {
 impl Integrator {
     pub(super) fn new(parameters: &AuroraParameters) -> Self {
         let particles = &parameters.particles;
-        let angle = particles.pull_weight * parameters.field.turn_deg_per_frame.to_radians();
+        let angle = particles.lorentz_weight * parameters.field.gyration_deg_per_frame.to_radians();
         Self {
-            pull_weight: particles.pull_weight as f32,
+            lorentz_weight: particles.lorentz_weight as f32,
             repulsion_weight: particles.repulsion_weight as f32,
             rotation: [math::cos(angle) as f32, math::sin(angle) as f32],
             friction_factor: math::exp(-particles.friction_per_s * FRAME_S) as f32,
@@ -178,7 +178,7 @@ impl Integrator {
         let speed = [cosine.fma(speed[0], sine * speed[1]), cosine.fma(speed[1], -sine * speed[0])];
         let (mut to, mut new) = ([0.0; 2], [0.0; 2]);
         for c in 0..2 {
-            let force = self.pull_weight.fma(here.field[c], self.repulsion_weight * repulsion[c]);
+            let force = self.lorentz_weight.fma(here.field[c], self.repulsion_weight * repulsion[c]);
             let moved = (0.5 * STEP * STEP).fma(force, STEP.fma(speed[c], position[c]));
             let clamped = if moved > -self.half_km { moved } else { -self.half_km };
             let clamped = if clamped < self.half_km { clamped } else { self.half_km };
@@ -193,7 +193,7 @@ impl Integrator {
     /// Velocity factor that limits kinetic plus potential energy; `fall` is the decrease of the potential.
     #[inline(always)]
     fn energy_limit_factor(&self, before: [f32; 2], after: [f32; 2], fall: f32) -> f32 {
-        let energy = (2.0 * self.pull_weight).fma(fall, before[0].fma(before[0], before[1] * before[1]));
+        let energy = (2.0 * self.lorentz_weight).fma(fall, before[0].fma(before[0], before[1] * before[1]));
         let energy = if energy > 0.0 { energy } else { 0.0 };
         let found = after[0].fma(after[0], after[1] * after[1]);
         if !found.is_finite() {

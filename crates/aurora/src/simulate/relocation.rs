@@ -75,7 +75,7 @@ impl Relocation {
         }
         let occupants = CellOccupants::new(particles, &cells, near.len());
         self.remove_excess(particles, &occupants, refined, scale);
-        let births = if self.parameters.scaled {
+        let births = if self.parameters.scale_counts {
             let mut intervals = ArcIntervals::new(refined, scattered, self.count);
             intervals.fill(particles);
             let births = self.births_by_interval(&mut intervals, scattered, particles.len(), renewal);
@@ -94,7 +94,7 @@ impl Relocation {
     /// applied literally.
     fn coverage(&self, field: &ElectricField, near: &[bool]) -> Vec<f64> {
         let full = full_cell_count(&field.counts).max(f64::MIN_POSITIVE);
-        let fraction = |(count, near): (&f64, &bool)| match (near, self.parameters.scaled) {
+        let fraction = |(count, near): (&f64, &bool)| match (near, self.parameters.scale_counts) {
             (false, _) => 0.0,
             (true, false) => 1.0,
             (true, true) => (count / full).min(1.0),
@@ -105,7 +105,7 @@ impl Relocation {
     /// Scale factor of the table's counts.
     fn scale(&self, coverage: &[f64]) -> f64 {
         let cells = coverage.iter().sum::<f64>().max(1.0);
-        if self.parameters.scaled { self.count / (cells * TABLE_COUNT) } else { 1.0 }
+        if self.parameters.scale_counts { self.count / (cells * TABLE_COUNT) } else { 1.0 }
     }
 
     /// Removes the particles farthest from the shape in cells with too many.
@@ -119,7 +119,7 @@ impl Relocation {
         let most = self.parameters.deaths_above * scale;
         for cell in 0..occupants.starts.len() - 1 {
             let list = occupants.of(cell);
-            let excess = (list.len() as f64 - most).min(self.parameters.deaths_at_most * scale).ceil();
+            let excess = (list.len() as f64 - most).min(self.parameters.max_deaths * scale).ceil();
             if excess < 1.0 {
                 continue;
             }
@@ -146,7 +146,7 @@ impl Relocation {
         let mut births = Vec::new();
         for cell in (0..near.len()).filter(|cell| near[*cell]) {
             let lack = self.parameters.births_below - occupants.of(cell).len() as f64;
-            let deficit = lack.min(self.parameters.births_at_most).round();
+            let deficit = lack.min(self.parameters.max_births).round();
             if deficit < 1.0 {
                 continue;
             }
@@ -172,8 +172,7 @@ impl Relocation {
         living: usize,
         renewal: u32,
     ) -> Vec<Birth> {
-        let [below, most] =
-            [self.parameters.births_below, self.parameters.births_at_most].map(|count| count / TABLE_COUNT);
+        let [below, most] = [self.parameters.births_below, self.parameters.max_births].map(|count| count / TABLE_COUNT);
         let lack = |interval: &ArcInterval| (FILL_FACTOR * below * interval.target_count - interval.count).max(0.0);
         let lacks: Vec<f64> = intervals.all().iter().map(lack).collect();
         let lacking: f64 = lacks.iter().sum();
@@ -233,7 +232,7 @@ const MAX_PARTICLE_FACTOR: f64 = 4.0;
 pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
     let (counts, potential) = (field.counts.values(), field.potential.values());
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let (least, greatest) = (table.count * mean(counts), table.potential * mean(potential));
+    let (least, greatest) = (table.scatter_count_threshold * mean(counts), table.potential_threshold * mean(potential));
     // An empty shape has no near cells, whatever the thresholds.
     let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
     counts.iter().zip(potential).map(near).collect()

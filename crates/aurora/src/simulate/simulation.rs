@@ -170,7 +170,7 @@ impl AuroraSimulation {
         energy_flux.distribute_power(&mut state.particles, (&target.refined, &rays), time);
         state.afterglow.fill_steady_state(&state.particles);
         let parameters = &targets.parameters;
-        let emission = parameters.drawing.fall.shared_emission(parameters.spectrum);
+        let emission = parameters.rendering.energy_deposition.shared_emission(parameters.spectrum);
         Self {
             decay: AfterglowDecay::new(emission, Self::STEP_S * parameters.time_lapse),
             emission: emission.clone(),
@@ -208,7 +208,7 @@ impl AuroraSimulation {
 
     /// Advances by [`Self::STEP_S`].
     pub fn step(&mut self) {
-        let frames = self.targets.parameters.motion.renew_frames.round().max(1.0) as u64;
+        let frames = self.targets.parameters.morphing.update_interval_frames.round().max(1.0) as u64;
         if self.state.steps.is_multiple_of(frames) {
             self.renew(frames);
         }
@@ -282,7 +282,7 @@ impl AuroraSimulation {
 
     /// Mean distance between neighboring particles, km: the side of a square with one particle.
     pub(crate) fn spacing_km(&self) -> f64 {
-        (std::f64::consts::PI / self.targets.parameters.particles.neighbours).sqrt() * self.state.support_km
+        (std::f64::consts::PI / self.targets.parameters.particles.neighbor_count).sqrt() * self.state.support_km
     }
 
     /// Afterglow of the green and the red line.

@@ -33,7 +33,7 @@ use crate::{
         },
     },
     render::{
-        DrawingParameters, TrackModel,
+        RenderingParameters, TrackModel,
         bin::source_bins::{FieldLineSource, PatchWeights, REACH, SourceBins},
         integrate::{
             column_block::{BLOCK_COLUMNS, ColumnBlock},
@@ -78,7 +78,7 @@ pub(crate) struct CollisionRenderer {
 
 impl CollisionRenderer {
     /// Tracks for all energies up to that of a node.
-    pub(crate) fn new(emission: &Emission, drawing: &DrawingParameters, highest: usize, key: Key) -> Self {
+    pub(crate) fn new(emission: &Emission, drawing: &RenderingParameters, highest: usize, key: Key) -> Self {
         let deviation = |index: usize| {
             // The sum of three uniforms approximates that density; scaled to its variance, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
@@ -88,10 +88,10 @@ impl CollisionRenderer {
         let highest = highest.min(NODES - 1);
         let levels = emission.photons_per_ion_pair().iter().copied();
         let photons = levels.chain([[0.0; 4]]);
-        let (deposition, deflection) = (emission.deposition(), drawing.wobble);
+        let (deposition, deflection) = (emission.deposition(), drawing.collision_deflection);
         let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
-        let tracks = match drawing.fall {
-            TrackModel::Fang => fang_tracks(&TrackSampler::new(deposition, deflection), highest, key),
+        let tracks = match drawing.energy_deposition {
+            TrackModel::Fang2010 => fang_tracks(&TrackSampler::new(deposition, deflection), highest, key),
             TrackModel::HardSphereAtmosphere => {
                 let tracks = hard_sphere_tracks(deposition, deflection, highest, key);
                 pairs.iter_mut().zip(&tracks).for_each(|(pairs, tracks)| *pairs *= tracks.energy_weight);
@@ -100,7 +100,8 @@ impl CollisionRenderer {
                 })
             }
         };
-        let wander = |node| REACH * lateral_spread_km(drawing.fall, deflection, node_energy_ev(node)) as f32;
+        let wander =
+            |node| REACH * lateral_spread_km(drawing.energy_deposition, deflection, node_energy_ev(node)) as f32;
         Self {
             key,
             tracks,

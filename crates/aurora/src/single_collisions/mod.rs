@@ -1,5 +1,5 @@
-//! Electrons drawn as single collisions, as in the thesis (2.4): selected by `drawing.sampling = "collisions"`; the
-//! blur (2.28) by `drawing.blur = "pixels"`.
+//! Electrons drawn as single collisions, as in the thesis (2.4): selected by `rendering.sampling = "single_collisions"`; the
+//! blur (2.28) by `rendering.blur_space = "screen"`.
 
 pub(crate) mod blur;
 pub(crate) mod collision_pass;

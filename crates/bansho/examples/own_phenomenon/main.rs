@@ -18,7 +18,7 @@ use bansho::{
 };
 
 const FLAME: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [64, 64]
 exposure_ev100 = 10.0

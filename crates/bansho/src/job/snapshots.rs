@@ -270,7 +270,7 @@ mod tests {
         use bansho_render::{PlanOptions, Shot};
 
         let assets = Arc::new(MemoryAssets::default());
-        let text = "bansho = 1\n[[flame_particles]]\nparticles = 60\n";
+        let text = "bansho = 2\n[[flame_particles]]\nparticles = 60\n";
         let compiled = crate::compile_scene("test", text, assets).unwrap();
         let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
         let shot = Shot::open(compiled, Arc::new(plan));

@@ -25,7 +25,7 @@ use crate::job::render::draw_frames::{FrameSink, FrameSource};
 /// A plan of a picture of one pixel with nothing in it.
 pub(crate) fn plan() -> Arc<Plan> {
     let assets = Arc::new(MemoryAssets::default());
-    let text = "bansho = 1\n[picture]\nsize = [1, 1]\nfps = 10\nfirst_frame = -4\n";
+    let text = "bansho = 2\n[picture]\nsize = [1, 1]\nfps = 10\nfirst_frame = -4\n";
     let scene = crate::parse_scene("test", text).unwrap_or_else(|error| panic!("{error}"));
     let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets, None).unwrap());
     Arc::new(Plan::new(&compiled, &PlanOptions::default()).unwrap())

@@ -38,13 +38,13 @@ fn an_arc_has_a_thin_lower_edge_and_a_fading_top() {
 }
 
 /// Share of what the picture changes by that it changes around a place rather than toward it.
-fn across_radii(film: &Film, centre: [f64; 2]) -> f64 {
+fn across_radii(film: &Film, center: [f64; 2]) -> f64 {
     let (mut around, mut all) = (0.0, 0.0);
     for row in 1..SMALL[1] - 1 {
         for column in 1..SMALL[0] - 1 {
             let at = |x: usize, y: usize| luminance(film.row(0, y)[x]).sqrt();
             let gradient = [at(column + 1, row) - at(column - 1, row), at(column, row + 1) - at(column, row - 1)];
-            let offset = [column as f64 + 0.5 - centre[0], row as f64 + 0.5 - centre[1]];
+            let offset = [column as f64 + 0.5 - center[0], row as f64 + 0.5 - center[1]];
             let distance = bansho::base::math::hypot(offset[0], offset[1]);
             if !(20.0..60.0).contains(&distance) {
                 continue;
@@ -91,11 +91,11 @@ fn a_lake_mirrors_the_sky_and_is_darker() {
         above.extend(column_means(HORIZON - height - 3));
         below.extend(column_means(HORIZON + height));
     }
-    let centre = |values: &[f64]| -> (f64, Vec<f64>) {
+    let center = |values: &[f64]| -> (f64, Vec<f64>) {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         (mean, values.iter().map(|value| value - mean).collect())
     };
-    let ((bright, above), (dim, below)) = (centre(&above), centre(&below));
+    let ((bright, above), (dim, below)) = (center(&above), center(&below));
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let alike = product(&above, &below) / (product(&above, &above) * product(&below, &below)).sqrt();
     assert!(alike > 0.7 && dim < 0.7 * bright, "correlation {alike}, brightness {bright} and {dim}");

@@ -23,7 +23,7 @@ fn flames_go_from_red_through_orange_to_yellow_white() {
 }
 
 #[test]
-fn cores_keep_their_modelling() {
+fn cores_keep_their_modeling() {
     for scene in ["candle", "torch", "campfire"] {
         let film = Film::of(scene, SMALL, &[20, 60, 100], &SceneOptions::default());
         let flat = film.pixels().filter(|p| p.iter().all(|value| *value > 0.99)).count() as f64 / film.len() as f64;
@@ -56,7 +56,7 @@ fn a_campfire_flickers_as_fires_do() {
 #[test]
 fn flames_narrow_upward_and_never_touch_the_edges_of_their_sheet() {
     let frames: Vec<i64> = (0..12).map(|i| 10 * i).collect();
-    let text = "bansho = 1\n[picture]\nsize = [144, 144]\n[camera]\nposition = [0, 0.85, 4]\ntarget = [0, 0.85, 0]\n\
+    let text = "bansho = 2\n[picture]\nsize = [144, 144]\n[camera]\nposition = [0, 0.85, 4]\ntarget = [0, 0.85, 0]\n\
                 [[flame_sheet]]\nwind_response = 0\n";
     let film = Film::of_text(text, [144, 144], &frames, &SceneOptions::default());
     let lit_at = |share: f64| -> f64 {
@@ -81,7 +81,7 @@ fn flames_narrow_upward_and_never_touch_the_edges_of_their_sheet() {
 fn wind_bends_the_flame_and_more_wind_bends_it_more() {
     let lean = |speed: f64| {
         let text = format!(
-            "bansho = 1\n[picture]\nsize = [160, 120]\n[wind]\nvelocity = [{speed}, 0, 0]\ngust = 0\n[[flame_sheet]]\n"
+            "bansho = 2\n[picture]\nsize = [160, 120]\n[wind]\nvelocity = [{speed}, 0, 0]\ngust = 0\n[[flame_sheet]]\n"
         );
         let film = Film::of_text(&text, [160, 120], &[0, 15, 30, 45, 60], &SceneOptions::default());
         film.centroid_of_upper_half()[0] - 80.0
@@ -126,12 +126,12 @@ fn the_papers_stages_follow_from_each_other() {
         let text = scene_text("ohshima_itahashi").replace("stage = \"flame\"", &format!("stage = \"{name}\""));
         Film::of_text(&text, [256, 256], &[0], &SceneOptions::default())
     };
-    let [texture, thresholded, sharpened, coloured] = ["texture", "thresholded", "sharpened", "coloured"].map(stage);
+    let [texture, thresholded, sharpened, colored] = ["texture", "thresholded", "sharpened", "colored"].map(stage);
     let lit = |film: &Film| film.pixels().filter(|pixel| luminance(**pixel) > 0.01).count() as f64 / film.len() as f64;
     assert!(lit(&texture) > 0.9, "the texture has no flat parts: {}", lit(&texture));
     assert!(lit(&thresholded) < 0.8 * lit(&texture));
     assert!((lit(&sharpened) / lit(&thresholded) - 1.0).abs() < 0.25, "sharpening moves no edge far");
     assert!(sharpened.mean(0) > thresholded.mean(0), "sharpening raises what is above the threshold");
     let grey = |film: &Film| film.pixels().all(|p| (p[0] - p[1]).abs() < 0.02 && (p[1] - p[2]).abs() < 0.02);
-    assert!(grey(&texture) && grey(&thresholded) && grey(&sharpened) && !grey(&coloured));
+    assert!(grey(&texture) && grey(&thresholded) && grey(&sharpened) && !grey(&colored));
 }

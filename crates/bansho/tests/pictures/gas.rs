@@ -46,7 +46,7 @@ fn burning_gas_has_sharp_rims_bright_cores_and_gaps() {
     let text = scene_text("inagaki_still");
     let film = Film::of_text(&text, [640, 360], &[20, 60], &SceneOptions::default());
     let smooth = Film::of_text(
-        &format!("{text}[flame_particles.look]\ndetail = 0\n"),
+        &format!("{text}[flame_particles.rendering]\ndetail = 0\n"),
         [640, 360],
         &[20, 60],
         &SceneOptions::default(),
@@ -76,7 +76,7 @@ fn burning_gas_has_sharp_rims_bright_cores_and_gaps() {
 fn haze_displaces_the_plate_around_the_flame_and_nowhere_else() {
     let text = scene_text("inagaki_haze");
     let draw = |text: &str| Film::of_text(text, [320, 180], &[40], &SceneOptions::default());
-    let (bent, straight) = (draw(&text), draw(&text.replace("haze_gain = 14.0", "haze_gain = 0.0")));
+    let (bent, straight) = (draw(&text), draw(&text.replace("heat_haze_gain = 14.0", "heat_haze_gain = 0.0")));
     let moved = |columns: std::ops::Range<usize>| {
         let pixels = || (0..180).flat_map(|row| columns.clone().map(move |x| (row, x)));
         let differs = |(row, x): &(usize, usize)| {

@@ -28,7 +28,7 @@ pub(crate) fn kinds() -> [PhenomenonKind; 2] {
 
 /// A camera at the origin that looks along -z; 45 pixels a meter at 1 m when the picture is 90 pixels high.
 pub(crate) const CAMERA: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [120, 90]
 fps = 24

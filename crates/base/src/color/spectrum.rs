@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn lines_agree_with_the_reference() {
         let mut checked = 0;
-        for row in include_str!("../../tests/data/line_colours.csv").lines().skip(1) {
+        for row in include_str!("../../tests/data/line_colors.csv").lines().skip(1) {
             let fields: Vec<&str> = row.split(',').collect();
             if fields[2] != "CIE1931_2deg" || fields[0].contains("composite") {
                 continue;

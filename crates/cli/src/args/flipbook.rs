@@ -17,8 +17,8 @@ use super::{
 /// The sheets that are wanted.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Writes NAME_colour.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as gray), NAME_motion.png (16 bits: how far \
-each pixel moves to the next frame) and NAME.json (grid, frame rate, rectangles, how to read the motion). As .exr: colour is \
+Writes NAME_color.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as gray), NAME_motion.png (16 bits: how far \
+each pixel moves to the next frame) and NAME.json (grid, frame rate, rectangles, how to read the motion). As .exr: color is \
 scene-linear with premultiplied alpha, motion is in pixels, and there is no alpha sheet.
 
 Examples:

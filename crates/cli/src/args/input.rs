@@ -22,11 +22,11 @@ pub(crate) struct InputArgs {
     /// Memory that the pictures, meshes and drawings of a scene may take together, such as 512MiB or 8GiB. Files that would take more are
     /// refused before they are read.
     #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = values::parse_bytes, help_heading = "Input")]
-    input_memory: u64,
+    max_asset_memory: u64,
     /// Refuse files that a scene names outside of this folder, links followed. For scenes of people one does not know. [default: a scene may
     /// name any file]
     #[arg(long, value_name = "DIR", value_parser = values::parse_folder, help_heading = "Input")]
-    root: Option<PathBuf>,
+    asset_root: Option<PathBuf>,
 }
 
 impl InputArgs {
@@ -36,7 +36,7 @@ impl InputArgs {
             Some("-") => SceneFile::read_stream(STDIN, io::stdin().lock())?,
             _ => SceneFile::read(path)?,
         };
-        let inputs = InputLimits { memory_bytes: self.input_memory, root: self.root.clone() };
+        let inputs = InputLimits { memory_bytes: self.max_asset_memory, root: self.asset_root.clone() };
         Ok(SceneFile { changes: changes.to_vec(), inputs, ..scene })
     }
 }

@@ -71,7 +71,7 @@ pub(crate) enum Command {
 Examples:
   bansho new fire                    fire.toml, a short scene of a flame sheet
   bansho new fire --all              the same with every setting explained
-  bansho new wet --phenomenon rain   wet.toml, rain around a lamp
+  bansho new wet --kind rain         wet.toml, rain around a lamp
   bansho new --list                  the examples that come with the program
   bansho new camp --from campfire    camp.toml, a copy of the campfire")]
 pub(crate) struct NewArgs {
@@ -80,7 +80,7 @@ pub(crate) struct NewArgs {
     pub(crate) name: Option<PathBuf>,
     /// What the scene shows: flame_sheet (the default), flame_particles, rain or aurora.
     #[arg(long, value_name = "KIND", conflicts_with = "from")]
-    pub(crate) phenomenon: Option<String>,
+    pub(crate) kind: Option<String>,
     /// Write every setting with its purpose and allowed values, not only those that are changed most often.
     #[arg(long, conflicts_with_all = ["from", "list"])]
     pub(crate) all: bool,
@@ -88,7 +88,7 @@ pub(crate) struct NewArgs {
     #[arg(long, value_name = "EXAMPLE")]
     pub(crate) from: Option<String>,
     /// List the examples.
-    #[arg(long, conflicts_with_all = ["name", "from", "phenomenon"])]
+    #[arg(long, conflicts_with_all = ["name", "from", "kind"])]
     pub(crate) list: bool,
 }
 

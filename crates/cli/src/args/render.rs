@@ -57,9 +57,9 @@ pub(crate) struct RenderArgs {
     /// Write temperature, optical depth, motion and the like (.exr).
     #[arg(long, help_heading = "Output")]
     aovs: bool,
-    /// Write a JSON file beside each picture with figures of its frame, such as the rain rate and the visibility (.png, .exr).
+    /// Write a JSON file beside each picture with metadata of its frame, such as the rain rate and the visibility (.png, .exr).
     #[arg(long, help_heading = "Output")]
-    figures: bool,
+    metadata: bool,
     /// One .png of N frames: the first N of several --frames, or N consecutive ones from a single frame on. [default out:
     /// out/SCENE/SCENE.sheet.png]
     #[arg(long, value_name = "N", help_heading = "Output")]
@@ -128,7 +128,7 @@ impl RenderArgs {
             transparent: self.transparent,
             layers: self.layers,
             aovs: self.aovs,
-            figures: self.figures,
+            figures: self.metadata,
             view: self.view,
             bits: self.bits,
             alpha: self.alpha,

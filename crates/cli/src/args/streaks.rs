@@ -23,9 +23,9 @@ streaks.json says how to read them, and lists every drop with its diameter, velo
 
 Examples:
   bansho streaks                                   24 textures in out/streaks/
-  bansho streaks --rates 50 --diameters 0.5,1,2,3,4 --exposure 1/60 -o heavy
-  bansho streaks --format exr --light 0,0.3,-1     radiance, lit from behind
-  bansho streaks --box 0.25 --size 2048 --variants 8")]
+  bansho streaks --rates 50 --diameters 0.5,1,2,3,4 --exposure-time 1/60 -o heavy
+  bansho streaks --format exr --light-direction 0,0.3,-1     radiance, lit from behind
+  bansho streaks --cube-size 0.25 --size 2048 --variants 8")]
 pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
     #[arg(long, value_name = "R,...", default_value = "1,5,10,20", allow_hyphen_values = true, value_parser = values::parse_numbers)]
@@ -41,19 +41,19 @@ pub(crate) struct StreaksArgs {
     diameters: Numbers,
     /// How long the shutter is open: seconds, such as 0.02 or 1/30.
     #[arg(long, value_name = "SECONDS", default_value = "1/30", allow_hyphen_values = true, value_parser = values::parse_exposure)]
-    exposure: f64,
+    exposure_time: f64,
     /// Pixels on a side of a texture.
     #[arg(long, value_name = "PIXELS", default_value_t = 512)]
     size: usize,
     /// Edge of the cube of air, m.
-    #[arg(long = "box", value_name = "METERS", default_value_t = 1.0, allow_hyphen_values = true)]
-    edge: f64,
-    /// How fast drops fall: as measured by Gunn and Kinzer, or by the paper's formula.
-    #[arg(long, default_value = "measured", value_parser = values::velocity_parser())]
-    velocity: VelocityLaw,
+    #[arg(long, value_name = "METERS", default_value_t = 1.0, allow_hyphen_values = true)]
+    cube_size: f64,
+    /// How fast drops fall: as measured by Gunn and Kinzer, or by the paper's formula for a rigid sphere.
+    #[arg(long, default_value = "gunn_kinzer", value_parser = values::velocity_parser())]
+    terminal_velocity: VelocityLaw,
     /// Give each drop a diameter of its own within its bin, by the distribution.
     #[arg(long)]
-    spread: bool,
+    vary_diameter: bool,
     /// Textures with other drops for each rate and diameter.
     #[arg(long, value_name = "N", default_value_t = 1)]
     variants: u32,
@@ -62,7 +62,7 @@ pub(crate) struct StreaksArgs {
     seed: u64,
     /// Light the drops from far away; the vector toward the light: right, up, toward the viewer.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = values::parse_vector)]
-    light: Option<[f64; 3]>,
+    light_direction: Option<[f64; 3]>,
 
     /// The folder. [default: out/streaks]
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
@@ -85,20 +85,20 @@ impl StreaksArgs {
         let Numbers(rates) = self.rates.clone();
         let Numbers(diameters) = self.diameters.clone();
         let cube = StreakCube {
-            edge: self.edge,
+            edge: self.cube_size,
             size: self.size,
-            exposure: self.exposure,
-            spread: self.spread,
+            exposure: self.exposure_time,
+            spread: self.vary_diameter,
             ..StreakCube::default()
         };
         Streaks {
             rates,
             diameters,
             cube,
-            law: self.velocity,
+            law: self.terminal_velocity,
             variants: self.variants,
             seed: self.seed,
-            light: self.light,
+            light: self.light_direction,
             format: self.format,
             bits: self.bits,
             out: self.out.clone(),

@@ -41,7 +41,7 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
     let Some(name) = &args.name else { return Ok(to_stdout(&list())?) };
     let path = with_extension(name);
     match args.from.as_deref().map(find).transpose()? {
-        None => atomic::write_new(&path, text(kind(args.phenomenon.as_deref())?, args.all).as_bytes())?,
+        None => atomic::write_new(&path, text(kind(args.kind.as_deref())?, args.all).as_bytes())?,
         Some(example) => {
             atomic::write_new(&path, example.text.as_bytes())?;
             copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
@@ -55,10 +55,8 @@ fn text(kind: &PhenomenonKind, all: bool) -> String {
     if all {
         return template::commented(kind);
     }
-    let more = format!(
-        "\n# What one changes first; `bansho new NAME --phenomenon {} --all` writes every setting.\n",
-        kind.key
-    );
+    let more =
+        format!("\n# What one changes first; `bansho new NAME --kind {} --all` writes every setting.\n", kind.key);
     template::short(kind).replacen('\n', &more, 1)
 }
 

@@ -6,7 +6,7 @@ use crate::support::{Folder, Png, decode_png};
 
 /// A flame whose colors are all within the display's range, so that the truth over any background is known.
 const FIRE: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [160, 120]
 exposure_ev100 = 11.5
@@ -18,7 +18,7 @@ target = [0.0, 0.7, 0.0]
 
 /// Rays and their faint surroundings: most of their light is dark, and was lost where encoded values are blended.
 const AURORA: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [160, 120]
 exposure_ev100 = -7.5

@@ -12,7 +12,7 @@ use crate::support::{Folder, read_exr};
 
 /// A small aurora that settles soon.
 const AURORA: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [48, 27]
 frames = 6
@@ -37,10 +37,10 @@ fn a_drawing_without_strokes_or_that_is_none_is_a_located_error() {
         ("words.svg", "it is no SVG"),
         ("gone.svg", "no such file"),
     ] {
-        folder.write("scene.toml", &format!("{AURORA}[[aurora.shapes]]\nsheets = [{{ path = \"{file}\" }}]\n"));
+        folder.write("scene.toml", &format!("{AURORA}[[aurora.shapes]]\nsheets = [{{ svg_file = \"{file}\" }}]\n"));
         let run = folder.run(&["check", "scene.toml"]);
         assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
-        assert!(run.stderr.contains("scene.toml:12:20: aurora.0.shapes.0.sheets.0.path"), "{}", run.stderr);
+        assert!(run.stderr.contains("scene.toml:12:24: aurora.0.shapes.0.sheets.0.svg_file"), "{}", run.stderr);
         assert!(run.stderr.contains(expected), "{}", run.stderr);
     }
 }
@@ -131,13 +131,13 @@ fn the_calibration_is_printed_and_within_what_is_observed() {
         run.stdout.contains(&format!("\"{spectrum}\"\n"))
             && run.stdout.contains(&format!("holds  {spectrum}: I(557.7)/I(427.8) at 10 keV"))
     };
-    assert!(["arc", "single", "maxwellian"].into_iter().all(claimed), "{}", run.stdout);
+    assert!(["gaussian", "monoenergetic", "maxwellian"].into_iter().all(claimed), "{}", run.stdout);
     assert!(run.stdout.contains("I(391.4)/I(427.8)") && !run.stdout.contains("FAILS"), "{}", run.stdout);
 }
 
 /// A straight, even, thin sheet through the zenith, of upright field lines: how bright it is, all across, is known.
 const EVEN: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [64, 64]
 frames = 1
@@ -151,7 +151,7 @@ energy_ev = 5000.0
 thickness_km = 4.0
 dip_deg = 90.0
 particles = { count = 20_000 }
-rays = { contrast = 0.0, energy = 0.0 }
+rays = { contrast = 0.0, energy_variation = 0.0 }
 folds = { amplitude_km = 0.0 }
 shapes = [{ sheets = [{ points = [[-290.0, 0.0], [290.0, 0.0]] }] }]
 ";
@@ -161,7 +161,7 @@ fn a_sheet_at_the_zenith_has_the_kilorayleighs_of_its_column() {
     let folder = Folder::with_scene(EVEN);
     folder.succeed(&["render", "scene.toml", "--aovs", "--out", "f.exr"]);
     let picture = read_exr(&folder.path("f.exr"));
-    let emission = Emission::new(atmosphere(), SpectrumShape::Arc.spectrum());
+    let emission = Emission::new(atmosphere(), SpectrumShape::Gaussian.spectrum());
     // A height z gives flux x thickness x emission / z for all directions across the sheet together, by the tangent of their angle.
     let tangents = bansho::base::math::tan(f64::to_radians(15.0)) / 32.0;
     for (line, emitter, photons) in

@@ -63,7 +63,7 @@ fn a_camera_that_looks_nowhere_is_refused() {
 #[test]
 fn a_scene_that_is_no_text_is_told_with_its_line() {
     let folder = Folder::new();
-    std::fs::write(folder.path("scene.toml"), b"bansho = 1\n# caf\xe9\n").unwrap();
+    std::fs::write(folder.path("scene.toml"), b"bansho = 2\n# caf\xe9\n").unwrap();
     let run = folder.run(&["check", "scene.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
     says(&run.stderr, &["scene.toml:2: ", "not UTF-8", "allowed: "]);
@@ -105,12 +105,12 @@ fn keys_that_do_not_ascend_are_refused() {
 
 #[test]
 fn text_that_is_no_toml_is_located() {
-    says(&refused("bansho = 1\n[picture\n", 3), &["error: scene.toml:2:"]);
+    says(&refused("bansho = 2\n[picture\n", 3), &["error: scene.toml:2:"]);
 }
 
 #[test]
 fn a_newer_format_is_refused() {
-    says(&refused("bansho = 99\n", 3), &["scene.toml:1:10: ", "99", "known: up to 1"]);
+    says(&refused("bansho = 99\n", 3), &["scene.toml:1:10: ", "99", "known: up to 2"]);
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn a_scene_that_is_not_there_is_named() {
 
 #[test]
 fn each_fault_has_an_error_of_its_own() {
-    let folder = Folder::with_scene("bansho = 1\n[picture]\nsize = [0, 4]\nfps = true\n[wnd]\n");
+    let folder = Folder::with_scene("bansho = 2\n[picture]\nsize = [0, 4]\nfps = true\n[wnd]\n");
     let run = folder.run(&["render", "scene.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 3), "{}", run.stderr);
     assert_eq!(folder.names(), ["scene.toml"]);
@@ -219,7 +219,7 @@ fn words_that_are_no_options_are_refused_with_the_nearest() {
 
 /// What the program says of a particle flame with these lines.
 fn refused_gas(lines: &str) -> String {
-    refused(&format!("bansho = 1\n[picture]\nsize = [32, 18]\n[[flame_particles]]\n{lines}"), 3)
+    refused(&format!("bansho = 2\n[picture]\nsize = [32, 18]\n[[flame_particles]]\n{lines}"), 3)
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn gas_that_cannot_be_says_what_can() {
         \"bufferViews\":[{\"buffer\":0,\"byteLength\":24}],\
         \"buffers\":[{\"byteLength\":24,\"uri\":\"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAA\"}]}";
     let folder = Folder::with_scene(
-        "bansho = 1\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = \"mesh\"\nfile = \"mesh.gltf\"\n",
+        "bansho = 2\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = \"mesh\"\nfile = \"mesh.gltf\"\n",
     );
     folder.write("mesh.gltf", line);
     let run = folder.run(&["check", "scene.toml"]);
@@ -321,8 +321,8 @@ fn what_the_scene_is_read_from_is_never_written_over() {
         refused(&["render", "laid.toml", "--out", "linked.png", "--frames", "0"], "linked.png");
         link("laid.toml", "film.gif");
         refused(&["render", "laid.toml", "--out", "film.gif", "--frames", "0-1"], "film.gif");
-        link("plate.0001.png", "book_colour.png");
-        refused(&["flipbook", "laid.toml", "--grid", "2x1", "--out", "book.png"], "book_colour.png");
+        link("plate.0001.png", "book_color.png");
+        refused(&["flipbook", "laid.toml", "--grid", "2x1", "--out", "book.png"], "book_color.png");
     }
     std::fs::create_dir(folder.path("sub")).unwrap();
     refused(&["render", "laid.toml", "--out", "sub/../plate.####.png", "--frames", "0-1"], "plate.0000.png");

@@ -21,23 +21,23 @@ fn a_new_scene_shows_any_phenomenon() {
     let folder = Folder::new();
     for kind in ["flame_sheet", "flame_particles", "rain", "aurora"] {
         let file = format!("{kind}.toml");
-        folder.succeed(&["new", kind, "--phenomenon", kind]);
+        folder.succeed(&["new", kind, "--kind", kind]);
         let text = String::from_utf8(folder.files("")[&file].clone()).unwrap();
         assert!(text.contains(&format!("\n[[{kind}]]\n")), "{text}");
         assert!((15..=42).contains(&text.lines().count()) && text.contains("--all"), "{text}");
         let short = folder.succeed(&["check", &file]);
         std::fs::remove_file(folder.path(&file)).unwrap();
-        folder.succeed(&["new", kind, "--phenomenon", kind, "--all"]);
+        folder.succeed(&["new", kind, "--kind", kind, "--all"]);
         assert!(folder.files("")[&file].len() > 4 * text.len());
         assert_eq!(folder.succeed(&["check", &file]).stdout, short.stdout);
     }
     for other in [&["--from", "drizzle"][..], &["--list"]] {
         assert_eq!(folder.run(&[&["new", "storm", "--all"], other].concat()).code, Some(2), "{other:?}");
     }
-    let unknown = folder.run(&["new", "storm", "--phenomenon", "rian"]);
+    let unknown = folder.run(&["new", "storm", "--kind", "rian"]);
     assert_eq!((unknown.code, unknown.errors()), (Some(2), 1));
     assert!(unknown.stderr.contains("no phenomenon `rian`, did you mean `rain`?"), "{}", unknown.stderr);
-    let both = folder.run(&["new", "storm", "--phenomenon", "rain", "--from", "drizzle"]);
+    let both = folder.run(&["new", "storm", "--kind", "rain", "--from", "drizzle"]);
     assert_eq!((both.code, both.errors()), (Some(2), 1));
     assert!(!folder.path("storm.toml").exists());
 }
@@ -66,7 +66,7 @@ fn an_unknown_example_is_an_error_and_writes_nothing() {
 #[test]
 fn check_tells_of_every_scene() {
     let folder = Folder::with_scene(FLAME);
-    folder.write("bad.toml", "bansho = 1\n[picture]\nsize = [0, 0]\n");
+    folder.write("bad.toml", "bansho = 2\n[picture]\nsize = [0, 0]\n");
     let run = folder.run(&["check", "bad.toml", "scene.toml", "gone.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 2), "{}", run.stderr);
     assert!(run.stdout.contains("scene.toml: right. 48 x 64, frames 0 to 5 at 30 a second"), "{}", run.stdout);
@@ -78,13 +78,13 @@ fn upgrade_states_the_format_keeps_comments_and_does_no_more() {
     let folder = Folder::new();
     folder.write("old.toml", "# mine\n[picture]\nframes = 3 # few\n");
     let run = folder.succeed(&["upgrade", "old.toml"]);
-    assert!(run.stdout.contains("rewritten for format 1"), "{}", run.stdout);
+    assert!(run.stdout.contains("rewritten for format 2"), "{}", run.stdout);
     let text = String::from_utf8(folder.files("")["old.toml"].clone()).unwrap();
-    assert_eq!(text, "bansho = 1\n# mine\n[picture]\nframes = 3 # few\n");
+    assert_eq!(text, "bansho = 2\n# mine\n[picture]\nframes = 3 # few\n");
     assert!(folder.succeed(&["upgrade", "old.toml"]).stdout.contains("unchanged"));
     assert_eq!(folder.names(), ["old.toml"]);
     folder.write("new.toml", "bansho = 99\n");
-    folder.write("broken.toml", "bansho = 1\n[\n");
+    folder.write("broken.toml", "bansho = 2\n[\n");
     for name in ["new.toml", "broken.toml"] {
         let run = folder.run(&["upgrade", name]);
         assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);

@@ -28,7 +28,7 @@ fn frames_that_vanish_or_are_changed_on_the_way_are_listed() {
     for extension in ["png", "exr"] {
         let folder = long_scene();
         let name = |number: usize| folder.path(&format!("f/f.{number:04}.{extension}"));
-        let child = start(&folder, &["render", "scene.toml", "--out", &format!("f/f.{extension}"), "--figures"]);
+        let child = start(&folder, &["render", "scene.toml", "--out", &format!("f/f.{extension}"), "--metadata"]);
         // Frames finish in another order than that of their numbers, but not that far apart.
         wait_until("half of the frames", || name(100).exists());
         (3..=14).for_each(|number| fs::remove_file(name(number)).unwrap());
@@ -46,9 +46,9 @@ fn frames_that_vanish_or_are_changed_on_the_way_are_listed() {
         assert!(told.contains(&said) && told.contains("; --frames asks for them again"), "{told}");
         // What is listed can be asked for.
         let again = ["render", "scene.toml", "--frames", "3-14,20,22", "--out", &format!("f/f.{extension}")];
-        folder.succeed(&[&again[..], &["--figures"]].concat());
+        folder.succeed(&[&again[..], &["--metadata"]].concat());
         let all =
-            folder.succeed(&["render", "scene.toml", "--out", &format!("f/f.{extension}"), "--resume", "--figures"]);
+            folder.succeed(&["render", "scene.toml", "--out", &format!("f/f.{extension}"), "--resume", "--metadata"]);
         assert!(all.stderr.starts_with("0 frames in "), "{}", all.stderr);
     }
 }
@@ -89,7 +89,7 @@ fn frames_that_were_there_before_are_looked_for_too() {
 
 #[test]
 fn particles_and_textures_are_looked_for_too() {
-    let gas = "bansho = 1\n[picture]\nframes = 60\n[[flame_particles]]\nparticles = 300\npreroll_s = 0.1\n";
+    let gas = "bansho = 2\n[picture]\nframes = 60\n[[flame_particles]]\nparticles = 300\npreroll_s = 0.1\n";
     let folder = Folder::with_scene(gas);
     let child = start(&folder, &["simulate", "scene.toml", "--particles", "p/gas.ply"]);
     wait_until("particles", || folder.path("p/gas.0003.ply").exists());
@@ -122,7 +122,7 @@ fn progress_that_cannot_be_written_costs_no_picture_and_is_an_error() {
     let told = onto_a_full_device(&folder, &["render", "scene.toml", "--out", "f/f.png", "--progress", "json"]);
     assert!(told.contains("error: progress was lost: standard output: No space left on device"), "{told}");
     assert_eq!(folder.files("f").len(), 6);
-    let gas = "bansho = 1\n[picture]\nframes = 1\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.1\n";
+    let gas = "bansho = 2\n[picture]\nframes = 1\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.1\n";
     folder.write("gas.toml", gas);
     for arguments in [
         &["flipbook", "scene.toml", "--grid", "1x2", "--out", "f/book.png"][..],

@@ -9,7 +9,7 @@ use crate::support::{FLAME, Folder};
 #[test]
 fn every_picture_has_its_figures_and_resume_restores_them() {
     let folder = Folder::with_scene(FLAME);
-    let render = ["render", "scene.toml", "--figures", "--out", "f/f.png"];
+    let render = ["render", "scene.toml", "--metadata", "--out", "f/f.png"];
     folder.succeed(&render);
     let files = folder.files("f");
     assert_eq!(files.len(), 12);
@@ -38,9 +38,9 @@ fn without_the_option_there_are_none() {
 fn films_and_sheets_have_no_place_for_figures() {
     let folder = Folder::with_scene(FLAME);
     for arguments in [&["--out", "f.gif"][..], &["--contact-sheet", "4"]] {
-        let run = folder.run(&[&["render", "scene.toml", "--figures"], arguments].concat());
+        let run = folder.run(&[&["render", "scene.toml", "--metadata"], arguments].concat());
         assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
-        assert!(run.stderr.contains("--figures") && run.stderr.contains("allowed: .png, .exr"), "{}", run.stderr);
+        assert!(run.stderr.contains("--metadata") && run.stderr.contains("allowed: .png, .exr"), "{}", run.stderr);
         assert_eq!(folder.names(), ["scene.toml"]);
     }
 }

@@ -13,15 +13,15 @@ fn a_flipbook_holds_the_very_frames_and_says_where() {
     folder.succeed(&["render", "scene.toml", "--alpha", "linear", "--out", "f/f.png"]);
     let files = folder.files("game");
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    assert_eq!(names, ["fire.json", "fire_alpha.png", "fire_colour.png", "fire_motion.png"]);
+    assert_eq!(names, ["fire.json", "fire_alpha.png", "fire_color.png", "fire_motion.png"]);
     let about = description(&folder, "game/fire.json");
-    let colour = decode_png(&files["fire_colour.png"]);
+    let color = decode_png(&files["fire_color.png"]);
     let alpha = decode_png(&files["fire_alpha.png"]);
-    assert_eq!((colour.width, colour.height, colour.channels), (144, 128, 4));
+    assert_eq!((color.width, color.height, color.channels), (144, 128, 4));
     for (index, frame) in about["frames"].as_array().unwrap().iter().enumerate() {
         let place = ["x", "y", "width", "height"].map(|key| frame[key].as_u64().unwrap() as usize);
         let drawn = decode_png(&folder.files("f")[&format!("f.{index:04}.png")]);
-        assert!(colour.part(place) == drawn.bytes, "frame {index}");
+        assert!(color.part(place) == drawn.bytes, "frame {index}");
         let alphas: Vec<u8> = drawn.bytes.chunks_exact(4).map(|pixel| pixel[3]).collect();
         let grey: Vec<u8> = alpha.part(place).chunks_exact(3).map(|pixel| pixel[0]).collect();
         assert!(alphas == grey, "frame {index}");
@@ -52,7 +52,7 @@ fn frames_are_cropped_to_what_is_lit_and_fill_the_sheet() {
     assert_eq!(padding, [x, y, picture[0] - x - width, picture[1] - y - height]);
     // Each tile is that very part of the picture, and outside it there is nothing.
     folder.succeed(&["render", "scene.toml", "--alpha", "linear", "--size", "640x360", "--out", "f/f.png"]);
-    let sheet = decode_png(&std::fs::read(folder.path("fire_colour.png")).unwrap());
+    let sheet = decode_png(&std::fs::read(folder.path("fire_color.png")).unwrap());
     for (index, frame) in about["frames"].as_array().unwrap().iter().enumerate() {
         let place: Vec<usize> = numbers(frame, &["x", "y", "width", "height"]);
         let drawn = decode_png(&folder.files("f")[&format!("f.{index:04}.png")]);
@@ -118,10 +118,10 @@ fn a_loop_fills_the_sheet_with_one_turn() {
     assert_eq!((about["frame_count"].as_u64(), about["loop"].as_bool()), (Some(8), Some(true)));
     assert!((about["fps"].as_f64().unwrap() - 8.0 / 1.5).abs() < 1e-9);
     assert!((about["duration_s"].as_f64().unwrap() - 1.5).abs() < 1e-9);
-    let colour = read_exr(&folder.path("fire_colour.exr"));
-    assert_eq!(colour.size, [4 * 48, 2 * 64]);
-    assert!(colour.channels["R"].iter().any(|&light| light > 0.1));
-    assert_eq!(read_exr(&folder.path("fire_motion.exr")).size, colour.size);
+    let color = read_exr(&folder.path("fire_color.exr"));
+    assert_eq!(color.size, [4 * 48, 2 * 64]);
+    assert!(color.channels["R"].iter().any(|&light| light > 0.1));
+    assert_eq!(read_exr(&folder.path("fire_motion.exr")).size, color.size);
 }
 
 #[test]

@@ -75,8 +75,8 @@ fn pipes_and_devices_are_refused_wherever_a_file_is_named() {
             drop(fs::remove_file(&link));
             symlink(&target, link).unwrap();
         }
-        let obstacle = "bansho = 1\n[[obstacle]]\nshape = \"mesh\"\nfile = \"link.gltf\"\n[[flame_particles]]\n";
-        let aurora = "bansho = 1\n[[aurora]]\nshapes = [{ kind = \"svg\", file = \"link.svg\" }]\n";
+        let obstacle = "bansho = 2\n[[obstacle]]\nshape = \"mesh\"\nfile = \"link.gltf\"\n[[flame_particles]]\n";
+        let aurora = "bansho = 2\n[[aurora]]\nshapes = [{ kind = \"svg\", file = \"link.svg\" }]\n";
         folder.write("png.toml", &over("link.png"));
         folder.write("exr.toml", &over("link.exr"));
         folder.write("gltf.toml", obstacle);
@@ -94,11 +94,11 @@ fn a_plate_that_would_take_too_much_memory_is_refused_with_what_may_be_done() {
     let folder = Folder::with_scene(FLAME);
     folder.succeed(&["render", "scene.toml", "--frames", "0", "--size", "400x300", "--out", "plate.png"]);
     folder.write("over.toml", &over("plate.png"));
-    folder.succeed(&["check", "over.toml", "--input-memory", "3MiB"]);
-    let told = refused(&folder, &["check", "over.toml", "--input-memory", "1MiB"]);
-    let parts = ["over.toml:16:9: plate.image: ", "takes 1.9 MiB of memory", "up to 1.0 MiB", "--input-memory"];
+    folder.succeed(&["check", "over.toml", "--max-asset-memory", "3MiB"]);
+    let told = refused(&folder, &["check", "over.toml", "--max-asset-memory", "1MiB"]);
+    let parts = ["over.toml:16:9: plate.image: ", "takes 1.9 MiB of memory", "up to 1.0 MiB", "--max-asset-memory"];
     assert!(parts.iter().all(|part| told.contains(part)), "{told}");
-    let run = folder.run(&["check", "over.toml", "--input-memory", "1"]);
+    let run = folder.run(&["check", "over.toml", "--max-asset-memory", "1"]);
     assert_eq!(run.code, Some(2));
     assert!(run.stderr.contains("512MiB"), "{}", run.stderr);
 }
@@ -111,14 +111,14 @@ fn a_root_confines_all_that_a_scene_names() {
     folder.write("job/own.toml", &over("plates/own.png"));
     folder.write("job/other.toml", &over("../secret.png"));
     for root in ["job", "."] {
-        folder.succeed(&["check", "job/own.toml", "--root", root]);
+        folder.succeed(&["check", "job/own.toml", "--asset-root", root]);
     }
     folder.succeed(&["check", "job/other.toml"]);
-    folder.succeed(&["check", "job/other.toml", "--root", "."]);
+    folder.succeed(&["check", "job/other.toml", "--asset-root", "."]);
     for command in [&["check"][..], &["render", "--frames", "0", "--out", "a.png"]] {
-        let told = refused(&folder, &[command, &["job/other.toml", "--root", "job"]].concat());
+        let told = refused(&folder, &[command, &["job/other.toml", "--asset-root", "job"]].concat());
         assert!(told.contains("lies outside job, the folder that this scene is confined to"), "{told}");
     }
-    let run = folder.run(&["check", "job/own.toml", "--root", "gone"]);
+    let run = folder.run(&["check", "job/own.toml", "--asset-root", "gone"]);
     assert_eq!(run.code, Some(2), "{}", run.stderr);
 }

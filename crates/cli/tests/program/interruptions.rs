@@ -73,10 +73,10 @@ fn resume_draws_broken_and_foreign_frames_and_no_others() {
         let expected = folder.files(extension);
         let bytes = fs::read(name(1)).unwrap();
         fs::write(name(1), &bytes[..bytes.len() - 5]).unwrap();
-        let mut spoilt = fs::read(name(2)).unwrap();
-        let middle = spoilt.len() / 2;
-        spoilt[middle] ^= 1;
-        fs::write(name(2), spoilt).unwrap();
+        let mut spoiled = fs::read(name(2)).unwrap();
+        let middle = spoiled.len() / 2;
+        spoiled[middle] ^= 1;
+        fs::write(name(2), spoiled).unwrap();
         folder.succeed(&[
             "render",
             "scene.toml",
@@ -168,7 +168,7 @@ fn what_stays_after_an_interruption_is_told_as_it_is() {
         interrupted(&folder, &["flipbook", "scene.toml", "--grid", "64x64", "--size", "200x200", "--out", "book.png"]);
     assert!(book.contains("nothing stays, since a flipbook is written only when"), "{book}");
     assert_eq!(folder.names(), ["scene.toml"]);
-    let gas = "bansho = 1\n[picture]\nframes = 1000000\n[[flame_particles]]\nparticles = 300\n";
+    let gas = "bansho = 2\n[picture]\nframes = 1000000\n[[flame_particles]]\nparticles = 300\n";
     folder.write("gas.toml", gas);
     let particles = interrupted(&folder, &["simulate", "gas.toml", "--particles", "p/gas.ply"]);
     assert!(

@@ -17,7 +17,7 @@ fn check(scene: &str) -> (Option<i32>, String) {
 }
 
 fn repeated(table: &str, count: usize) -> String {
-    format!("bansho = 1\n{}", table.repeat(count))
+    format!("bansho = 2\n{}", table.repeat(count))
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn a_hundred_faults_are_all_told() {
 #[test]
 fn a_million_unknown_keys_are_not_a_million_errors() {
     let keys: String = (0..1_000_000).map(|index| format!("k{index} = 1\n")).collect();
-    for scene in [format!("bansho = 1\n[[flame_sheet]]\n{keys}"), format!("bansho = 1\n{keys}")] {
+    for scene in [format!("bansho = 2\n[[flame_sheet]]\n{keys}"), format!("bansho = 2\n{keys}")] {
         let (code, said) = check(&scene);
         assert_eq!((code, said.matches("error: ").count()), (Some(3), 100));
         assert!(said.contains("and 999900 more faults"), "{said}");
@@ -60,7 +60,7 @@ fn a_million_unknown_keys_are_not_a_million_errors() {
 fn of_a_line_of_megabytes_the_part_around_the_fault_is_shown() {
     let long = "x".repeat(5_000_000);
     for line in [format!("height = \"{long}\""), format!("{long} = 1"), format!("stage = \"{long}\"")] {
-        let (code, said) = check(&format!("bansho = 1\n[[flame_sheet]]\n{line}\n"));
+        let (code, said) = check(&format!("bansho = 2\n[[flame_sheet]]\n{line}\n"));
         assert_eq!(code, Some(3));
         assert!(said.len() < 2000 && said.starts_with("error: scene.toml:3:"), "{}", said.len());
     }
@@ -69,7 +69,7 @@ fn of_a_line_of_megabytes_the_part_around_the_fault_is_shown() {
 #[test]
 fn too_many_keys_of_a_curve_are_one_fault() {
     let keys: Vec<String> = (0..100_001).map(|index| format!("[{index}, {}]", index % 7)).collect();
-    let scene = format!("bansho = 1\n[[flame_sheet]]\nspeed = {{ keys = [{}] }}\n", keys.join(", "));
+    let scene = format!("bansho = 2\n[[flame_sheet]]\nspeed = {{ keys = [{}] }}\n", keys.join(", "));
     let (code, said) = check(&scene);
     assert_eq!((code, said.matches("error: ").count()), (Some(3), 1));
     let told = "error: scene.toml:3:9: flame_sheet.0.speed: has 100001 items; allowed: 1 to 100000 items";
@@ -78,7 +78,7 @@ fn too_many_keys_of_a_curve_are_one_fault() {
 
 #[test]
 fn what_would_take_gigabytes_to_parse_is_refused_before() {
-    let (code, said) = check(&format!("bansho = 1\nx = [{}]\n", "0,".repeat(5_000_000)));
+    let (code, said) = check(&format!("bansho = 2\nx = [{}]\n", "0,".repeat(5_000_000)));
     assert_eq!((code, said.matches("error: ").count()), (Some(3), 1));
     assert!(said.contains("allowed: up to 1200000"), "{said}");
 }

@@ -6,7 +6,7 @@ use crate::support::{FLAME, Folder};
 
 /// A particle flame from a mesh, before a plate.
 const LAID: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [48, 64]
 frames = 2
@@ -71,7 +71,7 @@ fn no_output_of_any_command_is_a_hard_link_to_an_input() {
         ("mesh.gltf", "a.0001.exr", "a.0001.exr", &["render", "laid.toml", "--out", "a.exr"]),
         ("laid.toml", "a.gif", "x/../a.gif", &["render", "laid.toml", "--out", "x/../a.gif"]),
         ("plate.png", "a.mp4", "x/../a.mp4", &["render", "laid.toml", "--out", "x/../a.mp4"]),
-        ("plate.png", "f.0001.json", "f.0001.json", &["render", "laid.toml", "--figures", "--out", "f.exr"]),
+        ("plate.png", "f.0001.json", "f.0001.json", &["render", "laid.toml", "--metadata", "--out", "f.exr"]),
         (
             "plate.png",
             "book.json",
@@ -94,7 +94,7 @@ fn no_output_of_any_command_is_a_hard_link_to_an_input() {
 const COMMANDS: [(&str, &[&str]); 11] = [
     ("f/a.png", &["render", "scene.toml", "--frames", "0", "--out", "f/a.png"]),
     ("f/b.0000.exr", &["render", "scene.toml", "--frames", "0-1", "--out", "f/b.exr"]),
-    ("f/c.json", &["render", "scene.toml", "--frames", "0", "--figures", "--out", "f/c.png"]),
+    ("f/c.json", &["render", "scene.toml", "--frames", "0", "--metadata", "--out", "f/c.png"]),
     ("f/d.apng", &["render", "scene.toml", "--frames", "0-1", "--out", "f/d.apng"]),
     ("f/e.gif", &["render", "scene.toml", "--frames", "0-1", "--out", "f/e.gif"]),
     ("f/g.png", &["render", "scene.toml", "--contact-sheet", "2", "--out", "f/g.png"]),
@@ -106,7 +106,7 @@ const COMMANDS: [(&str, &[&str]); 11] = [
 ];
 
 const GAS: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [48, 64]
 frames = 4

@@ -4,7 +4,7 @@ use crate::support::Folder;
 
 /// A small particle flame that is soon developed.
 const GAS: &str = "\
-bansho = 1
+bansho = 2
 [picture]
 size = [48, 64]
 frames = 8
@@ -52,7 +52,7 @@ fn particles_are_written_a_file_a_frame() {
 #[test]
 fn an_auroras_electrons_lie_on_the_shell_at_100_km() {
     let folder = Folder::with_scene(
-        "bansho = 1\n[[aurora]]\npreroll_s = 0.2\nflux_mw_per_m2 = 20\nenergy_ev = 3000\nparticles = { count = 2000 }\n",
+        "bansho = 2\n[[aurora]]\npreroll_s = 0.2\nflux_mw_per_m2 = 20\nenergy_ev = 3000\nparticles = { count = 2000 }\n",
     );
     folder.succeed(&["simulate", "scene.toml", "--particles", "aurora.ply", "--frames", "3"]);
     let (names, rows) = read_ply(&folder.files("")["aurora.ply"]);
@@ -77,11 +77,11 @@ fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written()
     let name = folder.run(&["simulate", "scene.toml", "--particles", "gas.obj"]);
     assert_eq!((name.code, name.errors()), (Some(2), 1));
     assert!(name.stderr.contains("`.obj` is not written here; allowed: .ply"), "{}", name.stderr);
-    folder.write("sheet.toml", "bansho = 1\n[[flame_sheet]]\n");
+    folder.write("sheet.toml", "bansho = 2\n[[flame_sheet]]\n");
     let sheet = folder.run(&["simulate", "sheet.toml", "--particles", "gas.ply"]);
     assert_eq!((sheet.code, sheet.errors()), (Some(2), 1));
     assert!(sheet.stderr.contains("nothing in this scene has particles"), "{}", sheet.stderr);
-    folder.write("faulty.toml", "bansho = 1\n[[flame_particles]]\nparticles = -3\n");
+    folder.write("faulty.toml", "bansho = 2\n[[flame_particles]]\nparticles = -3\n");
     assert_eq!(folder.run(&["simulate", "faulty.toml", "--particles", "gas.ply"]).code, Some(3));
     assert_eq!(folder.names(), ["faulty.toml", "scene.toml", "sheet.toml"]);
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::support::{Folder, decode_png, read_exr};
 
-const PICTURE: &str = "bansho = 1\n[picture]\nsize = [96, 54]\nframes = 2\n";
+const PICTURE: &str = "bansho = 2\n[picture]\nsize = [96, 54]\nframes = 2\n";
 const LAMP: &str = "[[light]]\nkind = \"point\"\nposition = [0.3, 2.0, -3.0]\nintensity = 400.0\n";
 
 fn scene(tables: &str) -> Folder {
@@ -30,8 +30,8 @@ fn no_rain_is_exactly_the_plate() {
     folder.succeed(&["render", "scene.toml", "--frames", "1", "--out", "f.png"]);
     let files = folder.files("");
     let (plate, drawn) = (decode_png(&files["plate.png"]), decode_png(&files["f.png"]));
-    let colours: Vec<u8> = drawn.bytes.chunks_exact(drawn.channels).flat_map(|pixel| pixel[..3].to_vec()).collect();
-    assert!(plate.bytes == colours);
+    let colors: Vec<u8> = drawn.bytes.chunks_exact(drawn.channels).flat_map(|pixel| pixel[..3].to_vec()).collect();
+    assert!(plate.bytes == colors);
     folder.succeed(&["render", "scene.toml", "--frames", "1", "--set", "rain.0.rate_mm_per_h=50", "--out", "f.png"]);
     assert!(decode_png(&folder.files("")["f.png"]).bytes != drawn.bytes, "rain does show");
 }
@@ -71,10 +71,10 @@ fn the_strongest_rain_and_wind_at_any_shutter_give_sensible_pictures() {
 #[test]
 fn twice_the_fire_is_twice_the_light_on_the_rain_beside_it() {
     let fire = "[picture]\nsize = [160, 90]\nexposure_ev100 = 8.0\n[camera]\nposition = [0, 1, 3.6]\ntarget = [0, 0.8, 0]\n\
-                [[flame_sheet]]\nname = \"fire\"\ncolour = { luminance = 12000.0 }\n[[rain]]\nrate_mm_per_h = 60.0\n";
-    let folder = Folder::with_scene(&format!("bansho = 1\n{fire}"));
+                [[flame_sheet]]\nname = \"fire\"\ncolor = { luminance = 12000.0 }\n[[rain]]\nrate_mm_per_h = 60.0\n";
+    let folder = Folder::with_scene(&format!("bansho = 2\n{fire}"));
     let rain = |luminance: &str| {
-        let set = format!("flame_sheet.fire.colour.luminance={luminance}");
+        let set = format!("flame_sheet.fire.color.luminance={luminance}");
         folder.succeed(&["render", "scene.toml", "--frames", "20", "--layers", "--set", &set, "--out", "f.exr"]);
         read_exr(&folder.path("f.exr")).channels["rain.R"].clone()
     };
@@ -98,7 +98,7 @@ fn rain_that_nothing_lights_is_drawn_with_a_warning() {
 #[test]
 fn figures_say_what_falls() {
     let folder = scene(&format!("{LAMP}[[rain]]\nrate_mm_per_h = 20.0\n"));
-    folder.succeed(&["render", "scene.toml", "--frames", "1", "--figures", "--out", "f.png"]);
+    folder.succeed(&["render", "scene.toml", "--frames", "1", "--metadata", "--out", "f.png"]);
     let about: Value = serde_json::from_slice(&fs::read(folder.path("f.json")).unwrap()).unwrap();
     let figure = |name: &str| about["phenomena"]["rain"][name]["value"].as_f64().unwrap_or_else(|| panic!("{about:#}"));
     assert_eq!(figure("rain_rate"), 20.0);

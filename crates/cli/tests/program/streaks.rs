@@ -60,7 +60,7 @@ fn without_options_it_writes_the_papers_24_textures_and_they_measure_right() {
 #[test]
 fn a_streak_lies_where_the_index_puts_its_drop() {
     let folder = Folder::new();
-    folder.succeed(&["streaks", "--rates", "1", "--diameters", "2", "--seed", "5", "--exposure", "1/60"]);
+    folder.succeed(&["streaks", "--rates", "1", "--diameters", "2", "--seed", "5", "--exposure-time", "1/60"]);
     let about = index(&folder, "out/streaks/streaks.json");
     let entry = &entries(&about, "textures")[0];
     let opacities = opacities(&folder, entry);
@@ -77,7 +77,7 @@ fn a_streak_lies_where_the_index_puts_its_drop() {
 #[test]
 fn light_makes_radiance_in_proportion_to_opacity() {
     let folder = Folder::new();
-    let common = ["streaks", "--rates", "20", "--diameters", "1", "--size", "64", "--light", "0,0.2,-1"];
+    let common = ["streaks", "--rates", "20", "--diameters", "1", "--size", "64", "--light-direction", "0,0.2,-1"];
     folder.succeed(&[&common[..], &["--format", "exr", "-o", "exr"]].concat());
     folder.succeed(&[&common[..], &["--bits", "8", "-o", "png"]].concat());
     let about = index(&folder, "exr/streaks.json");
@@ -105,8 +105,18 @@ fn light_makes_radiance_in_proportion_to_opacity() {
 #[test]
 fn variants_and_spread_drops_differ_and_any_threads_give_the_same_bytes() {
     let folder = Folder::new();
-    let options =
-        ["streaks", "--rates", "0,5", "--diameters", "1,3", "--variants", "2", "--spread", "--velocity", "formula"];
+    let options = [
+        "streaks",
+        "--rates",
+        "0,5",
+        "--diameters",
+        "1,3",
+        "--variants",
+        "2",
+        "--vary-diameter",
+        "--terminal-velocity",
+        "rigid_sphere",
+    ];
     folder.succeed(&[&options[..], &["--size", "96", "--threads", "1", "-o", "one"]].concat());
     folder.succeed(&[&options[..], &["--size", "96", "--threads", "3", "-o", "many"]].concat());
     let files = folder.files("one");
@@ -135,17 +145,17 @@ fn nonsense_is_refused_and_nothing_is_written() {
         (&["--diameters", "1,1"], "--diameters: drop diameters: value 2 is 1 after 1; the list must ascend"),
         (&["--diameters", "-1"], "--diameters: drop diameters: value 1 is -1; allowed: 0.05 to 8 mm"),
         (&["--diameters", "1,,2"], "numbers with commas between"),
-        (&["--exposure", "0"], "--exposure: an exposure of 0 s; allowed: 0.000001 to 10 s"),
-        (&["--exposure", "-1/30"], "allowed: 0.000001 to 10 s"),
-        (&["--exposure", "1/0"], "a number of seconds, such as 0.02 or 1/30"),
+        (&["--exposure-time", "0"], "--exposure-time: an exposure of 0 s; allowed: 0.000001 to 10 s"),
+        (&["--exposure-time", "-1/30"], "allowed: 0.000001 to 10 s"),
+        (&["--exposure-time", "1/0"], "a number of seconds, such as 0.02 or 1/30"),
         (&["--size", "0"], "--size: textures of 0 pixels a side; allowed: 8 to 4096"),
-        (&["--box", "-1"], "--box: a box of -1 m; allowed: 0.001 to 100 m"),
-        (&["--box", "100"], "choose a smaller box"),
+        (&["--cube-size", "-1"], "--cube-size: a cube of -1 m; allowed: 0.001 to 100 m"),
+        (&["--cube-size", "100"], "choose a smaller cube"),
         (&["--variants", "0"], "--variants: 0 variants; allowed: 1 to 1000"),
-        (&["--light", "0,0,0"], "--light: the vector toward the light must have a length"),
-        (&["--light", "up"], "three numbers"),
-        (&["--velocity", "guessed"], "measured, formula"),
-        (&["--velocity", "formula", "--diameters", "0.08,1"], "no solution for a drop of 0.08 mm"),
+        (&["--light-direction", "0,0,0"], "--light-direction: the vector toward the light must have a length"),
+        (&["--light-direction", "up"], "three numbers"),
+        (&["--terminal-velocity", "guessed"], "gunn_kinzer, rigid_sphere"),
+        (&["--terminal-velocity", "rigid_sphere", "--diameters", "0.08,1"], "no solution for a drop of 0.08 mm"),
         (&["--format", "jpg"], "png, exr"),
     ] {
         let run = folder.run(&[&["streaks"], arguments].concat());

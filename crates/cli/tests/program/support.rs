@@ -10,7 +10,7 @@ use std::{
 
 /// A small picture of a flame.
 pub(crate) const FLAME: &str = "\
-bansho = 1
+bansho = 2
 
 [picture]
 size = [48, 64]   # small

@@ -15,7 +15,7 @@ const SCENES: [(&str, &str); 5] = [
     (
         "two auroras",
         "[camera]\ntarget = [0.0, 60.0, -100.0]\n[[aurora]]\nparticles = { count = 2000 }\nfield = { cells = 31 }\n\
-      [[aurora]]\nparticles = { count = 2000 }\nfield = { cells = 31 }\ndrawing = { sampling = \"collisions\" }\n",
+      [[aurora]]\nparticles = { count = 2000 }\nfield = { cells = 31 }\nrendering = { sampling = \"single_collisions\" }\n",
     ),
     (
         "fire in rain",
@@ -25,7 +25,7 @@ const SCENES: [(&str, &str); 5] = [
 ];
 
 fn scene(what: &str, plate: &str) -> String {
-    format!("bansho = 1\n[picture]\nsize = [192, 256]\nframes = 4\n{plate}{what}")
+    format!("bansho = 2\n[picture]\nsize = [192, 256]\nframes = 4\n{plate}{what}")
 }
 
 /// Runs, and must be done in time.

@@ -67,7 +67,7 @@ fn rectangles_are_what_their_two_triangles_are() {
 }
 
 #[test]
-fn colours_are_linear_between_corners() {
+fn colors_are_linear_between_corners() {
     let corners = [([0.0, 0.0], Color32::BLACK), ([200.0, 0.0], Color32::from_rgb(200, 0, 0))];
     let low = ([0.0, 100.0], Color32::from_rgb(0, 100, 0));
     let mut mesh = triangles(GREY, &[corners[0].0, corners[1].0, low.0]);

@@ -29,7 +29,7 @@ bansho_base::parameters! {
         /// How high it lies.
         height: f64 = 0.0, unit("m");
         /// Share of light that it throws back when dry, linear sRGB.
-        colour: [f64; 3] = [0.13, 0.125, 0.12], limits(Range::new(0.0, 1.0));
+        color: [f64; 3] = [0.13, 0.125, 0.12], limits(Range::new(0.0, 1.0));
         /// How much it varies from place to place.
         texture: f64 = 0.5, limits(Range::new(0.0, 1.0));
         /// Size of its largest patches.
@@ -57,7 +57,7 @@ impl GroundParameters {
         match self.kind {
             GroundKind::Water => f64::from(WATER_ALBEDO),
             GroundKind::Land | GroundKind::Plate => {
-                let dry = luminance(acescg_from_srgb(self.colour.map(|value| value as f32)));
+                let dry = luminance(acescg_from_srgb(self.color.map(|value| value as f32)));
                 f64::from(dry) * wet_albedo_factor(self.wetness.at(t))
             }
         }

@@ -61,7 +61,7 @@ impl Surface {
         let octaves =
             words.as_flattened().iter().take(OCTAVES).filter_map(|&seed| Noise::new(seed, SINGLE_OCTAVE, [0, 0]).ok());
         Self {
-            albedo: acescg_from_srgb(parameters.colour.map(|value| value as f32)),
+            albedo: acescg_from_srgb(parameters.color.map(|value| value as f32)),
             texture: parameters.texture,
             size: parameters.texture_size,
             octaves: octaves.collect(),

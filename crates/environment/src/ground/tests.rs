@@ -37,7 +37,7 @@ fn drawn(parameters: GroundParameters, lights: Vec<Light>, reflection: Option<&I
 }
 
 fn plain() -> GroundParameters {
-    GroundParameters { texture: 0.0, colour: [0.5; 3], puddles: 0.0, ..GroundParameters::default() }
+    GroundParameters { texture: 0.0, color: [0.5; 3], puddles: 0.0, ..GroundParameters::default() }
 }
 
 fn lamp(height: f64) -> Light {
@@ -113,7 +113,7 @@ fn only_dry_land_is_no_mirror() {
 }
 
 #[test]
-fn a_wall_stays_dry_three_centimetres_above_the_ground() {
+fn a_wall_stays_dry_three_centimeters_above_the_ground() {
     let size = [640, 480];
     let camera = CameraParameters { position: [0.0, 1.6, 6.0].into(), ..CameraParameters::default() };
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, size, 0);

@@ -69,8 +69,8 @@ mod tests;
 pub use fault::{ParticleFault, ParticleFaultKind};
 pub use model::FlameParticles;
 pub use parameters::{
-    BurnerParameters, BurnerShape, FlameParticlesParameters, FluidParameters, LifeParameters, MotionParameters,
-    TemperatureLaw, Tension, WindForce,
+    BurnerParameters, BurnerShape, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters,
+    NegativePressure, TemperatureLaw, WindForce,
 };
 pub use simulate::{
     burner::heskestad,

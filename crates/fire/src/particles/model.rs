@@ -71,7 +71,7 @@ impl FlameParticles {
             particles: &self.simulation.particles,
             time: self.time,
             air_temperature_k: self.air_temperature_k,
-            detail_speed: match self.parameters.look.detail_speed {
+            detail_speed: match self.parameters.rendering.detail_speed {
                 Auto::Set(speed) => speed,
                 Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
             },
@@ -86,7 +86,7 @@ impl FlameParticles {
     pub(super) fn fade_out(&self) -> FadeOut {
         /// Duration of the fade-out as a fraction of the afterlife.
         const FADING: f64 = 0.2;
-        let seconds = (FADING * self.parameters.life.afterlife_s).max(self.parameters.step_s) as f32;
+        let seconds = (FADING * self.parameters.combustion.burnt_gas_lifetime_s).max(self.parameters.step_s) as f32;
         FadeOut { seconds, domain: self.simulation.constants.domain.map(|corner| corner.as_vec3()) }
     }
 

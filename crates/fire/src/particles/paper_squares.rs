@@ -8,7 +8,7 @@ use bansho_base::{
 };
 
 use crate::particles::{
-    parameters::LookParameters,
+    parameters::RenderingParameters,
     render::{
         gas::Gas,
         project::sprite::{ProjectedParticle, SpriteKind, project_particles},
@@ -54,7 +54,7 @@ impl SpriteKind for SquareSprites<'_> {
 pub(crate) struct Squares(Vec<Square>);
 
 impl Squares {
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Self {
+    pub(crate) fn new(gas: &Gas, look: &RenderingParameters, view: &View) -> Self {
         let kind = SquareSprites {
             gas,
             side: look.square_size as f32,

@@ -13,7 +13,7 @@ bansho_base::choice! {
     /// Shape of the area that gas comes from.
     pub enum BurnerShape {
         /// A round area that faces along the burner's y axis.
-        Disc = "disc",
+        Disk = "disk",
         /// A point: gas starts within a ball of `diameter`.
         Point = "point",
         /// A strip along the burner's x axis, `length` long and `diameter` wide.
@@ -27,11 +27,11 @@ bansho_base::choice! {
 
 bansho_base::choice! {
     /// What becomes of the pressure, eq. (11), in gas thinner than rho_0.
-    pub enum Tension {
+    pub enum NegativePressure {
         /// It is 0.
         Clamped = "clamped",
         /// It is negative, as in the paper: thin gas pulls itself into strings.
-        Unclamped = "unclamped",
+        Allowed = "allowed",
     }
 }
 
@@ -39,7 +39,7 @@ bansho_base::choice! {
     /// What becomes of a particle's temperature.
     pub enum TemperatureLaw {
         /// It heats where it burns, and cools by mixing with air and by radiation.
-        Living = "living",
+        Simulated = "simulated",
         /// It stays what it was at birth, as in the paper.
         Constant = "constant",
     }
@@ -49,9 +49,9 @@ bansho_base::choice! {
     /// How the wind acts.
     pub enum WindForce {
         /// Air that the gas mixes with brings its own momentum: gas takes up the wind's velocity as it mixes.
-        Mixing = "mixing",
-        /// The wind's velocity, times `wind_gain`, is a force per volume, as in the paper.
-        PerVolume = "per_volume",
+        Entrainment = "entrainment",
+        /// The wind's velocity, times `wind_response`, is a force per volume, as in the paper.
+        BodyForce = "body_force",
     }
 }
 
@@ -59,12 +59,12 @@ bansho_base::parameters! {
     /// Where burning gas comes from. Its heat release rate and its size say all that is needed.
     pub struct BurnerParameters {
         /// Shape of the area.
-        shape: BurnerShape = BurnerShape::Disc;
+        shape: BurnerShape = BurnerShape::Disk;
         /// Where its middle is, from `position` of the flame. Gas leaves a moving burner where it is then, no faster for its motion.
         position: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), unit("m");
         /// Turn about x, then y, then z; unturned it blows upward.
         rotation_deg: [f64; 3] = [0.0, 0.0, 0.0], limits(Range::new(-3600.0, 3600.0)), unit("degrees");
-        /// Diameter D of a disc or a point, width of a line.
+        /// Diameter D of a disk or a point, width of a line.
         diameter: f64 = 0.3, limits(LENGTH), unit("m");
         /// Length of a line.
         length: f64 = 1.0, limits(LENGTH), unit("m");
@@ -91,38 +91,38 @@ bansho_base::parameters! {
     /// Smoothed particle hydrodynamics, section 4.
     pub struct FluidParameters {
         /// Support radius d, eq. (2), in mean distances of particles at the burner.
-        support: f64 = 2.3, limits(Range::new(1.2, 6.0)), unit("distances");
+        support_radius: f64 = 2.3, limits(Range::new(1.2, 6.0)), unit("distances");
         /// Density of reference rho_0, eq. (11), as a share of the density at the burner.
         rest_density: f64 = 0.8, limits(Range::new(0.0, 10.0));
         /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being
         /// pressed.
         stiffness: f64 = 1.2, limits(Range::new(0.0, 20.0));
         /// Kernel of the pressure force, eq. (12). The paper's is `"poly6"`, whose gradient vanishes at the center, so that particles clump.
-        force_kernel: KernelShape = KernelShape::Spiky;
+        pressure_kernel: KernelShape = KernelShape::Spiky;
         /// Pressure of thin gas, eq. (11).
-        tension: Tension = Tension::Clamped;
+        negative_pressure: NegativePressure = NegativePressure::Clamped;
         /// How far neighbors even out their velocities in a hundredth of a second; 0 is the paper's Euler equation, eq. (1).
         viscosity: f64 = 0.12, limits(FRACTION);
         /// How far neighbors even out temperature in a hundredth of a second.
         conduction: f64 = 0.08, limits(FRACTION);
         /// Sub-steps that a step is cut into at most. Gas that would need more keeps its time and gives way more easily.
-        sub_steps: i64 = 3, limits(Range::new(1.0, 100.0));
+        max_substeps: i64 = 3, limits(Range::new(1.0, 100.0));
     }
 }
 
 bansho_base::parameters! {
     /// What moves the gas beside its own pressure.
-    pub struct MotionParameters {
+    pub struct ForceParameters {
         /// Buoyancy against the air, 1 is physical; 0 in the paper.
         buoyancy: f64 = 1.0, limits(Range::new(0.0, 10.0));
         /// How the wind acts.
-        wind: WindForce = WindForce::Mixing;
-        /// Scale of the wind's effect; for `wind = "per_volume"` force per volume and wind speed, in N s/m^4.
-        wind_gain: f64 = 1.0, limits(Range::new(0.0, 100.0));
+        wind_model: WindForce = WindForce::Entrainment;
+        /// Scale of the wind's effect; for `wind_model = "body_force"` force per volume and wind speed, in N s/m^4.
+        wind_response: f64 = 1.0, limits(Range::new(0.0, 100.0));
         /// Entrainment coefficient: speed at which air enters the gas, as a share of the speed between them; slows, dilutes and cools it.
         entrainment: f64 = 0.12, limits(FRACTION);
         /// How far rising gas that grows faster grows narrower too; 1 keeps its volume.
-        narrowing: f64 = 0.9, limits(FRACTION);
+        plume_contraction: f64 = 0.9, limits(FRACTION);
         /// Strength of the vortex rings that the fire sheds as it breathes; 1 is usual, 0 is a fire that does not puff.
         puffing: f64 = 1.0, limits(Range::new(0.0, 5.0));
         /// How often it sheds them; `"auto"` is `1.5 / sqrt(D)` Hz (Cetegen and Ahmed 1993).
@@ -136,24 +136,24 @@ bansho_base::parameters! {
 
 bansho_base::parameters! {
     /// How gas burns and what becomes of it.
-    pub struct LifeParameters {
+    pub struct CombustionParameters {
         /// What becomes of its temperature.
-        temperature: TemperatureLaw = TemperatureLaw::Living;
+        temperature_model: TemperatureLaw = TemperatureLaw::Simulated;
         /// Temperature that burning gas nears.
         flame_temperature_k: f64 = 1900.0, limits(KELVIN), unit("K");
         /// How long it takes to heat up.
-        heating_s: f64 = 0.03, limits(Range::new(1e-3, 10.0)), unit("s");
+        heating_time_s: f64 = 0.03, limits(Range::new(1e-3, 10.0)), unit("s");
         /// How much of the fuel's burning waits for air: 0 burns all gas alike, 1 burns what lies outside first, so that flames
         /// narrow upward.
-        air_hunger: f64 = 0.75, limits(FRACTION);
+        oxygen_dependence: f64 = 0.75, limits(FRACTION);
         /// Volume fraction of soot that forms in burning gas, in parts per million.
         soot_ppm: f64 = 1.2, limits(Range::new(0.0, 100.0)), unit("1e-6");
         /// Share of the soot that does not burn in the flame and leaves it as smoke.
-        smoke: f64 = 0.0, limits(FRACTION);
+        smoke_fraction: f64 = 0.0, limits(FRACTION);
         /// Strength of cooling by the soot's own radiation; 1 is physical.
-        radiation: f64 = 0.3, limits(Range::new(0.0, 10.0));
+        radiative_cooling: f64 = 0.3, limits(Range::new(0.0, 10.0));
         /// How long burnt gas stays after its fuel is gone, unless it leaves the domain.
-        afterlife_s: f64 = 0.35, limits(Range::new(0.0, 60.0)), unit("s");
+        burnt_gas_lifetime_s: f64 = 0.35, limits(Range::new(0.0, 60.0)), unit("s");
     }
 }
 
@@ -171,11 +171,11 @@ bansho_base::parameters! {
         /// Pressure and viscosity.
         fluid: FluidParameters = FluidParameters::default();
         /// Buoyancy, wind, entrainment, puffing, turbulence.
-        motion: MotionParameters = MotionParameters::default();
+        forces: ForceParameters = ForceParameters::default();
         /// Burning, heating, cooling, soot.
-        life: LifeParameters = LifeParameters::default();
+        combustion: CombustionParameters = CombustionParameters::default();
         /// How it looks.
-        look: LookParameters = LookParameters::default();
+        rendering: RenderingParameters = RenderingParameters::default();
         /// Least corner of the box that gas may fill, from `position`; `"auto"` leaves room for flame and smoke.
         domain_min: Auto<[f64; 3]> = Auto::Auto, unit("m");
         /// Greatest corner of the box that gas may fill, from `position`.
@@ -191,7 +191,7 @@ bansho_base::choice! {
     /// What becomes of a particle in the picture.
     pub enum SpriteStyle {
         /// What a ray sees of its ball: sums are the exact line integrals of the gas, so that light and opacity follow from its soot.
-        Integral = "integral",
+        LineIntegral = "line_integral",
         /// The paper's: poly6 itself, times the color of a black body, added; opacity from density.
         Poly6 = "poly6",
         /// The paper's figure 7: a square, the redder the denser the gas.
@@ -201,9 +201,9 @@ bansho_base::choice! {
 
 bansho_base::parameters! {
     /// How the gas is drawn.
-    pub struct LookParameters {
+    pub struct RenderingParameters {
         /// What becomes of a particle: exact line integrals, the paper's sprites, or squares that show the density.
-        sprite: SpriteStyle = SpriteStyle::Integral;
+        sprite: SpriteStyle = SpriteStyle::LineIntegral;
         /// How strongly soot absorbs, and so shines, beside what its volume fraction gives.
         soot_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
         /// How unevenly gas finer than the particles burns: 0 is the smooth sum of the particles alone. The mean light stays.
@@ -223,7 +223,7 @@ bansho_base::parameters! {
         /// Share of the light of others that soot scatters on rather than takes away: what makes smoke visible.
         smoke_albedo: f64 = 0.3, limits(FRACTION);
         /// How strongly hot gas bends the light of what lies behind; 1 is physical, 0 leaves it straight.
-        haze_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
+        heat_haze_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();
         /// Light on others.

@@ -34,9 +34,9 @@ impl Describe for FlameParticlesParameters {
     const FIRST_KEYS: &'static [&'static str] = &[
         "position",
         "particles",
-        "motion.turbulence",
-        "life.soot_ppm",
-        "life.smoke",
+        "forces.turbulence",
+        "combustion.soot_ppm",
+        "combustion.smoke_fraction",
         "burners.diameter",
         "burners.heat_release_kw",
     ];
@@ -70,14 +70,15 @@ impl Phenomenon for FlameParticles {
     fn luminance(&self) -> f64 {
         /// Mean of bright parts relative to a whole flame of the hottest soot.
         const BRIGHT: f64 = 0.09;
-        let hottest = match self.parameters.life.temperature {
-            TemperatureLaw::Living => self.parameters.life.flame_temperature_k,
+        let hottest = match self.parameters.combustion.temperature_model {
+            TemperatureLaw::Simulated => self.parameters.combustion.flame_temperature_k,
             TemperatureLaw::Constant => self.tallest().parameters.temperature_k,
         };
         let black = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
-        let absorption = render::soot_absorption(self.parameters.life.soot_ppm * 1e-6, &self.parameters.look);
-        let emissivity = match self.parameters.look.sprite {
-            SpriteStyle::Integral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
+        let absorption =
+            render::soot_absorption(self.parameters.combustion.soot_ppm * 1e-6, &self.parameters.rendering);
+        let emissivity = match self.parameters.rendering.sprite {
+            SpriteStyle::LineIntegral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
             SpriteStyle::Poly6 | SpriteStyle::Squares => 1.0,
         };
         BRIGHT * black * emissivity
@@ -112,12 +113,12 @@ impl Phenomenon for FlameParticles {
 
 impl Run for FlameParticles {
     fn publish(&self, shutter: Shutter) -> Publication {
-        let lights = render::point_lights_of_gas(&self.gas(), &self.parameters.look, shutter.middle());
+        let lights = render::point_lights_of_gas(&self.gas(), &self.parameters.rendering, shutter.middle());
         Publication { lights, ..Publication::default() }
     }
 
     fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        render::depth_intervals(&self.gas(), &self.parameters.look, view)
+        render::depth_intervals(&self.gas(), &self.parameters.rendering, view)
     }
 
     fn prepare<'a>(
@@ -126,7 +127,7 @@ impl Run for FlameParticles {
         surroundings: &'a Surroundings<'a>,
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.look, view, surroundings, observer)?))
+        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.rendering, view, surroundings, observer)?))
     }
 
     fn export(&self, t: f64) -> Option<PointCloud> {

@@ -57,10 +57,10 @@ impl FlameSheet {
     }
 
     pub(super) fn tables(&self) -> &Tables {
-        let FlameSheetParameters { shape, texture, colour, stage, .. } = &self.parameters;
+        let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
         let make = || Tables {
-            shape: Box::new(ShapeTables::new(shape, texture, colour)),
-            ramp: Box::new(ColorRamp::new(texture, colour, *stage)),
+            shape: Box::new(ShapeTables::new(shape, texture, color)),
+            ramp: Box::new(ColorRamp::new(texture, color, *stage)),
         };
         get_or_compute(&self.tables, make)
     }

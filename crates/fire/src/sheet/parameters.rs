@@ -31,7 +31,7 @@ bansho_base::choice! {
         /// T2 gives temperature and density of glowing soot, Planck's law gives the light.
         BlackBody = "black_body",
         /// The curves `red`, `green` and `blue`, eq. (7).
-        Paper = "paper",
+        RgbCurves = "rgb_curves",
     }
 }
 
@@ -47,7 +47,7 @@ bansho_base::choice! {
         /// After sharpening, T2 (picture 3).
         Sharpened = "sharpened",
         /// Colored, before it is mapped to the flame's shape (picture 4).
-        Colored = "coloured",
+        Colored = "colored",
     }
 }
 
@@ -56,7 +56,7 @@ bansho_base::choice! {
     pub enum Facing {
         /// Turned about the vertical to face the camera.
         Camera = "camera",
-        /// As `turn_deg` says.
+        /// As `yaw_deg` says.
         Fixed = "fixed",
     }
 }
@@ -121,11 +121,11 @@ bansho_base::parameters! {
         kind: Coloring = Coloring::BlackBody;
         /// Luminance of the brightest color.
         luminance: Animated<f64> = Animated::from(12_000.0), limits(Range::new(0.0, 1e7)), unit("cd/m^2");
-        /// R(s), eq. (7), as a display shows it (sRGB-encoded); for `kind = "paper"`.
+        /// R(s), eq. (7), as a display shows it (sRGB-encoded); for `kind = "rgb_curves"`.
         red: Curve = curve(&[[0.0, 0.0], [0.25, 0.75], [0.5, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
-        /// G(s), eq. (7), as a display shows it; for `kind = "paper"`.
+        /// G(s), eq. (7), as a display shows it; for `kind = "rgb_curves"`.
         green: Curve = curve(&[[0.0, 0.0], [0.25, 0.12], [0.6, 0.62], [1.0, 0.98]]), limits(CurveLimits::default());
-        /// B(s), eq. (7), as a display shows it; for `kind = "paper"`.
+        /// B(s), eq. (7), as a display shows it; for `kind = "rgb_curves"`.
         blue: Curve = curve(&[[0.0, 0.0], [0.4, 0.02], [0.75, 0.2], [1.0, 0.72]]), limits(CurveLimits::default());
         /// Temperature of the soot where T2 is nearly 0: tips and edges.
         edge_temperature_k: f64 = 1100.0, limits(KELVIN), unit("K");
@@ -150,13 +150,13 @@ bansho_base::parameters! {
         /// Share of the light that it scatters on rather than takes away.
         albedo: f64 = 0.55, limits(FRACTION);
         /// Tint of what it scatters, linear red, green and blue.
-        colour: [f64; 3] = [0.95, 0.97, 1.0], limits(FRACTION);
+        color: [f64; 3] = [0.95, 0.97, 1.0], limits(FRACTION);
         /// Height of the smoke in flame heights.
         height: f64 = 3.0, limits(Range::new(0.1, 50.0));
         /// Width of the smoke at its top in flame widths.
         width: f64 = 2.0, limits(Range::new(0.1, 50.0));
         /// Where it begins, in flame heights above the base.
-        start: f64 = 0.45, limits(Range::new(0.0, 10.0));
+        base_height: f64 = 0.45, limits(Range::new(0.0, 10.0));
         /// How fast it scrolls beside the flame.
         speed: f64 = 0.35, limits(Range::new(0.0, 10.0));
         /// How much of the fire's own light reaches it from beneath.
@@ -184,7 +184,7 @@ bansho_base::parameters! {
         /// How far it is ahead in time.
         phase_s: f64 = 0.0, unit("s");
         /// Turn about the vertical where sheets do not face the camera.
-        turn_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
+        yaw_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
     }
 }
 
@@ -200,7 +200,7 @@ bansho_base::parameters! {
         /// Which way it looks.
         facing: Facing = Facing::Camera;
         /// Turn about the vertical for `facing = "fixed"`; at 0 it looks along +z.
-        turn_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
+        yaw_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
         /// Scroll speed s in sheet heights a second, eq. (1).
         speed: Animated<f64> = Animated::from(1.1), limits(Range::new(0.0, 100.0)), unit("1/s");
         /// How far it is ahead in time.
@@ -214,7 +214,7 @@ bansho_base::parameters! {
         /// Texture, threshold and sharpening.
         texture: TextureParameters = TextureParameters::default();
         /// Color and soot.
-        colour: ColorParameters = ColorParameters::default();
+        color: ColorParameters = ColorParameters::default();
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();
         /// Smoke.

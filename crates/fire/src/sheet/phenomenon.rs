@@ -26,8 +26,8 @@ impl Describe for FlameSheetParameters {
         "speed",
         "variation",
         "texture.contrast",
-        "colour.luminance",
-        "colour.core_temperature_k",
+        "color.luminance",
+        "color.core_temperature_k",
         "sparks.rate",
         "smoke.optical_depth",
     ];
@@ -48,7 +48,7 @@ impl Phenomenon for FlameSheet {
     fn luminance(&self) -> f64 {
         /// Bright parts beside the very brightest: most of a flame is far dimmer than its hottest soot.
         const BRIGHT: f64 = 0.28;
-        BRIGHT * self.parameters.colour.luminance.bounds()[1]
+        BRIGHT * self.parameters.color.luminance.bounds()[1]
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {

@@ -122,7 +122,7 @@ fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
 }
 
 #[test]
-fn every_valid_parameter_set_stays_within_0_and_1_before_colour() {
+fn every_valid_parameter_set_stays_within_0_and_1_before_color() {
     let mut content = 0;
     for number in 0..1500 {
         let Ok(sheet) = FlameSheet::new(random_parameters(number), "random", number, None) else { continue };
@@ -141,7 +141,7 @@ fn random_sheets_draw_without_nan_or_infinity_through_every_lens() {
         let mut parameters = random_parameters(number);
         parameters.instances.truncate(2);
         parameters.sparks.rate = parameters.sparks.rate.min(100.0);
-        parameters.sparks.life_s = parameters.sparks.life_s.min(2.0);
+        parameters.sparks.lifetime_s = parameters.sparks.lifetime_s.min(2.0);
         let Ok(sheet) = FlameSheet::new(parameters, "random", number, Some(2.0)) else { continue };
         let lens = [Lens::Perspective, Lens::Fisheye, Lens::Panorama][number as usize % 3];
         let planes = draw(&sheet, &view(lens, 0.7), 33, None);

@@ -26,13 +26,13 @@ bansho_base::parameters! {
         /// Speed at which they rise at first.
         speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
         /// How much that differs between them, as a share.
-        spread: f64 = 0.5, limits(FRACTION);
+        speed_variation: f64 = 0.5, limits(FRACTION);
         /// How far they swirl sideways.
         swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
         /// How long they glow.
-        life_s: f64 = 1.8, limits(Range::new(0.05, 20.0)), unit("s");
+        lifetime_s: f64 = 1.8, limits(Range::new(0.05, 20.0)), unit("s");
         /// Their diameter.
-        size: f64 = 0.004, limits(Range::new(1e-5, 1.0)), unit("m");
+        diameter: f64 = 0.004, limits(Range::new(1e-5, 1.0)), unit("m");
         /// Temperature at birth; they cool to 900 K.
         temperature_k: f64 = 1750.0, limits(Range::new(900.0, 4000.0)), unit("K");
     }
@@ -88,7 +88,8 @@ impl SparkEmitter<'_> {
             }
             None => (sparks.rate, None),
         };
-        let (first, last) = (((self.now - sparks.life_s) * rate).floor() as i64 - 1, (self.now * rate).ceil() as i64);
+        let (first, last) =
+            (((self.now - sparks.lifetime_s) * rate).floor() as i64 - 1, (self.now * rate).ceil() as i64);
         let loop_index = |id: i64| births_per_loop.map_or(id, |births_per_loop| id.rem_euclid(births_per_loop)) as u64;
         (first..=last)
             .filter_map(|id| {
@@ -104,8 +105,8 @@ impl SparkEmitter<'_> {
         let first = self.key.uniforms(id, 0, Purpose::named("spark start")).map(f64::from);
         let second = self.key.uniforms(id, 0, Purpose::named("spark flight")).map(f64::from);
         let age = since_turn - first[0] / rate;
-        let life = sparks.life_s * (0.35 + 0.65 * first[1] * first[1]);
-        let vary = |variate: f64| 1.0 + sparks.spread * (2.0 * variate - 1.0);
+        let life = sparks.lifetime_s * (0.35 + 0.65 * first[1] * first[1]);
+        let vary = |variate: f64| 1.0 + sparks.speed_variation * (2.0 * variate - 1.0);
         (0.0..life).contains(&age).then(|| Spark {
             age,
             life,
@@ -119,7 +120,7 @@ impl SparkEmitter<'_> {
     /// Displacement of a spark at `age` in still air, m: it slows down as it cools, and swirls in a growing spiral.
     fn displacement(&self, spark: &Spark, age: f64) -> DVec3 {
         const DRAG: f64 = 1.3;
-        let life = self.parameters.life_s;
+        let life = self.parameters.lifetime_s;
         let rise = spark.speed * life * -math::exp_m1(-DRAG * age / life) / DRAG;
         let swirl = self.parameters.swirl * age / (age + 0.4 * life);
         let angle = |phase: f64, turns: f64| std::f64::consts::TAU * (phase + turns * age);
@@ -154,7 +155,7 @@ impl SparkEmitter<'_> {
         let cooled = math::pow(spark.age / spark.life, 0.8);
         let hottest = self.parameters.temperature_k;
         let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled);
-        let radius = 0.5 * self.parameters.size * self.scale * opened.pixels_per_meter;
+        let radius = 0.5 * self.parameters.diameter * self.scale * opened.pixels_per_meter;
         let area = std::f64::consts::PI * radius * radius;
         let radiance = color::black_body().radiance(temperature as f32);
         Streak::new(opened.pixel, closed.pixel, radius.max(0.6), radiance, area, 0.5 * (opened.depth + closed.depth))

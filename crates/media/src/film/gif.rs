@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_come_back_over_black_with_their_lengths() {
+    fn colors_come_back_over_black_with_their_lengths() {
         let frames = read_back(&film(3, [30, 1], false));
         assert_eq!(frames.iter().map(|frame| frame.0).collect::<Vec<_>>(), [3, 4, 3]);
         for (index, (_, pixels)) in frames.iter().enumerate() {

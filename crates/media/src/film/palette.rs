@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn few_colours_are_kept_exactly_however_rare() {
+    fn few_colors_are_kept_exactly_however_rare() {
         let histogram = counted(&[([0, 0, 0], 100_000), ([255, 255, 255], 1), ([255, 0, 0], 3)]);
         let mut palette = palette(&histogram, 256);
         palette.sort();

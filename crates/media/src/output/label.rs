@@ -82,7 +82,7 @@ mod tests {
 
     use super::*;
 
-    fn labelled(size: [usize; 2], shown: i64) -> DisplayImage {
+    fn labeled(size: [usize; 2], shown: i64) -> DisplayImage {
         let pixels = DisplayPixels::Eight(vec![[9, 9, 9, 255]; size[0] * size[1]]);
         let mut picture =
             DisplayImage { width: size[0], height: size[1], opaque: true, alpha: AlphaConvention::Linear, pixels };
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_number_stands_in_the_corner_in_white_on_black() {
-        let codes = codes(&labelled([40, 72], -7));
+        let codes = codes(&labeled([40, 72], -7));
         let rows: Vec<String> = codes
             .chunks(40)
             .take(9)
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn it_grows_with_the_picture_and_never_takes_more_than_an_eighth_of_its_height() {
         for (height, rows) in [(71, 0), (72, 9), (288, 18), (720, 45), (2160, 135)] {
-            let picture = labelled([2 * height, height], 120);
+            let picture = labeled([2 * height, height], 120);
             let touched = codes(&picture).chunks(2 * height).filter(|row| row[0] != 9).count();
             assert_eq!(touched, rows, "{height}");
             assert!(8 * touched <= height);
@@ -139,6 +139,6 @@ mod tests {
 
     #[test]
     fn a_number_that_does_not_fit_is_left_out() {
-        assert!(codes(&labelled([12, 400], 123)).iter().all(|&code| code == 9));
+        assert!(codes(&labeled([12, 400], 123)).iter().all(|&code| code == 9));
     }
 }

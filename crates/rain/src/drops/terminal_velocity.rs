@@ -9,9 +9,9 @@ bansho_base::choice! {
     /// Where terminal velocities come from.
     pub enum VelocityLaw {
         /// Measured by Gunn and Kinzer: large drops flatten and fall no faster than 9.2 m/s.
-        Measured = "measured",
+        GunnKinzer = "gunn_kinzer",
         /// The paper's formula (2)-(4) for a rigid sphere: 4 % slow at 1 mm, 29 % fast at 5 mm.
-        Formula = "formula",
+        RigidSphere = "rigid_sphere",
     }
 }
 
@@ -71,7 +71,7 @@ pub struct TerminalVelocity {
 
 impl Default for TerminalVelocity {
     fn default() -> Self {
-        Self { law: VelocityLaw::Measured, air: Air::default() }
+        Self { law: VelocityLaw::GunnKinzer, air: Air::default() }
     }
 }
 
@@ -82,8 +82,8 @@ impl TerminalVelocity {
     /// velocity at which Re was computed last.
     pub fn speed(&self, diameter_mm: f64) -> f64 {
         match self.law {
-            VelocityLaw::Measured => measured_velocity(diameter_mm) * density_correction(&self.air),
-            VelocityLaw::Formula => match fixed_point_velocity(diameter_mm, &self.air) {
+            VelocityLaw::GunnKinzer => measured_velocity(diameter_mm) * density_correction(&self.air),
+            VelocityLaw::RigidSphere => match fixed_point_velocity(diameter_mm, &self.air) {
                 Ok(speed) => speed,
                 Err(NoTerminalVelocity::DragJump { .. }) => stokes_velocity(diameter_mm, &self.air),
                 Err(NoTerminalVelocity::TooFast { reynolds, .. }) => {
@@ -250,11 +250,11 @@ mod tests {
     fn the_formula_says_where_it_has_no_solution() {
         let air = Air::default();
         let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
-        for micrometre in (700..900).map(|tenth| tenth as f64 * 0.1) {
-            match fixed_point_velocity(1e-3 * micrometre, &air) {
+        for micrometer in (700..900).map(|tenth| tenth as f64 * 0.1) {
+            match fixed_point_velocity(1e-3 * micrometer, &air) {
                 Ok(_) => {}
                 Err(NoTerminalVelocity::DragJump { .. }) => {
-                    (first, last) = (first.min(micrometre), last.max(micrometre));
+                    (first, last) = (first.min(micrometer), last.max(micrometer));
                 }
                 Err(other) => panic!("{other}"),
             }
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn velocities_rise_with_diameter_under_both_laws() {
-        for law in [VelocityLaw::Measured, VelocityLaw::Formula] {
+        for law in [VelocityLaw::GunnKinzer, VelocityLaw::RigidSphere] {
             let velocity = TerminalVelocity { law, air: Air::default() };
             let speeds: Vec<f64> = (0..=800).map(|i| velocity.speed(0.01 * i as f64)).collect();
             assert!(speeds.is_sorted_by(|a, b| a <= b || (a - b) / a < 0.2), "{law:?}");
@@ -279,7 +279,7 @@ mod tests {
     fn thin_air_lets_drops_fall_faster() {
         // Half the density: 2^0.4 = 1.3195.
         let air = Air { density: 0.602, ..Air::default() };
-        let velocity = TerminalVelocity { law: VelocityLaw::Measured, air };
+        let velocity = TerminalVelocity { law: VelocityLaw::GunnKinzer, air };
         assert!(near(velocity.speed(2.0), 6.49 * 1.3195, 1e-4));
         assert!(near(Air::at(293.15, 101_325.0).density, 1.204, 1e-3));
         assert!(near(Air::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));

@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn light_divides_among_the_paths_as_in_the_reference() {
-        for [index, view, p0, p1, p2, p3, p4, p5, rest, centre, ..] in
+        for [index, view, p0, p1, p2, p3, p4, p5, rest, center, ..] in
             rows::<13>(include_str!("../../data/drop_lens.csv"))
         {
             let rays = trace_rays(index);
@@ -185,7 +185,7 @@ mod tests {
             let widest = rays.iter().map(|paths| paths[1].deviation).fold(0.0, f64::max);
             assert!(near(2.0 * widest.to_degrees(), view, 2e-3), "{}", 2.0 * widest.to_degrees());
             let step = FRAC_PI_2 / RAYS as f64;
-            assert!(near(rays[0][1].fraction / (math::sin(step) * math::sin(step)), centre, 1e-3));
+            assert!(near(rays[0][1].fraction / (math::sin(step) * math::sin(step)), center, 1e-3));
         }
     }
 

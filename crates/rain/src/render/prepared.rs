@@ -110,7 +110,7 @@ impl<'a> PreparedRain<'a> {
         };
         chunks.extend(frame.splashes());
         let ends =
-            [if rain.parameters.veil_distance > 0.0 { rain.near_reach() } else { 0.0 }, rain.reach(surroundings)];
+            [if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 }, rain.reach(surroundings)];
         let single_scattering =
             SingleScattering::new(&exposure, &lighting, sky_lighting.clone(), view, extinctions, ends);
         let figures = frame.figures(chunks.iter().map(StreakChunk::count).sum(), billboards);

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_millimetre_in_a_thirtieth_blocks_seven_thousandths() {
+    fn a_millimeter_in_a_thirtieth_blocks_seven_thousandths() {
         let streak = Streak::new(1.0, 4.03, 1.0 / 30.0);
         assert!(near(streak.profile(0.0), 1e-3 / 0.134333, 1e-5));
         assert!(near(streak.mean_opacity(), 0.0058466, 1e-4));

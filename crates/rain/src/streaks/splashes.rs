@@ -72,7 +72,7 @@ impl Splashes<'_> {
         let (exposure, reach) = (self.projection.exposure, self.parameters.distance);
         let eye = exposure.cameras.middle().position;
         let high = (eye.y - exposure.ground).abs();
-        if self.parameters.amount <= 0.0 || high >= reach {
+        if self.parameters.fraction <= 0.0 || high >= reach {
             return Vec::new();
         }
         let range = |center: f64| {
@@ -114,7 +114,7 @@ impl Splashes<'_> {
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
         let distance = (middle - self.projection.exposure.cameras.middle().position).length();
         let thinning = (distance / FULL_DENSITY_DISTANCE).max(1.0);
-        let probability = self.parameters.amount / (thinning * thinning);
+        let probability = self.parameters.fraction / (thinning * thinning);
         let fade = 1.0 - math::smoothstep(0.7, 1.0, distance / self.parameters.distance);
         for back in 0..2 {
             let step = self
@@ -172,7 +172,7 @@ impl Splashes<'_> {
         let turns = if high { random[0] } else { (index as f64 + 0.6 * random[0]) / RING_DROPLETS as f64 };
         let elevation = if high { 1.2 + 0.3 * random[1] } else { 0.85 + 0.3 * random[1] };
         let speed = (if high { 1.1 } else { 0.75 }) * (0.7 + 0.6 * random[2]) * math::sqrt(0.5 * impact.diameter_mm);
-        let speed = (speed * self.parameters.speed).min(0.5 * STANDARD_GRAVITY * SPLASH_PERIOD);
+        let speed = (speed * self.parameters.speed_scale).min(0.5 * STANDARD_GRAVITY * SPLASH_PERIOD);
         let ((sin_turn, cos_turn), (sin_up, cos_up)) = (math::sin_cos(TAU * turns), math::sin_cos(elevation));
         let velocity = DVec3::new(cos_turn * cos_up, sin_up, sin_turn * cos_up) * speed;
         let half = 0.5 * cameras.exposure_time;

@@ -89,7 +89,7 @@ fn the_thickest_veil_around_lamps_stays_finite() {
     let light = lamp([0.2, 1.0, -3.0], 1e6);
     let thick = RainParameters {
         rate_mm_per_h: 300.0.into(),
-        veil_distance: 5000.0,
+        airlight_distance: 5000.0,
         opacity_gain: 20.0,
         ..streaks(Method::Drops, 300.0)
     };
@@ -106,7 +106,8 @@ fn the_thickest_veil_around_lamps_stays_finite() {
 #[test]
 fn the_veil_is_single_scattering_along_each_line_of_sight() {
     // All drops veil: none is drawn as a streak.
-    let parameters = RainParameters { diameters_mm: vec![8.0], veil_distance: 30.0, ..streaks(Method::Drops, 20.0) };
+    let parameters =
+        RainParameters { diameters_mm: vec![8.0], airlight_distance: 30.0, ..streaks(Method::Drops, 20.0) };
     let light = lamp([1.0, 3.0, -9.0], 5000.0);
     let strip = lit_by(parameters.clone(), vec![light], None);
     let view = view_at(1.0, 1.0 / 60.0, SIZE);

@@ -43,9 +43,13 @@ pub(super) fn wind(velocity: [f64; 3], gust: f64) -> Wind {
 
 /// Streaks alone, at a rate.
 pub(super) fn streaks(method: Method, rate_mm_per_h: f64) -> RainParameters {
-    let mut parameters =
-        RainParameters { rate_mm_per_h: rate_mm_per_h.into(), method, veil_distance: 0.0, ..RainParameters::default() };
-    parameters.splashes.amount = 0.0;
+    let mut parameters = RainParameters {
+        rate_mm_per_h: rate_mm_per_h.into(),
+        method,
+        airlight_distance: 0.0,
+        ..RainParameters::default()
+    };
+    parameters.splashes.fraction = 0.0;
     parameters
 }
 
@@ -197,7 +201,7 @@ fn splashes_stay_near_the_ground_and_grow_with_the_rain() {
     let view = View::new(view.camera_parameters, view.shutter, 1.1, view.size, 0);
     let picture = |rate: f64, amount: f64| {
         let mut parameters = streaks(Method::Drops, rate);
-        parameters.splashes.amount = amount;
+        parameters.splashes.fraction = amount;
         opacity(&draw(&rain(parameters, 1), &view, &Surroundings::from_wind(&calm)))
     };
     // How much splashes add to the rows above and below the one that shows 0.3 m above the ground at the end of their reach.

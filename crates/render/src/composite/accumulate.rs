@@ -12,7 +12,7 @@ use fearless_simd::{Level, dispatch};
 pub(crate) struct Accumulator {
     pub(crate) rect: Rect,
     /// C: red, green, blue of the light that reaches the camera.
-    pub(crate) colour: [Vec<f32>; 3],
+    pub(crate) color: [Vec<f32>; 3],
     /// Tacc: share of the light from behind that still reaches the camera; holds nothing until something absorbs.
     transmittance: [Vec<f32>; 3],
     absorbs: bool,
@@ -34,7 +34,7 @@ impl Accumulator {
     pub(crate) fn reset(&mut self, rect: Rect, layers: usize, aovs: &[usize]) {
         let pixels = rect.width * rect.height;
         self.rect = rect;
-        self.colour.iter_mut().for_each(|plane| refill(plane, pixels, 0.0));
+        self.color.iter_mut().for_each(|plane| refill(plane, pixels, 0.0));
         self.absorbs = false;
         refill(&mut self.depth, pixels, f32::INFINITY);
         self.layers.resize_with(layers, Default::default);
@@ -86,18 +86,18 @@ impl Accumulator {
     fn add_row(&mut self, level: Level, strip: &Strip, from: usize, to: usize) {
         let width = strip.rect.width;
         for c in 0..3 {
-            let colour = &mut self.colour[c][to..][..width];
+            let color = &mut self.color[c][to..][..width];
             let radiance = &strip.radiance[c][from..][..width];
             if !self.absorbs {
-                dispatch!(level, _simd => add_light(colour, radiance));
+                dispatch!(level, _simd => add_light(color, radiance));
                 continue;
             }
             let transmittance = &mut self.transmittance[c][to..][..width];
             match strip.transmittance_planes() {
-                None => dispatch!(level, _simd => emit_row(colour, transmittance, radiance)),
+                None => dispatch!(level, _simd => emit_row(color, transmittance, radiance)),
                 Some(planes) => {
                     let absorbed = &planes[c][from..][..width];
-                    dispatch!(level, _simd => absorb_row(colour, transmittance, radiance, absorbed));
+                    dispatch!(level, _simd => absorb_row(color, transmittance, radiance, absorbed));
                 }
             }
         }
@@ -122,8 +122,8 @@ impl Accumulator {
 }
 
 #[inline(always)]
-fn add_light(colour: &mut [f32], radiance: &[f32]) {
-    colour.iter_mut().zip(radiance).for_each(|(colour, radiance)| *colour += radiance);
+fn add_light(color: &mut [f32], radiance: &[f32]) {
+    color.iter_mut().zip(radiance).for_each(|(color, radiance)| *color += radiance);
 }
 
 #[inline(always)]
@@ -132,18 +132,18 @@ fn nearest_row(nearest: &mut [f32], depth: &[f32]) {
 }
 
 #[inline(always)]
-fn emit_row(colour: &mut [f32], transmittance: &[f32], radiance: &[f32]) {
-    for ((colour, transmittance), radiance) in colour.iter_mut().zip(transmittance).zip(radiance) {
-        *colour = transmittance.fma(*radiance, *colour);
+fn emit_row(color: &mut [f32], transmittance: &[f32], radiance: &[f32]) {
+    for ((color, transmittance), radiance) in color.iter_mut().zip(transmittance).zip(radiance) {
+        *color = transmittance.fma(*radiance, *color);
     }
 }
 
 #[inline(always)]
-fn absorb_row(colour: &mut [f32], transmittance: &mut [f32], radiance: &[f32], absorbed: &[f32]) {
-    for (((colour, transmittance), radiance), absorbed) in
-        colour.iter_mut().zip(transmittance).zip(radiance).zip(absorbed)
+fn absorb_row(color: &mut [f32], transmittance: &mut [f32], radiance: &[f32], absorbed: &[f32]) {
+    for (((color, transmittance), radiance), absorbed) in
+        color.iter_mut().zip(transmittance).zip(radiance).zip(absorbed)
     {
-        *colour = transmittance.fma(*radiance, *colour);
+        *color = transmittance.fma(*radiance, *color);
         *transmittance *= absorbed;
     }
 }

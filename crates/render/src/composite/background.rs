@@ -13,7 +13,7 @@ use fearless_simd::{Level, dispatch};
 #[derive(Clone, Copy)]
 pub(crate) struct Behind<'a> {
     /// Exposed radiance and alpha.
-    pub(crate) colour: Option<&'a Image<4>>,
+    pub(crate) color: Option<&'a Image<4>>,
     /// Depth, m, row after row.
     depth: Option<&'a [f32]>,
     /// Layers and AOVs of what has been drawn of it; empty for a plate.
@@ -32,12 +32,12 @@ impl<'a> Behind<'a> {
     /// The plate.
     pub(crate) fn plate(plate: &'a PlateFrame) -> Self {
         let depth = plate.depth.as_ref().map(|depth| depth.pixels().as_flattened());
-        Self { colour: plate.colour.as_ref(), depth, channels: &[], bend: None }
+        Self { color: plate.color.as_ref(), depth, channels: &[], bend: None }
     }
 
     /// A frame that has been drawn.
     pub(crate) fn drawn(frame: &'a Frame) -> Self {
-        Self { colour: Some(&frame.beauty), depth: frame.depth.as_deref(), channels: &frame.channels, bend: None }
+        Self { color: Some(&frame.beauty), depth: frame.depth.as_deref(), channels: &frame.channels, bend: None }
     }
 
     /// The same through `air`.
@@ -53,7 +53,7 @@ impl<'a> Behind<'a> {
     /// Finds where the light of those pixels of `rect` comes from that the air bends.
     pub(crate) fn trace(&self, rect: Rect, sources: &mut Sources) {
         sources.span = Rect::default();
-        let (Some(bend), Some(image)) = (&self.bend, self.colour) else { return };
+        let (Some(bend), Some(image)) = (&self.bend, self.color) else { return };
         let span = bend.air.rect.intersection(&rect);
         sources.span = span;
         sources.list.resize(span.width * span.height, Source::default());
@@ -64,7 +64,7 @@ impl<'a> Behind<'a> {
     }
 
     /// Colors in a row of `rect`, traced to `sources`; `buffer` holds them if any is bent.
-    pub(crate) fn colour_row<'b>(
+    pub(crate) fn color_row<'b>(
         &self,
         rect: Rect,
         row: usize,
@@ -74,7 +74,7 @@ impl<'a> Behind<'a> {
     where
         'a: 'b,
     {
-        let image = self.colour?;
+        let image = self.color?;
         let y = rect.y + row;
         if sources.row(y).is_empty() {
             return Some(&image.row(y)[rect.x..rect.right()]);
@@ -276,9 +276,9 @@ mod tests {
             let angles = Image::filled(size[0], size[1], angle);
             let air = Deflection { depth: 2.0, rect: Rect::from_size(size[0], size[1]), angle: &angles };
             let mut sources = Sources::default();
-            let colour = Image::from_pixels(size[0], size[1], [1.0, 2.0, 4.0].map(|v| [v; 4]).to_vec()).unwrap();
+            let color = Image::from_pixels(size[0], size[1], [1.0, 2.0, 4.0].map(|v| [v; 4]).to_vec()).unwrap();
             let bend = Some(Bend { air, focal_pixels: 1.0 });
-            let behind = Behind { colour: Some(&colour), depth: None, channels: &[], bend };
+            let behind = Behind { color: Some(&color), depth: None, channels: &[], bend };
             behind.trace(Rect::from_size(size[0], size[1]), &mut sources);
             let seen = behind.plane(&[1.0, 2.0, 4.0], Rect::from_size(size[0], size[1]), &sources, size[0]);
             assert_eq!(seen, [1.5, 3.0, 4.0], "{size:?}");
@@ -289,14 +289,14 @@ mod tests {
     fn only_pixels_behind_the_air_are_looked_up_elsewhere() {
         let angles = Image::filled(1, 1, [1.0, 0.0]);
         let air = Deflection { depth: 2.0, rect: Rect { x: 1, y: 1, width: 1, height: 1 }, angle: &angles };
-        let colour = Image::from_pixels(3, 2, (0..6_u8).map(|v| [f32::from(v); 4]).collect()).unwrap();
+        let color = Image::from_pixels(3, 2, (0..6_u8).map(|v| [f32::from(v); 4]).collect()).unwrap();
         let behind =
-            Behind { colour: Some(&colour), depth: None, channels: &[], bend: Some(Bend { air, focal_pixels: 1.0 }) };
+            Behind { color: Some(&color), depth: None, channels: &[], bend: Some(Bend { air, focal_pixels: 1.0 }) };
         let (mut sources, mut buffer) = (Sources::default(), Vec::new());
         let rect = Rect { x: 0, y: 0, width: 3, height: 2 };
         behind.trace(rect, &mut sources);
         let mut row =
-            |row| behind.colour_row(rect, row, &sources, &mut buffer).unwrap().iter().map(|c| c[0]).collect::<Vec<_>>();
+            |row| behind.color_row(rect, row, &sources, &mut buffer).unwrap().iter().map(|c| c[0]).collect::<Vec<_>>();
         assert_eq!((row(0), row(1)), (vec![0.0, 1.0, 2.0], vec![3.0, 5.0, 5.0]));
     }
 

@@ -48,9 +48,9 @@ pub(crate) fn mirrored(
     exposure: f32,
     observer: &dyn Observer,
 ) -> Result<PlateFrame, Cancelled> {
-    let Some(colour) = &plate.colour else { return Ok(PlateFrame::default()) };
-    let march = March { colour, depth: plate.depth.as_ref(), camera, mirror, exposure };
-    let (width, rows) = (colour.width(), colour.height());
+    let Some(color) = &plate.color else { return Ok(PlateFrame::default()) };
+    let march = March { color, depth: plate.depth.as_ref(), camera, mirror, exposure };
+    let (width, rows) = (color.width(), color.height());
     let mut seen = Image::filled(width, rows, [0.0; 4]);
     let mut depth = Image::filled(width, rows, [f32::INFINITY]);
     let lines = seen.pixels_mut().par_chunks_mut(width.max(1)).zip(depth.pixels_mut().par_chunks_mut(width.max(1)));
@@ -58,13 +58,13 @@ pub(crate) fn mirrored(
         observer::check(observer)?;
         for (x, (seen, depth)) in seen.iter_mut().zip(depth).enumerate() {
             let pixel = DVec2::new(x as f64, y as f64) + 0.5;
-            if let Some((colour, far)) = march.seen(pixel) {
-                (*seen, depth[0]) = (colour, far);
+            if let Some((color, far)) = march.seen(pixel) {
+                (*seen, depth[0]) = (color, far);
             }
         }
         Ok(())
     })?;
-    Ok(PlateFrame { colour: Some(seen), depth: plate.depth.is_some().then_some(depth) })
+    Ok(PlateFrame { color: Some(seen), depth: plate.depth.is_some().then_some(depth) })
 }
 
 /// Puts the sky, which a plate stands for in the picture itself, behind what is seen by the camera of a mirrored `view`; `scale` is the
@@ -86,7 +86,7 @@ pub(crate) fn lay_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale: usize
 
 /// Plate and sky in the mirror, small: for what mirrors too roughly to show more.
 pub(crate) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<Backdrop> {
-    let fine = mirrored.colour.as_ref()?;
+    let fine = mirrored.color.as_ref()?;
     let size = [fine.width(), fine.height()].map(|side| side.div_ceil(COARSE));
     let mut coarse = Image::filled(size[0], size[1], [0.0; 4]);
     coarse.pixels_mut().par_chunks_mut(size[0].max(1)).enumerate().for_each(|(row, line)| {
@@ -111,7 +111,7 @@ fn span(index: usize, end: usize) -> std::ops::Range<usize> {
 
 /// A plate whose mirrored lines of sight are followed.
 struct March<'a> {
-    colour: &'a Image<4>,
+    color: &'a Image<4>,
     depth: Option<&'a Image<1>>,
     camera: &'a Camera,
     mirror: LevelMirror,
@@ -167,13 +167,13 @@ impl March<'_> {
         let standing = self.plate_depth(pixel);
         if ground > FAR || (standing < ground && self.stands(pixel, standing)) {
             // The mirror is hidden by what stands before it: nobody sees this, but blurred it is the best guess of what lies beside.
-            return self.radiance(pixel).map(|colour| (colour, standing as f32));
+            return self.radiance(pixel).map(|color| (color, standing as f32));
         }
         let toward = DVec3::new(down.x, -down.y, down.z);
         let sight = self.sight(self.camera.position + down * ground, ground, toward);
         match self.first_met(pixel, &sight) {
             Some((place, way)) => Some((self.radiance(place)?, (ground + way) as f32)),
-            None => self.beyond(&sight).map(|colour| (colour, f32::INFINITY)),
+            None => self.beyond(&sight).map(|color| (color, f32::INFINITY)),
         }
     }
 
@@ -238,7 +238,7 @@ impl March<'_> {
     }
 
     fn is_inside(&self, pixel: DVec2) -> bool {
-        let (width, height) = (self.colour.width() as f64, self.colour.height() as f64);
+        let (width, height) = (self.color.width() as f64, self.color.height() as f64);
         pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width && pixel.y < height
     }
 
@@ -274,7 +274,7 @@ impl March<'_> {
 
     /// The plate's radiance and coverage at a pixel.
     fn radiance(&self, pixel: DVec2) -> Option<[f32; 4]> {
-        let [red, green, blue, coverage] = self.colour.sample_bilinear(pixel);
+        let [red, green, blue, coverage] = self.color.sample_bilinear(pixel);
         let scale = 1.0 / self.exposure;
         scale.is_finite().then_some([scale * red, scale * green, scale * blue, coverage])
     }
@@ -324,19 +324,19 @@ mod tests {
 
     /// A plate whose colors are the places that it shows, exposed.
     fn plate(view: &View) -> PlateFrame {
-        let mut colour = Image::filled(SIZE[0], SIZE[1], [0.0, 0.0, 0.0, 1.0]);
+        let mut color = Image::filled(SIZE[0], SIZE[1], [0.0, 0.0, 0.0, 1.0]);
         let mut depth = Image::filled(SIZE[0], SIZE[1], [f32::INFINITY]);
         for y in 0..SIZE[1] {
             for x in 0..SIZE[0] {
                 let direction = view.camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
                 if let Some((way, _)) = met(view.camera.position, direction) {
                     let place = (view.camera.position + direction * way).as_vec3() * EXPOSURE;
-                    colour.row_mut(y)[x] = [place.x, place.y, place.z, 1.0];
+                    color.row_mut(y)[x] = [place.x, place.y, place.z, 1.0];
                     depth.row_mut(y)[x] = [way as f32];
                 }
             }
         }
-        PlateFrame { colour: Some(colour), depth: Some(depth) }
+        PlateFrame { color: Some(color), depth: Some(depth) }
     }
 
     #[test]
@@ -348,10 +348,10 @@ mod tests {
             let view = view(roll, vertical_fov_deg);
             let camera = &view.camera;
             let seen = mirrored(&plate(&view), camera, WET, EXPOSURE, &Unobserved).unwrap();
-            let (colour, depth) = (seen.colour.unwrap(), seen.depth.unwrap());
+            let (color, depth) = (seen.color.unwrap(), seen.depth.unwrap());
             let behind = camera.mirrored(0.0);
             let (mut right, mut wrong) = (0, 0);
-            for (index, (colour, depth)) in colour.pixels().iter().zip(depth.pixels()).enumerate() {
+            for (index, (color, depth)) in color.pixels().iter().zip(depth.pixels()).enumerate() {
                 let pixel = DVec2::new((index % SIZE[0]) as f64, (index / SIZE[0]) as f64) + 0.5;
                 let direction = camera.direction(pixel).unwrap();
                 let Some((way, false)) = met(camera.position, direction) else { continue };
@@ -363,7 +363,7 @@ mod tests {
                 if !camera.project(place).is_some_and(|place| place.pixel.x > 0.0 && place.pixel.x < SIZE[0] as f64) {
                     continue;
                 }
-                let shown = DVec3::new(f64::from(colour[0]), f64::from(colour[1]), f64::from(colour[2]));
+                let shown = DVec3::new(f64::from(color[0]), f64::from(color[1]), f64::from(color[2]));
                 let error = (place - shown).abs().max_element();
                 let near = error < 0.15 && (f64::from(depth[0]) - behind.depth(place)).abs() < 0.15;
                 if near { right += 1 } else { wrong += 1 }
@@ -379,7 +379,7 @@ mod tests {
         let view = view(0.0, 60.0);
         let plate = plate(&view);
         let mirrored = mirrored(&plate, &view.camera, WET, EXPOSURE, &Unobserved).unwrap();
-        let mut seen = mirrored.colour.clone().unwrap();
+        let mut seen = mirrored.color.clone().unwrap();
         let parameters = SkyParameters { kind: SkyKind::Uniform, luminance: 300.0.into(), ..SkyParameters::default() };
         let sky = parameters.at(0.0);
         lay_sky(&mut seen, &view.mirrored(0.0), &sky, 1);
@@ -399,7 +399,7 @@ mod tests {
             matches!(met(camera.position, direction), Some((_, false)))
         };
         let foot = (0..SIZE[1]).find(is_ground).unwrap();
-        let seen = mirrored(plate, camera, mirror, EXPOSURE, &Unobserved).unwrap().colour.unwrap();
+        let seen = mirrored(plate, camera, mirror, EXPOSURE, &Unobserved).unwrap().color.unwrap();
         (foot..foot + rows).map(|row| f64::from(seen.at(column as usize, row)[2])).collect()
     }
 
@@ -431,7 +431,7 @@ mod tests {
         }
         let seen = |plate_tolerance: f64| {
             let wet = LevelMirror { plate_tolerance, ..WET };
-            f64::from(mirrored(&plate, camera, wet, EXPOSURE, &Unobserved).unwrap().colour.unwrap().at(x, y)[2])
+            f64::from(mirrored(&plate, camera, wet, EXPOSURE, &Unobserved).unwrap().color.unwrap().at(x, y)[2])
         };
         assert!((seen(0.1) - WALL).abs() < 0.2, "{} m south is not the wall", seen(0.1));
         assert!(seen(0.02) > WALL + 1.0, "{} m south is the wall", seen(0.02));
@@ -440,6 +440,6 @@ mod tests {
     #[test]
     fn without_a_plate_nothing_is_mirrored() {
         let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, EXPOSURE, &Unobserved).unwrap();
-        assert!(seen.colour.is_none() && seen.depth.is_none());
+        assert!(seen.color.is_none() && seen.depth.is_none());
     }
 }

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PlateFrame {
     /// Exposed scene-linear ACEScg and coverage: 0 beyond the plate's edges (overscan).
-    pub(crate) colour: Option<Image<4>>,
+    pub(crate) color: Option<Image<4>>,
     /// Depth as the camera's lens measures it, m.
     pub(crate) depth: Option<Image<1>>,
 }
@@ -101,7 +101,7 @@ fn load(context: &ShotContext, number: i64, camera: &Camera) -> Result<PlateFram
     let fit = Fit::new(context, [width, image.color.height()]);
     let depths = depth.as_ref().and_then(|picture| picture.depth.as_ref());
     let depth = depths.map(|depths| fit_depth(context, camera, depths, width, &fit));
-    Ok(PlateFrame { colour: Some(fit_colour(context, &image, &fit)), depth })
+    Ok(PlateFrame { color: Some(fit_color(context, &image, &fit)), depth })
 }
 
 /// How the picture's pixels fall on the plate's: the plate fills the picture, centered, its longer side cut.
@@ -154,7 +154,7 @@ fn taps(fit: &Fit, axis: usize, pixel: usize) -> Vec<(usize, f32)> {
     taps
 }
 
-fn fit_colour(context: &ShotContext, picture: &Picture, fit: &Fit) -> Image<4> {
+fn fit_color(context: &ShotContext, picture: &Picture, fit: &Fit) -> Image<4> {
     let columns: Vec<_> = (0..fit.picture[0]).map(|x| taps(fit, 0, x)).collect();
     let view = context.plan.shown();
     let mut image = Image::filled(fit.picture[0], fit.picture[1], [0.0; 4]);
@@ -167,9 +167,9 @@ fn fit_colour(context: &ShotContext, picture: &Picture, fit: &Fit) -> Image<4> {
             let mut sum = [0.0_f32; 3];
             for &(plate_y, weight_y) in &rows {
                 for &(plate_x, weight_x) in &columns[x] {
-                    let colour = picture.color.at(plate_x, plate_y);
+                    let color = picture.color.at(plate_x, plate_y);
                     for c in 0..3 {
-                        sum[c] += weight_y * weight_x * colour[c];
+                        sum[c] += weight_y * weight_x * color[c];
                     }
                 }
             }
@@ -181,11 +181,11 @@ fn fit_colour(context: &ShotContext, picture: &Picture, fit: &Fit) -> Image<4> {
 }
 
 /// A plate's numbers as exposed ACEScg: what the view transform takes back to the very same numbers.
-pub(crate) fn to_scene(view: &color::View, encoding: Encoding, colour: [f32; 3]) -> [f32; 3] {
+pub(crate) fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3] {
     match encoding {
-        Encoding::DisplaySrgb => view.to_scene(colour.map(color::decode_srgb)),
-        Encoding::LinearSrgb => color::acescg_from_srgb(colour),
-        Encoding::LinearAcescg => colour,
+        Encoding::DisplaySrgb => view.to_scene(color.map(color::decode_srgb)),
+        Encoding::LinearSrgb => color::acescg_from_srgb(color),
+        Encoding::LinearAcescg => color,
     }
 }
 
@@ -199,11 +199,11 @@ fn fit_depth(context: &ShotContext, camera: &Camera, depth: &[f32], plate_width:
             if fit.covers(0, x) && fit.covers(1, y) {
                 let nearest = |axis, at| (fit.place(axis, at) as usize).min(fit.plate[axis] - 1);
                 let value = f64::from(depth[nearest(1, y) * plate_width + nearest(0, x)]);
-                let metres = match kind {
+                let meters = match kind {
                     DepthKind::Inverse => scale / value,
                     DepthKind::Axis | DepthKind::Distance => scale * value,
                 };
-                pixel[0] = as_lens_measures(camera, kind, metres, x, y) as f32;
+                pixel[0] = as_lens_measures(camera, kind, meters, x, y) as f32;
             }
         }
     });
@@ -211,8 +211,8 @@ fn fit_depth(context: &ShotContext, camera: &Camera, depth: &[f32], plate_width:
 }
 
 /// A perspective camera measures along its axis, the others from the camera; whatever is not a depth hides nothing.
-fn as_lens_measures(camera: &Camera, kind: DepthKind, metres: f64, x: usize, y: usize) -> f64 {
-    if metres.is_nan() || metres <= 0.0 {
+fn as_lens_measures(camera: &Camera, kind: DepthKind, meters: f64, x: usize, y: usize) -> f64 {
+    if meters.is_nan() || meters <= 0.0 {
         return f64::INFINITY;
     }
     let stretch = || {
@@ -220,8 +220,8 @@ fn as_lens_measures(camera: &Camera, kind: DepthKind, metres: f64, x: usize, y: 
         direction.map_or(1.0, |direction| direction.length())
     };
     match (camera.lens, kind) {
-        (Lens::Perspective, DepthKind::Distance) => metres / stretch(),
-        _ => metres,
+        (Lens::Perspective, DepthKind::Distance) => meters / stretch(),
+        _ => meters,
     }
 }
 

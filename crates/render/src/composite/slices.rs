@@ -36,7 +36,7 @@ pub fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
         .map(|interval| Slice { interval, members: members(intervals, &interval) })
         .filter(|slice| !slice.members.is_empty())
         .collect();
-    merge_lone_neighbours(&mut slices);
+    merge_lone_neighbors(&mut slices);
     while slices.len() > MOST_SLICES {
         merge_thinnest(&mut slices);
     }
@@ -54,7 +54,7 @@ fn members(intervals: &[Vec<DepthInterval>], slice: &DepthInterval) -> Vec<usize
 }
 
 /// One phenomenon alone sorts its own parts, so touching slices that hold only it need no edge.
-fn merge_lone_neighbours(slices: &mut Vec<Slice>) {
+fn merge_lone_neighbors(slices: &mut Vec<Slice>) {
     slices.dedup_by(|next, previous| {
         let lone = next.members.len() == 1 && next.members == previous.members;
         if lone {

@@ -81,7 +81,7 @@ impl Composition<'_> {
 
     /// The part of a strip that can differ from nothing; all of it where there is something behind, a layer or an AOV to fill.
     fn worth_drawing(&self, rect: Rect) -> Rect {
-        if self.behind.colour.is_some() || self.outputs.layers || self.outputs.aovs {
+        if self.behind.color.is_some() || self.outputs.layers || self.outputs.aovs {
             return rect;
         }
         let touched = |slice: &Slice| {
@@ -201,7 +201,7 @@ pub(crate) fn frame(
             })
         })
         .collect::<Result<_, Cancelled>>()?;
-    let opaque = composition.plate.colour.is_some() && composition.view.overscan == 0;
+    let opaque = composition.plate.color.is_some() && composition.view.overscan == 0;
     let content = composition.content();
     Ok(Frame {
         header,
@@ -231,20 +231,20 @@ fn finish_strip(
         let first = (rect.y - strip.y + row) * strip.width + rect.x - strip.x;
         let (out, depth) = (&mut beauty[first..][..rect.width], &mut depth[first..][..rect.width]);
         depth.copy_from_slice(&accumulator.depth[pixels.clone()]);
-        let colour = accumulator.colour.each_ref().map(|plane| &plane[pixels.clone()]);
+        let color = accumulator.color.each_ref().map(|plane| &plane[pixels.clone()]);
         match accumulator.transmittance() {
-            None => dispatch!(level, _simd => expose_row(exposure, colour, out)),
+            None => dispatch!(level, _simd => expose_row(exposure, color, out)),
             Some(planes) => {
                 let through = planes.each_ref().map(|plane| &plane[pixels.clone()]);
-                dispatch!(level, _simd => expose_absorbed_row(exposure, colour, through, out));
+                dispatch!(level, _simd => expose_absorbed_row(exposure, color, through, out));
             }
         }
-        if let Some(colours) = behind.colour_row(rect, row, sources, buffer) {
+        if let Some(colors) = behind.color_row(rect, row, sources, buffer) {
             match accumulator.transmittance() {
-                None => dispatch!(level, _simd => lay_behind(colours, out)),
+                None => dispatch!(level, _simd => lay_behind(colors, out)),
                 Some(planes) => {
                     let through = planes.each_ref().map(|plane| &plane[pixels.clone()]);
-                    dispatch!(level, _simd => lay_behind_absorbed(through, colours, out));
+                    dispatch!(level, _simd => lay_behind_absorbed(through, colors, out));
                 }
             }
         }
@@ -262,8 +262,8 @@ fn expose_row(exposure: f32, [red, green, blue]: [&[f32]; 3], out: &mut [[f32; 4
 }
 
 #[inline(always)]
-fn expose_absorbed_row(exposure: f32, colour: [&[f32]; 3], through: [&[f32]; 3], out: &mut [[f32; 4]]) {
-    expose_row(exposure, colour, out);
+fn expose_absorbed_row(exposure: f32, color: [&[f32]; 3], through: [&[f32]; 3], out: &mut [[f32; 4]]) {
+    expose_row(exposure, color, out);
     let [red, green, blue] = through;
     for (((out, red), green), blue) in out.iter_mut().zip(red).zip(green).zip(blue) {
         out[3] = 1.0 - (red + green + blue) * (1.0 / 3.0);
@@ -329,7 +329,7 @@ fn layer_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32>>
         planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect::<Vec<f32>>()));
         planes.push(layer[3].clone());
     }
-    if composition.outputs.layers && composition.plate.colour.is_some() {
+    if composition.outputs.layers && composition.plate.color.is_some() {
         match behind.channels {
             [] => planes.extend(plate_layer(composition, worker)),
             _ => planes.extend([0; 4].map(|_| vec![0.0; accumulator.depth.len()])),
@@ -363,7 +363,7 @@ fn plate_layer(composition: &Composition, worker: &mut Worker) -> [Vec<f32>; 4] 
     let rect = accumulator.rect;
     let mut layer: [Vec<f32>; 4] = Default::default();
     for row in 0..rect.height {
-        let Some(plate) = composition.behind.colour_row(rect, row, sources, buffer) else { break };
+        let Some(plate) = composition.behind.color_row(rect, row, sources, buffer) else { break };
         for (x, plate) in plate.iter().enumerate() {
             let through = accumulator.transmittance_at(row * rect.width + x);
             for c in 0..3 {
@@ -390,11 +390,11 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
     let channel = |name: String, precision| Channel { name, precision, values: Vec::new() };
     let mut channels = Vec::new();
     if composition.outputs.layers {
-        let plate = composition.plate.colour.is_some().then_some(PLATE_LAYER);
+        let plate = composition.plate.color.is_some().then_some(PLATE_LAYER);
         let names = composition.runs.iter().map(|run| run.info().name).chain(plate);
         for name in names {
-            let colour = |suffix| channel(format!("{name}.{suffix}"), Precision::Half);
-            channels.extend(["R", "G", "B", "A"].map(colour));
+            let color = |suffix| channel(format!("{name}.{suffix}"), Precision::Half);
+            channels.extend(["R", "G", "B", "A"].map(color));
         }
     }
     if composition.outputs.aovs {

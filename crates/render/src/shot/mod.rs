@@ -202,7 +202,7 @@ impl Shot {
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
         // Where nothing lies behind, nothing is bent.
-        let behind = plate.colour.is_some() || self.runs.len() > 1;
+        let behind = plate.color.is_some() || self.runs.len() > 1;
         let is_whole = view.window == Rect::from_size(view.size[0], view.size[1]);
         // Also where the window itself sees nothing bent: a picture before which light is bent is rounded otherwise everywhere.
         if !is_whole && behind && prepared.iter().any(|prepared| prepared.may_bend()) {
@@ -271,7 +271,7 @@ impl Shot {
         let sky = self.context.sky(view.shutter.middle());
         // A sky that is not to be seen lights the ground, and stands in no still water.
         let is_seen = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
-        if is_seen && mirrored.colour.is_some() {
+        if is_seen && mirrored.color.is_some() {
             mirror::lay_sky(&mut seen, &view, &sky, 1);
         }
         let backdrop = mirror::backdrop(mirrored, &view, &sky);

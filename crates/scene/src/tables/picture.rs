@@ -155,17 +155,17 @@ bansho_base::parameters! {
         /// Where it shines to (directional and spot).
         direction: [f64; 3] = [0.0, -1.0, 0.0];
         /// Linear sRGB color; its luminance is scaled to `intensity`.
-        colour: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
+        color: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
         /// Luminous intensity (candela) of points and spots, illuminance (lux) of directional lights.
         intensity: Animated<f64> = Animated::from(100.0), limits(Range::new(0.0, 1e9)), unit("cd or lx");
         /// Radius of the ball that a point or a spot is.
         radius: f64 = 0.05, limits(Range::new(1e-4, 100.0)), unit("m");
         /// Whether the ball itself is seen.
         visible: bool = false;
-        /// Angle from the axis up to which a spot is full; at most `outer_deg`.
-        inner_deg: f64 = 15.0, limits(Range::new(0.0, 89.0)), unit("degrees");
+        /// Angle from the axis up to which a spot is full; at most `outer_cone_deg`.
+        inner_cone_deg: f64 = 15.0, limits(Range::new(0.0, 89.0)), unit("degrees");
         /// Angle from the axis beyond which a spot is dark.
-        outer_deg: f64 = 30.0, limits(Range::new(0.1, 90.0)), unit("degrees");
+        outer_cone_deg: f64 = 30.0, limits(Range::new(0.1, 90.0)), unit("degrees");
     }
 }
 
@@ -195,13 +195,13 @@ impl LightParameters {
             LightKind::Spot => Emitter::Spot {
                 position,
                 axis: direction,
-                cos_inner: math::cos(self.inner_deg.min(self.outer_deg).to_radians()),
-                cos_outer: math::cos(self.outer_deg.to_radians()),
+                cos_inner: math::cos(self.inner_cone_deg.min(self.outer_cone_deg).to_radians()),
+                cos_outer: math::cos(self.outer_cone_deg.to_radians()),
             },
         };
-        let colour = bansho_base::color::acescg_from_srgb(self.colour.map(|value| value as f32));
-        let luminance = bansho_base::color::luminance(colour).max(1e-6);
+        let color = bansho_base::color::acescg_from_srgb(self.color.map(|value| value as f32));
+        let luminance = bansho_base::color::luminance(color).max(1e-6);
         let scale = self.intensity.at(t) as f32 / luminance;
-        Light { emitter, intensity: colour.map(|value| value * scale) }
+        Light { emitter, intensity: color.map(|value| value * scale) }
     }
 }

@@ -2,6 +2,8 @@
 
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
+pub use super::upgrade::upgrade;
+
 use super::toml;
 use crate::{FORMAT, PhenomenonKind, SHARED_TABLES, suggest};
 
@@ -195,7 +197,7 @@ fn set_in_list(tables: Vec<&mut dyn TableLike>, segments: &[&str], value: &Value
 }
 
 /// Replaces a value; the space and the comment around it stay.
-fn replace(old: &mut Value, value: &Value) {
+pub(super) fn replace(old: &mut Value, value: &Value) {
     let decor = old.decor().clone();
     *old = value.clone();
     *old.decor_mut() = decor;
@@ -240,23 +242,4 @@ fn part(path: &str, segment: &str) -> String {
 fn did_you_mean(meant: &[String]) -> String {
     let meant: Vec<String> = meant.iter().map(|path| format!("`{path}`")).collect();
     if meant.is_empty() { String::new() } else { format!(", did you mean {}?", meant.join(" or ")) }
-}
-
-/// The text in the newest format; `None` where it is that already.
-///
-/// A scene that does not state its format gets one; there is no older format yet to migrate from.
-///
-/// # Errors
-/// The text is no TOML, or of a newer format.
-pub fn upgrade(text: &str) -> Result<Option<String>, EditError> {
-    let document = document(text)?;
-    match document.get("bansho").and_then(Item::as_integer) {
-        Some(FORMAT) => Ok(None),
-        Some(found) if found > FORMAT => Err(EditError::NewerFormat { found }),
-        _ => {
-            let mut document = document;
-            document.remove("bansho");
-            Ok(Some(format!("bansho = {FORMAT}\n{document}")))
-        }
-    }
 }

@@ -6,3 +6,4 @@ pub mod operation;
 pub(crate) mod path;
 pub(crate) mod positions;
 pub(crate) mod toml;
+mod upgrade;

@@ -212,12 +212,12 @@ mod tests {
 
     #[test]
     fn a_draft_has_fewer_particles_where_there_are_many() {
-        let many = "bansho = 1\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
+        let many = "bansho = 2\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
         let fewer = fewer_particles(&values(many).unwrap());
         let places: Vec<String> = fewer.iter().map(|operation| operation.place().to_string()).collect();
         assert_eq!(places, ["aurora.0.particles.count", "flame_particles.0.particles"]);
-        assert!(draft("bansho = 1\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
-        assert!(draft("bansho = 1\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());
+        assert!(draft("bansho = 2\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
+        assert!(draft("bansho = 2\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());
     }
 
     /// The files of the examples, and how often a mesh was read: each time a flame that burns on it is made.
@@ -255,7 +255,7 @@ mod tests {
         let mut checker = Checker::default();
         let mut made = |rest: &str| {
             let before = counting.meshes.load(Ordering::Relaxed);
-            let text = format!("bansho = 1\n{burner}{rest}");
+            let text = format!("bansho = 2\n{burner}{rest}");
             let plan = checker.check("scene", &text, &assets);
             let alone = check("scene", &text, &(Arc::new(Bundle::default()) as Arc<dyn Assets>));
             assert_eq!(plan.map(|own| own.plan.exposure_ev100).ok(), alone.map(|own| own.plan.exposure_ev100).ok());
@@ -263,15 +263,15 @@ mod tests {
         };
         assert_eq!(made(""), 1);
         assert_eq!(made("[wind]\nvelocity = [1.0, 0.0, 0.0]\n"), 0);
-        assert_eq!(made("look = { haze_gain = 2.0 }\n"), 1);
+        assert_eq!(made("rendering = { heat_haze_gain = 2.0 }\n"), 1);
         assert_eq!(made("no_such_key = 1\n"), 0);
-        assert_eq!(made("look = { haze_gain = 2.0 }\n[[rain]]\n"), 0);
-        assert_eq!(made("look = { haze_gain = 2.0 }\n[picture]\nseed = 4\n"), 1);
+        assert_eq!(made("rendering = { heat_haze_gain = 2.0 }\n[[rain]]\n"), 0);
+        assert_eq!(made("rendering = { heat_haze_gain = 2.0 }\n[picture]\nseed = 4\n"), 1);
     }
 
     #[test]
     fn faults_are_those_of_the_scene_itself() {
-        let text = "bansho = 1\n[[flame_particles]]\nparticles = 9000\nno_such_key = 1\n";
+        let text = "bansho = 2\n[[flame_particles]]\nparticles = 9000\nno_such_key = 1\n";
         let error = draft(text).and_then(Result::err).unwrap();
         assert_eq!(error.text, text);
         assert!(error.problems[0].to_string().contains("no_such_key"));
@@ -280,17 +280,17 @@ mod tests {
     #[test]
     fn what_another_check_found_gives_the_same_plan_without_its_work() {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-        let text = "bansho = 1\n[picture]\nframes = 9\n[[flame_sheet]]\n";
+        let text = "bansho = 2\n[picture]\nframes = 9\n[[flame_sheet]]\n";
         let first = check("scene", text, &assets).unwrap().plan;
         let again = recheck("scene", text, Ok(first.exposure_ev100)).unwrap();
         assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
-        let faulty = recheck("scene", "bansho = 1\n[[flame_shet]]\n", Err(Vec::new())).err().unwrap();
+        let faulty = recheck("scene", "bansho = 2\n[[flame_shet]]\n", Err(Vec::new())).err().unwrap();
         assert!(faulty.to_string().contains("flame_shet"));
     }
 
     #[test]
     fn faults_that_another_check_found_are_told_in_its_words_and_made_by_nobody_again() {
-        let text = "bansho = 1\n[plate]\nimage = \"gone.png\"\n[[flame_particles]]\nburners = [{ shape = \"mesh\", file = \"meshes/ring.glb\" }]\n";
+        let text = "bansho = 2\n[plate]\nimage = \"gone.png\"\n[[flame_particles]]\nburners = [{ shape = \"mesh\", file = \"meshes/ring.glb\" }]\n";
         let counting = Arc::new(Counting::default());
         let assets: Arc<dyn Assets> = counting.clone();
         let error = check("scene", text, &assets).err().unwrap();

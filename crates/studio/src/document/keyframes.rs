@@ -116,7 +116,7 @@ mod tests {
             |root: &str, keys: &[&str]| keys.iter().fold(ValuePath::root().key(root), |place, key| place.key(key));
         assert!(animatable(&within("wind", &["velocity"])) && animatable(&within("camera", &["position"])));
         assert!(animatable(&ValuePath::root().key("light").index(3).key("position")));
-        assert!(animatable(&ValuePath::root().key("flame_sheet").index(0).key("colour").key("luminance")));
+        assert!(animatable(&ValuePath::root().key("flame_sheet").index(0).key("color").key("luminance")));
         assert!(!animatable(&ValuePath::root().key("flame_sheet").index(0).key("height")));
         assert!(!animatable(&within("picture", &["size"])) && !animatable(&ValuePath::root()));
         assert!(!animatable(&within("no_such_table", &["at_all"])));

@@ -61,9 +61,9 @@ fn plan(
     let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
     let mut picture = scene.picture.clone();
     // Grays are shares of the full luminance.
-    let full = sheet.colour.luminance.bounds()[1].max(f64::MIN_POSITIVE);
-    let coloured = stage == Stage::Colored.name();
-    picture.exposure_ev100 = if coloured { Auto::Auto } else { Auto::Set(ev100_of_white_luminance(full)) };
+    let full = sheet.color.luminance.bounds()[1].max(f64::MIN_POSITIVE);
+    let colored = stage == Stage::Colored.name();
+    picture.exposure_ev100 = if colored { Auto::Auto } else { Auto::Set(ev100_of_white_luminance(full)) };
     let scene = Scene {
         picture,
         camera: camera(sheet.width, sheet.height),
@@ -104,9 +104,9 @@ mod tests {
     #[test]
     fn each_stage_shows_that_sheet_alone() {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-        let text = "bansho = 1\n[[rain]]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nenabled = false\nheight = 3.0\n";
+        let text = "bansho = 2\n[[rain]]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nenabled = false\nheight = 3.0\n";
         let plans = plans("scene", text, &assets, 1).unwrap();
-        assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "coloured"]);
+        assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "colored"]);
         assert_eq!(plans.len(), 4);
         for PlannedScene { plan, .. } in &plans {
             let names: Vec<&str> = plan.scene().instances.iter().map(|instance| instance.name.as_str()).collect();
@@ -114,6 +114,6 @@ mod tests {
             assert_eq!(plan.scene().camera.target.at(0.0), [0.0, 1.5, 0.0]);
         }
         assert!(super::plans("scene", text, &assets, 2).is_none());
-        assert!(super::plans("scene", "bansho = 1\n[[flame_shet]]\n", &assets, 0).is_none());
+        assert!(super::plans("scene", "bansho = 2\n[[flame_shet]]\n", &assets, 0).is_none());
     }
 }

@@ -17,7 +17,7 @@ use crate::document::{
 
 const SCENE: &str = "\
 # A fire in the rain.
-bansho = 1
+bansho = 2
 [picture]
 size = [32, 18]
 [[flame_sheet]]
@@ -183,8 +183,8 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     assert!(!document.is_dirty());
     assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
     assert_eq!(files::external_change(&document, &path), ExternalChange::Same);
-    fs::write(&path, "bansho = 1\n").unwrap();
-    assert_eq!(files::external_change(&document, &path), ExternalChange::Changed("bansho = 1\n".into()));
+    fs::write(&path, "bansho = 2\n").unwrap();
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Changed("bansho = 2\n".into()));
     fs::remove_file(&path).unwrap();
     assert_eq!(files::external_change(&document, &path), ExternalChange::Gone);
     document.set_file_missing(true);

@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn a_picture_that_fits_no_file_is_told_of() {
         let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
-        let scene = crate::document::check("scene", "bansho = 1\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
+        let scene = crate::document::check("scene", "bansho = 2\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
         let mut shot = Shot::open(scene.compiled, scene.plan);
         let mut frame = bansho::draw(&mut shot, 0, &bansho::Unobserved).unwrap();
         assert!(encode_png(&frame).unwrap().starts_with(b"\x89PNG"));

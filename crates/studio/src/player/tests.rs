@@ -17,9 +17,9 @@ use bansho::{
 use super::*;
 use crate::document::Document;
 
-const SCENE: &str = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_sheet]]\n";
+const SCENE: &str = "bansho = 2\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_sheet]]\n";
 const STEPPED: &str =
-    "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.1\n";
+    "bansho = 2\n[picture]\nsize = [64, 36]\nframes = 20\n[[flame_particles]]\nparticles = 200\npreroll_s = 0.1\n";
 
 pub(super) fn request(text: &str, number: i64) -> FrameRequest {
     FrameRequest {
@@ -129,7 +129,7 @@ fn a_changed_wind_goes_on_from_where_the_flame_is_and_says_so() {
 fn faults_are_judged_and_the_last_good_scene_is_drawn() {
     let mut engine = engine::Engine::default();
     let good = picture(process(&mut engine, &request(SCENE, 4)));
-    let faulty = FrameRequest { revision: bumped(SCENE), ..request("bansho = 1\n[[flame_shet]]\n", 4) };
+    let faulty = FrameRequest { revision: bumped(SCENE), ..request("bansho = 2\n[[flame_shet]]\n", 4) };
     let events = process(&mut engine, &faulty);
     assert!(matches!(&events[0], Event::Checked { outcome: Err(error), .. } if error.problems.len() == 1));
     assert!(picture(events).pixels == good.pixels);
@@ -337,7 +337,7 @@ fn difference(a: &Picture, b: &Picture) -> f64 {
 #[test]
 fn rain_that_a_slider_changes_keeps_its_drops() {
     let text =
-        |rain: &str| format!("bansho = 1\n[picture]\nsize = [160, 90]\n[sky]\nkind = \"overcast\"\n[[rain]]\n{rain}\n");
+        |rain: &str| format!("bansho = 2\n[picture]\nsize = [160, 90]\n[sky]\nkind = \"overcast\"\n[[rain]]\n{rain}\n");
     let mut engine = engine::Engine::default();
     let mut drawn =
         |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 7) }));
@@ -352,7 +352,7 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
 fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
     let text = |shutter: &str, first: &str| {
         format!(
-            "bansho = 1\n[picture]\nsize = [160, 90]\n[camera]\nposition = [0.0, 1.2, 4.0]\n\
+            "bansho = 2\n[picture]\nsize = [160, 90]\n[camera]\nposition = [0.0, 1.2, 4.0]\n\
              target = [0.0, 0.9, 0.0]\nshutter_s = {shutter}\n[sky]\nkind = \"overcast\"\n\
              [[rain]]\nrate_mm_per_h = 20.0\ndiameters_mm = [{first}, 2.0, 3.0]\n"
         )
@@ -373,7 +373,7 @@ fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
 fn rain_that_is_blown_late_keeps_its_drops_too() {
     let text = |wind: &str| {
         let sky = "[sky]\nkind = \"overcast\"\n[wind]\ngust = 0.0\nvelocity = ";
-        format!("bansho = 1\n[picture]\nsize = [160, 90]\nframes = 900\n{sky}[{wind}, 0.0, 0.0]\n[[rain]]\n")
+        format!("bansho = 2\n[picture]\nsize = [160, 90]\nframes = 900\n{sky}[{wind}, 0.0, 0.0]\n[[rain]]\n")
     };
     let mut engine = engine::Engine::default();
     let mut drawn =

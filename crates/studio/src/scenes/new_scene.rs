@@ -6,19 +6,19 @@ pub const NEW_SCENES: [(&str, &str); 5] = [
     ("Particle flame", PARTICLE_FLAME),
     ("Rain", RAIN),
     ("Aurora", AURORA),
-    ("Nothing", "bansho = 1\n"),
+    ("Nothing", "bansho = 2\n"),
 ];
 
 /// The template for a studio started without a scene.
 pub const FLAME_SHEET: &str = "\
-bansho = 1
+bansho = 2
 
 [[flame_sheet]]
 name = \"fire\"
 ";
 
 const PARTICLE_FLAME: &str = "\
-bansho = 1
+bansho = 2
 
 [[flame_particles]]
 name = \"flame\"
@@ -26,7 +26,7 @@ name = \"flame\"
 
 /// Rain under a street lamp at dusk.
 const RAIN: &str = "\
-bansho = 1
+bansho = 2
 
 [picture]
 exposure_ev100 = 1.6
@@ -46,10 +46,10 @@ kind = \"spot\"
 visible = true
 position = [0.0, 2.9, 0.0]
 direction = [0.0, -1.0, 0.0]
-colour = [1.0, 0.82, 0.55]
+color = [1.0, 0.82, 0.55]
 intensity = 2500.0
-inner_deg = 40.0
-outer_deg = 78.0
+inner_cone_deg = 40.0
+outer_cone_deg = 78.0
 
 [[rain]]
 name = \"rain\"
@@ -59,7 +59,7 @@ distance = 6.0
 
 /// The view to the north, where the default shapes are.
 const AURORA: &str = "\
-bansho = 1
+bansho = 2
 
 [picture]
 exposure_ev100 = -6.9

@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_is_metres_for_prompt_light_and_kilometres_for_red() {
+    fn spread_is_meters_for_prompt_light_and_kilometers_for_red() {
         let root = |emitter, altitude_km| LifetimeAndDiffusion::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
         assert!((root(Emitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
         assert!((10.0..100.0).contains(&root(Emitter::OxygenGreen, 110.0)));

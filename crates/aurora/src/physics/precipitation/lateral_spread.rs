@@ -29,7 +29,7 @@ static HARD_SPHERE: OnceLock<SpreadByEnergy> = OnceLock::new();
 
 fn by_energy(model: TrackModel) -> &'static SpreadByEnergy {
     match model {
-        TrackModel::Fang => get_or_compute(&FANG, || {
+        TrackModel::Fang2010 => get_or_compute(&FANG, || {
             // Tracks are monoenergetic, so the spectrum does not matter.
             let tracks = TrackSampler::new(&Deposition::new(atmosphere(), ARC), 0.0);
             SpreadByEnergy::new(|node, key, particle| altitudes_km(tracks.sample_track(node, key, particle)))
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn it_is_that_of_the_falls_that_are_drawn_at_every_energy() {
         let key = Key::new(4, "aurora");
-        for model in [TrackModel::Fang, TrackModel::HardSphereAtmosphere] {
+        for model in [TrackModel::Fang2010, TrackModel::HardSphereAtmosphere] {
             let emission = model.emission(ARC);
             for energy_ev in [600.0, 5000.0, 40_000.0] {
                 let node = locate(energy_ev).0;
@@ -113,7 +113,7 @@ mod tests {
                 };
                 for particle in 100..800 {
                     match model {
-                        TrackModel::Fang => {
+                        TrackModel::Fang2010 => {
                             TrackSampler::new(emission.deposition(), 0.05)
                                 .sample_track(node, key, particle)
                                 .for_each(&mut add);

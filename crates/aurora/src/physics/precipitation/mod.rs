@@ -23,7 +23,7 @@ bansho_base::choice! {
     /// What stops the electrons and what shines where they are stopped.
     pub enum TrackModel {
         /// Air as it is measured: heights after Fang et al. (2010), colors and brightness as observed.
-        Fang = "fang",
+        Fang2010 = "fang_2010",
         /// Hard spheres, as in the thesis (2.4): one radius for all energies, and green light only above 190 km.
         HardSphereAtmosphere = "hard_sphere",
     }

@@ -14,7 +14,7 @@ use crate::{
         precipitation::energy_grid::{LOWEST_EV, NODES, node_coordinate, node_energy_ev},
     },
     render::{
-        Blur, DrawingParameters, Sampling,
+        Blur, RenderingParameters, Sampling,
         project::field_lines::{FieldLines, FootPoint},
     },
     simulate::{
@@ -165,7 +165,7 @@ impl SourceBuilder<'_> {
 impl Sources {
     /// Sources while the shutter is open.
     pub(crate) fn new(light: &EmissionInputs, field: &FieldLines, moments: &SampleTimes) -> Self {
-        let by_collisions = light.parameters.sampling == Sampling::CollisionRenderer;
+        let by_collisions = light.parameters.sampling == Sampling::SingleCollisions;
         let faintest = if by_collisions { FAINTEST_WITH_COLLISIONS } else { FAINTEST };
         let afterglow = light.afterglow;
         let column = light.emission.column(light.energy_ev);
@@ -232,7 +232,7 @@ pub(crate) struct EmissionInputs<'a> {
     /// The green and the red map.
     pub(crate) afterglow: &'a Afterglow,
     pub(crate) emission: &'a Emission,
-    pub(crate) parameters: &'a DrawingParameters,
+    pub(crate) parameters: &'a RenderingParameters,
     /// Mean distance between neighboring particles, km.
     pub(crate) spacing_km: f64,
     /// Mean electron energy without rays and sheet factors, eV.
@@ -244,10 +244,10 @@ pub(crate) struct EmissionInputs<'a> {
 impl EmissionInputs<'_> {
     /// Standard deviation of a particle's light perpendicular to the field, km.
     pub(crate) fn spread_km(&self) -> f64 {
-        let own = match (self.parameters.blur, self.parameters.spread_km) {
-            (Blur::Pixels, _) => 0.0,
-            (Blur::Kilometers, Auto::Set(spread)) => spread,
-            (Blur::Kilometers, Auto::Auto) => SPREAD_PER_SPACING * self.spacing_km,
+        let own = match (self.parameters.blur_space, self.parameters.blur_radius_km) {
+            (Blur::Screen, _) => 0.0,
+            (Blur::World, Auto::Set(spread)) => spread,
+            (Blur::World, Auto::Auto) => SPREAD_PER_SPACING * self.spacing_km,
         };
         math::hypot(own, self.lateral_spread_km).max(1e-3)
     }

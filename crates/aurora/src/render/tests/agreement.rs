@@ -1,7 +1,7 @@
 //! Pictures of collisions have the picture of the mean track for their mean, each emitter by itself.
 
 use super::*;
-use crate::{parameters::MAX_WOBBLE, physics::precipitation::lateral_spread::lateral_spread_km};
+use crate::{parameters::MAX_COLLISION_DEFLECTION, physics::precipitation::lateral_spread::lateral_spread_km};
 
 /// Sum of absolute differences over the sum, for each emitter but the red line, which is not drawn by collisions.
 fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
@@ -41,32 +41,48 @@ fn beside_profile(
 }
 
 /// The same for an arc of so many particles with tracks of a seed.
-fn arc_beside_profile(fall: TrackModel, wobble: f64, seed: u64, particles: usize) -> ([f64; 3], ColumnBuffer) {
-    let (emission, drawing) = (fall.emission(ARC), DrawingParameters { fall, wobble, ..DrawingParameters::default() });
+fn arc_beside_profile(
+    fall: TrackModel,
+    collision_deflection: f64,
+    seed: u64,
+    particles: usize,
+) -> ([f64; 3], ColumnBuffer) {
+    let (emission, drawing) = (
+        fall.emission(ARC),
+        RenderingParameters { energy_deposition: fall, collision_deflection, ..RenderingParameters::default() },
+    );
     let collisions =
         CollisionRenderer::new(&emission, &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(seed, "aurora"));
-    let spread_km = math::hypot(OWN_SPREAD_KM, lateral_spread_km(fall, wobble, ENERGY_EV));
+    let spread_km = math::hypot(OWN_SPREAD_KM, lateral_spread_km(fall, collision_deflection, ENERGY_EV));
     beside_profile(&emission, &collisions, &arc(particles), spread_km)
 }
 
-fn usual_wobble() -> f64 {
-    DrawingParameters::default().wobble
+fn usual_collision_deflection() -> f64 {
+    RenderingParameters::default().collision_deflection
 }
 
 #[test]
 fn the_mean_of_many_collision_pictures_is_the_profile() {
-    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, 0.02), (5, MAX_WOBBLE), (77, MAX_WOBBLE)] {
-        let (apart, _) = arc_beside_profile(TrackModel::Fang, wobble, seed, 8000);
-        assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
+    for (seed, collision_deflection) in [
+        (5, usual_collision_deflection()),
+        (77, usual_collision_deflection()),
+        (5, 0.02),
+        (5, MAX_COLLISION_DEFLECTION),
+        (77, MAX_COLLISION_DEFLECTION),
+    ] {
+        let (apart, _) = arc_beside_profile(TrackModel::Fang2010, collision_deflection, seed, 8000);
+        assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, deflection {collision_deflection}: {apart:?}");
     }
 }
 
 #[test]
 fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
     // A track has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
-    for (seed, wobble) in [(5, usual_wobble()), (77, usual_wobble()), (5, MAX_WOBBLE)] {
-        let (apart, _) = arc_beside_profile(TrackModel::HardSphereAtmosphere, wobble, seed, 40_000);
-        assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, wobble {wobble}: {apart:?}");
+    for (seed, collision_deflection) in
+        [(5, usual_collision_deflection()), (77, usual_collision_deflection()), (5, MAX_COLLISION_DEFLECTION)]
+    {
+        let (apart, _) = arc_beside_profile(TrackModel::HardSphereAtmosphere, collision_deflection, seed, 40_000);
+        assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, deflection {collision_deflection}: {apart:?}");
     }
 }
 
@@ -75,14 +91,14 @@ fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
 fn collisions_lose_no_light_on_hard_sheets() {
     const FACTOR: f64 = 20.0;
     let sheet = SheetParameters {
-        energy: Curve::new(vec![[0.0, FACTOR]], Interpolation::Linear).unwrap(),
+        energy_factor: Curve::new(vec![[0.0, FACTOR]], Interpolation::Linear).unwrap(),
         ..SheetParameters::default()
     };
     let parameters = AuroraParameters {
         energy_ev: Animated::from(0.2 * ENERGY_EV),
         particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
         shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
-        drawing: DrawingParameters { sampling: Sampling::CollisionRenderer, ..DrawingParameters::default() },
+        rendering: RenderingParameters { sampling: Sampling::SingleCollisions, ..RenderingParameters::default() },
         ..AuroraParameters::default()
     };
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
@@ -112,7 +128,7 @@ fn middle_row(picture: &ColumnBuffer, emitter: Emitter) -> usize {
 #[test]
 fn the_fall_of_the_thesis_lies_elsewhere() {
     let [measured, thesis] =
-        [TrackModel::Fang, TrackModel::HardSphereAtmosphere].map(|fall| arc_beside_profile(fall, 0.0, 5, 1000).1);
+        [TrackModel::Fang2010, TrackModel::HardSphereAtmosphere].map(|fall| arc_beside_profile(fall, 0.0, 5, 1000).1);
     // Rows of 5 mrad: green light only above 190 km, the rest hardly elsewhere at this energy.
     let [green, violet] = [Emitter::OxygenGreen, Emitter::NitrogenIon]
         .map(|emitter| [&measured, &thesis].map(|picture| middle_row(picture, emitter)));

@@ -20,7 +20,7 @@ use bansho_base::{
 };
 
 use super::{
-    BlurParameters, DrawingParameters, Sampling, TrackModel,
+    BlurParameters, RenderingParameters, Sampling, TrackModel,
     prepared::{ChartBuilder, PixelBatch},
 };
 use crate::{
@@ -233,7 +233,8 @@ fn every_measured_line_is_there_and_named_by_its_wavelength() {
 fn auto_exposure_knows_the_flux_and_energy_of_sheets() {
     let luminance = |flux: f64, energy: f64| {
         let even = |value: f64| Curve::new(vec![[0.0, value]], Interpolation::Linear).unwrap();
-        let sheet = SheetParameters { flux: even(flux), energy: even(energy), ..SheetParameters::default() };
+        let sheet =
+            SheetParameters { flux_factor: even(flux), energy_factor: even(energy), ..SheetParameters::default() };
         let parameters = AuroraParameters {
             particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
             shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
@@ -295,7 +296,7 @@ fn even_arc(north_km: f64, energy_ev: f32) -> Vec<AfterglowCell<1>> {
 fn far_and_near_arcs_are_smooth_up_and_down() {
     let (field, view) = (field(77.0), view(Lens::Perspective, [0.0, 24.0, -60.0], [1280, 720]));
     for (energy_ev, spectrum, lower_edge) in
-        [(350.0, SpectrumShape::Maxwellian, 0.02), (5000.0, SpectrumShape::Arc, 0.08)]
+        [(350.0, SpectrumShape::Maxwellian, 0.02), (5000.0, SpectrumShape::Gaussian, 0.08)]
     {
         let parameters = AuroraParameters {
             energy_ev: Animated::from(energy_ev),

@@ -18,7 +18,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn single_collisions_do_not_depend_on_the_number_of_threads() {
     let (view, field) = (view(Lens::Perspective, [0.0, 60.0, -110.0], [320, 180]), field(77.0));
-    let drawing = DrawingParameters::default();
+    let drawing = RenderingParameters::default();
     let collisions =
         CollisionRenderer::new(&emission(), &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(5, "aurora"));
     let sources = sources(&arc(3000), PROMPT_AND_GREEN, 0.5, &field);

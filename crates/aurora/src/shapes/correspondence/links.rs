@@ -44,9 +44,9 @@ impl LinkConstraints {
             let count = change.chains.len();
             let no_target = |_| error(ShapeErrorKind::NoSuchTarget { sheet: link.to, count });
             let to = sheet_index(link.to, count).map_err(no_target)?;
-            let track = nearest(&sheets[from], link.at.unwrap_or(0.5), tracks, index - 1);
+            let track = nearest(&sheets[from], link.from_length_fraction.unwrap_or(0.5), tracks, index - 1);
             constraints.constrain_chain(change, track, to).map_err(error)?;
-            match (link.at, link.arrives) {
+            match (link.from_length_fraction, link.to_length_fraction) {
                 (Some(_), Some(fraction)) => {
                     constraints.points.push((track, fraction.clamp(END_MARGIN, 1.0 - END_MARGIN)));
                 }

@@ -190,7 +190,7 @@ fn cuts(
 
 fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<Cut, ShapeErrorKind> {
     let segments = positions.len() - 1;
-    match (split.segment, split.at) {
+    match (split.segment, split.length_fraction) {
         (Some(_), Some(_)) => Err(ShapeErrorKind::SegmentAndPosition),
         (Some(segment), None) => {
             let index = usize::try_from(segment - 1).ok().filter(|&index| index < segments);
@@ -219,7 +219,7 @@ fn merged_ends(
     if pair[0] == pair[1] {
         return Err(ShapeErrorKind::Ring { sheet: pair[0] + 1 });
     }
-    let Auto::Set(at) = merge.at else { return Ok(nearest_ends(pair, sheets, tracks, knot)) };
+    let Auto::Set(at) = merge.ends else { return Ok(nearest_ends(pair, sheets, tracks, knot)) };
     let end = |side: usize| match at[side] {
         0.0 => Ok((pair[side], 0)),
         1.0 => Ok((pair[side], 1)),
@@ -318,11 +318,14 @@ mod tests {
     }
 
     fn split(sheet: i64, segment: Option<i64>, at: Option<f64>) -> ShapeParameters {
-        ShapeParameters { split: vec![SplitParameters { sheet, segment, at }], ..ShapeParameters::default() }
+        ShapeParameters {
+            split: vec![SplitParameters { sheet, segment, length_fraction: at }],
+            ..ShapeParameters::default()
+        }
     }
 
     fn merge(merges: &[([i64; 2], Auto<[f64; 2]>)]) -> ShapeParameters {
-        let merge = merges.iter().map(|&(sheets, at)| MergeParameters { sheets, at }).collect();
+        let merge = merges.iter().map(|&(sheets, at)| MergeParameters { sheets, ends: at }).collect();
         ShapeParameters { merge, ..ShapeParameters::default() }
     }
 
@@ -389,7 +392,7 @@ mod tests {
         for (parameters, expected) in [
             (split(3, None, None), "shapes.1.split.0: there is no sheet 3 in the shape before; allowed: 1 to 2"),
             (split(2, Some(4), None), "shapes.1.split.0: sheet 2 has no segment 4; allowed: 1 to 3"),
-            (split(2, Some(1), Some(0.5)), "says both `segment` and `at`"),
+            (split(2, Some(1), Some(0.5)), "says both `segment` and `length_fraction`"),
             (merge(&[([1, 5], Auto::Auto)]), "shapes.1.merge.0: there is no sheet 5"),
             (merge(&[([1, 2], Auto::Set([1.0, 0.4]))]), "the point at 0.4 of sheet 2 is not an end"),
             (merge(&[([2, 2], Auto::Set([0.0, 1.0]))]), "would close sheet 2 to a ring"),

@@ -7,7 +7,7 @@ use super::{
     spline_track::{ControlPointTrack, Knot},
 };
 use crate::shapes::{
-    Correspondence, MotionParameters, ShapeError, ShapeErrorKind, ShapeParameters,
+    Correspondence, MorphingParameters, ShapeError, ShapeErrorKind, ShapeParameters,
     correspondence::{
         links::LinkConstraints,
         sheet_matching::{SheetMatch, match_sheets},
@@ -62,7 +62,7 @@ pub(crate) fn drawn_shapes(
 /// A shape with the wrong number of sheets; too many control points.
 pub(crate) fn track_control_points(
     (shapes, drawn): (&[ShapeParameters], &[Vec<DrawnSheet>]),
-    motion: &MotionParameters,
+    motion: &MorphingParameters,
     extent_km: f64,
     evenness: f64,
 ) -> Result<TrackedControlPoints, ShapeError> {
@@ -140,8 +140,8 @@ fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
 }
 
 /// Control points of a sheet with flux and energy factors.
-fn control_knots(sheet: &DrawnSheet, count: usize, motion: &MotionParameters) -> Vec<Knot> {
-    let points = sheet.control_points(count, motion.spacing);
+fn control_knots(sheet: &DrawnSheet, count: usize, motion: &MorphingParameters) -> Vec<Knot> {
+    let points = sheet.control_points(count, motion.control_point_spacing);
     let fractions = length_fractions(&points);
     let knot = |(position, fraction): (DVec2, f64)| Knot { position, factors: sheet.factors.at(fraction) };
     points.into_iter().zip(fractions).map(knot).collect()
@@ -169,7 +169,7 @@ impl TrackedControlPoints {
     }
 
     /// Adds the first shape.
-    fn begin(&mut self, drawn: &[DrawnSheet], motion: &MotionParameters) {
+    fn begin(&mut self, drawn: &[DrawnSheet], motion: &MorphingParameters) {
         let mut sheets = Vec::new();
         for sheet in drawn {
             let first = self.tracks.len();
@@ -182,7 +182,7 @@ impl TrackedControlPoints {
 
     /// Correspondence by drawing order, as in the thesis. Where a sheet splits, the segment between its parts shrinks;
     /// where two ends merge, a segment grows between them.
-    fn advance_in_order(&mut self, change: &Transition, drawn: &[DrawnSheet], motion: &MotionParameters) {
+    fn advance_in_order(&mut self, change: &Transition, drawn: &[DrawnSheet], motion: &MorphingParameters) {
         let sheets = self.shapes[self.shapes.len() - 1].clone();
         let next = self.shapes.len();
         for (sheet, drawn) in sheets.iter().zip(drawn) {

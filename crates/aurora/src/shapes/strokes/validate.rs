@@ -108,16 +108,16 @@ fn draw_entry(
     sheets: &mut Vec<DrawnSheet>,
 ) -> Result<(), ShapeError> {
     let error_for = |key: &str, kind| context.error(&format!(".sheets.{entry}{key}"), kind);
-    if parameters.stroke.is_some() && parameters.path.is_none() {
-        return Err(error_for(".stroke", ShapeErrorKind::StrokeWithoutFile));
+    if parameters.svg_path_id.is_some() && parameters.svg_file.is_none() {
+        return Err(error_for(".svg_path_id", ShapeErrorKind::StrokeWithoutFile));
     }
-    let strokes = match (&parameters.points, &parameters.path, parameters.form) {
+    let strokes = match (&parameters.points, &parameters.svg_file, parameters.form) {
         (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
         (None, Some(path), None) => {
-            let id = parameters.stroke.as_deref();
+            let id = parameters.svg_path_id.as_deref();
             strokes(&path.0, id, context.extent_km, assets).map_err(|error| {
                 error_for(
-                    if matches!(error.problem, AssetProblem::NoStroke(_)) { ".stroke" } else { ".path" },
+                    if matches!(error.problem, AssetProblem::NoStroke(_)) { ".svg_path_id" } else { ".svg_file" },
                     error.into(),
                 )
             })?
@@ -166,7 +166,7 @@ fn sheet(
 
 fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
     let set = |auto: Auto<f64>| if let Auto::Set(value) = auto { Some(value) } else { None };
-    let count = if let Auto::Set(count) = parameters.count { Some(count) } else { None };
+    let count = if let Auto::Set(count) = parameters.wave_count { Some(count) } else { None };
     let length = set(parameters.length_km).unwrap_or(DEFAULT_FORM_LENGTH * extent_km);
     let line = parameters.form.unwrap_or_default().line(set(parameters.bend_deg), count);
     line.into_iter().map(|point| point * length).collect()
@@ -248,7 +248,10 @@ pub(crate) struct FluxEnergyFactors {
 
 impl FluxEnergyFactors {
     pub(super) fn new(parameters: &SheetParameters) -> Self {
-        Self { curves: Arc::new([parameters.flux.clone(), parameters.energy.clone()]), fade: parameters.fade }
+        Self {
+            curves: Arc::new([parameters.flux_factor.clone(), parameters.energy_factor.clone()]),
+            fade: parameters.end_taper,
+        }
     }
 
     /// Flux and energy at that fraction of the length.
@@ -277,7 +280,8 @@ mod factors_tests {
 
     #[test]
     fn flux_rises_from_nothing_at_both_ends_and_energy_stays() {
-        let factors = |fade: f64| FluxEnergyFactors::new(&SheetParameters { fade, ..SheetParameters::default() });
+        let factors =
+            |fade: f64| FluxEnergyFactors::new(&SheetParameters { end_taper: fade, ..SheetParameters::default() });
         let soft = factors(0.2);
         assert_eq!([0.0, 1.0].map(|fraction| soft.at(fraction)), [[0.0, 1.0]; 2]);
         assert_eq!([0.1, 0.9].map(|fraction| (soft.at(fraction)[0] - 0.5).abs() < 1e-12), [true; 2]);

@@ -69,7 +69,7 @@ pub(crate) struct FieldSample {
 impl FieldBuilder {
     pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
         let cells = parameters.field.cells as usize;
-        let reach = match parameters.field.reach_km {
+        let reach = match parameters.field.screening_length_km {
             Auto::Auto => REACH_CELLS * parameters.cell_km(),
             Auto::Set(reach) => reach,
         };
@@ -166,7 +166,7 @@ impl FieldBuilder {
 
     /// Field at the edge of a sheet, km/s^2.
     fn edge_field(&self) -> f64 {
-        self.parameters.field.pull * EDGE_FIELD * self.parameters.cell_km() / (FRAME_S * FRAME_S)
+        self.parameters.field.attraction * EDGE_FIELD * self.parameters.cell_km() / (FRAME_S * FRAME_S)
     }
 
     /// Solves `laplacian(phi) - phi / l^2 = rho` directly; phi is negative, lowest on the shape.
@@ -212,7 +212,7 @@ impl FieldBuilder {
         let level = Level::new();
         let rows = potential.values_mut().par_chunks_mut(columns).enumerate();
         rows.for_each_with(vec![0.0_f32; columns], |values, (row, cells)| {
-            let origin = [0.0, row as f64 * scale, time / field.noise_life_s].map(Coordinate::from_f64);
+            let origin = [0.0, row as f64 * scale, time / field.noise_correlation_time_s].map(Coordinate::from_f64);
             self.noise.row(level, origin, &along, values);
             cells.iter_mut().zip(values).for_each(|(cell, noise)| *cell += field.noise * depth * f64::from(*noise));
         });

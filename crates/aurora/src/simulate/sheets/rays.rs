@@ -103,7 +103,7 @@ impl RayPattern {
                 let noises = self.noises(level, &batch, time);
                 nodes.extend((0..coordinates.len()).map(|lane| noises.map(|values| values[lane])));
             }
-            fade(&mut nodes, &coordinates, length / last, self.rays.scale_km);
+            fade(&mut nodes, &coordinates, length / last, self.rays.spacing_km);
             nodes
         };
         RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
@@ -112,9 +112,9 @@ impl RayPattern {
     /// Node spacing for the finest requested pattern.
     fn node_km(&self) -> f64 {
         let finest = |strength: f64, scale: f64| if strength > 0.0 { scale } else { f64::INFINITY };
-        let rays = finest(self.rays.contrast.max(self.rays.energy), self.rays.scale_km);
-        let others = finest(self.rays.black_rays, self.rays.black_scale_km)
-            .min(finest(self.pulsation.depth, self.pulsation.patch_km));
+        let rays = finest(self.rays.contrast.max(self.rays.energy_variation), self.rays.spacing_km);
+        let others = finest(self.rays.black_ray_depth, self.rays.black_ray_spacing_km)
+            .min(finest(self.pulsation.modulation_depth, self.pulsation.patch_length_km));
         rays.min(others) / NODES_PER_CELL
     }
 
@@ -133,7 +133,7 @@ impl RayPattern {
             let variance = fraction * fraction + (1.0 - fraction) * (1.0 - fraction);
             let mixed = (left + fraction * (right - left)) / (self.deviation * variance.sqrt());
             sample.brightness[i] = approximations::exp(self.rays.contrast as f32 * mixed);
-            sample.hardness[i] = approximations::exp(self.rays.energy as f32 * mixed);
+            sample.hardness[i] = approximations::exp(self.rays.energy_variation as f32 * mixed);
             sample.dimming[i] = self.darkness(black) * self.pulse(patch, time);
         }
         sample
@@ -142,14 +142,14 @@ impl RayPattern {
     /// Noise of the rays on both sides, of black rays and of patches; 0 for disabled patterns.
     fn noises(&self, level: Level, coordinates: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
         let rays = &self.rays;
-        let (shift, age) = (rays.shear_km_per_s * time, time / rays.life_s);
+        let (shift, age) = (rays.shear_km_per_s * time, time / rays.lifetime_s);
         // Groups of rays are four rays long. Black rays drift against the rays of one side.
-        let [group, black, patch] = [4.0 * rays.scale_km, rays.black_scale_km, self.pulsation.patch_km];
+        let [group, black, patch] = [4.0 * rays.spacing_km, rays.black_ray_spacing_km, self.pulsation.patch_length_km];
         let wanted = [
-            (rays.contrast.max(rays.energy), &self.noise[0], shift, group, age),
-            (rays.contrast.max(rays.energy), &self.noise[1], -shift, group, age),
-            (rays.black_rays, &self.black, -shift, black, age),
-            (self.pulsation.depth, &self.patches, 0.0, patch, 0.0),
+            (rays.contrast.max(rays.energy_variation), &self.noise[0], shift, group, age),
+            (rays.contrast.max(rays.energy_variation), &self.noise[1], -shift, group, age),
+            (rays.black_ray_depth, &self.black, -shift, black, age),
+            (self.pulsation.modulation_depth, &self.patches, 0.0, patch, 0.0),
         ];
         wanted.map(|(strength, noise, shift, scale, age)| {
             if strength > 0.0 {
@@ -164,7 +164,7 @@ impl RayPattern {
     #[inline(always)]
     fn darkness(&self, noise: f32) -> f32 {
         let depth = (1.0 - (noise / BLACK_WIDTH).abs()).max(0.0);
-        1.0 - self.rays.black_rays as f32 * depth.sqrt()
+        1.0 - self.rays.black_ray_depth as f32 * depth.sqrt()
     }
 
     /// Patches pulsate with independent phases.
@@ -173,7 +173,7 @@ impl RayPattern {
         let turns = time / self.pulsation.period_s;
         let turns = (turns - turns.floor()) as f32;
         let dark = 0.5 - 0.5 * approximations::cos_turns(turns + 2.0 * noise);
-        1.0 - self.pulsation.depth as f32 * dark
+        1.0 - self.pulsation.modulation_depth as f32 * dark
     }
 }
 
@@ -266,7 +266,7 @@ mod tests {
     fn contrast_is_the_deviation_of_the_logarithm_and_hardness_goes_with_it() {
         let mut parameters = AuroraParameters::default();
         parameters.rays.contrast = 0.5;
-        parameters.rays.energy = 0.1;
+        parameters.rays.energy_variation = 0.1;
         let [brightness, dimming, hardness] = coordinate(&parameters, 3.0);
         let logarithm = |values: &[f64]| values.iter().map(|value| bansho_base::math::ln(*value)).collect::<Vec<_>>();
         assert!((deviation(&logarithm(&brightness)) / 0.5 - 1.0).abs() < 0.15);
@@ -293,7 +293,7 @@ mod tests {
     fn there_are_no_more_nodes_than_particles_show() {
         let nodes = |particles: i64| {
             let mut parameters = AuroraParameters::default();
-            (parameters.particles.count, parameters.rays.scale_km) = (particles, 0.05);
+            (parameters.particles.count, parameters.rays.spacing_km) = (particles, 0.05);
             let table = RayPattern::new(&parameters, KEY).table(&[2000.0, 500.0], |_, last| evenly(1.0, last), 1.0);
             table.sheets.iter().map(Vec::len).collect::<Vec<_>>()
         };
@@ -318,7 +318,7 @@ mod tests {
             |table: &RayTable, fraction: f64| (table.at(0, fraction + 2e-4)[0] - table.at(0, fraction - 2e-4)[0]).abs();
         assert!(step(&torn, 0.5) < 0.1 * f64::from(rays.deviation) as f32, "{}", step(&torn, 0.5));
         // A ray away it is as it was.
-        let away = 0.5 - 1.1 * parameters.rays.scale_km / 300.0;
+        let away = 0.5 - 1.1 * parameters.rays.spacing_km / 300.0;
         assert_eq!(torn.at(0, away), even.at(0, away));
         let ten = (1..60).map(|coordinate| torn.at(0, f64::from(coordinate) / 60.0)[0].abs()).fold(0.0, f32::max);
         assert!(ten > rays.deviation, "elsewhere there are rays");
@@ -328,7 +328,7 @@ mod tests {
     fn rays_run_along_the_sheet() {
         let mut parameters = AuroraParameters::default();
         parameters.rays.shear_km_per_s = 3.0;
-        parameters.rays.life_s = 1e5;
+        parameters.rays.lifetime_s = 1e5;
         let [before, ..] = coordinate(&parameters, 1.0);
         let [after, ..] = coordinate(&parameters, 1.5);
         // 1.5 km are 30 positions; on the left they run onward.
@@ -341,7 +341,7 @@ mod tests {
     #[test]
     fn black_rays_are_narrow_and_dark() {
         let mut parameters = AuroraParameters::default();
-        parameters.rays.black_rays = 1.0;
+        parameters.rays.black_ray_depth = 1.0;
         let [_, dimming, _] = coordinate(&parameters, 3.0);
         let dark = dimming.iter().filter(|dimming| **dimming < 0.3).count() as f64 / dimming.len() as f64;
         let whole = dimming.iter().filter(|dimming| **dimming == 1.0).count() as f64 / dimming.len() as f64;
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn patches_pulsate_with_their_period() {
         let mut parameters = AuroraParameters::default();
-        parameters.pulsation.depth = 0.8;
+        parameters.pulsation.modulation_depth = 0.8;
         parameters.pulsation.period_s = 5.0;
         let at = |time: f64| coordinate(&parameters, time)[1].clone();
         let same = at(1.0).iter().zip(at(6.0)).all(|(a, b)| (a - b).abs() < 1e-5);

@@ -41,7 +41,8 @@ impl FoldModel {
         let [seed, ..] = key.words(0, 0, bansho_base::math::random::Purpose::named("aurora folds"));
         let fractal = Fractal { octaves: 2, ..Fractal::default() };
         let noise = Noise::new(seed, fractal, [0; 2]).expect("two octaves without a period are noise");
-        let fold = if parameters.amplitude_km > 0.0 { parameters.scale_km / PIECES_PER_FOLD } else { f64::INFINITY };
+        let fold =
+            if parameters.amplitude_km > 0.0 { parameters.wavelength_km / PIECES_PER_FOLD } else { f64::INFINITY };
         // Detail finer than a fraction of the thickness is not visible.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
         let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(MIN_MAX_SEGMENTS, MAX_SEGMENTS);
@@ -50,8 +51,8 @@ impl FoldModel {
 
     /// Lateral displacement of the sheet at a coordinate and a time, km.
     fn swing(&self, along: f64, time: f64) -> f64 {
-        let FoldParameters { amplitude_km, scale_km, speed_km_per_s, life_s, .. } = self.parameters;
-        let coordinates = [(along - speed_km_per_s * time) / scale_km, time / life_s];
+        let FoldParameters { amplitude_km, wavelength_km, speed_km_per_s, lifetime_s, .. } = self.parameters;
+        let coordinates = [(along - speed_km_per_s * time) / wavelength_km, time / lifetime_s];
         SWING * amplitude_km * f64::from(self.noise.at(coordinates.map(Coordinate::from_f64)))
     }
 }
@@ -386,7 +387,7 @@ mod tests {
     #[test]
     fn crests_travel_along_the_sheet_as_fast_as_told() {
         for speed_km_per_s in [-3.0, 0.0, 5.0] {
-            let folds = folds(FoldParameters { speed_km_per_s, life_s: 1e4, ..FoldParameters::default() });
+            let folds = folds(FoldParameters { speed_km_per_s, lifetime_s: 1e4, ..FoldParameters::default() });
             let (mut apart, mut all) = (0.0, 0.0);
             for coordinates in 0..200 {
                 let along = f64::from(coordinates);

@@ -8,7 +8,7 @@ use fearless_simd::Level;
 
 use super::*;
 use crate::{
-    shapes::{ControlPointIds, MotionParameters},
+    shapes::{ControlPointIds, MorphingParameters},
     simulate::sheets::{
         arc_length::ArcLengthMap,
         rays::{PatternInputs, RayPattern},
@@ -182,7 +182,7 @@ fn nothing_jumps_where_a_loop_begins_again() {
         folded(vec![reached(straight()), reached(swapped(60.0)), reached(swapped(120.0)), reached(straight())]);
     let assets = MemoryAssets::default();
     let sequence =
-        Sequence::new(&parameters.shapes, &MotionParameters::default(), parameters.extent_km, &assets, Some(9.0))
+        Sequence::new(&parameters.shapes, &MorphingParameters::default(), parameters.extent_km, &assets, Some(9.0))
             .unwrap();
     let positions = [beside(0.0), beside(240.0)].concat();
     let [folds, rays] = jumps(&parameters, &sequence, &[3.0, 6.0, 9.0, 12.0, 18.0], &positions, Known::ByNumber);

@@ -117,7 +117,7 @@ fn random(trial: u64) -> Result<AuroraSimulation, ShapeError> {
     parameters.field.sweeps = parameters.field.sweeps.min(20);
     parameters.shapes.truncate(2);
     let assets = MemoryAssets::default();
-    let sequence = Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, &assets, None)?;
+    let sequence = Sequence::new(&parameters.shapes, &parameters.morphing, parameters.extent_km, &assets, None)?;
     Ok(AuroraSimulation::new(parameters, sequence, "random", trial))
 }
 

@@ -24,7 +24,8 @@ fn small() -> AuroraParameters {
 }
 
 fn sequence(parameters: &AuroraParameters) -> Sequence {
-    Sequence::new(&parameters.shapes, &parameters.motion, parameters.extent_km, &MemoryAssets::default(), None).unwrap()
+    Sequence::new(&parameters.shapes, &parameters.morphing, parameters.extent_km, &MemoryAssets::default(), None)
+        .unwrap()
 }
 
 fn simulation(parameters: AuroraParameters) -> AuroraSimulation {
@@ -38,11 +39,11 @@ fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
 
 /// A form whose flux is even.
 fn form(form: Form) -> SheetParameters {
-    SheetParameters { form: Some(form), fade: 0.0, ..SheetParameters::default() }
+    SheetParameters { form: Some(form), end_taper: 0.0, ..SheetParameters::default() }
 }
 
 fn line(from: [f64; 2], to: [f64; 2]) -> SheetParameters {
-    SheetParameters { points: Some(vec![from, to]), fade: 0.0, ..SheetParameters::default() }
+    SheetParameters { points: Some(vec![from, to]), end_taper: 0.0, ..SheetParameters::default() }
 }
 
 /// From an arc to a form.

@@ -106,7 +106,7 @@ fn nothing(parameters: &AuroraParameters) -> crate::simulate::field::sheet_field
 #[test]
 fn sheets_that_do_not_pull_make_no_field() {
     let mut parameters = small();
-    parameters.field.pull = 0.0;
+    parameters.field.attraction = 0.0;
     let builder = FieldBuilder::new(&parameters, KEY);
     let refined = refined(&parameters, &[&[[-200.0, 0.0], [200.0, 0.0]]], 40.0);
     let scattered = scatter(&refined, parameters.half_thickness_km(), 2_000, KEY, 0);
@@ -120,8 +120,8 @@ fn sheets_that_do_not_pull_make_no_field() {
 fn a_free_particle_keeps_its_way_and_the_magnetic_field_turns_it() {
     let mut parameters = small();
     parameters.particles.friction_per_s = 0.0;
-    parameters.particles.pull_weight = 1.0;
-    parameters.field.turn_deg_per_frame = 90.0;
+    parameters.particles.lorentz_weight = 1.0;
+    parameters.field.gyration_deg_per_frame = 90.0;
     let field = nothing(&parameters);
     let mut particles = AuroraParticles::default();
     particles.push(0, DVec2::ZERO, [30.0, 0.0], 1.0);
@@ -132,7 +132,7 @@ fn a_free_particle_keeps_its_way_and_the_magnetic_field_turns_it() {
     assert!((position - DVec2::new(0.0, -1.0)).length() < 1e-5, "{position}");
     assert!(velocity[0].abs() < 1e-4 && (velocity[1] + 30.0).abs() < 1e-4, "{velocity:?}");
     // Eq. (2.19) and (2.20) with a push of 9 km/s^2 along x and weight 0.4, without the bound on energy.
-    parameters.field.turn_deg_per_frame = 0.0;
+    parameters.field.gyration_deg_per_frame = 0.0;
     parameters.particles.limit_energy = false;
     let mut particles = AuroraParticles::default();
     particles.push(0, DVec2::ZERO, [0.0, 0.0], 1.0);
@@ -159,7 +159,7 @@ fn kinetic_and_potential_energy_do_not_grow() {
         let energy = |i: usize| {
             let [u, w] = particles.velocities.each_ref().map(|v| f64::from(v[i]));
             let here = field.sample(particles.positions[0][i], particles.positions[1][i]);
-            0.5 * (u * u + w * w) + parameters.particles.pull_weight * f64::from(here.potential)
+            0.5 * (u * u + w * w) + parameters.particles.lorentz_weight * f64::from(here.potential)
         };
         (0..particles.len()).map(energy).collect()
     };
@@ -208,7 +208,7 @@ fn in_cell(u: f64, v: f64) -> DVec2 {
 
 #[test]
 fn table_3_3_to_the_letter() {
-    let table = || RelocationParameters { scaled: false, ..RelocationParameters::default() };
+    let table = || RelocationParameters { scale_counts: false, ..RelocationParameters::default() };
     // 700 in a cell: 200 too many, of which the 100 farthest from the line at z = 5 die.
     let (particles, _) = relocated(700, in_cell, table());
     let distance = |index: &usize| (particles.position(*index).y - 5.0).abs();
@@ -270,7 +270,7 @@ fn the_coordinate_stays_with_the_sheet_when_it_splits() {
 #[test]
 fn power_is_flux_times_area_and_follows_the_drawn_flux() {
     let mut parameters = AuroraParameters { shapes: vec![shape(vec![line([-200.0, 0.0], [200.0, 0.0])])], ..small() };
-    parameters.shapes[0].sheets[0].flux = bansho_base::math::curve::Curve::new(
+    parameters.shapes[0].sheets[0].flux_factor = bansho_base::math::curve::Curve::new(
         vec![[0.0, 0.0], [1.0, 2.0]],
         bansho_base::math::curve::Interpolation::Linear,
     )
@@ -348,7 +348,7 @@ fn an_even_charge_is_the_count() {
         let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
         ratios.iter().map(|ratio| (ratio / mean - 1.0).abs()).fold(0.0, f64::max)
     };
-    let (even, conductor) = (of(FieldCharge::Even), of(FieldCharge::Conductor));
+    let (even, conductor) = (of(FieldCharge::Uniform), of(FieldCharge::Conductor));
     assert!(even < 1e-6 && conductor > 0.1, "{even} {conductor}");
 }
 
@@ -356,7 +356,7 @@ fn an_even_charge_is_the_count() {
 fn births_without_end_are_held() {
     let mut parameters = AuroraParameters { shapes: vec![shape(vec![form(Form::Arc)])], ..small() };
     parameters.particles.relocation =
-        RelocationParameters { births_below: 1e6, births_at_most: 1e6, ..parameters.particles.relocation };
+        RelocationParameters { births_below: 1e6, max_births: 1e6, ..parameters.particles.relocation };
     let mut simulation = simulation(parameters);
     for _ in 0..8 {
         simulation.step();

@@ -72,7 +72,7 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
 
 /// A sheet through these points, taken to as they are.
 fn through(points: Vec<[f64; 2]>) -> SheetParameters {
-    SheetParameters { points: Some(points), smooth: false, fade: 0.0, ..SheetParameters::default() }
+    SheetParameters { points: Some(points), smooth: false, end_taper: 0.0, ..SheetParameters::default() }
 }
 
 /// An S of three long limbs whose bends have a radius of 4 km, less than two cells.
@@ -226,7 +226,7 @@ fn parting(kernel: RepulsionKernel) -> f64 {
 /// What the kernels differ in: not in rays as they are drawn, but in how close to each other particles come.
 #[test]
 fn poly6_with_spiky_parts_particles_that_the_spline_lets_be() {
-    let [spline, parted] = [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(parting);
+    let [spline, parted] = [RepulsionKernel::CubicSpline, RepulsionKernel::Poly6Spiky].map(parting);
     assert!(parted > 1.1 * spline, "{spline} {parted}");
 }
 
@@ -242,7 +242,7 @@ fn contrast_along(kernel: RepulsionKernel, particles: i64) -> f64 {
         parameters.field.cells = 255;
         parameters.particles.count = particles;
         parameters.particles.kernel = kernel;
-        let width = 0.5 * parameters.rays.scale_km;
+        let width = 0.5 * parameters.rays.spacing_km;
         let sequence = sequence(&parameters);
         let mut simulation = AuroraSimulation::new(parameters, sequence, "aurora", seed);
         (0..90).for_each(|_| simulation.step());
@@ -268,7 +268,7 @@ fn contrast_along(kernel: RepulsionKernel, particles: i64) -> f64 {
 #[test]
 fn rays_have_more_contrast_with_the_spline_while_particles_are_few() {
     let of = |particles: i64| {
-        [RepulsionKernel::Spline, RepulsionKernel::Poly6Spiky].map(|kernel| contrast_along(kernel, particles))
+        [RepulsionKernel::CubicSpline, RepulsionKernel::Poly6Spiky].map(|kernel| contrast_along(kernel, particles))
     };
     let (few, many) = (of(12_000), of(60_000));
     assert!(few[0] > 1.07 * few[1], "{few:?}");

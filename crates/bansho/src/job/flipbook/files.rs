@@ -25,7 +25,7 @@ use bansho_render::{
 
 use super::{
     FlipbookSummary,
-    motion::{self, Colour, Tile},
+    motion::{self, Color, Tile},
 };
 use crate::job::{error::JobError, render::finished_files::Finished};
 
@@ -66,17 +66,17 @@ impl Files {
 
     /// All files, the JSON last.
     pub(crate) fn paths(&self) -> Vec<PathBuf> {
-        let sheets: &[&str] = if self.is_linear() { &["colour", "motion"] } else { &["colour", "alpha", "motion"] };
+        let sheets: &[&str] = if self.is_linear() { &["color", "motion"] } else { &["color", "alpha", "motion"] };
         sheets.iter().map(|what| self.sheet_path(what)).chain([self.path(".json")]).collect()
     }
 
-    /// What colour sheets keep of a frame.
-    pub(crate) fn colour(&self, frame: &Frame, observer: &dyn Observer) -> Colour {
+    /// What color sheets keep of a frame.
+    pub(crate) fn color(&self, frame: &Frame, observer: &dyn Observer) -> Color {
         if self.is_linear() {
-            return Colour::Linear(frame.beauty.clone());
+            return Color::Linear(frame.beauty.clone());
         }
         let _stage = StageGuard::begin(observer, Stage::View);
-        Colour::Shown(display(frame, &self.view, self.bits, self.alpha))
+        Color::Shown(display(frame, &self.view, self.bits, self.alpha))
     }
 
     /// Lays out the tiles and writes every file.
@@ -114,14 +114,14 @@ impl Files {
 
     fn write_linear(&self, sheet: &SheetLayout, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
         let header = FrameHeader { display_size: sheet.size(), data_origin: [0, 0], ..tiles[0].header.clone() };
-        let colours: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
+        let colors: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
         let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.clone()).collect();
         let motion = tile(&motion, sheet.columns, 0, [0.0; 2])?;
         let [width, height] = sheet.size();
         let pixels = motion.pixels().iter().map(|&[x, y]| [x, y, 0.0, 1.0]).collect();
         let motion =
             Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
-        for (what, beauty) in [("colour", tile(&colours, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
+        for (what, beauty) in [("color", tile(&colors, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
             let path = self.sheet_path(what);
             let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
             let content = Rect::from_size(beauty.width(), beauty.height());
@@ -148,8 +148,8 @@ impl Files {
         finished: &Finished,
     ) -> Result<(), JobError> {
         let shown: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.shown().cloned()).collect();
-        let colour = tile_display(&shown, sheet.columns, 0, [0; 4])?;
-        let alpha = DisplayImage { opaque: true, pixels: alpha(&colour.pixels), ..colour };
+        let color = tile_display(&shown, sheet.columns, 0, [0; 4])?;
+        let alpha = DisplayImage { opaque: true, pixels: alpha(&color.pixels), ..color };
         let coded = tiles.iter().map(|tile| DisplayImage {
             width: tile.motion.width(),
             height: tile.motion.height(),
@@ -160,7 +160,7 @@ impl Files {
             ),
         });
         let motion = tile_display(&coded.collect::<Vec<_>>(), sheet.columns, 0, [0; 4])?;
-        for (what, picture) in [("colour", &colour), ("alpha", &alpha), ("motion", &motion)] {
+        for (what, picture) in [("color", &color), ("alpha", &alpha), ("motion", &motion)] {
             let path = self.sheet_path(what);
             let bytes = png::encode(picture, &fingerprint(tiles, what), PngEffort::Fast, &path)?;
             self.keep(path, &bytes, finished)?;
@@ -175,10 +175,10 @@ impl Files {
             let time_s = index as f64 * fps.frame_s();
             json!({ "number": number, "time_s": time_s, "x": place.x, "y": place.y, "width": place.width, "height": place.height })
         };
-        let colour = match self.is_linear() {
+        let color = match self.is_linear() {
             true => {
                 json!({
-                    "file": name(&self.sheet_path("colour")),
+                    "file": name(&self.sheet_path("color")),
                     "space": "ACEScg",
                     "alpha": "premultiplied",
                     "alpha_convention": "linear",
@@ -186,7 +186,7 @@ impl Files {
                 })
             }
             false => json!({
-                "file": name(&self.sheet_path("colour")),
+                "file": name(&self.sheet_path("color")),
                 "space": "sRGB",
                 "alpha": "straight",
                 "alpha_convention": self.alpha.name(),
@@ -208,7 +208,7 @@ impl Files {
             "fps": f64::from(fps.frames) / f64::from(fps.seconds),
             "duration_s": sheet.count as f64 * fps.frame_s(),
             "loop": plan.loop_s().is_some(),
-            "colour": colour,
+            "color": color,
         });
         if !self.is_linear() {
             description["alpha"] = json!({ "file": name(&self.sheet_path("alpha")), "space": "linear" });
@@ -276,11 +276,11 @@ impl Files {
 
 impl Tile {
     fn shown(&self) -> Option<&DisplayImage> {
-        if let Colour::Shown(picture) = &self.colour { Some(picture) } else { None }
+        if let Color::Shown(picture) = &self.color { Some(picture) } else { None }
     }
 
     fn linear(&self) -> Option<&Image<4>> {
-        if let Colour::Linear(picture) = &self.colour { Some(picture) } else { None }
+        if let Color::Linear(picture) = &self.color { Some(picture) } else { None }
     }
 }
 

@@ -68,7 +68,7 @@ pub struct Flipbook {
     /// What the straight alpha of PNG sheets is made for; left out it is [`AlphaConvention::Linear`], since engines blend sprites in linear
     /// light.
     pub alpha: Option<AlphaConvention>,
-    /// Where it goes: `DIR/NAME.png` stands for `NAME_colour.png` and so on; `out/STEM/STEM.png` when left out.
+    /// Where it goes: `DIR/NAME.png` stands for `NAME_color.png` and so on; `out/STEM/STEM.png` when left out.
     pub out: Option<PathBuf>,
     /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
     pub overwrite: bool,

@@ -11,14 +11,14 @@ use super::files::Files;
 /// What a sheet needs of a frame.
 pub(crate) struct Tile {
     pub(crate) header: FrameHeader,
-    pub(crate) colour: Colour,
+    pub(crate) color: Color,
     /// Pixels to the right and down until the next frame.
     pub(crate) motion: Image<2>,
     pub(crate) has_motion: bool,
 }
 
-/// A frame's colours as its format keeps them.
-pub(crate) enum Colour {
+/// A frame's colors as its format keeps them.
+pub(crate) enum Color {
     Shown(DisplayImage),
     Linear(Image<4>),
 }
@@ -32,7 +32,7 @@ impl Tile {
             has_motion: !fields.is_empty(),
             motion: Image::from_pixels(width, height, motion).unwrap_or_else(|| Image::filled(width, height, [0.0; 2])),
             header: frame.header.clone(),
-            colour: files.colour(frame, observer),
+            color: files.color(frame, observer),
         }
     }
 }

@@ -73,7 +73,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let finished = Finished::default();
-        for name in ["kept", "removed", "cut", "spoilt", "again"] {
+        for name in ["kept", "removed", "cut", "spoiled", "again"] {
             fs::write(at(name), "BANSHOSS").unwrap();
             finished.note(at(name));
         }
@@ -81,11 +81,11 @@ mod tests {
         assert_eq!(finished.lost(), [at("never")]);
         fs::remove_file(at("removed")).unwrap();
         fs::write(at("cut"), "BANSH").unwrap();
-        fs::write(at("spoilt"), "--------").unwrap();
+        fs::write(at("spoiled"), "--------").unwrap();
         // Another program that makes the same puts its own file there.
         fs::write(at("new"), "BANSHOSS").unwrap();
         fs::rename(at("new"), at("again")).unwrap();
-        assert_eq!(finished.lost(), ["cut", "never", "removed", "spoilt"].map(at));
+        assert_eq!(finished.lost(), ["cut", "never", "removed", "spoiled"].map(at));
         assert!(finished.is_untouched(&at("kept")) && !finished.is_untouched(&at("again")));
     }
 }

@@ -72,7 +72,7 @@ pub enum StreaksError {
     #[error("textures of {} a side; allowed: 8 to 4096", counted(*.0, "pixel"))]
     Size(usize),
     /// A cube too small or too large.
-    #[error("a box of {0} m; allowed: 0.001 to 100 m")]
+    #[error("a cube of {0} m; allowed: 0.001 to 100 m")]
     Edge(f64),
     /// No variant, or very many.
     #[error("{0} variants; allowed: 1 to 1000")]
@@ -82,7 +82,7 @@ pub enum StreaksError {
     Light,
     /// More drops than an index can list.
     #[error(
-        "a texture at {rate} mm/h and {diameter_mm} mm would hold {drops:.0} drops; allowed: up to {MOST_DROPS}, so choose a smaller box"
+        "a texture at {rate} mm/h and {diameter_mm} mm would hold {drops:.0} drops; allowed: up to {MOST_DROPS}, so choose a smaller cube"
     )]
     Drops {
         /// Rain rate, mm/h.

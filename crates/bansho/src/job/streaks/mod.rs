@@ -113,7 +113,7 @@ impl Streaks {
     pub fn prepare(&self) -> Result<PreparedStreaks, JobError> {
         fault::check(self)?;
         let air = Air::default();
-        if self.law == VelocityLaw::Formula {
+        if self.law == VelocityLaw::RigidSphere {
             // Where the drops of a bin have diameters of their own, its ends stand for them.
             let bins = SizeBin::around(&self.diameters);
             let ends = bins.iter().filter(|_| self.cube.spread).flat_map(|bin| bin.range_mm);

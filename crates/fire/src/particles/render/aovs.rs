@@ -7,7 +7,7 @@ use bansho_base::{
 
 use super::gas::Gas;
 use crate::particles::{
-    parameters::LookParameters,
+    parameters::RenderingParameters,
     render::{
         project::sprite::{ProjectedParticle, SpriteKind, project_particles},
         resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer, spline},
@@ -77,7 +77,7 @@ pub(crate) struct MotionField<'a> {
 /// Glowing particles as sprites of their motion.
 struct MotionSprites<'a> {
     gas: &'a Gas<'a>,
-    look: &'a LookParameters,
+    look: &'a RenderingParameters,
 }
 
 impl MotionSprites<'_> {
@@ -104,7 +104,7 @@ impl SpriteKind for MotionSprites<'_> {
 }
 
 impl<'a> MotionField<'a> {
-    pub(crate) fn new(gas: &Gas<'a>, look: &LookParameters, view: &View) -> Option<Self> {
+    pub(crate) fn new(gas: &Gas<'a>, look: &RenderingParameters, view: &View) -> Option<Self> {
         let sprites = project_particles(gas, view, &MotionSprites { gas, look });
         let motions = |axis: usize| {
             sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::{aovs::DEFLECTION, gas::Gas};
 use crate::particles::{
-    parameters::LookParameters,
+    parameters::RenderingParameters,
     render::{
         depth_layers::is_visible,
         project::sprite::{ProjectedParticle, SpriteKind, project_particles},
@@ -45,9 +45,9 @@ pub(crate) struct HeatHaze {
 /// Optical path difference to air along a ray through the center of a particle's sprite, in pixels at its depth: the gradient of
 /// the summed path differences, per pixel, is an angle.
 #[inline(always)]
-pub(crate) fn path(gas: &Gas, look: &LookParameters, seen: &ProjectedParticle) -> f32 {
+pub(crate) fn path(gas: &Gas, look: &RenderingParameters, seen: &ProjectedParticle) -> f32 {
     let refractivity_excess = refractivity_excess(gas, seen.index);
-    let length = look.haze_gain * refractivity_excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
+    let length = look.heat_haze_gain * refractivity_excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
     (length * f64::from(seen.scale)) as f32
 }
 
@@ -60,7 +60,7 @@ fn refractivity_excess(gas: &Gas, index: usize) -> f64 {
 /// Particles as sprites of their optical path: those that emit and absorb nothing, or all.
 struct RefractionSprites<'a> {
     gas: &'a Gas<'a>,
-    look: &'a LookParameters,
+    look: &'a RenderingParameters,
     whole_gas: bool,
 }
 
@@ -85,12 +85,12 @@ impl HeatHaze {
     /// where no gas is visible in the whole picture.
     pub(crate) fn new(
         gas: &Gas,
-        look: &LookParameters,
+        look: &RenderingParameters,
         view: &View,
         splatted: Option<&Grid<'_>>,
         whole_gas: bool,
     ) -> Option<Self> {
-        if look.haze_gain <= 0.0 {
+        if look.heat_haze_gain <= 0.0 {
             return None;
         }
         let settings = SplatSettings {

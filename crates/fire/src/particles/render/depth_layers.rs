@@ -12,7 +12,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use crate::particles::{
-    parameters::{LookParameters, SpriteStyle},
+    parameters::{RenderingParameters, SpriteStyle},
     render::{gas::Gas, prepared::PARTICLES_PER_TASK, resolve::detail::DetailScale},
 };
 
@@ -91,9 +91,9 @@ impl DepthLayers {
 
 /// Whether a particle contributes to the picture's light or opacity.
 #[inline(always)]
-pub(crate) fn is_visible(gas: &Gas, look: &LookParameters, index: usize) -> bool {
+pub(crate) fn is_visible(gas: &Gas, look: &RenderingParameters, index: usize) -> bool {
     match look.sprite {
-        SpriteStyle::Integral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
+        SpriteStyle::LineIntegral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
         SpriteStyle::Poly6 | SpriteStyle::Squares => true,
     }
 }
@@ -109,7 +109,7 @@ pub(crate) struct GasStatistics {
 }
 
 impl GasStatistics {
-    pub(crate) fn new(gas: &Gas, look: &LookParameters, view: &View) -> Self {
+    pub(crate) fn new(gas: &Gas, look: &RenderingParameters, view: &View) -> Self {
         let (count, level) = (gas.particles.len(), Level::new());
         let of_task = |task: usize| {
             let mut statistics = Self::default();
@@ -123,14 +123,14 @@ impl GasStatistics {
     }
 
     #[inline(always)]
-    fn add_all(&mut self, gas: &Gas, look: &LookParameters, view: &View, range: Range<usize>) {
+    fn add_all(&mut self, gas: &Gas, look: &RenderingParameters, view: &View, range: Range<usize>) {
         for index in range {
             self.add(gas, look, view, index);
         }
     }
 
     #[inline(always)]
-    fn add(&mut self, gas: &Gas, look: &LookParameters, view: &View, index: usize) {
+    fn add(&mut self, gas: &Gas, look: &RenderingParameters, view: &View, index: usize) {
         let radius = f64::from(gas.particles.support_radius[index]);
         self.radius_sum += radius;
         if !is_visible(gas, look, index) {
@@ -143,7 +143,7 @@ impl GasStatistics {
         let volume = gas.volume(index);
         self.spread.add(depth, volume);
         let absorption = gas.absorption(index, look);
-        if absorption > 0.0 && look.sprite == SpriteStyle::Integral {
+        if absorption > 0.0 && look.sprite == SpriteStyle::LineIntegral {
             let light = absorption * volume * gas.luminance(index);
             let scale = view.camera.focal_pixels / depth;
             for (sum, value) in self.light.iter_mut().zip([1.0, radius, absorption, scale]) {

@@ -11,7 +11,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
-use crate::particles::parameters::LookParameters;
+use crate::particles::parameters::RenderingParameters;
 
 /// Slabs of height over which emission is accumulated.
 const SLABS: usize = 48;
@@ -45,12 +45,12 @@ impl Slab {
     }
 }
 
-/// Point lights that represent the gas at `t`: `look.light.count` segments of equal power along its height, each at its center of
+/// Point lights that represent the gas at `t`: `rendering.light.count` segments of equal power along its height, each at its center of
 /// intensity, so that they move as smoothly as the gas.
 ///
 /// Soot of volume V with absorption coefficient k and temperature T emits `V k B(T)` in every direction. Self-absorption of a
 /// segment is that of a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
-pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Light> {
+pub fn point_lights_of_gas(gas: &Gas, look: &RenderingParameters, t: f64) -> Vec<Light> {
     let count = look.light.count.max(1) as usize;
     if look.light.scale <= 0.0 || gas.particles.is_empty() {
         return Vec::new();
@@ -68,7 +68,7 @@ pub fn point_lights_of_gas(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Ligh
 }
 
 /// Emission by height; a particle is distributed to the two nearest slabs.
-fn slabs(gas: &Gas, look: &LookParameters, t: f64) -> Vec<Slab> {
+fn slabs(gas: &Gas, look: &RenderingParameters, t: f64) -> Vec<Slab> {
     let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = Level::new();
@@ -106,7 +106,7 @@ fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
 #[inline(always)]
 fn add_to_slabs(
     gas: &Gas,
-    look: &LookParameters,
+    look: &RenderingParameters,
     t: f64,
     range: Range<usize>,
     [low, step]: [f64; 2],
@@ -132,7 +132,7 @@ fn add_to_slabs(
 }
 
 /// The light of the part of the flame between two values of cumulative power.
-fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &LookParameters) -> Option<Light> {
+fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &RenderingParameters) -> Option<Light> {
     let mut sum = Slab::default();
     let mut cumulative = 0.0;
     for slab in slabs {

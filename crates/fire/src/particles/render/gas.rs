@@ -5,7 +5,7 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, parameters::LookParameters, render::splat::scratch_pool::ScratchPool};
+use crate::particles::{Particles, parameters::RenderingParameters, render::splat::scratch_pool::ScratchPool};
 
 /// The gas of one flame at one time, with what rendering needs of its surroundings.
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +70,7 @@ const BLUE_PEAK_BURNED: f64 = 0.06;
 
 /// Absorption coefficient of soot for a volume fraction, 1/m.
 #[inline(always)]
-pub fn soot_absorption(volume_fraction: f64, look: &LookParameters) -> f64 {
+pub fn soot_absorption(volume_fraction: f64, look: &RenderingParameters) -> f64 {
     volume_fraction * VISIBLE_SOOT_ABSORPTION * look.soot_gain
 }
 
@@ -97,7 +97,7 @@ impl Gas<'_> {
 
     /// Absorption coefficient of a particle's soot, 1/m.
     #[inline(always)]
-    pub(crate) fn absorption(&self, index: usize, look: &LookParameters) -> f64 {
+    pub(crate) fn absorption(&self, index: usize, look: &RenderingParameters) -> f64 {
         soot_absorption(f64::from(self.particles.soot[index]), look)
     }
 
@@ -109,7 +109,7 @@ impl Gas<'_> {
 
     /// Whether a particle emits blue light: it has begun to burn and is not burnt out.
     #[inline(always)]
-    pub(crate) fn is_blue(&self, index: usize, look: &LookParameters) -> bool {
+    pub(crate) fn is_blue(&self, index: usize, look: &RenderingParameters) -> bool {
         /// Fuel fraction at which less than 1e-4 of the greatest blue light is left.
         const BURNT_OUT: f32 = 1.0 - 14.0 * BLUE_PEAK_BURNED as f32;
         let fuel = self.particles.fuel[index];
@@ -120,7 +120,7 @@ impl Gas<'_> {
     ///
     /// CH and C2 exist where fuel has just begun to burn, and nowhere that soot has formed.
     #[inline(always)]
-    pub(crate) fn blue_luminance(&self, index: usize, look: &LookParameters) -> f64 {
+    pub(crate) fn blue_luminance(&self, index: usize, look: &RenderingParameters) -> f64 {
         if !self.is_blue(index, look) {
             return 0.0;
         }

@@ -28,7 +28,7 @@ pub use splat::{
     scratch_pool::ScratchPool,
 };
 
-pub use crate::particles::parameters::{GasLightParameters, LookParameters, SpriteStyle};
+pub use crate::particles::parameters::{GasLightParameters, RenderingParameters, SpriteStyle};
 
 #[cfg(test)]
 mod tests;

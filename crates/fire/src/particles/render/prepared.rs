@@ -27,7 +27,7 @@ use crate::{
     chemiluminescence_color,
     particles::{
         paper_squares::Squares,
-        parameters::{LookParameters, SpriteStyle},
+        parameters::{RenderingParameters, SpriteStyle},
         render::{
             depth_layers::{GasStatistics, is_visible},
             project::sprite::{ProjectedParticle, SpriteKind, project_particles},
@@ -44,7 +44,7 @@ use crate::{
 /// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {
     gas: Gas<'a>,
-    look: &'a LookParameters,
+    look: &'a RenderingParameters,
     view: &'a View,
     level: Level,
     layers: DepthLayers,
@@ -82,7 +82,7 @@ struct SplattedGas<'a> {
 }
 
 /// Sparks of the fire.
-fn spark_emitter<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> SparkEmitter<'a> {
+fn spark_emitter<'a>(gas: &Gas, look: &'a RenderingParameters, view: &View) -> SparkEmitter<'a> {
     SparkEmitter {
         parameters: &look.sparks,
         key: gas.key,
@@ -96,7 +96,7 @@ fn spark_emitter<'a>(gas: &Gas, look: &'a LookParameters, view: &View) -> SparkE
 }
 
 /// Depth intervals of the gas and its sparks.
-pub fn depth_intervals(gas: &Gas, look: &LookParameters, view: &View) -> Vec<DepthInterval> {
+pub fn depth_intervals(gas: &Gas, look: &RenderingParameters, view: &View) -> Vec<DepthInterval> {
     if gas.particles.is_empty() && look.sparks.rate <= 0.0 {
         return Vec::new();
     }
@@ -117,7 +117,7 @@ impl<'a> PreparedGas<'a> {
     /// The observer asked to stop.
     pub fn new(
         gas: Gas<'a>,
-        look: &'a LookParameters,
+        look: &'a RenderingParameters,
         view: &'a View,
         surroundings: &Surroundings,
         observer: &dyn Observer,
@@ -152,7 +152,7 @@ impl<'a> PreparedGas<'a> {
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
             detail: splat_gas.detail.as_ref().map(|(detail, strain)| (detail, strain)),
-            self_absorption: self.look.sprite == SpriteStyle::Integral,
+            self_absorption: self.look.sprite == SpriteStyle::LineIntegral,
             blue: chemiluminescence_color(),
             scattered: &splat_gas.scattered,
             weights: &splat_gas.weights,
@@ -165,7 +165,7 @@ impl<'a> PreparedGas<'a> {
 /// Splats all sprites into their depth layers.
 fn splat_gas<'a>(
     gas: &Gas<'a>,
-    look: &LookParameters,
+    look: &RenderingParameters,
     view: &View,
     statistics: &GasStatistics,
     surroundings: &Surroundings,
@@ -219,7 +219,7 @@ fn splat_gas<'a>(
 /// Visible particles as sprites of emission and absorption.
 struct RadianceSprites<'a> {
     gas: &'a Gas<'a>,
-    look: &'a LookParameters,
+    look: &'a RenderingParameters,
     layers: &'a DepthLayers,
     /// Opacity of a poly6 sprite per density.
     opacity: f64,
@@ -291,7 +291,7 @@ fn mean_density(gas: &Gas) -> Option<f64> {
 }
 
 /// Radiance that opaque soot at a depth scatters toward the camera: isotropic single scattering of other lights.
-fn scattered(gas: &Gas, look: &LookParameters, view: &View, depth: f64, surroundings: &Surroundings) -> [f32; 3] {
+fn scattered(gas: &Gas, look: &RenderingParameters, view: &View, depth: f64, surroundings: &Surroundings) -> [f32; 3] {
     let toward = (gas.particles.origin - view.camera.position).normalize_or(DVec3::NEG_Z);
     let position = view.camera.position + toward * depth;
     let scale = (look.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
@@ -345,7 +345,7 @@ impl Prepared for PreparedGas<'_> {
     }
 
     fn may_bend(&self) -> bool {
-        self.look.haze_gain > 0.0 && !self.gas.particles.is_empty()
+        self.look.heat_haze_gain > 0.0 && !self.gas.particles.is_empty()
     }
 
     fn deflection(&self) -> Option<Deflection<'_>> {
@@ -359,10 +359,10 @@ impl PreparedGas<'_> {
     /// The haze, computed by all threads. Where AOVs are requested it exists before strips are drawn.
     fn haze(&self) -> Option<&HeatHaze> {
         let (summed, all) = match &self.mode {
-            DrawMode::SplattedGas(splat_gas) if self.look.sprite == SpriteStyle::Integral => {
+            DrawMode::SplattedGas(splat_gas) if self.look.sprite == SpriteStyle::LineIntegral => {
                 (Some(&splat_gas.grid), false)
             }
-            DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::Integral => (None, false),
+            DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::LineIntegral => (None, false),
             _ => (None, true),
         };
         get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()

@@ -93,7 +93,7 @@ impl Burner {
             area_m2: size.area_m2,
             height,
             speed,
-            acceleration: AXIS_ACCELERATION * flame.motion.buoyancy,
+            acceleration: AXIS_ACCELERATION * flame.forces.buoyancy,
             bounding_radius: size.bounding_radius,
             extent: match &size.mesh {
                 Some(mesh) => extent(mesh, &placement),
@@ -120,7 +120,7 @@ impl Burner {
 
     /// Puffing frequency, Hz: `1.5 / sqrt(D)` (Cetegen and Ahmed 1993).
     pub(crate) fn puffing_hz(&self, flame: &FlameParticlesParameters) -> f64 {
-        match flame.motion.puffing_hz {
+        match flame.forces.puffing_hz {
             Auto::Set(hz) => hz,
             Auto::Auto => 1.5 / math::sqrt(self.diameter),
         }
@@ -193,7 +193,7 @@ fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DV
     let axis = |unit: DVec3, half: f64| placement.direction_in_world(unit) * half;
     let half = match parameters.shape {
         BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
-        BurnerShape::Disc => {
+        BurnerShape::Disk => {
             let [x, z] = [axis(DVec3::X, radius), axis(DVec3::Z, radius)];
             DVec3::from([0, 1, 2].map(|c| math::sqrt(x[c] * x[c] + z[c] * z[c])))
         }
@@ -211,7 +211,7 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSur
     let disc_area = 0.25 * std::f64::consts::PI * diameter * diameter;
     let size = |diameter, area_m2, bounding_radius| Size { diameter, area_m2, bounding_radius, mesh: None };
     Ok(match parameters.shape {
-        BurnerShape::Disc => (BurnerSurface::Disc, size(diameter, disc_area, 0.5 * diameter)),
+        BurnerShape::Disk => (BurnerSurface::Disc, size(diameter, disc_area, 0.5 * diameter)),
         BurnerShape::Point => (BurnerSurface::Ball, size(diameter, disc_area, 0.5 * diameter)),
         BurnerShape::Line => (BurnerSurface::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
         BurnerShape::Box => {
@@ -311,7 +311,7 @@ mod tests {
     #[test]
     fn all_places_lie_within_the_extent_and_fill_it() {
         for (number, shape) in
-            [BurnerShape::Point, BurnerShape::Disc, BurnerShape::Line, BurnerShape::Box].into_iter().enumerate()
+            [BurnerShape::Point, BurnerShape::Disk, BurnerShape::Line, BurnerShape::Box].into_iter().enumerate()
         {
             let rotation_deg = [20.0 * number as f64, 65.0, -40.0];
             let parameters = BurnerParameters { shape, diameter: 0.3, length: 2.0, rotation_deg, ..Default::default() };

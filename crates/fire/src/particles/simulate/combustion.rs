@@ -10,7 +10,7 @@ use bansho_sph::KernelShape;
 use fearless_simd::Simd;
 
 use crate::particles::{
-    parameters::{LifeParameters, TemperatureLaw},
+    parameters::{CombustionParameters, TemperatureLaw},
     simulate::{
         fluid::{NeighborSums, Neighborhood},
         forces::external_forces::{BurnerForces, ExternalForces},
@@ -71,23 +71,23 @@ pub(crate) struct AmbientConditions<R> {
 pub(crate) struct CombustionModel {
     reacting: bool,
     flame_temperature: f32,
-    heating_s: f32,
-    air_hunger: f32,
+    heating_time_s: f32,
+    oxygen_dependence: f32,
     soot: f32,
     smoke: f32,
     radiation: f32,
 }
 
-impl From<&LifeParameters> for CombustionModel {
-    fn from(life: &LifeParameters) -> Self {
+impl From<&CombustionParameters> for CombustionModel {
+    fn from(life: &CombustionParameters) -> Self {
         Self {
-            reacting: life.temperature == TemperatureLaw::Living,
+            reacting: life.temperature_model == TemperatureLaw::Simulated,
             flame_temperature: life.flame_temperature_k as f32,
-            heating_s: life.heating_s as f32,
-            air_hunger: life.air_hunger as f32,
+            heating_time_s: life.heating_time_s as f32,
+            oxygen_dependence: life.oxygen_dependence as f32,
             soot: life.soot_ppm as f32 * 1e-6,
-            smoke: life.smoke as f32,
-            radiation: life.radiation as f32,
+            smoke: life.smoke_fraction as f32,
+            radiation: life.radiative_cooling as f32,
         }
     }
 }
@@ -103,7 +103,8 @@ impl CombustionModel {
     ) -> ParticleState<R> {
         let splat = |value: f32| state.fuel.broadcast(value);
         // Exposed gas burns faster than the mean, enclosed gas slower; a mean exposure of 1/3 burns at the mean rate.
-        let air = conditions.air_exposure.fma(splat(2.4 * self.air_hunger), splat(1.0 - 0.8 * self.air_hunger));
+        let air =
+            conditions.air_exposure.fma(splat(2.4 * self.oxygen_dependence), splat(1.0 - 0.8 * self.oxygen_dependence));
         let fuel = (state.fuel - conditions.burning * air * splat(seconds)).simd_max(splat(0.0));
         let growth = conditions.mixing.fma(splat(seconds * (1.0 / 3.0)), splat(1.0));
         ParticleState {
@@ -121,7 +122,7 @@ impl CombustionModel {
         let splat = |value: f32| state.fuel.broadcast(value);
         let air = splat(conditions.air_temperature);
         let front = conditions.air_exposure.simd_sqrt().fma(splat(1.0 - INNER_TEMPERATURE), splat(INNER_TEMPERATURE));
-        let (flame, heating) = (front * splat(self.flame_temperature), splat(seconds / self.heating_s));
+        let (flame, heating) = (front * splat(self.flame_temperature), splat(seconds / self.heating_time_s));
         // Burning gas approaches the flame temperature, burnt gas that of the air.
         let target = state.fuel.select_lt(splat(f32::MIN_POSITIVE), air, flame);
         let rate = state.fuel.select_lt(
@@ -338,7 +339,7 @@ mod tests {
     };
 
     fn combustion() -> CombustionModel {
-        CombustionModel::from(&LifeParameters::default())
+        CombustionModel::from(&CombustionParameters::default())
     }
 
     fn after(mut state: ParticleState<f32>, conditions: AmbientConditions<f32>, seconds: f32) -> ParticleState<f32> {
@@ -369,7 +370,7 @@ mod tests {
     #[test]
     fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
         // dT/dt = -4 sigma kappa T^4 / (rho c_p), worked by hand at 1500 K with 1e-6 of soot.
-        let combustion = CombustionModel { heating_s: 1e9, radiation: 1.0, ..combustion() };
+        let combustion = CombustionModel { heating_time_s: 1e9, radiation: 1.0, ..combustion() };
         let state = ParticleState { temperature: 1500.0, soot: 1e-6, ..STATE };
         let cooled = combustion.advance(state, &AmbientConditions { mixing: 0.0, ..CONDITIONS }, 1e-5);
         let kappa = 1862.0 * 1e-6 * 1500.0;

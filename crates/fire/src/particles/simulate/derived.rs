@@ -30,7 +30,7 @@ const MIN_STEPS: f64 = 4.0;
 ///
 /// Every particle represents the same volume V of gas at spawning. V follows from `particles`, the number alive at a time: a burner
 /// of area A and exit velocity w spawns `A w / V` per second, and gas stays for the rise time plus its afterlife. The support
-/// radius d is `fluid.support` times `V^(1/3)`; the mass m is V times the density of air at the temperature of the gas; rho_0 is a
+/// radius d is `fluid.support_radius` times `V^(1/3)`; the mass m is V times the density of air at the temperature of the gas; rho_0 is a
 /// fraction of that density; k is the square of a speed of sound, a multiple of the gas's own speed.
 #[derive(Clone, Debug)]
 pub(crate) struct DerivedConstants {
@@ -85,7 +85,7 @@ impl DerivedConstants {
         Ok(Self {
             rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
-            pulse: (FLOW_PULSATION * parameters.motion.puffing).min(0.9),
+            pulse: (FLOW_PULSATION * parameters.forces.puffing).min(0.9),
             support_radius: support_radius as f32,
             mass: (density * volume) as f32,
             density: density as f32,
@@ -100,14 +100,14 @@ impl DerivedConstants {
     }
 
     /// Age at which a particle of burner `index` is removed even if it still burns, s.
-    pub(crate) fn max_age(&self, index: usize, afterlife_s: f64) -> f64 {
-        MAX_RISE_TIMES * self.burners[index].rise_time() + afterlife_s
+    pub(crate) fn max_age(&self, index: usize, burnt_gas_lifetime_s: f64) -> f64 {
+        MAX_RISE_TIMES * self.burners[index].rise_time() + burnt_gas_lifetime_s
     }
 }
 
 /// Residence time of gas of a burner, s: rise time plus afterlife.
 fn residence_time(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
-    (burner.rise_time() + parameters.life.afterlife_s).max(MIN_STEPS * parameters.step_s)
+    (burner.rise_time() + parameters.combustion.burnt_gas_lifetime_s).max(MIN_STEPS * parameters.step_s)
 }
 
 /// Support radius d, m, of particles that represent that volume of gas at spawning.
@@ -116,7 +116,7 @@ fn support_radius(
     volume: f64,
     domain: &[DVec3; 2],
 ) -> Result<f64, ParticleFault> {
-    let (radius, side) = (parameters.fluid.support * math::cbrt(volume), (domain[1] - domain[0]).min_element());
+    let (radius, side) = (parameters.fluid.support_radius * math::cbrt(volume), (domain[1] - domain[0]).min_element());
     if radius <= side {
         return Ok(radius);
     }
@@ -228,11 +228,11 @@ mod tests {
             ..FlameParticlesParameters::default()
         };
         let constants = constants(&parameters).unwrap();
-        let residence_time = |burner: &Burner| burner.rise_time() + parameters.life.afterlife_s;
+        let residence_time = |burner: &Burner| burner.rise_time() + parameters.combustion.burnt_gas_lifetime_s;
         let living: f64 =
             constants.burners.iter().zip(&constants.rates).map(|(burner, rate)| rate * residence_time(burner)).sum();
         assert!((living - parameters.particles as f64).abs() < 1.0);
-        let spacing = f64::from(constants.support_radius) / parameters.fluid.support;
+        let spacing = f64::from(constants.support_radius) / parameters.fluid.support_radius;
         let layer = constants.rates[1] / (constants.burners[1].area_m2 * constants.burners[1].speed);
         assert!((spacing * spacing * spacing * layer - 1.0).abs() < 1e-5);
     }

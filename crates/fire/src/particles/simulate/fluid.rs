@@ -8,7 +8,7 @@ use bansho_sph::{
 use rayon::prelude::*;
 
 use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
-use crate::particles::parameters::{FluidParameters, Tension};
+use crate::particles::parameters::{FluidParameters, NegativePressure};
 
 /// Speed of gas relative to its neighbors, as a fraction of its speed.
 const RELATIVE_SPEED: f32 = 0.15;
@@ -31,13 +31,13 @@ pub(crate) struct FluidSolver {
 
 impl FluidSolver {
     pub(crate) fn new(fluid: &FluidParameters, constants: &DerivedConstants) -> Self {
-        let negative_pressure = fluid.tension == Tension::Unclamped;
+        let negative_pressure = fluid.negative_pressure == NegativePressure::Allowed;
         Self {
             equation_of_state: StateEquation { rest_density: constants.rest_density, negative_pressure },
             stiffness_per_kelvin: constants.stiffness_per_kelvin,
-            max_substeps: fluid.sub_steps as u32,
+            max_substeps: fluid.max_substeps as u32,
             cells: Cells::new(constants.support_radius),
-            force: PressureForce::new(fluid.force_kernel),
+            force: PressureForce::new(fluid.pressure_kernel),
             pressure: Vec::new(),
             acceleration: Default::default(),
             neighbor_sums: NeighborSums::default(),

@@ -131,14 +131,14 @@ impl IntegrationStep<'_> {
         let mut acceleration = clamp_length(&gas.acceleration, max_acceleration);
         let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
         acceleration[1] = (density_ratio - splat(1.0)).fma(splat(forces.buoyancy), acceleration[1]);
-        let per_volume = forces.wind == WindForce::PerVolume;
+        let per_volume = forces.wind == WindForce::BodyForce;
         if per_volume {
             acceleration =
-                add_scaled(&acceleration, wind, splat(forces.wind_gain) / gas.density.simd_max(splat(MIN_DENSITY)));
+                add_scaled(&acceleration, wind, splat(forces.wind_response) / gas.density.simd_max(splat(MIN_DENSITY)));
         }
         let accelerated = add_scaled(&gas.own, &acceleration, splat(seconds));
         // Entrained air brings its own momentum.
-        let gain = if per_volume { 0.0 } else { forces.wind_gain };
+        let gain = if per_volume { 0.0 } else { forces.wind_response };
         let air = [wind[0] * splat(gain), wind[1] * splat(gain), wind[2] * splat(gain)];
         let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * splat(seconds);
         let mix_weight = splat(1.0) / (rate + splat(1.0));
@@ -220,7 +220,7 @@ mod tests {
 
     use super::*;
     use crate::particles::{
-        parameters::{FlameParticlesParameters, MotionParameters},
+        parameters::{FlameParticlesParameters, ForceParameters},
         simulate::{
             derived::DerivedConstants,
             forces::{external_forces::StepConstants, turbulence::TurbulenceTile},
@@ -245,9 +245,9 @@ mod tests {
 
     #[test]
     fn one_particle_and_sixteen_are_pushed_alike() {
-        for wind in [WindForce::Mixing, WindForce::PerVolume] {
-            let motion = MotionParameters { wind, ..MotionParameters::default() };
-            let parameters = FlameParticlesParameters { motion, ..FlameParticlesParameters::default() };
+        for wind in [WindForce::Entrainment, WindForce::BodyForce] {
+            let motion = ForceParameters { wind_model: wind, ..ForceParameters::default() };
+            let parameters = FlameParticlesParameters { forces: motion, ..FlameParticlesParameters::default() };
             let constants = DerivedConstants::new(&parameters, None, &MemoryAssets::default()).unwrap();
             let (key, wind_field) = (Key::new(1, "flame"), Wind::new(WindParameters::default(), 1, None));
             let turbulence = TurbulenceTile::new(key);

@@ -56,7 +56,7 @@ pub(crate) struct Simulation {
 impl Simulation {
     pub(crate) fn new(parameters: &FlameParticlesParameters, constants: DerivedConstants, key: Key) -> Self {
         Self {
-            combustion: CombustionModel::from(&parameters.life),
+            combustion: CombustionModel::from(&parameters.combustion),
             turbulence: TurbulenceTile::new(key),
             particles: Particles::new(parameters.position.into()),
             solver: FluidSolver::new(&parameters.fluid, &constants),
@@ -82,14 +82,20 @@ impl Simulation {
         let step_seconds = parameters.step_s as f32;
         let substeps = solver.substep_count(particles, step_seconds);
         let (substep_s, radius) = (parameters.step_s / f64::from(substeps), solver.support_radius());
-        let spawner = Spawner { constants, turbulence, key: *key, afterlife_s: parameters.life.afterlife_s };
+        let spawner = Spawner {
+            constants,
+            turbulence,
+            key: *key,
+            burnt_gas_lifetime_s: parameters.combustion.burnt_gas_lifetime_s,
+        };
         for substep in 0..substeps {
             let (t, seconds) = (time + substep_s * f64::from(substep), substep_s as f32);
             solver.compute_pressure_forces(particles, seconds);
             if substep == 0 {
                 solver.sum_over_neighbors(particles);
                 let smoothing = [parameters.fluid.viscosity, parameters.fluid.conduction].map(|share| share as f32);
-                let (neighbor_sums, afterlife) = (&solver.neighbor_sums, parameters.life.afterlife_s as f32);
+                let (neighbor_sums, afterlife) =
+                    (&solver.neighbor_sums, parameters.combustion.burnt_gas_lifetime_s as f32);
                 let combustion_step = CombustionStep {
                     combustion,
                     forces: &forces,

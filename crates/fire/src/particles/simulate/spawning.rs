@@ -30,7 +30,7 @@ pub(crate) struct Spawner<'a> {
     pub(crate) constants: &'a DerivedConstants,
     pub(crate) turbulence: &'a TurbulenceTile,
     pub(crate) key: Key,
-    pub(crate) afterlife_s: f64,
+    pub(crate) burnt_gas_lifetime_s: f64,
 }
 
 impl Spawner<'_> {
@@ -79,7 +79,7 @@ impl Spawner<'_> {
             temperature: burner.parameters.temperature_k as f32,
             support_radius: constants.support_radius,
             age: age as f32,
-            max_age: constants.max_age(number, self.afterlife_s) as f32,
+            max_age: constants.max_age(number, self.burnt_gas_lifetime_s) as f32,
             fuel: 1.0,
             soot: 0.0,
         };

@@ -13,7 +13,7 @@ use bansho_base::{
 
 use super::*;
 use crate::particles::{
-    render::{LookParameters, PreparedGas, ScratchPool},
+    render::{PreparedGas, RenderingParameters, ScratchPool},
     simulate::snapshot,
 };
 
@@ -25,7 +25,7 @@ fn small() -> FlameParticlesParameters {
 fn any_number_of_threads_gives_the_same_bits() {
     // So many that every part of a step, and of the drawing, is split into several tasks.
     let parameters = FlameParticlesParameters { particles: 30_000, ..Default::default() };
-    let look = LookParameters::default();
+    let look = RenderingParameters::default();
     let camera = CameraParameters { position: Animated::from([0.0, 0.4, 3.0]), ..CameraParameters::default() };
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.04, [256, 192], 0);
     let (wind, scratch) = (Wind::new(WindParameters::default(), 1, None), ScratchPool::default());

@@ -3,7 +3,7 @@
 use bansho_base::{math, math::curve::Interpolation, parameters::animated::Animated};
 
 use super::*;
-use crate::particles::{heskestad, parameters::BurnerParameters, render::LookParameters};
+use crate::particles::{heskestad, parameters::BurnerParameters, render::RenderingParameters};
 
 fn fire(heat_release_kw: f64, diameter: f64) -> FlameParticlesParameters {
     FlameParticlesParameters {
@@ -151,7 +151,7 @@ fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> 
 
 #[test]
 fn blue_light_stands_at_the_base_and_yellow_light_above_it() {
-    let (parameters, look) = (fire(60.0, 0.3), LookParameters::default());
+    let (parameters, look) = (fire(60.0, 0.3), RenderingParameters::default());
     let mut simulation = simulation(&parameters);
     let (mut blue, mut yellow, mut high) = ([0.0; 2], [0.0; 2], 0.0);
     World::default().run(&mut simulation, 1.0, |simulation, t| {
@@ -182,8 +182,8 @@ fn blue_light_stands_at_the_base_and_yellow_light_above_it() {
 fn smoke_is_the_soot_that_leaves_the_flame_and_cools_above_it() {
     let smoke = |share: f64| {
         let mut parameters = fire(60.0, 0.3);
-        parameters.life.smoke = share;
-        parameters.life.afterlife_s = 1.5;
+        parameters.combustion.smoke_fraction = share;
+        parameters.combustion.burnt_gas_lifetime_s = 1.5;
         let mut simulation = simulation(&parameters);
         World::default().run(&mut simulation, 0.0, |_, _| {});
         let particles = &simulation.particles;

@@ -9,23 +9,23 @@ use bansho_base::{
 use super::*;
 use crate::particles::{
     Particle,
-    parameters::{BurnerParameters, LifeParameters, MotionParameters, TemperatureLaw, WindForce},
+    parameters::{BurnerParameters, CombustionParameters, ForceParameters, TemperatureLaw, WindForce},
 };
 
 /// Nothing but pressure and viscosity, and no births.
 fn quiet() -> FlameParticlesParameters {
     FlameParticlesParameters {
         burners: vec![BurnerParameters { flow: Animated::from(0.0), ..Default::default() }],
-        motion: MotionParameters {
+        forces: ForceParameters {
             buoyancy: 0.0,
-            wind_gain: 0.0,
+            wind_response: 0.0,
             entrainment: 0.0,
-            narrowing: 0.0,
+            plume_contraction: 0.0,
             puffing: 0.0,
             turbulence: 0.0,
             ..Default::default()
         },
-        life: LifeParameters { temperature: TemperatureLaw::Constant, ..Default::default() },
+        combustion: CombustionParameters { temperature_model: TemperatureLaw::Constant, ..Default::default() },
         domain_min: Auto::Set([-1e4; 3]),
         domain_max: Auto::Set([1e4; 3]),
         ..Default::default()
@@ -86,7 +86,7 @@ fn a_free_cloud_keeps_its_momentum_and_its_center_goes_straight() {
 #[test]
 fn a_lattice_at_rest_stays_at_rest() {
     let mut parameters = quiet();
-    parameters.fluid.support = 2.6;
+    parameters.fluid.support_radius = 2.6;
     parameters.fluid.rest_density = 1.0;
     let mut simulation = simulation(&parameters);
     let spacing = simulation.constants.support_radius / 2.6;
@@ -104,7 +104,7 @@ fn a_lattice_at_rest_stays_at_rest() {
 #[test]
 fn eddies_at_a_wall_give_the_gas_no_speed_of_its_own() {
     let mut parameters = quiet();
-    parameters.motion = MotionParameters { turbulence: 2.0, wind: WindForce::PerVolume, ..parameters.motion };
+    parameters.forces = ForceParameters { turbulence: 2.0, wind_model: WindForce::BodyForce, ..parameters.forces };
     let mut simulation = simulation(&parameters);
     let d = simulation.constants.support_radius;
     for id in 0..100 {
@@ -127,7 +127,7 @@ fn eddies_at_a_wall_give_the_gas_no_speed_of_its_own() {
 #[test]
 fn a_lattice_has_its_density_and_its_middle_rests_until_sound_arrives() {
     let mut parameters = quiet();
-    parameters.fluid.support = 2.6;
+    parameters.fluid.support_radius = 2.6;
     // Under pressure everywhere: what rests is pushed alike from all sides.
     parameters.fluid.rest_density = 0.9;
     let mut simulation = simulation(&parameters);
@@ -186,7 +186,7 @@ fn one_particle_falls_and_rises_as_buoyancy_says() {
     // At 0 K gas weighs all that it would in a vacuum; five times as hot as air it rises at 4 g.
     for (share, acceleration) in [(0.0, -STANDARD_GRAVITY), (5.0, 4.0 * STANDARD_GRAVITY)] {
         let mut parameters = quiet();
-        parameters.motion.buoyancy = 1.0;
+        parameters.forces.buoyancy = 1.0;
         let mut simulation = simulation(&parameters);
         let mut single = particle(&simulation.constants, 0, [0.0; 3], [0.0; 3]);
         single.temperature = (share * Air::default().temperature_k) as f32;
@@ -203,7 +203,7 @@ fn one_particle_falls_and_rises_as_buoyancy_says() {
 #[test]
 fn gas_flows_around_a_ball() {
     let mut parameters = FlameParticlesParameters { particles: 800, ..Default::default() };
-    parameters.motion.turbulence = 0.1;
+    parameters.forces.turbulence = 0.1;
     let ball = Occluder::Sphere { center: DVec3::new(0.0, 0.4, 0.0), radius: 0.12 };
     let world = World { occluders: vec![ball.clone()], ..World::default() };
     let mut above = 0;

@@ -54,12 +54,12 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
     let [low, high] = constants.domain.map(|corner| corner.as_vec3());
     // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
     let born = constants.burners.iter().map(|burner| burner.parameters.temperature_k);
-    let flame = parameters.life.flame_temperature_k;
+    let flame = parameters.combustion.flame_temperature_k;
     let (mut coldest, mut hottest) = (Air::default().temperature_k.min(f64::from(INNER_TEMPERATURE) * flame), flame);
     for kelvin in born {
         (coldest, hottest) = (coldest.min(kelvin), hottest.max(kelvin));
     }
-    let most_soot = parameters.life.soot_ppm as f32 * 1e-6;
+    let most_soot = parameters.combustion.soot_ppm as f32 * 1e-6;
     for index in 0..particles.len() {
         let position = position(simulation, index);
         assert!(
@@ -79,7 +79,7 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
 
 /// The speed that parameters and wind could give the gas, m/s.
 fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, wind: &WindParameters) -> f32 {
-    let (constants, motion) = (&simulation.constants, &parameters.motion);
+    let (constants, motion) = (&simulation.constants, &parameters.forces);
     let greatest = |speed: &dyn Fn(&Burner) -> f64| constants.burners.iter().map(speed).fold(0.0, f64::max);
     // On the axis at the top of the domain that a flame has by itself, with its eddies and rings.
     let rise = greatest(&|burner| burner.axis_speed(burner.bounding_radius + 3.0 * burner.height));
@@ -88,20 +88,20 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let room = constants.domain[1] - constants.domain[0];
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
     let blown =
-        wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_gain;
-    let blown = match motion.wind {
-        WindForce::Mixing => blown,
+        wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_response;
+    let blown = match motion.wind_model {
+        WindForce::Entrainment => blown,
         // Nothing holds gas back that a force drives, m/s^2 on gas as dense as at the burner.
-        WindForce::PerVolume => {
+        WindForce::BodyForce => {
             driven_speed(simulation, parameters, blown / f64::from(constants.density), room.max_element())
         }
     };
     let hottest = constants.burners.iter().map(|burner| burner.parameters.temperature_k);
-    let hottest = hottest.fold(parameters.life.flame_temperature_k, f64::max);
+    let hottest = hottest.fold(parameters.combustion.flame_temperature_k, f64::max);
     // Flames may be far hotter than those of their height are.
     let buoyancy = STANDARD_GRAVITY * motion.buoyancy * (hottest / Air::default().temperature_k - 1.0).max(0.0);
     let upward = rise * (1.0 + motion.turbulence + motion.puffing);
-    let inward = motion.narrowing * (inflow + 0.2 * rise);
+    let inward = motion.plume_contraction * (inflow + 0.2 * rise);
     ((upward * upward + inward * inward).sqrt() + blown).max(driven_speed(simulation, parameters, buoyancy, room.y))
         as f32
 }
@@ -109,7 +109,8 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
 fn driven_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, acceleration: f64, far: f64) -> f64 {
     let constants = &simulation.constants;
-    let max_ages = (0..constants.burners.len()).map(|index| constants.max_age(index, parameters.life.afterlife_s));
+    let max_ages =
+        (0..constants.burners.len()).map(|index| constants.max_age(index, parameters.combustion.burnt_gas_lifetime_s));
     (acceleration * max_ages.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
 }
 

@@ -52,7 +52,7 @@ fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
             let emissivity = if color.soot_optical_depth > 1e-6 { opacity(color, t2) } else { t2 };
             color::black_body().radiance(temperature(color, t2) as f32).map(|value| f64::from(value) * emissivity)
         }
-        Coloring::Paper => {
+        Coloring::RgbCurves => {
             let display =
                 [&color.red, &color.green, &color.blue].map(|curve| color::decode_srgb(curve.eval(t2) as f32));
             color::acescg_from_srgb(display).map(f64::from)

@@ -430,7 +430,7 @@ impl ShapeTables {
 fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
     const RED: f64 = 13.87;
     const GREEN: f64 = 15.67;
-    if color.kind == Coloring::Paper {
+    if color.kind == Coloring::RgbCurves {
         return [1.0, 1.0];
     }
     let cooled_fraction = color.cooling * w;

@@ -126,7 +126,7 @@ impl FlameSheet {
         match self.parameters.facing {
             Facing::Camera => right_facing(camera, base),
             Facing::Fixed => {
-                let (sin, cos) = math::sin_cos((self.parameters.turn_deg + flame.placement.turn_deg).to_radians());
+                let (sin, cos) = math::sin_cos((self.parameters.yaw_deg + flame.placement.yaw_deg).to_radians());
                 DVec3::new(cos, 0.0, -sin)
             }
         }
@@ -203,7 +203,7 @@ impl FlameSheet {
 
     /// Luminance of the brightest color at `t`, cd/m^2.
     pub(crate) fn luminance_at(&self, t: f64) -> f64 {
-        self.parameters.colour.luminance.at(self.clock.time(t))
+        self.parameters.color.luminance.at(self.clock.time(t))
     }
 }
 

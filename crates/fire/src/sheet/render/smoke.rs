@@ -108,7 +108,7 @@ impl FlameSheet {
         let base = self.base(flame, t);
         let right = self.right(flame, &view.camera, base);
         let plume = DVec2::new(size.x * smoke.width, size.y * smoke.height);
-        let start = base + DVec3::Y * (smoke.start * size.y);
+        let start = base + DVec3::Y * (smoke.base_height * size.y);
         let speed = (self.rise_speed(flame, t) * smoke.speed).max(0.3);
         let lean = WindLean::new(surroundings.wind, start, t, right, speed, self.parameters.wind_response);
         let quad = UprightQuad::new(start, right, plume, lean.toward);
@@ -148,7 +148,7 @@ impl FlameSheet {
         let flame_center = self.base(flame, t) + DVec3::Y * (0.3 * size.y);
         let near = 0.16 * size.length_squared();
         let scatter = smoke.albedo / (4.0 * std::f64::consts::PI);
-        let tint = bansho_base::color::acescg_from_srgb(smoke.colour.map(|value| value as f32));
+        let tint = bansho_base::color::acescg_from_srgb(smoke.color.map(|value| value as f32));
         std::array::from_fn(|i| {
             let point = quad.point(0.5, i as f64 / (LIGHT_SAMPLES - 1) as f64);
             let falloff = smoke.fire_light / ((point - flame_center).length_squared() + near);

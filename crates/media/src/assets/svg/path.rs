@@ -166,8 +166,8 @@ impl Pen {
         let square = (1.0 / ratio.length_squared() - 1.0).max(0.0).sqrt();
         let sign = if large == sweep { -1.0 } else { 1.0 };
         // On the unit circle: center, and the angles of both ends.
-        let centre = sign * square * DVec2::new(ratio.y, -ratio.x);
-        let angle = |point: DVec2| math::atan2(point.y - centre.y, point.x - centre.x);
+        let center = sign * square * DVec2::new(ratio.y, -ratio.x);
+        let angle = |point: DVec2| math::atan2(point.y - center.y, point.x - center.x);
         let from = angle(ratio);
         let mut way = angle(-ratio) - from;
         if sweep && way < 0.0 {
@@ -179,7 +179,7 @@ impl Pen {
         let pieces = (way.abs() / std::f64::consts::FRAC_PI_2 * CURVE_SEGMENTS as f64).ceil().max(1.0) as usize;
         for piece in 1..pieces {
             let (sin, cos) = math::sin_cos(from + way * piece as f64 / pieces as f64);
-            self.push(middle + axis.rotate((centre + DVec2::new(cos, sin)) * radii));
+            self.push(middle + axis.rotate((center + DVec2::new(cos, sin)) * radii));
         }
         self.push(end);
     }
@@ -216,13 +216,13 @@ mod tests {
 
     #[test]
     fn arcs_stay_on_their_circle() {
-        for (data, centre, pieces) in [
+        for (data, center, pieces) in [
             ("M1 0A1 1 0 0 1 0 1", [0.0, 0.0], 16),
             ("M1 0A1 1 0 1 1 0 1", [1.0, 1.0], 48),
             ("M1 0A1 1 0 0 0 0 1", [1.0, 1.0], 16),
         ] {
             let line = subpaths(data, 1000).unwrap().remove(0);
-            assert!(line.iter().all(|point| (point.distance(centre.into()) - 1.0).abs() < 1e-12), "{data}");
+            assert!(line.iter().all(|point| (point.distance(center.into()) - 1.0).abs() < 1e-12), "{data}");
             assert!(line.len().abs_diff(pieces + 1) <= 1, "{data}: {}", line.len());
         }
         // Too small a radius grows to half of the way; a turned ellipse keeps its ends.

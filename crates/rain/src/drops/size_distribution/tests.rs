@@ -33,8 +33,8 @@ fn rain_rates_water_and_shares_are_those_of_the_reference() {
         let [rate, whole, to_six, drops, water, share] =
             [rate, whole, to_six, drops, water, share].map(|field| field.parse::<f64>().expect("a number"));
         let law = match law {
-            "formula" => VelocityLaw::Formula,
-            "gunn_kinzer1949" => VelocityLaw::Measured,
+            "formula" => VelocityLaw::RigidSphere,
+            "gunn_kinzer1949" => VelocityLaw::GunnKinzer,
             _ => continue,
         };
         let (sizes, fall) =
@@ -110,7 +110,7 @@ fn tables_that_make_no_sense_are_refused() {
 }
 
 #[test]
-fn bins_meet_between_their_neighbours() {
+fn bins_meet_between_their_neighbors() {
     let bins = SizeBin::around(&[1.0, 1.2, 2.0]);
     let ranges: Vec<[f64; 2]> = bins.iter().map(|bin| bin.range_mm).collect();
     for (found, expected) in ranges.iter().zip([[0.9, 1.1], [1.1, 1.6], [1.6, 2.4]]) {

@@ -4,7 +4,7 @@ use super::*;
 
 const SCENE: &str = "\
 # What it shows.
-bansho = 1
+bansho = 2
 
 [wind] # from the left
 velocity = [0.5, 0, 0] # m/s
@@ -108,9 +108,9 @@ fn tables_that_hold_tables_get_headers_within_one_that_has() {
     shape.push("sheets", Value::List(vec![Value::Table(sheet).into()]));
     let shape = Operation::Append { place: at("aurora.0.shapes"), value: Value::Table(shape) };
     let aurora = Operation::Append { place: at("aurora"), value: Value::Table(Values::default()) };
-    let text = apply("bansho = 1\n", &[aurora, shape.clone(), shape]).unwrap();
+    let text = apply("bansho = 2\n", &[aurora, shape.clone(), shape]).unwrap();
     let shape = "\n[[aurora.shapes]]\nsheets = [{ scale = 2.0 }]\n";
-    assert_eq!(text, format!("bansho = 1\n\n[[aurora]]\n{shape}{shape}"));
+    assert_eq!(text, format!("bansho = 2\n\n[[aurora]]\n{shape}{shape}"));
 }
 
 #[test]

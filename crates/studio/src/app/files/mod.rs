@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_panic_while_rendering_is_told_and_the_work_kept_at_once() {
-        let document = Document::new("scene", "bansho = 1\n");
+        let document = Document::new("scene", "bansho = 2\n");
         let mut session = Session::new(document, None, Box::<PolledPlayer>::default(), |_| Arc::new(Bundle::default()));
         report_end(&mut session, Err(JobFailure::Failed("the disk is full".into())));
         assert_eq!((session.notice(), session.autosave_now), (Some("the disk is full"), false));

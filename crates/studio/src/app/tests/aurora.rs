@@ -71,7 +71,7 @@ fn an_s_is_drawn_split_played_saved_and_opened_again() {
 
     let edited = text(&mut harness);
     assert!(edited.contains("# few, to be quick") && edited.matches("[[aurora.shapes]]").count() == 3, "{edited}");
-    assert!(edited.contains("split = [{ sheet = 1, at = 0."), "{edited}");
+    assert!(edited.contains("split = [{ sheet = 1, length_fraction = 0."), "{edited}");
     assert!(harness.state_mut().session().document.error().is_none());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");
@@ -79,7 +79,7 @@ fn an_s_is_drawn_split_played_saved_and_opened_again() {
     choosing::answer(&mut harness, &path, "Save");
     assert!(!harness.state_mut().session().document.is_dirty());
 
-    let mut again = window("bansho = 1\n[[aurora]]\n");
+    let mut again = window("bansho = 2\n[[aurora]]\n");
     choosing::open(&mut again, &path);
     assert_eq!(drawing(&mut again).lines(2).len(), 2);
     assert_eq!(text(&mut again), edited);
@@ -150,7 +150,7 @@ fn points_are_moved_smoothed_brightened_and_erased() {
         harness.step();
     }
     release(&mut harness, end);
-    assert!(text(&mut harness).contains("flux = [["), "{}", text(&mut harness));
+    assert!(text(&mut harness).contains("flux_factor = [["), "{}", text(&mut harness));
     choose(&mut harness, "Erase");
     let end = at(target, 0.9, 0.5);
     press(&mut harness, end);
@@ -213,7 +213,7 @@ fn shapes_are_made_of_templates_retimed_and_removed() {
     choose(&mut harness, "Add shape");
     harness.get_by_role_and_label(Role::SpinButton, "reached after").set_value_accesskit(3.5);
     drawn(&mut harness);
-    assert!(text(&mut harness).contains("after_s = 3.5"), "{}", text(&mut harness));
+    assert!(text(&mut harness).contains("transition_s = 3.5"), "{}", text(&mut harness));
     assert_eq!(drawing(&mut harness).arrivals(), [0.0, 3.5]);
     choose(&mut harness, "Remove shape");
     assert_eq!(drawing(&mut harness).arrivals().len(), 1);

@@ -134,7 +134,7 @@ fn a_mesh_that_is_dropped_burns_and_of_several_files_none_is_forgotten() {
     let handles = handles();
     let file = |name: &str| handles.path().join(name);
     let mut harness =
-        window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
+        window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
     drop_on(&mut harness, &[file("ring.glb"), file("board.png")]);
     let edited = text(&mut harness);
     assert!(
@@ -156,12 +156,12 @@ fn a_scene_is_saved_under_a_whole_name_and_never_over_another_unasked() {
     answer(&mut harness, &folder.path().join("fire.v2"), "Save");
     assert_eq!(fs::read_to_string(folder.path().join("fire.v2.toml")).unwrap(), SCENE);
 
-    fs::write(folder.path().join("taken.toml"), "bansho = 1\n").unwrap();
+    fs::write(folder.path().join("taken.toml"), "bansho = 2\n").unwrap();
     menu(&mut harness, &["File", "Save as…"]);
     answer(&mut harness, &folder.path().join("taken"), "Save");
     harness.get_by_label_contains("There is a file of that name");
     confirm(&mut harness, "Cancel");
-    assert_eq!(fs::read_to_string(folder.path().join("taken.toml")).unwrap(), "bansho = 1\n");
+    assert_eq!(fs::read_to_string(folder.path().join("taken.toml")).unwrap(), "bansho = 2\n");
     menu(&mut harness, &["File", "Save as…"]);
     answer(&mut harness, &folder.path().join("taken.toml"), "Save");
     confirm(&mut harness, "Replace it");
@@ -173,7 +173,7 @@ fn a_scene_is_saved_under_a_whole_name_and_never_over_another_unasked() {
 fn what_a_question_led_to_comes_after_the_scene_was_saved_under_a_new_name() {
     let folder = tempfile::tempdir().unwrap();
     let other = folder.path().join("other.toml");
-    fs::write(&other, "bansho = 1\n[[rain]]\n").unwrap();
+    fs::write(&other, "bansho = 2\n[[rain]]\n").unwrap();
     let mut harness = window(SCENE);
     edited(&mut harness, &SCENE.replace("0.9", "1.3"));
     open(&mut harness, &other);
@@ -181,7 +181,7 @@ fn what_a_question_led_to_comes_after_the_scene_was_saved_under_a_new_name() {
     confirm(&mut harness, "Save");
     answer(&mut harness, &folder.path().join("mine.toml"), "Save");
     assert!(fs::read_to_string(folder.path().join("mine.toml")).unwrap().contains("height = 1.3"));
-    assert_eq!(text(&mut harness), "bansho = 1\n[[rain]]\n", "then the other one is open");
+    assert_eq!(text(&mut harness), "bansho = 2\n[[rain]]\n", "then the other one is open");
     assert_eq!(harness.state_mut().session().path, Some(other));
 }
 
@@ -208,7 +208,7 @@ fn a_scene_that_is_saved_in_another_folder_names_the_same_files() {
     let handles = handles();
     let scene = format!("{SCENE}[plate]\nimage = \"board.png\" # the ground\n");
     fs::write(handles.path().join("scene.toml"), &scene).unwrap();
-    let mut harness = window("bansho = 1\n");
+    let mut harness = window("bansho = 2\n");
     open(&mut harness, &handles.path().join("scene.toml"));
     menu(&mut harness, &["File", "Save as…"]);
     answer(&mut harness, &handles.path().join("deep/er/scene.toml"), "Save");
@@ -238,7 +238,7 @@ fn a_scene_that_cannot_be_saved_elsewhere_keeps_its_paths() {
     let file = |name: &str| handles.path().join(name);
     let scene = format!("{SCENE}[plate]\nimage = \"board.png\"\n");
     fs::write(file("scene.toml"), &scene).unwrap();
-    let mut harness = window("bansho = 1\n");
+    let mut harness = window("bansho = 2\n");
     open(&mut harness, &file("scene.toml"));
     let refused = |harness: &mut Harness<'_, Studio>, to: &str, reason: &str, unchanged: &str| {
         menu(harness, &["File", "Save as…"]);
@@ -261,7 +261,7 @@ fn a_file_that_cannot_be_read_is_not_written_over_unasked() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     fs::write(&path, SCENE).unwrap();
-    let mut harness = window("bansho = 1\n");
+    let mut harness = window("bansho = 2\n");
     open(&mut harness, &path);
     edited(&mut harness, &SCENE.replace("0.9", "1.3"));
     fs::write(&path, b"\xff\xfe").unwrap();

@@ -201,7 +201,7 @@ fn a_scene_that_panics_while_it_is_checked_is_broken_at_every_frame() {
     session.update(0.0, WINDOW, false);
     fake.process(0.01);
     session.update(0.1, WINDOW, false);
-    session.document.replace("typing", "bansho = 1\n[[rain]]\n");
+    session.document.replace("typing", "bansho = 2\n[[rain]]\n");
     session.update(0.2, WINDOW, false);
     fake.panic(session.document.revision(), 0);
     session.update(0.3, WINDOW, false);

@@ -134,7 +134,7 @@ fn highest(harness: &mut Harness<'_, Studio>) -> (f32, f32) {
     };
     let Value::Table(table) = &sheets[0].value else { panic!("a table") };
     let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
-    let highest = sheet.colour.blue.points().iter().copied().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+    let highest = sheet.color.blue.points().iter().copied().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
     (highest[0] as f32, highest[1] as f32)
 }
 
@@ -230,12 +230,12 @@ fn dragging_a_point_of_a_template_is_one_step() {
 
 #[test]
 fn retiming_a_shape_that_counts_frames_is_one_step() {
-    let shapes = "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\nafter_frames = 2\n";
+    let shapes = "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\ntransition_frames = 2\n";
     let mut harness = window(&sky(90, shapes));
     let shape = harness.get_by_label("Shape 2").rect().center();
     drag(&mut harness, shape, vec2(-60.0, 0.0));
     let edited = text(&mut harness);
-    assert!(edited.contains("after_s = ") && !edited.contains("after_frames"), "{edited}");
+    assert!(edited.contains("transition_s = ") && !edited.contains("transition_frames"), "{edited}");
     assert_eq!(steps(&mut harness), ["time of shape"]);
     undo(&mut harness);
     assert_eq!(text(&mut harness), sky(90, shapes));
@@ -301,7 +301,7 @@ fn the_edit_menu_undoes_redoes_and_goes_back_several_steps() {
 fn shapes_stay_under_the_hand_that_drags_them_in_time() {
     let arc = "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n";
     // The last of them comes after the shot, so that the line of time ends with it.
-    let mut harness = window(&sky(31, &format!("{arc}{arc}after_s = 0.4\n{arc}after_s = 3.6\n")));
+    let mut harness = window(&sky(31, &format!("{arc}{arc}transition_s = 0.4\n{arc}transition_s = 3.6\n")));
     let at = |harness: &Harness<'_, Studio>, shape: &str| harness.get_by_label(shape).rect().center().x;
     let arrivals = |harness: &mut Harness<'_, Studio>| {
         let session = harness.state_mut().session();

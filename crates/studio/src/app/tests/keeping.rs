@@ -21,7 +21,7 @@ use crate::{
 fn window_on_file(folder: &Path, scene: &str) -> (Harness<'static, Studio>, PathBuf) {
     let path = folder.join("scene.toml");
     fs::write(&path, scene).unwrap();
-    let mut harness = window("bansho = 1\n");
+    let mut harness = window("bansho = 2\n");
     choosing::open(&mut harness, &path);
     (harness, path)
 }
@@ -242,7 +242,7 @@ fn a_studio_that_can_keep_nothing_says_so_once() {
 #[test]
 fn work_of_a_studio_that_crashed_is_offered() {
     let home = crashed("3.5");
-    let session = Session::new(Document::new("scene", "bansho = 1\n"), None, Box::<PolledPlayer>::default(), assets);
+    let session = Session::new(Document::new("scene", "bansho = 2\n"), None, Box::<PolledPlayer>::default(), assets);
     let studio = Studio::new(session, Some(home.path().to_path_buf()));
     let mut harness =
         Harness::builder().with_max_steps(64).build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);

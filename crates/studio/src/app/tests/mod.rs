@@ -25,7 +25,7 @@ use egui_kittest::{Harness, HarnessBuilder, kittest::Queryable};
 
 const SCENE: &str = "\
 # A fire.
-bansho = 1
+bansho = 2
 [picture]
 size = [64, 36]
 frames = 10
@@ -69,7 +69,7 @@ fn drawn(harness: &mut Harness<'_, Studio>) {
 /// A small scene with an aurora of few particles, to be quick; `rest` goes on in its table.
 fn sky(frames: u32, rest: &str) -> String {
     format!(
-        "bansho = 1\n[picture]\nsize = [64, 36]\nframes = {frames}\n[[aurora]]\npreroll_s = 0.0\n\
+        "bansho = 2\n[picture]\nsize = [64, 36]\nframes = {frames}\n[[aurora]]\npreroll_s = 0.0\n\
          particles = {{ count = 300 }} # few, to be quick\nfield = {{ cells = 31 }}\n{rest}"
     )
 }
@@ -284,7 +284,7 @@ fn a_plate_that_vanished_is_told_and_linked_anew() {
 
 #[test]
 fn burners_are_dragged() {
-    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 2\n\
+    let scene = "bansho = 2\n[picture]\nsize = [64, 36]\nframes = 2\n\
         [[flame_particles]]\nparticles = 50\nposition = [0.0, 0.5, 0.0]\n[[flame_particles.burners]]\nposition = [0.5, 0.0, 0.0] # aside\n";
     let mut harness = window(scene);
     harness.get_by_label("Place").click();

@@ -29,11 +29,11 @@ sheets = [{ points = [[-300, 0], [0, 60], [300, 0]] }, { points = [[-200, -150],
 [[aurora.shapes]]
 sheets = [
   { points = [[-320, 60], [-30, 150]] },
-  { points = [[20, 150], [280, 40]], flux = [[0.0, 0.4], [1.0, 3.0]] },
+  { points = [[20, 150], [280, 40]], flux_factor = [[0.0, 0.4], [1.0, 3.0]] },
   { points = [[-250, -200], [200, -220]] },
 ]
-split = [{ sheet = 1, at = 0.5 }]
-link = [{ from = 2, to = 3, at = 0.3, arrives = 0.5 }]
+split = [{ sheet = 1, length_fraction = 0.5 }]
+link = [{ from = 2, to = 3, from_length_fraction = 0.3, to_length_fraction = 0.5 }]
 ";
 
 /// A window of `text`, painted by what the builder is given.

@@ -14,11 +14,11 @@ const THINK_S: f64 = 1.35;
 const POINT_S: f64 = 1.1;
 const BUTTON_S: f64 = 0.1;
 const LINE_S: f64 = 0.9;
-const CENTIMETRE_S: f64 = 0.16;
+const CENTIMETER_S: f64 = 0.16;
 /// How many times as long somebody thinks who looks for each step; a guess.
 const SEEKING: f64 = 3.0;
 /// Points of the screen in a centimeter, at 96 to the inch.
-const CENTIMETRE: f32 = 96.0 / 2.54;
+const CENTIMETER: f32 = 96.0 / 2.54;
 
 /// Hands that know the way, and what they did.
 struct Hand {
@@ -77,7 +77,7 @@ impl Hand {
                 self.harness.hover_at(pair[0].lerp(pair[1], step as f32 / 4.0));
                 self.harness.step();
             }
-            seconds += LINE_S + CENTIMETRE_S * f64::from(pair[0].distance(pair[1]) / CENTIMETRE);
+            seconds += LINE_S + CENTIMETER_S * f64::from(pair[0].distance(pair[1]) / CENTIMETER);
         }
         self.release(line[line.len() - 1]);
         self.act(seconds);
@@ -114,7 +114,11 @@ fn practised_hands_make_an_s_that_splits_in_less_than_a_minute() {
     assert!(session.document.error().is_none());
     let drawing = AuroraDrawing::read(session.document.values(), 0, &assets).unwrap();
     assert_eq!([0, 1, 2].map(|shape| drawing.lines(shape).len()), [1, 1, 2], "{}", text(&mut hand.harness));
-    assert!(text(&mut hand.harness).contains("split = [{ sheet = 1, at = 0."), "{}", text(&mut hand.harness));
+    assert!(
+        text(&mut hand.harness).contains("split = [{ sheet = 1, length_fraction = 0."),
+        "{}",
+        text(&mut hand.harness)
+    );
     assert!(hand.seconds < 45.0, "{} s", hand.seconds);
     // Also who seeks each step.
     let seeking = hand.seconds + (SEEKING - 1.0) * THINK_S * hand.thoughts as f64;

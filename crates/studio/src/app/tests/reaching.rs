@@ -8,7 +8,7 @@ use super::{SCENE, drag, drawn, text, window};
 #[test]
 fn a_new_scene_begins_with_what_was_chosen_and_asks_where_work_would_be_lost() {
     let mut harness = window(SCENE);
-    for (name, begins) in [("Rain", "[[rain]]"), ("Nothing", "bansho = 1")] {
+    for (name, begins) in [("Rain", "[[rain]]"), ("Nothing", "bansho = 2")] {
         for choice in ["File", "New", name] {
             harness.get_by_label(choice).click();
             harness.run_steps(3);

@@ -30,11 +30,11 @@ fn bounded_values_have_sliders_with_their_numbers_beside() {
 #[test]
 fn a_particle_flame_is_slid_hotter_and_lighter() {
     let mut harness =
-        window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
+        window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
     for (section, name, to, written) in [
-        ("motion", "buoyancy", 2.0, "buoyancy = 2.0"),
-        ("life", "flame temperature k", 2100.0, "flame_temperature_k = 2100.0"),
-        ("look", "haze gain", 2.5, "haze_gain = 2.5"),
+        ("forces", "buoyancy", 2.0, "buoyancy = 2.0"),
+        ("combustion", "flame temperature k", 2100.0, "flame_temperature_k = 2100.0"),
+        ("rendering", "heat haze gain", 2.5, "heat_haze_gain = 2.5"),
     ] {
         harness.get_by_label(section).click_accesskit();
         harness.run_steps(12);
@@ -53,7 +53,7 @@ fn a_particle_flame_is_slid_hotter_and_lighter() {
 
 #[test]
 fn rain_is_slid_heavier_and_its_drops_and_streaks_changed() {
-    let mut harness = window("bansho = 1\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
+    let mut harness = window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
     slide(&mut harness, "rate mm per h", 40.0);
     assert!(text(&mut harness).contains("rate_mm_per_h = 40.0"), "{}", text(&mut harness));
     harness.get_by_label("diameters mm").click_accesskit();
@@ -115,7 +115,7 @@ fn a_lamp_that_is_dragged_while_recording_leaves_keyframes() {
 
 #[test]
 fn a_burner_that_is_dragged_while_recording_leaves_keyframes() {
-    let scene = "bansho = 1\n[picture]\nsize = [64, 36]\nframes = 200\n[[flame_particles]]\nparticles = 50\n";
+    let scene = "bansho = 2\n[picture]\nsize = [64, 36]\nframes = 200\n[[flame_particles]]\nparticles = 50\n";
     let mut harness = window(scene);
     harness.get_by_label("Place").click();
     harness.get_by_label("Record").click();
@@ -160,15 +160,15 @@ fn curves_are_edited_by_their_points() {
 }
 
 #[test]
-fn vectors_and_colours_with_bounds_have_sliders() {
+fn vectors_and_colors_with_bounds_have_sliders() {
     let mut harness = window(SCENE);
     harness.get_by_label("light 1").click();
     harness.run_steps(3);
-    let sliders: Vec<_> = harness.get_all_by_role_and_label(Role::Slider, "colour").collect();
+    let sliders: Vec<_> = harness.get_all_by_role_and_label(Role::Slider, "color").collect();
     assert_eq!(sliders.len(), 3);
     sliders[1].set_value_accesskit(0.25);
     drawn(&mut harness);
-    assert!(text(&mut harness).contains("colour = [1.0, 0.25, 0.75]"), "{}", text(&mut harness));
+    assert!(text(&mut harness).contains("color = [1.0, 0.25, 0.75]"), "{}", text(&mut harness));
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn a_camera_that_is_turned_while_recording_is_keyed_now() {
 #[test]
 fn stages_of_the_flame_are_seen_live() {
     let mut harness = window(SCENE);
-    for name in ["texture", "thresholded", "sharpened", "coloured"] {
+    for name in ["texture", "thresholded", "sharpened", "colored"] {
         harness.get_by_label(&format!("Stage {name}"));
     }
     let shown = |harness: &mut Harness<'_, Studio>| {
@@ -216,7 +216,7 @@ fn stages_of_the_flame_are_seen_live() {
 #[test]
 fn a_value_beyond_its_bounds_is_told_and_left_as_it_is() {
     let faulty =
-        SCENE.replace("height = 0.9", "height = -5.0").replace("bansho = 1", "bansho = 1\n[camera]\nroll_deg = 9999.0");
+        SCENE.replace("height = 0.9", "height = -5.0").replace("bansho = 2", "bansho = 2\n[camera]\nroll_deg = 9999.0");
     let mut harness = window(&faulty);
     harness.get_by_label_contains("-5 is out of range");
     for selection in ["fire", "camera"] {

@@ -84,13 +84,13 @@ mod tests {
     fn a_writing_is_told_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.toml");
-        fs::write(&path, "bansho = 1\n").unwrap();
+        fs::write(&path, "bansho = 2\n").unwrap();
         let (sender, woken) = mpsc::channel();
         let watch = FileWatcher::start(&path, move || sender.send(()).unwrap_or_default()).unwrap();
         assert!(!watch.touched());
         // The thread may have taken its first look before or after this.
         thread::sleep(Duration::from_millis(200));
-        fs::write(&path, "bansho = 1 # longer\n").unwrap();
+        fs::write(&path, "bansho = 2 # longer\n").unwrap();
         woken.recv_timeout(Duration::from_secs(20)).unwrap();
         assert!(watch.touched() && !watch.touched());
     }

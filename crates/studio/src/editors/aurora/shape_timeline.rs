@@ -53,11 +53,11 @@ fn buttons_ui(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, dra
     }
     if editor.target > 0 {
         let label = ui.label("reached after").id;
-        let mut after_s = drawing.after_s(editor.target);
-        let drag = egui::DragValue::new(&mut after_s).range(0.1..=1e5).speed(0.05).max_decimals(2).suffix(" s");
+        let mut transition_s = drawing.transition_s(editor.target);
+        let drag = egui::DragValue::new(&mut transition_s).range(0.1..=1e5).speed(0.05).max_decimals(2).suffix(" s");
         let drag = drag.clamp_existing_to_range(false);
         if ui.add(drag).labelled_by(label).changed() {
-            let change = drawing.retime(editor.target, after_s);
+            let change = drawing.retime(editor.target, transition_s);
             editor.change(session, "time of shape", &change, ui.cursor().min);
         }
     }
@@ -153,7 +153,7 @@ fn move_in_time(
     (shape, later): (usize, f64),
     at: Pos2,
 ) {
-    let change = drawing.retime(shape, drawing.after_s(shape) + later);
+    let change = drawing.retime(shape, drawing.transition_s(shape) + later);
     // Smaller changes vanish in the rounding of the text.
     if shape > 0 && later.abs() >= 0.005 {
         editor.change(session, "time of shape", &change, at);

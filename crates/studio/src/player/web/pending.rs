@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::player::{Picture, tests::request};
 
-    const SCENE: &str = "bansho = 1\n[[flame_sheet]]\n";
+    const SCENE: &str = "bansho = 2\n[[flame_sheet]]\n";
 
     fn panicked(number: u64) -> WorkerMessage {
         WorkerMessage::Reply(Reply::Panicked { number, message: "broken on purpose".into() })

@@ -89,12 +89,17 @@ fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
     }
 }
 
-fn smooth() -> LookParameters {
-    LookParameters { detail: 0.0, ..LookParameters::default() }
+fn smooth() -> RenderingParameters {
+    RenderingParameters { detail: 0.0, ..RenderingParameters::default() }
 }
 
 /// Prepares the gas and hands it to `each`.
-fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: impl FnOnce(&PreparedGas) -> T) -> T {
+fn prepared<T>(
+    particles: &Particles,
+    look: &RenderingParameters,
+    view: &View,
+    each: impl FnOnce(&PreparedGas) -> T,
+) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let scratch = ScratchPool::default();
@@ -102,7 +107,7 @@ fn prepared<T>(particles: &Particles, look: &LookParameters, view: &View, each: 
 }
 
 /// The whole picture drawn as one strip, with AOVs where wanted and a plate at `plate` m.
-fn drawn(particles: &Particles, look: &LookParameters, view: &View, aovs: usize, plate: Option<f32>) -> Strip {
+fn drawn(particles: &Particles, look: &RenderingParameters, view: &View, aovs: usize, plate: Option<f32>) -> Strip {
     let depths = plate.map(|depth| vec![depth; SIZE[0]]);
     let mut strip = Strip::default();
     let rect = Rect::from_size(SIZE[0], SIZE[1]);
@@ -181,12 +186,14 @@ fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_color() {
 fn detail_keeps_the_mean_light() {
     let view = view(camera());
     let particles = glowing_cloud(400);
-    let mean = |look: &LookParameters| {
+    let mean = |look: &RenderingParameters| {
         let strip = drawn(&particles, look, &view, 0, None);
         strip.radiance[1].iter().map(|value| f64::from(*value)).sum::<f64>()
     };
-    let (plain, fine) =
-        (mean(&smooth()), mean(&LookParameters { detail: 1.0, detail_size: 0.25, ..LookParameters::default() }));
+    let (plain, fine) = (
+        mean(&smooth()),
+        mean(&RenderingParameters { detail: 1.0, detail_size: 0.25, ..RenderingParameters::default() }),
+    );
     assert!((fine / plain - 1.0).abs() < 0.1, "{}", fine / plain);
 }
 
@@ -194,7 +201,7 @@ fn detail_keeps_the_mean_light() {
 fn no_sprite_is_a_disc() {
     // A lone particle with detail: along the circle of half its radius the light differs by more than its half.
     let view = view(camera());
-    let strip = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 4e-7)]), &LookParameters::default(), &view, 0, None);
+    let strip = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 4e-7)]), &RenderingParameters::default(), &view, 0, None);
     let radius = 0.5 * 0.3 * view.camera.focal_pixels / DISTANCE;
     let around: Vec<f64> = (0..48)
         .map(|i| {
@@ -210,7 +217,7 @@ fn no_sprite_is_a_disc() {
 fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
     let view = view(camera());
     let particles = cloud([ball(0, [0.0; 3], 1500.0, 0.0)]);
-    let look = LookParameters { haze_gain: 3.0, ..smooth() };
+    let look = RenderingParameters { heat_haze_gain: 3.0, ..smooth() };
     let scale = view.camera.focal_pixels / DISTANCE;
     prepared(&particles, &look, &view, |prepared| {
         let bend = prepared.deflection().unwrap();
@@ -236,7 +243,7 @@ fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
             assert!(!inside || at(x, y) == [0.0; 2], "{x} {y}");
         }
     });
-    let straight = LookParameters { haze_gain: 0.0, ..smooth() };
+    let straight = RenderingParameters { heat_haze_gain: 0.0, ..smooth() };
     assert!(prepared(&particles, &straight, &view, |prepared| prepared.deflection().is_none()));
 }
 
@@ -247,7 +254,7 @@ fn lights_carry_the_light_of_the_picture() {
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&thin, &smooth(), &view, 0, None);
     let seen: f64 = strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>() / (scale * scale);
-    let lights = point_lights_of_gas(&gas(&thin, &ScratchPool::default()), &LookParameters::default(), 1.0);
+    let lights = point_lights_of_gas(&gas(&thin, &ScratchPool::default()), &RenderingParameters::default(), 1.0);
     assert_eq!(lights.len(), 3);
     let sum: f64 = lights.iter().map(|light| f64::from(light.intensity[0])).sum();
     assert!((sum / seen - 1.0).abs() < 0.02, "{sum} {seen}");
@@ -267,8 +274,8 @@ fn no_lens_and_no_place_of_the_camera_is_too_much() {
     for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
         for position in [[0.0, 0.0, 0.0], [0.05, -0.2, 0.3], [0.0, 0.0, 3.0], [0.0, 5.0, 0.001]] {
             let camera = CameraParameters { lens, position: Animated::from(position), ..camera() };
-            for sprite in [SpriteStyle::Integral, SpriteStyle::Poly6, SpriteStyle::Squares] {
-                let look = LookParameters { sprite, ..LookParameters::default() };
+            for sprite in [SpriteStyle::LineIntegral, SpriteStyle::Poly6, SpriteStyle::Squares] {
+                let look = RenderingParameters { sprite, ..RenderingParameters::default() };
                 let view = view(camera.clone());
                 let strip = drawn(&particles, &look, &view, AOVS.len(), None);
                 let finite = strip.radiance.iter().flatten().all(|value| value.is_finite());
@@ -291,7 +298,7 @@ fn strips_crops_and_threads_change_no_bit() {
     // So many, and so small, that there are several tasks of particles and of rows.
     let mut particles = glowing_cloud(10_000);
     particles.support_radius.fill(0.08);
-    let look = LookParameters::default();
+    let look = RenderingParameters::default();
     let view = view(camera());
     let whole = drawn(&particles, &look, &view, 0, None);
     for threads in [1, 2, 3] {
@@ -319,7 +326,7 @@ fn a_part_of_the_picture_alone_is_the_same_to_the_bit() {
     let mut particles = glowing_cloud(500);
     particles.support_radius.iter_mut().step_by(3).for_each(|radius| *radius *= 0.12);
     particles.support_radius.iter_mut().step_by(7).for_each(|radius| *radius *= 3.0);
-    let look = LookParameters::default();
+    let look = RenderingParameters::default();
     let whole_view = view(camera());
     let part = Rect { x: 67, y: 51, width: 31, height: 23 };
     let part_view = View { window: part, ..view(camera()) };
@@ -425,7 +432,7 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
 }
 
 /// Light and opacity in the middle of a ball of gas among lights of so much illuminance.
-fn lit_ball(ball: Particle, look: &LookParameters, illuminance: f32) -> ([f64; 3], f64) {
+fn lit_ball(ball: Particle, look: &RenderingParameters, illuminance: f32) -> ([f64; 3], f64) {
     let (view, scratch, wind, air) =
         (view(camera()), ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
@@ -446,7 +453,7 @@ fn cold_soot_is_smoke_that_hides_and_shows_the_light_of_others_alone() {
     let (dark, opacity) = lit_ball(smoke, &smooth(), 0.0);
     assert!(opacity > 0.5 && dark.iter().all(|value| *value < 1e-6), "{dark:?} {opacity}");
     for albedo in [0.15, 0.3] {
-        let look = LookParameters { smoke_albedo: albedo, ..smooth() };
+        let look = RenderingParameters { smoke_albedo: albedo, ..smooth() };
         // Alike in all directions: albedo E / 4 pi where it hides everything.
         let expected = albedo * 1000.0 / (4.0 * std::f64::consts::PI) * opacity;
         let (lit, as_opaque) = lit_ball(smoke, &look, 1000.0);
@@ -458,8 +465,8 @@ fn cold_soot_is_smoke_that_hides_and_shows_the_light_of_others_alone() {
 #[test]
 fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
     let begun = |fuel: f32, soot: f32| Particle { fuel, ..ball(0, [0.0; 3], 1900.0, soot) };
-    let once = LookParameters { base_blue: 1.0, ..smooth() };
-    let twice = LookParameters { base_blue: 2.0, ..smooth() };
+    let once = RenderingParameters { base_blue: 1.0, ..smooth() };
+    let twice = RenderingParameters { base_blue: 2.0, ..smooth() };
     let (blue, opacity) = lit_ball(begun(0.94, 0.0), &once, 0.0);
     assert!(blue[2] > 2.0 * blue[0] && blue[2] > 0.0 && opacity == 0.0, "{blue:?} {opacity}");
     let (brighter, _) = lit_ball(begun(0.94, 0.0), &twice, 0.0);

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
     let view = view(camera());
-    let look = LookParameters { sprite: SpriteStyle::Poly6, opacity: 0.1, ..LookParameters::default() };
+    let look = RenderingParameters { sprite: SpriteStyle::Poly6, opacity: 0.1, ..RenderingParameters::default() };
     let one = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0)]), &look, &view, 0, None);
     let two = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0), ball(1, [0.0; 3], 1800.0, 0.0)]), &look, &view, 0, None);
     assert!((luminance(&two, 80, 60) / luminance(&one, 80, 60) - 2.0).abs() < 1e-4);
@@ -18,7 +18,7 @@ fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
 
 #[test]
 fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
-    let look = LookParameters { sprite: SpriteStyle::Poly6, opacity: 0.3, ..LookParameters::default() };
+    let look = RenderingParameters { sprite: SpriteStyle::Poly6, opacity: 0.3, ..RenderingParameters::default() };
     let thin = ball(0, [-0.5, 0.0, 0.0], 1800.0, 0.0);
     let dense = Particle { density: 3.0 * thin.density, ..ball(1, [0.5, 0.0, 0.0], 1800.0, 0.0) };
     let view = view(camera());
@@ -36,7 +36,7 @@ fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
 #[test]
 fn squares_are_redder_where_gas_is_denser() {
     let view = view(camera());
-    let look = LookParameters { sprite: SpriteStyle::Squares, ..LookParameters::default() };
+    let look = RenderingParameters { sprite: SpriteStyle::Squares, ..RenderingParameters::default() };
     let dense = Particle { density: 0.4, ..ball(1, [0.5, 0.0, 0.0], 1800.0, 0.0) };
     let strip = drawn(&cloud([ball(0, [-0.5, 0.0, 0.0], 1800.0, 0.0), dense]), &look, &view, 0, None);
     let scale = view.camera.focal_pixels / DISTANCE;

@@ -20,7 +20,7 @@ fn wall(apart: [f32; 3]) -> Particles {
 /// Mean and greatest change of luminance from pixel to pixel near the middle column, beside the mean luminance.
 fn roughness(particles: &Particles) -> [f64; 2] {
     let view = view(camera());
-    let strip = drawn(particles, &LookParameters::default(), &view, 0, None);
+    let strip = drawn(particles, &RenderingParameters::default(), &view, 0, None);
     let (mut light, mut changes, mut greatest, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
     for (x, y) in (20..100).flat_map(|y| (74..86).map(move |x| (x, y))) {
         let here = luminance(&strip, x, y);

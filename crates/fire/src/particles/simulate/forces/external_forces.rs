@@ -63,7 +63,7 @@ pub(crate) struct ExternalForces<'a> {
     /// Gravity times the buoyancy parameter, m/s^2.
     pub(crate) buoyancy: f32,
     pub(crate) wind: WindForce,
-    pub(crate) wind_gain: f32,
+    pub(crate) wind_response: f32,
     /// Density of air at 1 K, kg K/m^3.
     pub(crate) density_at_1_k: f32,
     /// The forces on the gas of each burner.
@@ -75,7 +75,7 @@ impl<'a> ExternalForces<'a> {
     pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, surroundings: &'a Surroundings, t: f64) -> Self {
         let StepConstants { parameters: flame, constants, .. } = step;
         let plume_axes =
-            plume_axes(&constants.burners, particles.positions(), &particles.burner, flame.motion.narrowing, t);
+            plume_axes(&constants.burners, particles.positions(), &particles.burner, flame.forces.plume_contraction, t);
         let bounds = bounds(particles, constants.burners.len());
         let burner_forces = plume_axes.into_iter().zip(bounds).enumerate().map(|(index, (axis, bounds))| {
             let wind_field = WindField::new(surroundings.wind, particles.origin, bounds, t);
@@ -88,9 +88,9 @@ impl<'a> ExternalForces<'a> {
             origin: particles.origin,
             occluders: &surroundings.others.occluders,
             air_temperature: surroundings.air.temperature_k as f32,
-            buoyancy: (STANDARD_GRAVITY * flame.motion.buoyancy) as f32,
-            wind: flame.motion.wind,
-            wind_gain: flame.motion.wind_gain as f32,
+            buoyancy: (STANDARD_GRAVITY * flame.forces.buoyancy) as f32,
+            wind: flame.forces.wind_model,
+            wind_response: flame.forces.wind_response as f32,
             density_at_1_k: density_at_1_k(surroundings.air),
         }
     }
@@ -113,7 +113,7 @@ impl<'a> StepConstants<'a> {
         surroundings: &Surroundings,
         t: f64,
     ) -> BurnerForces<'a> {
-        let (burner, motion) = (&self.constants.burners[index], &self.parameters.motion);
+        let (burner, motion) = (&self.constants.burners[index], &self.parameters.forces);
         BurnerForces {
             wind_field,
             rings: self.rings(index, &axis, t),
@@ -122,7 +122,7 @@ impl<'a> StepConstants<'a> {
             turbulence: motion.turbulence as f32,
             turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
             entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
-            drag: (CROSS_DRAG * motion.wind_gain / (0.5 * burner.diameter)) as f32,
+            drag: (CROSS_DRAG * motion.wind_response / (0.5 * burner.diameter)) as f32,
             burning: [(BURNED_PER_HEIGHT / burner.height) as f32, (BURNED_PER_RISE_TIME / burner.rise_time()) as f32],
         }
     }
@@ -132,8 +132,8 @@ impl<'a> StepConstants<'a> {
     }
 
     fn eddies(self, index: usize, surroundings: &Surroundings, t: f64) -> EddyField<'a> {
-        let (burner, motion) = (&self.constants.burners[index], &self.parameters.motion);
-        let drift = surroundings.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_gain);
+        let (burner, motion) = (&self.constants.burners[index], &self.parameters.forces);
+        let drift = surroundings.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_response);
         self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
     }
 }

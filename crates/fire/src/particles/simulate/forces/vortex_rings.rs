@@ -86,7 +86,7 @@ pub(crate) fn active_rings(
     t: f64,
     axis: &PlumeAxis,
 ) -> Vec<VortexRing> {
-    if flame.motion.puffing == 0.0 {
+    if flame.forces.puffing == 0.0 {
         return Vec::new();
     }
     let hz = burner.puffing_hz(flame);
@@ -96,7 +96,7 @@ pub(crate) fn active_rings(
     let stream_rings = |stream: u32| {
         let shedding =
             VortexShedding { burner, key, purpose: Purpose(burner_index * 64 + stream), streams, hz, t, axis };
-        (0..MAX_RINGS).filter_map(move |back| shedding.ring(latest - back, flame.motion.puffing))
+        (0..MAX_RINGS).filter_map(move |back| shedding.ring(latest - back, flame.forces.puffing))
     };
     (0..streams).flat_map(stream_rings).collect()
 }
@@ -191,7 +191,7 @@ mod tests {
     fn rings_come_and_go_without_a_jump_however_many_there_are() {
         // A frequency at which rings are removed by their count, long before they rise above the flame.
         let mut flame = FlameParticlesParameters::default();
-        flame.motion.puffing_hz = bansho_base::parameters::Auto::Set(40.0);
+        flame.forces.puffing_hz = bansho_base::parameters::Auto::Set(40.0);
         let burner = Burner::new(&BurnerParameters::default(), &flame, &MemoryAssets::default()).unwrap();
         let axis = plume_axes(std::slice::from_ref(&burner), [&[]; 3], &[], 0.0, 0.0).remove(0);
         let total = |t: f64| {

@@ -56,7 +56,7 @@ impl AuroraDrawing {
     /// The strokes of the SVG file `path` in place of the sheets of the first shape.
     pub fn trace(&self, path: Value) -> Vec<Operation> {
         let mut sheet = Table::default();
-        sheet.push("path", path);
+        sheet.push("svg_file", path);
         let sheets = Value::List(vec![Value::Table(sheet).into()]);
         if self.is_stated() {
             return vec![Operation::Set { place: self.shape(0).key("sheets"), value: sheets }];
@@ -99,12 +99,14 @@ impl AuroraDrawing {
         let at = rounded(at);
         let mut change = Table::default();
         change.push("sheet", Value::Integer(sheet as i64 + 1));
-        change.push("at", Value::Number(at));
+        change.push("length_fraction", Value::Number(at));
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
         // A link of the split sheet now means its first half.
-        let part = |link: &LinkParameters| match link.at {
-            None if link.from == sheet as i64 + 1 => LinkParameters { at: Some(rounded(0.5 * at)), ..link.clone() },
+        let part = |link: &LinkParameters| match link.from_length_fraction {
+            None if link.from == sheet as i64 + 1 => {
+                LinkParameters { from_length_fraction: Some(rounded(0.5 * at)), ..link.clone() }
+            }
             _ => link.clone(),
         };
         let line = self.lines(shape - 1).into_iter().nth(sheet).unwrap_or_default();
@@ -122,7 +124,7 @@ impl AuroraDrawing {
         let mut change = Table::default();
         let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
         change.push("sheets", list(ends.map(|(sheet, _)| sheet as i64 + 1)));
-        change.push("at", list(ends.map(|(_, last)| i64::from(last))));
+        change.push("ends", list(ends.map(|(_, last)| i64::from(last))));
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
@@ -203,8 +205,8 @@ impl AuroraDrawing {
         // What comes first is there from the beginning, and comes from nothing.
         let stated = next.map_or(Vec::new(), |next| {
             let keys = [
-                ("after_s", next.after_s.is_some()),
-                ("after_frames", next.after_frames.is_some()),
+                ("transition_s", next.transition_s.is_some()),
+                ("transition_frames", next.transition_frames.is_some()),
                 ("split", !next.split.is_empty()),
                 ("merge", !next.merge.is_empty()),
                 ("link", !next.link.is_empty()),
@@ -216,16 +218,16 @@ impl AuroraDrawing {
     }
 
     /// Reaches shape `shape` so long after the one before was left, s.
-    pub fn retime(&self, shape: usize, after_s: f64) -> Vec<Operation> {
+    pub fn retime(&self, shape: usize, transition_s: f64) -> Vec<Operation> {
         let place = self.shape(shape);
-        let in_frames = self.parameters.shapes.get(shape).is_some_and(|shape| shape.after_frames.is_some());
-        let frames = in_frames.then(|| Operation::Remove { place: place.key("after_frames") });
-        let seconds = Value::Number((after_s.max(0.1) * 100.0).round() / 100.0);
-        frames.into_iter().chain([Operation::Set { place: place.key("after_s"), value: seconds }]).collect()
+        let in_frames = self.parameters.shapes.get(shape).is_some_and(|shape| shape.transition_frames.is_some());
+        let frames = in_frames.then(|| Operation::Remove { place: place.key("transition_frames") });
+        let seconds = Value::Number((transition_s.max(0.1) * 100.0).round() / 100.0);
+        frames.into_iter().chain([Operation::Set { place: place.key("transition_s"), value: seconds }]).collect()
     }
 
     /// Time from the shape before `shape` to this one, s.
-    pub fn after_s(&self, shape: usize) -> f64 {
+    pub fn transition_s(&self, shape: usize) -> f64 {
         let hold = self.parameters.shapes.get(shape.wrapping_sub(1)).map_or(0.0, |before| before.hold_s);
         let at = |shape: usize| self.arrivals().get(shape).copied().unwrap_or_default();
         at(shape) - at(shape.saturating_sub(1)) - hold
@@ -233,7 +235,7 @@ impl AuroraDrawing {
 
     /// Whether a shape is drawn as it is after its splits and merges, rather than before.
     pub fn shows_changes(&self) -> bool {
-        self.parameters.motion.correspondence == Correspondence::Automatic
+        self.parameters.morphing.correspondence == Correspondence::Automatic
     }
 
     pub(super) fn shape(&self, shape: usize) -> ValuePath {
@@ -266,8 +268,8 @@ impl AuroraDrawing {
         let gap = HALF_GAP * self.extent_km() / polyline::length(line).max(f64::MIN_POSITIVE);
         let ranges = [[0.0, fraction - gap.min(0.25 * fraction)], [fraction + gap.min(0.25 * (1.0 - fraction)), 1.0]];
         let parts = ranges.map(|range| SheetParameters {
-            flux: curve_range(&sheets[sheet].flux, range),
-            energy: curve_range(&sheets[sheet].energy, range),
+            flux_factor: curve_range(&sheets[sheet].flux_factor, range),
+            energy_factor: curve_range(&sheets[sheet].energy_factor, range),
             ..with_points(&sheets[sheet], self.written(&polyline::range(line, range)))
         });
         sheets.splice(sheet..=sheet, parts);
@@ -292,9 +294,9 @@ impl AuroraDrawing {
             let of = |sheet: usize, turned: bool| (curve(&sheets[sheet]), turned);
             curve_chain([of(first.0, turned[0]), of(second.0, turned[1])], one / (one + other))
         };
-        let (flux, energy) = (curves(|sheet| &sheet.flux), curves(|sheet| &sheet.energy));
+        let (flux_factor, energy_factor) = (curves(|sheet| &sheet.flux_factor), curves(|sheet| &sheet.energy_factor));
         let points = parts.concat().into_iter().map(|point| self.rounded(point)).collect();
-        let joined = SheetParameters { flux, energy, ..with_points(&sheets[first.0], points) };
+        let joined = SheetParameters { flux_factor, energy_factor, ..with_points(&sheets[first.0], points) };
         sheets[first.0.min(second.0)] = joined;
         sheets.remove(first.0.max(second.0));
         let remap = SheetRemap::Joined([(first.0, turned[0]), (second.0, turned[1])], one / (one + other));

@@ -25,15 +25,21 @@ impl AuroraDrawing {
             return self.exchange_sheets(shape, from.0, to);
         }
         let splits = self.parameters.shapes.get(shape).is_some_and(|shape| !shape.split.is_empty());
-        let link = LinkParameters { at: splits.then(|| rounded(from.1)), ..between(from.0, to) };
+        let link = LinkParameters { from_length_fraction: splits.then(|| rounded(from.1)), ..between(from.0, to) };
         let kept = self.links(shape).iter().filter(|own| own.from != link.from && own.to != link.to);
         self.set_links(shape, kept.cloned().chain([link.clone()]).collect())
     }
 
     /// Makes the point at `from` on the shape before `shape` arrive at `to`.
     pub fn link_point(&self, shape: usize, from: SheetPosition, to: SheetPosition) -> Vec<Operation> {
-        let link = LinkParameters { at: Some(rounded(from.1)), arrives: Some(rounded(to.1)), ..between(from.0, to.0) };
-        let same_place = |own: &LinkParameters| own.at.zip(link.at).is_some_and(|(a, b)| (a - b).abs() < SAME);
+        let link = LinkParameters {
+            from_length_fraction: Some(rounded(from.1)),
+            to_length_fraction: Some(rounded(to.1)),
+            ..between(from.0, to.0)
+        };
+        let same_place = |own: &LinkParameters| {
+            own.from_length_fraction.zip(link.from_length_fraction).is_some_and(|(a, b)| (a - b).abs() < SAME)
+        };
         let stays = |own: &&LinkParameters| (own.from == link.from) == (own.to == link.to) && !same_place(own);
         let kept = self.links(shape).iter().filter(stays);
         self.set_links(shape, kept.cloned().chain([link.clone()]).collect())
@@ -56,7 +62,8 @@ impl AuroraDrawing {
             polyline::at(all.get(usize::try_from(sheet - 1).ok()?)?, fraction)
         };
         let ends = |(number, link): (usize, &LinkParameters)| {
-            Some((number, [at(&leaving, link.from, link.at?)?, at(&arriving, link.to, link.arrives?)?]))
+            let [leaves, arrives] = [link.from_length_fraction?, link.to_length_fraction?];
+            Some((number, [at(&leaving, link.from, leaves)?, at(&arriving, link.to, arrives)?]))
         };
         self.links(shape).iter().enumerate().filter_map(ends).collect()
     }
@@ -84,7 +91,9 @@ fn table(link: &LinkParameters) -> Table {
     let mut table = Table::default();
     table.push("from", Value::Integer(link.from));
     table.push("to", Value::Integer(link.to));
-    for (key, fraction) in [("at", link.at), ("arrives", link.arrives)] {
+    for (key, fraction) in
+        [("from_length_fraction", link.from_length_fraction), ("to_length_fraction", link.to_length_fraction)]
+    {
         fraction.into_iter().for_each(|fraction| table.push(key, Value::Number(fraction)));
     }
     table

@@ -84,9 +84,9 @@ impl AuroraDrawing {
         if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| own(&problem.kind)) {
             return Err(ShapeEditError::Faulty(problem.to_string()));
         }
-        let AuroraParameters { shapes, motion, extent_km, .. } = &parameters;
+        let AuroraParameters { shapes, morphing, extent_km, .. } = &parameters;
         let sequence =
-            Sequence::new(shapes, motion, *extent_km, assets.as_ref(), None).map_err(ShapeEditError::Shape)?;
+            Sequence::new(shapes, morphing, *extent_km, assets.as_ref(), None).map_err(ShapeEditError::Shape)?;
         Ok(Self { place, parameters, sequence })
     }
 

@@ -57,7 +57,9 @@ impl AuroraDrawing {
             let splits = parameters.split.iter().enumerate();
             let mut cuts: Vec<usize> =
                 splits.filter(|(_, split)| split.sheet == sheet as i64 + 1).map(|(number, _)| number).collect();
-            let place = |number: usize| (parameters.split[number].segment, parameters.split[number].at.unwrap_or(0.5));
+            let place = |number: usize| {
+                (parameters.split[number].segment, parameters.split[number].length_fraction.unwrap_or(0.5))
+            };
             cuts.sort_by(|&a, &b| {
                 let (a, b) = (place(a), place(b));
                 a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))

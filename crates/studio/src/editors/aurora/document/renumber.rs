@@ -54,31 +54,31 @@ impl SheetRemap {
     }
 
     fn of_arrival(&self, link: &LinkParameters) -> Option<LinkParameters> {
-        let (to, arrives) = self.counted(link.to, link.arrives)?;
-        Some(LinkParameters { to, arrives, ..link.clone() })
+        let (to, to_length_fraction) = self.counted(link.to, link.to_length_fraction)?;
+        Some(LinkParameters { to, to_length_fraction, ..link.clone() })
     }
 
     fn of_departure(&self, link: &LinkParameters) -> Option<LinkParameters> {
-        let (from, at) = self.counted(link.from, link.at)?;
-        Some(LinkParameters { from, at, ..link.clone() })
+        let (from, from_length_fraction) = self.counted(link.from, link.from_length_fraction)?;
+        Some(LinkParameters { from, from_length_fraction, ..link.clone() })
     }
 
     fn of_split(&self, split: &SplitParameters) -> Option<SplitParameters> {
-        let (sheet, at) = self.counted(split.sheet, split.at)?;
-        Some(SplitParameters { sheet, at, ..split.clone() })
+        let (sheet, length_fraction) = self.counted(split.sheet, split.length_fraction)?;
+        Some(SplitParameters { sheet, length_fraction, ..split.clone() })
     }
 
     /// Ends that are ends no longer do not merge.
     fn of_merge(&self, merge: &MergeParameters) -> Option<MergeParameters> {
-        let ends = match merge.at {
+        let ends = match merge.ends {
             Auto::Auto => [None; 2],
             Auto::Set(ends) => ends.map(Some),
         };
         let one = self.counted(merge.sheets[0], ends[0])?;
         let other = self.counted(merge.sheets[1], ends[1])?;
         let still_ends = [one.1, other.1].into_iter().flatten().all(|end| end == 0.0 || end == 1.0);
-        let at = one.1.zip(other.1).map_or(Auto::Auto, |(one, other)| Auto::Set([one, other]));
-        (still_ends && one.0 != other.0).then_some(MergeParameters { sheets: [one.0, other.0], at })
+        let ends = one.1.zip(other.1).map_or(Auto::Auto, |(one, other)| Auto::Set([one, other]));
+        (still_ends && one.0 != other.0).then_some(MergeParameters { sheets: [one.0, other.0], ends })
     }
 }
 
@@ -147,7 +147,7 @@ fn split_table(split: &SplitParameters) -> Table {
     let mut table = Table::default();
     table.push("sheet", Value::Integer(split.sheet));
     split.segment.into_iter().for_each(|segment| table.push("segment", Value::Integer(segment)));
-    split.at.into_iter().for_each(|at| table.push("at", Value::Number(at)));
+    split.length_fraction.into_iter().for_each(|at| table.push("length_fraction", Value::Number(at)));
     table
 }
 
@@ -155,8 +155,8 @@ fn merge_table(merge: &MergeParameters) -> Table {
     let whole = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
     let mut table = Table::default();
     table.push("sheets", whole(merge.sheets));
-    if let Auto::Set(ends) = merge.at {
-        table.push("at", whole(ends.map(|end| end as i64)));
+    if let Auto::Set(ends) = merge.ends {
+        table.push("ends", whole(ends.map(|end| end as i64)));
     }
     table
 }
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn merges_of_what_are_ends_no_longer_go() {
-        let merge = MergeParameters { sheets: [1, 3], at: Auto::Set([1.0, 0.0]) };
+        let merge = MergeParameters { sheets: [1, 3], ends: Auto::Set([1.0, 0.0]) };
         let after = |remap: SheetRemap| remap.of_merge(&merge);
         assert_eq!(after(SheetRemap::Gone([1].into())), Some(MergeParameters { sheets: [1, 2], ..merge.clone() }));
         assert_eq!(after(SheetRemap::Gone([2].into())), None);

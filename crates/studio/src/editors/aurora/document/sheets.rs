@@ -23,8 +23,8 @@ impl Factor {
     /// Its curve in `sheet`.
     pub(super) fn of(self, sheet: &mut SheetParameters) -> &mut Curve {
         match self {
-            Self::Flux => &mut sheet.flux,
-            Self::Energy => &mut sheet.energy,
+            Self::Flux => &mut sheet.flux_factor,
+            Self::Energy => &mut sheet.energy_factor,
         }
     }
 
@@ -75,9 +75,10 @@ impl AuroraDrawing {
         }
         let entry = |(sheet, line): (usize, &Vec<DVec2>)| {
             let along = |factor| along(line, &self.factors(shape, sheet, factor));
-            let [flux, energy] = [Factor::Flux, Factor::Energy].map(along);
+            let [flux_factor, energy_factor] = [Factor::Flux, Factor::Energy].map(along);
             // The factors include the fading ends.
-            SheetParameters { flux, energy, fade: 0.0, ..with_points(&SheetParameters::default(), self.written(line)) }
+            let plain = with_points(&SheetParameters::default(), self.written(line));
+            SheetParameters { flux_factor, energy_factor, end_taper: 0.0, ..plain }
         };
         lines.iter().enumerate().map(entry).collect()
     }
@@ -87,7 +88,7 @@ impl AuroraDrawing {
 fn along(line: &[DVec2], values: &[f64]) -> Curve {
     /// Tolerance of a factor.
     const TOLERANCE: f64 = 0.01;
-    let usual = SheetParameters::default().flux;
+    let usual = SheetParameters::default().flux_factor;
     let total = polyline::length(line).max(f64::MIN_POSITIVE);
     let mut distance = 0.0;
     let mut points = Vec::new();
@@ -126,9 +127,9 @@ pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> She
     SheetParameters {
         points: Some(points),
         smooth: sheet.smooth,
-        flux: sheet.flux.clone(),
-        fade: sheet.fade,
-        energy: sheet.energy.clone(),
+        flux_factor: sheet.flux_factor.clone(),
+        end_taper: sheet.end_taper,
+        energy_factor: sheet.energy_factor.clone(),
         ..SheetParameters::default()
     }
 }
@@ -137,11 +138,11 @@ pub(super) fn with_points(sheet: &SheetParameters, points: Vec<[f64; 2]>) -> She
 pub(super) fn with_form(sheet: &SheetParameters, form: bansho::aurora::shapes::Form) -> SheetParameters {
     SheetParameters {
         points: None,
-        path: None,
-        stroke: None,
+        svg_file: None,
+        svg_path_id: None,
         form: Some(form),
         bend_deg: Auto::Auto,
-        count: Auto::Auto,
+        wave_count: Auto::Auto,
         smooth: true,
         ..sheet.clone()
     }

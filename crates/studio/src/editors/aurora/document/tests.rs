@@ -6,7 +6,7 @@ use super::{AuroraDrawing, Factor, ShapeEditError};
 use crate::document::Document;
 
 const ARC: &str = "\
-bansho = 1
+bansho = 2
 [[aurora]]
 extent_km = 800.0 # wide
 [[aurora.shapes]]
@@ -38,7 +38,7 @@ fn is_good(document: &mut Document) -> bool {
 
 #[test]
 fn strokes_are_drawn_as_new_sheets_and_in_stead_of_old_ones() {
-    let (mut document, drawing) = open("bansho = 1\n[[aurora]]\n");
+    let (mut document, drawing) = open("bansho = 2\n[[aurora]]\n");
     assert!(!drawing.is_stated() && drawing.arrivals() == [0.0]);
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-100.0, 0.0], [0.0, 0.04], [100.0, 0.0]])));
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-100.0, 50.0], [100.0, 50.0]])));
@@ -111,7 +111,7 @@ fn forms_are_put_and_moved_point_by_point() {
 fn brightness_is_painted_where_the_brush_is() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.paint(0, 0, Factor::Flux, 0.25, 1.0));
-    assert!(document.text().contains("flux = [[0.0, 1.0]"), "{}", document.text());
+    assert!(document.text().contains("flux_factor = [[0.0, 1.0]"), "{}", document.text());
     let drawing = change(&mut document, &drawing.paint(0, 0, Factor::Energy, 0.75, -0.5));
     let mut sheets = drawing.sheets(0);
     assert_eq!(Factor::Flux.of(&mut sheets[0]).eval(0.25), 2.0);
@@ -121,11 +121,11 @@ fn brightness_is_painted_where_the_brush_is() {
 
 #[test]
 fn shapes_are_added_timed_and_removed() {
-    let (mut document, drawing) = open("bansho = 1\n[[aurora]]\n");
+    let (mut document, drawing) = open("bansho = 2\n[[aurora]]\n");
     let drawing = change(&mut document, &drawing.add_shape());
     assert_eq!(drawing.arrivals().len(), 2);
     let drawing = change(&mut document, &drawing.retime(1, 2.5));
-    assert_eq!((drawing.arrivals()[1], drawing.after_s(1)), (2.5, 2.5));
+    assert_eq!((drawing.arrivals()[1], drawing.transition_s(1)), (2.5, 2.5));
     let drawing = change(&mut document, &drawing.remove_shape(1));
     assert_eq!(drawing.arrivals().len(), 1);
     assert!(is_good(&mut document));
@@ -135,7 +135,7 @@ fn shapes_are_added_timed_and_removed() {
     let drawing = change(&mut document, &drawing.split(1, 0, 0.4));
     let drawing = change(&mut document, &drawing.remove_shape(0));
     assert_eq!(drawing.arrivals(), [0.0]);
-    assert!(is_good(&mut document) && !document.text().contains("after_s"), "{}", document.text());
+    assert!(is_good(&mut document) && !document.text().contains("transition_s"), "{}", document.text());
 }
 
 #[test]
@@ -182,7 +182,7 @@ const THREE: &str = "sheets = [{ points = [[-200, 0], [200, 0]] }, { points = [[
 fn exchanged_then_split(rest: &str) -> String {
     format!(
         "\
-bansho = 1
+bansho = 2
 [[aurora]]
 extent_km = 800.0
 [[aurora.shapes]]
@@ -193,14 +193,15 @@ link = [{{ from = 2, to = 3 }}, {{ from = 3, to = 2 }}]
 [[aurora.shapes]]
 sheets = [{{ points = [[-200, 0], [200, 0]] }}, {{ points = [[-200, 80], [-10, 80]] }}, {{ points = [[10, 80], [200, 80]] }}, \
 {{ points = [[-200, 160], [200, 160]] }}]
-split = [{{ sheet = 2, at = 0.5 }}]
+split = [{{ sheet = 2, length_fraction = 0.5 }}]
 {rest}"
     )
 }
 
 #[test]
 fn what_counts_sheets_follows_them() {
-    let text = &exchanged_then_split("link = [{ from = 3, to = 4, at = 0.5, arrives = 0.25 }]\n");
+    let text =
+        &exchanged_then_split("link = [{ from = 3, to = 4, from_length_fraction = 0.5, to_length_fraction = 0.25 }]\n");
     let (document, drawing) = open(text);
     let after = |operations: &[bansho::scene::operation::Operation]| {
         let mut document = Document::new("aurora", document.text().clone());
@@ -210,17 +211,23 @@ fn what_counts_sheets_follows_them() {
     };
     let cut = after(&drawing.split(1, 0, 0.5));
     assert!(cut.contains("link = [{ from = 2, to = 4 }, { from = 3, to = 3 }]"), "{cut}");
-    assert!(cut.contains("split = [{ sheet = 3, at = 0.5 }]"), "{cut}");
-    assert!(cut.contains("link = [{ from = 4, to = 5, at = 0.5, arrives = 0.25 }]"), "{cut}");
+    assert!(cut.contains("split = [{ sheet = 3, length_fraction = 0.5 }]"), "{cut}");
+    assert!(
+        cut.contains("link = [{ from = 4, to = 5, from_length_fraction = 0.5, to_length_fraction = 0.25 }]"),
+        "{cut}"
+    );
     assert_eq!(cut.matches("sheets = ").count(), 3, "{cut}");
     let linked = after(&drawing.split(1, 1, 0.5));
-    assert!(linked.contains("link = [{ from = 2, to = 3, at = 0.25 }, { from = 3, to = 2 }]"), "{linked}");
+    assert!(
+        linked.contains("link = [{ from = 2, to = 3, from_length_fraction = 0.25 }, { from = 3, to = 2 }]"),
+        "{linked}"
+    );
 }
 
 #[test]
 fn a_sheet_goes_with_all_that_only_it_becomes() {
     let text =
-        &exchanged_then_split(&format!("[[aurora.shapes]]\n{THREE}\nmerge = [{{ sheets = [2, 3], at = [1, 0] }}]\n"));
+        &exchanged_then_split(&format!("[[aurora.shapes]]\n{THREE}\nmerge = [{{ sheets = [2, 3], ends = [1, 0] }}]\n"));
     let counts_after = |shape: usize, sheet: usize| {
         let (mut document, drawing) = open(text);
         let drawing = change(&mut document, &drawing.remove_sheet(shape, sheet));
@@ -231,8 +238,8 @@ fn a_sheet_goes_with_all_that_only_it_becomes() {
     let (counts, first) = counts_after(1, 0);
     assert_eq!(counts, [2, 2, 3, 2], "it goes from end to end: {first}");
     assert!(first.contains("link = [{ from = 1, to = 2 }, { from = 2, to = 1 }]"), "{first}");
-    assert!(first.contains("split = [{ sheet = 1, at = 0.5 }]"), "{first}");
-    assert!(first.contains("merge = [{ sheets = [1, 2], at = [1, 0] }]"), "{first}");
+    assert!(first.contains("split = [{ sheet = 1, length_fraction = 0.5 }]"), "{first}");
+    assert!(first.contains("merge = [{ sheets = [1, 2], ends = [1, 0] }]"), "{first}");
     let (counts, middle) = counts_after(1, 1);
     assert_eq!(counts, [2, 2, 2, 2], "both of its parts go, and what they grow together to: {middle}");
     assert!(!middle.contains("split") && !middle.contains("merge"), "{middle}");
@@ -244,12 +251,12 @@ fn a_sheet_goes_with_all_that_only_it_becomes() {
 #[test]
 fn what_is_painted_along_sheets_outlives_an_edit_of_one_that_stands_for_many() {
     let shapes = "\
-bansho = 1
+bansho = 2
 [[aurora]]
 extent_km = 800.0
 [[aurora.shapes]]
 sheets = [
-  { points = [[-200, 0], [200, 0]], copies = 2, spacing_km = 80.0, flux = [[0.0, 0.5], [1.0, 3.0]], energy = [[0.0, 2.0]] }, # a pair
+  { points = [[-200, 0], [200, 0]], copies = 2, spacing_km = 80.0, flux_factor = [[0.0, 0.5], [1.0, 3.0]], energy_factor = [[0.0, 2.0]] }, # a pair
 ]
 ";
     let (mut document, drawing) = open(shapes);
@@ -272,7 +279,7 @@ sheets = [
 #[test]
 fn entries_of_a_list_keep_their_comments_when_others_come_and_go() {
     let shapes = "\
-bansho = 1
+bansho = 2
 [[aurora]]
 extent_km = 800.0
 [[aurora.shapes]]
