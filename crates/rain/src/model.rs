@@ -7,7 +7,6 @@ use bansho_base::{
     math::random::Key,
     parameters::parameter_error::{ParameterError, ParameterErrorKind},
     phenomenon::surroundings::Surroundings,
-    world::wind::Wind,
 };
 
 use super::parameters::RainParameters;
@@ -57,8 +56,6 @@ pub(super) static OPTICS: LazyLock<Optics> = LazyLock::new(|| {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Class {
     pub(super) bin: SizeBin,
-    /// Terminal velocity, m/s.
-    pub(super) speed: f64,
     /// Most drops a cubic meter in the shot.
     pub(super) most: f64,
 }
@@ -77,10 +74,9 @@ impl Rain {
             return Err(ParameterError { key: "diameters_mm", kind });
         }
         constructions::count("rain");
-        let velocity = TerminalVelocity { law: parameters.terminal_velocity, air: Air::default() };
         let [_, heaviest] = parameters.rate_mm_per_h.bounds();
         let sizes = DropSizeDistribution::marshall_palmer(heaviest);
-        let class = |bin: SizeBin| Class { bin, speed: velocity.speed(bin.diameter_mm), most: bin.count(&sizes) };
+        let class = |bin: SizeBin| Class { bin, most: bin.count(&sizes) };
         let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
         Ok(Self {
             name: name.to_owned(),
@@ -103,27 +99,28 @@ impl Rain {
         self.parameters.rate_mm_per_h.at(self.loop_s.map_or(t, |seconds| t.rem_euclid(seconds)))
     }
 
-    /// The drops of each diameter at time `t` between two `heights` (m) over the `ground`.
+    /// The drops of each diameter at time `t` between two `heights` (m) over the `ground`, as they fall in the wind and the air of the scene.
     pub(super) fn classes(
         &self,
         t: f64,
-        wind: &Wind,
+        surroundings: &Surroundings,
         ground: f64,
         heights: RangeInclusive<f64>,
     ) -> Vec<DropClassState> {
         let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
-        let (response, loop_s) = (self.parameters.wind_response, self.loop_s);
-        let now = |(index, class): (usize, &Class)| DropClassState {
-            index,
-            diameter_mm: class.bin.diameter_mm,
-            speed: class.speed,
-            max_density: class.most,
-            fraction: if class.most > 0.0 { class.bin.count(&sizes) / class.most } else { 0.0 },
-            lattice: Lattice::new(
-                &LatticeMotion { speed: class.speed, wind, response, ground, loop_s },
-                heights.clone(),
-                t,
-            ),
+        let air = Air::at(surroundings.air.temperature_k, surroundings.air.pressure_pa);
+        let velocity = TerminalVelocity { law: self.parameters.terminal_velocity, air };
+        let (wind, response, loop_s) = (surroundings.wind, self.parameters.wind_response, self.loop_s);
+        let now = |(index, class): (usize, &Class)| {
+            let speed = velocity.speed(class.bin.diameter_mm);
+            DropClassState {
+                index,
+                diameter_mm: class.bin.diameter_mm,
+                speed,
+                max_density: class.most,
+                fraction: if class.most > 0.0 { class.bin.count(&sizes) / class.most } else { 0.0 },
+                lattice: Lattice::new(&LatticeMotion { speed, wind, response, ground, loop_s }, heights.clone(), t),
+            }
         };
         self.classes.iter().enumerate().map(now).collect()
     }

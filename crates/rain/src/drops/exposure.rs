@@ -99,7 +99,7 @@ impl ExposureState {
         let (eye, reach) = (cameras.middle().position, parameters.distance * (1.0 + REGION_FADE) + LAMP_MARGIN);
         Self {
             key: rain.key,
-            classes: rain.classes(t, wind, ground, eye.y - reach..=eye.y + reach),
+            classes: rain.classes(t, surroundings, ground, eye.y - reach..=eye.y + reach),
             ground,
             distance: parameters.distance,
             gain: parameters.opacity_gain,

@@ -1,6 +1,9 @@
 //! Terminal velocity of drops in still air: measured, and by the paper's equations (2) to (4).
 
-use bansho_base::{math, world::gravity::STANDARD_GRAVITY};
+use bansho_base::{
+    math,
+    world::{air, gravity::STANDARD_GRAVITY},
+};
 
 /// Density of water rho_p, kg/m^3.
 const WATER_DENSITY: f64 = 998.2;
@@ -32,12 +35,16 @@ impl Default for Air {
 }
 
 impl Air {
-    /// Dry air as an ideal gas, with Sutherland's formula for the viscosity.
+    /// Dry air as an ideal gas, with Sutherland's formula for the viscosity, both relative to the air of the measurements: at 20 degrees
+    /// Celsius and 1013.25 hPa, exactly the default.
     pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
-        /// Gas constant of dry air, J/(kg K).
-        const GAS_CONSTANT: f64 = 287.05;
-        let viscosity = 1.458e-6 * temperature_k * math::sqrt(temperature_k) / (temperature_k + 110.4);
-        Self { density: pressure_pa / (GAS_CONSTANT * temperature_k), viscosity }
+        let sutherland = |kelvin: f64| kelvin * math::sqrt(kelvin) / (kelvin + 110.4);
+        let (scene, measured) = (air::Air { temperature_k, pressure_pa }, air::Air::default());
+        let reference = Self::default();
+        Self {
+            density: reference.density * (scene.density() / measured.density()),
+            viscosity: reference.viscosity * (sutherland(temperature_k) / sutherland(measured.temperature_k)),
+        }
     }
 }
 
@@ -281,7 +288,9 @@ mod tests {
         let air = Air { density: 0.602, ..Air::default() };
         let velocity = TerminalVelocity { law: VelocityLaw::GunnKinzer, air };
         assert!(near(velocity.speed(2.0), 6.49 * 1.3195, 1e-4));
-        assert!(near(Air::at(293.15, 101_325.0).density, 1.204, 1e-3));
-        assert!(near(Air::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));
+        assert_eq!(Air::at(293.15, 101_325.0), Air::default());
+        // U.S. Standard Atmosphere (1976) at 2 km: 275.15 K, 795 hPa, 1.0066 kg/m^3, 1.7260e-5 Pa s.
+        assert!(near(Air::at(275.15, 79_501.4).density, 1.0066, 1e-3));
+        assert!(near(Air::at(275.15, 79_501.4).viscosity, 1.726e-5, 5e-3));
     }
 }
