@@ -23,8 +23,8 @@ streaks.json says how to read them, and lists every drop with its diameter, velo
 
 Examples:
   bansho streaks                                   24 textures in out/streaks/
-  bansho streaks --rates 50 --diameters 0.5,1,2,3,4 --exposure-time 1/60 -o heavy
-  bansho streaks --format exr --light-direction 0,0.3,-1     radiance, lit from behind
+  bansho streaks --rates 50 --diameters 0.5,1,2,4 --exposure-time 1/60 -o heavy
+  bansho streaks --format exr --light-direction 0,0.3,-1   lit from behind
   bansho streaks --cube-size 0.25 --size 2048 --variants 8")]
 pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
