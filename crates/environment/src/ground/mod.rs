@@ -18,7 +18,7 @@
 //! | --- | --- |
 //! | diffuse reflection `albedo E / pi` | `shade::PreparedGround::diffuse` |
 //! | albedo of wet ground | `shade::wet_albedo_factor` |
-//! | Fresnel reflectance `F = F0 + (1 - F0) (1 - cos)^5`, n = 1.333 | `surface::fresnel` |
+//! | Fresnel reflectance `F = F0 + (1 - F0) (1 - cos)^5`, n = 1.333 | `wet_reflection::fresnel` |
 //! | microfacet reflection `F D G / (4 cos)` | `wet_reflection::Microfacets::specular_lobe` |
 //! | GTR distribution D and Smith masking G | `wet_reflection::gtr3_distribution_with_masking` |
 //! | deep-water waves, `omega^2 = g k` | `waves::Waves::new`, `waves::Waves::slope` |

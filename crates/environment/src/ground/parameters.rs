@@ -1,12 +1,9 @@
 //! What a scene may say of its ground.
 
 use bansho_base::{
-    color::{acescg_from_srgb, luminance},
     parameters::{Range, animated::Animated},
     phenomenon::LevelMirror,
 };
-
-use super::shade::{WATER_ALBEDO, wet_albedo_factor};
 
 bansho_base::choice! {
     /// What the ground is.
@@ -51,20 +48,8 @@ bansho_base::parameters! {
 }
 
 impl GroundParameters {
-    /// Share of light that it throws back to all sides, as wet as it is at time `t`.
-    #[must_use]
-    pub fn reflectance(&self, t: f64) -> f64 {
-        match self.kind {
-            GroundKind::Water => f64::from(WATER_ALBEDO),
-            GroundKind::Land | GroundKind::Plate => {
-                let dry = luminance(acescg_from_srgb(self.color.map(|value| value as f32)));
-                f64::from(dry) * wet_albedo_factor(self.wetness.at(t))
-            }
-        }
-    }
-
-    /// It as a mirror.
-    pub(super) fn level(&self) -> LevelMirror {
+    /// The ground plane as a mirror.
+    pub(super) fn mirror(&self) -> LevelMirror {
         LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance }
     }
 }

@@ -16,7 +16,7 @@ use super::{GroundKind, lake_reflection, model::Ground, shade, shade::PreparedGr
 impl Phenomenon for Ground {
     fn info(&self) -> PhenomenonInfo<'_> {
         let dry = self.parameters.wetness.constant() == Some(0.0) && self.parameters.kind != GroundKind::Water;
-        PhenomenonInfo { mirror: (!dry).then(|| self.parameters.level()), ..PhenomenonInfo::new(Self::NAME) }
+        PhenomenonInfo { mirror: (!dry).then(|| self.parameters.mirror()), ..PhenomenonInfo::new(Self::NAME) }
     }
 
     /// It only shows the light of others.

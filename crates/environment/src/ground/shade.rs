@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use bansho_base::{
+    color::{acescg_from_srgb, luminance},
     image::Rect,
     math::{self, DVec2, DVec3, MulAdd},
     phenomenon::{
@@ -15,9 +16,9 @@ use bansho_base::{
 use super::{
     model::LakeFrame,
     parameters::{GroundKind, GroundParameters},
-    surface::{Surface, SurfaceSample, fresnel},
+    surface::{Surface, SurfaceSample},
     waves::WaveSlope,
-    wet_reflection::glossy_reflection,
+    wet_reflection::{fresnel, glossy_reflection},
 };
 
 /// Depth at which the ground ends, m: in front of the sky, behind everything else.
@@ -27,11 +28,25 @@ const WET_DARKENING: f64 = 0.55;
 /// Fraction that puddles lose beyond that: they are deeper, and often turbid.
 const PUDDLE_DARKENING: f64 = 0.4;
 /// Albedo of deep water.
-pub(super) const WATER_ALBEDO: f32 = 0.02;
+const WATER_ALBEDO: f32 = 0.02;
 
 /// Albedo of wet ground relative to dry ground.
-pub(super) fn wet_albedo_factor(wetness: f64) -> f64 {
+fn wet_albedo_factor(wetness: f64) -> f64 {
     1.0 - WET_DARKENING * wetness
+}
+
+impl GroundParameters {
+    /// Luminance of the diffuse albedo at time `t`, with the darkening by wetness.
+    #[must_use]
+    pub fn reflectance(&self, t: f64) -> f64 {
+        match self.kind {
+            GroundKind::Water => f64::from(WATER_ALBEDO),
+            GroundKind::Land | GroundKind::Plate => {
+                let dry = luminance(acescg_from_srgb(self.color.map(|value| value as f32)));
+                f64::from(dry) * wet_albedo_factor(self.wetness.at(t))
+            }
+        }
+    }
 }
 
 /// One frame of the ground.
@@ -163,7 +178,7 @@ impl PreparedGround<'_> {
     fn is_ground(&self, hit: &Hit, plate: f64) -> bool {
         let camera_height = self.view.camera.position.y - self.parameters.height;
         let above = camera_height * (1.0 - plate / hit.depth);
-        above.abs() < self.parameters.level().tolerance_at(plate, self.view.camera.focal_pixels)
+        above.abs() < self.parameters.mirror().tolerance_at(plate, self.view.camera.focal_pixels)
     }
 
     /// The transmittance of the sample; `None` if it is hidden.

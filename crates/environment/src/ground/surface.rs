@@ -138,13 +138,6 @@ fn film_fraction(relief: f64) -> f64 {
     1.0 - math::smoothstep(-RELIEF_DEVIATION, RELIEF_DEVIATION, relief)
 }
 
-/// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
-pub(super) fn fresnel(cos: f64) -> f64 {
-    let grazing = 1.0 - cos.clamp(0.0, 1.0);
-    let fifth = grazing * grazing * grazing * grazing * grazing;
-    0.0204 + 0.9796 * fifth
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,12 +178,5 @@ mod tests {
         };
         let fraction = variance(&coarse) / variance(&all);
         assert!(fraction < 0.15, "{fraction}");
-    }
-
-    #[test]
-    fn water_mirrors_two_hundredths_from_above_and_all_at_the_horizon() {
-        assert!((fresnel(1.0) - 0.0204).abs() < 1e-12);
-        assert!((fresnel(0.0) - 1.0).abs() < 1e-12);
-        assert!((0.05..0.07).contains(&fresnel(0.5)));
     }
 }

@@ -7,7 +7,12 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Surroundings},
 };
 
-use super::surface::fresnel;
+/// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
+pub(super) fn fresnel(cos: f64) -> f64 {
+    let grazing = 1.0 - cos.clamp(0.0, 1.0);
+    let fifth = grazing * grazing * grazing * grazing * grazing;
+    0.0204 + 0.9796 * fifth
+}
 
 /// Microfacets of wet ground. The slope distribution has longer tails than a Gaussian (Burley 2012: GTR with exponent
 /// 3), so that highlights fade without an edge.
@@ -150,5 +155,12 @@ mod tests {
         let tilt = DVec2::new(-half.x, -half.z) / half.y;
         let lobe = |tilt| Microfacets { tilt, ..even(0.03) }.specular_lobe(light, viewer, 0.0);
         assert!(lobe(tilt) > lobe(DVec2::ZERO) && lobe(tilt) > lobe(2.0 * tilt));
+    }
+
+    #[test]
+    fn water_mirrors_two_hundredths_from_above_and_all_at_the_horizon() {
+        assert!((fresnel(1.0) - 0.0204).abs() < 1e-12);
+        assert!((fresnel(0.0) - 1.0).abs() < 1e-12);
+        assert!((0.05..0.07).contains(&fresnel(0.5)));
     }
 }
