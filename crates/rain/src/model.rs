@@ -13,10 +13,10 @@ use bansho_base::{
 use super::parameters::RainParameters;
 use crate::{
     drops::{
-        exposure::{DropClassState, ground_height},
         lattice::{Lattice, LatticeMotion},
+        shutter_state::{DropClassState, ground_height},
         size_distribution::{DropSizeDistribution, SizeBin},
-        terminal_velocity::{Air, TerminalVelocity},
+        terminal_velocity::{FallAir, TerminalVelocity},
     },
     lighting::{
         drop_lighting::ScatteringTable,
@@ -44,13 +44,13 @@ pub struct Rain {
 /// How a drop sends light on: the same for all rain.
 #[derive(Debug)]
 pub(super) struct Optics {
-    pub(super) lens: DropPhaseFunction,
+    pub(super) phase_function: DropPhaseFunction,
     pub(super) scattering: ScatteringTable,
 }
 
 pub(super) static OPTICS: LazyLock<Optics> = LazyLock::new(|| {
-    let lens = DropPhaseFunction::new();
-    Optics { scattering: ScatteringTable::new(&lens), lens }
+    let phase_function = DropPhaseFunction::new();
+    Optics { scattering: ScatteringTable::new(&phase_function), phase_function }
 });
 
 /// The drops that one diameter stands for.
@@ -77,7 +77,7 @@ impl Rain {
             return Err(ParameterError { key: "diameters_mm", kind });
         }
         constructions::count("rain");
-        let velocity = TerminalVelocity { law: parameters.terminal_velocity, air: Air::default() };
+        let velocity = TerminalVelocity { law: parameters.terminal_velocity, air: FallAir::default() };
         let [_, heaviest] = parameters.rate_mm_per_h.bounds();
         let sizes = DropSizeDistribution::marshall_palmer(heaviest);
         let class = |bin: SizeBin| Class { bin, speed: velocity.speed(bin.diameter_mm), most: bin.count(&sizes) };

@@ -18,8 +18,8 @@ use fearless_simd::dispatch;
 
 use crate::{
     drops::{
-        exposure::{DropClassState, Sphere},
         lattice::{CELL_SIZE, Cell},
+        shutter_state::{DropClassState, Sphere},
     },
     lanes::{Lanes, ZERO_LANES, fast_max, fast_min},
     streaks::{

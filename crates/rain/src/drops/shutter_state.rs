@@ -70,7 +70,7 @@ pub(crate) struct Sphere {
 
 /// The rain while the shutter is open.
 #[derive(Clone, Debug)]
-pub(crate) struct ExposureState {
+pub(crate) struct ShutterState {
     pub(crate) key: Key,
     pub(crate) cameras: ShutterCameras,
     pub(crate) classes: Vec<DropClassState>,
@@ -87,7 +87,7 @@ pub(crate) struct ExposureState {
     occluders: Vec<Occluder>,
 }
 
-impl ExposureState {
+impl ShutterState {
     pub(crate) fn new(rain: &Rain, view: &View, surroundings: &Surroundings) -> Self {
         let parameters = &rain.parameters;
         let cameras = ShutterCameras::new(view);

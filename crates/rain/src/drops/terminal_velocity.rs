@@ -17,21 +17,21 @@ bansho_base::choice! {
 
 /// Properties of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Air {
+pub struct FallAir {
     /// Density rho_f, kg/m^3.
     pub density: f64,
     /// Dynamic viscosity mu, Pa s.
     pub viscosity: f64,
 }
 
-impl Default for Air {
+impl Default for FallAir {
     /// Dry air at 20 degrees Celsius and 1013.25 hPa.
     fn default() -> Self {
         Self { density: 1.204, viscosity: 1.81e-5 }
     }
 }
 
-impl Air {
+impl FallAir {
     /// Dry air as an ideal gas, with Sutherland's formula for the viscosity.
     pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
         /// Gas constant of dry air, J/(kg K).
@@ -66,12 +66,12 @@ pub struct TerminalVelocity {
     /// Where the velocities come from.
     pub law: VelocityLaw,
     /// The air.
-    pub air: Air,
+    pub air: FallAir,
 }
 
 impl Default for TerminalVelocity {
     fn default() -> Self {
-        Self { law: VelocityLaw::GunnKinzer, air: Air::default() }
+        Self { law: VelocityLaw::GunnKinzer, air: FallAir::default() }
     }
 }
 
@@ -151,8 +151,8 @@ pub fn measured_velocity(diameter_mm: f64) -> f64 {
 
 /// Correction of measured velocities for the density of the air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8
 /// (1969).
-fn density_correction(air: &Air) -> f64 {
-    math::pow(Air::default().density / air.density, 0.4)
+fn density_correction(air: &FallAir) -> f64 {
+    math::pow(FallAir::default().density / air.density, 0.4)
 }
 
 /// Drag coefficient C of a rigid sphere, eq. (3).
@@ -166,17 +166,17 @@ pub fn drag_coefficient(reynolds: f64) -> f64 {
 }
 
 /// Reynolds number Re, eq. (4).
-pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
+pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &FallAir) -> f64 {
     speed * air.density * 1e-3 * diameter_mm / air.viscosity
 }
 
 /// Velocity at which weight and drag are in equilibrium for the drag coefficient C, eq. (2).
-fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
+fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &FallAir) -> f64 {
     math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
 }
 
 /// Stokes' velocity: the solution for C = 24/Re.
-fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
+fn stokes_velocity(diameter_mm: f64, air: &FallAir) -> f64 {
     let diameter = 1e-3 * diameter_mm;
     STANDARD_GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
 }
@@ -185,7 +185,7 @@ fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
 ///
 /// # Errors
 /// There is no such velocity, or it lies where (3) gives no drag.
-pub fn fixed_point_velocity(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
+pub fn fixed_point_velocity(diameter_mm: f64, air: &FallAir) -> Result<f64, NoTerminalVelocity> {
     /// Steps for the slowest convergence: far below Re = 1 each step halves the error.
     const STEPS: usize = 200;
     if diameter_mm.is_nan() || diameter_mm <= 0.0 {
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn the_formula_gives_the_reference_velocities() {
-        let air = Air::default();
+        let air = FallAir::default();
         for [diameter, speed, re, c, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
             let found = fixed_point_velocity(diameter, &air).expect("converges");
             assert!(near(found, speed, 1e-4), "{diameter} mm: {found}");
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_solution_satisfies_all_three_equations() {
-        let air = Air::at(273.15, 90_000.0);
+        let air = FallAir::at(273.15, 90_000.0);
         for diameter in [0.02, 0.05, 0.2, 1.0, 3.0, 6.0] {
             let speed = fixed_point_velocity(diameter, &air).expect("converges");
             assert!(near(
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_formula_says_where_it_has_no_solution() {
-        let air = Air::default();
+        let air = FallAir::default();
         let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
         for micrometer in (700..900).map(|tenth| tenth as f64 * 0.1) {
             match fixed_point_velocity(1e-3 * micrometer, &air) {
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn velocities_rise_with_diameter_under_both_laws() {
         for law in [VelocityLaw::GunnKinzer, VelocityLaw::RigidSphere] {
-            let velocity = TerminalVelocity { law, air: Air::default() };
+            let velocity = TerminalVelocity { law, air: FallAir::default() };
             let speeds: Vec<f64> = (0..=800).map(|i| velocity.speed(0.01 * i as f64)).collect();
             assert!(speeds.is_sorted_by(|a, b| a <= b || (a - b) / a < 0.2), "{law:?}");
             assert!(speeds.iter().all(|speed| (0.0..20.0).contains(speed)));
@@ -278,10 +278,10 @@ mod tests {
     #[test]
     fn thin_air_lets_drops_fall_faster() {
         // Half the density: 2^0.4 = 1.3195.
-        let air = Air { density: 0.602, ..Air::default() };
+        let air = FallAir { density: 0.602, ..FallAir::default() };
         let velocity = TerminalVelocity { law: VelocityLaw::GunnKinzer, air };
         assert!(near(velocity.speed(2.0), 6.49 * 1.3195, 1e-4));
-        assert!(near(Air::at(293.15, 101_325.0).density, 1.204, 1e-3));
-        assert!(near(Air::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));
+        assert!(near(FallAir::at(293.15, 101_325.0).density, 1.204, 1e-3));
+        assert!(near(FallAir::at(293.15, 101_325.0).viscosity, 1.81e-5, 5e-3));
     }
 }

@@ -21,10 +21,10 @@ pub(crate) struct ScatteringTable {
 }
 
 impl ScatteringTable {
-    pub(crate) fn new(lens: &DropPhaseFunction) -> Self {
+    pub(crate) fn new(phase_function: &DropPhaseFunction) -> Self {
         let at = |step: usize| {
             let half_sine = step as f32 / TABLE_STEPS as f32;
-            lens.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
+            phase_function.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
         };
         let table: Vec<[f32; 3]> = (0..=TABLE_STEPS).map(at).collect();
         let greatest = table.iter().flatten().copied().fold(0.0, f32::max);

@@ -1,7 +1,7 @@
 //! Rain that is not drawn drop by drop, as a participating medium: extinction of the background, and single scattering
 //! (airlight, halos around lamps).
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
     image::Rect,
@@ -18,7 +18,7 @@ use super::{
     sky::SkyLighting,
     tiles::{FINE_TILE, FINEST_TILE, TileGrid, geometric_sequence, lerp_color},
 };
-use crate::{drops::exposure::ExposureState, streaks::bin::TILE_ROWS};
+use crate::drops::shutter_state::ShutterState;
 
 /// First distance at which accumulated in-scattering is stored, m, and the ratio of successive distances.
 const FIRST_DISTANCE: f64 = 0.5;
@@ -37,7 +37,7 @@ const MIN_LAMP_DISTANCE: f64 = 0.02;
 /// Extinction coefficient as a function of the distance from the camera.
 #[derive(Clone, Copy)]
 struct ExtinctionProfile<'a> {
-    exposure: &'a ExposureState,
+    exposure: &'a ShutterState,
     /// Of all drops, and of those that are drawn as streaks in the region, 1/m.
     extinction: [f64; 2],
 }
@@ -145,7 +145,7 @@ impl<'a> SingleScattering<'a> {
     /// The medium of drops with extinctions `[all, drawn as streaks]` up to the first of the two distances (m), and to
     /// the second where there is no plate; `None` where there is none.
     pub(crate) fn new(
-        exposure: &ExposureState,
+        exposure: &ShutterState,
         lighting: &DropLighting,
         sky: Arc<SkyLighting>,
         view: &'a View,
@@ -298,19 +298,20 @@ impl<'a> SingleScattering<'a> {
         (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(end)))
     }
 
-    /// Draws the pixels of `rows`, which lie in the row of tiles `band`, under what the strip holds.
-    pub(crate) fn draw(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
+    /// Draws the pixels of `rows` under the contents of the strip. They lie within a row of tiles, which spans the rows
+    /// `tile` of the picture.
+    pub(crate) fn draw(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         if strip.has_plate() {
             self.draw_before_plate(slice, rows, strip);
         } else {
-            dispatch!(self.level, _simd => self.draw_open(slice, band, rows, strip));
+            dispatch!(self.level, _simd => self.draw_without_plate(slice, tile, rows, strip));
         }
         self.add_halos(slice, rows, strip);
     }
 
     /// Only the ground ends the medium: intervals are evaluated at the corners of the grid.
     #[inline(always)]
-    fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
+    fn draw_without_plate(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         let side = self.tiles().side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edge = |y: f64| -> Vec<[f32; 4]> {
@@ -323,9 +324,9 @@ impl<'a> SingleScattering<'a> {
             };
             columns.clone().map(corner).collect()
         };
-        let edges = [edge((band * TILE_ROWS) as f64), edge(((band + 1) * TILE_ROWS) as f64)];
+        let edges = [edge(tile.start as f64), edge(tile.end as f64)];
         for y in rows.y..rows.bottom() {
-            let down = ((y - band * TILE_ROWS) as f32 + 0.5) / TILE_ROWS as f32;
+            let down = ((y - tile.start) as f32 + 0.5) / tile.len() as f32;
             let corner = |column: usize, c: usize| {
                 let (top, bottom) = (edges[0][column][c], edges[1][column][c]);
                 (bottom - top).fma(down, top)

@@ -13,7 +13,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::{
     Rain,
     billboards::Billboards,
-    drops::{exposure::ExposureState, size_distribution::DropSizeDistribution},
+    drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
     lighting::{
         drop_lighting::{DropLighting, PreparedLight},
         extinction::{ExtinctionEfficiency, extinction, visibility},
@@ -22,9 +22,12 @@ use crate::{
     },
     parameters::Method,
     streaks::{
-        bin::{StreakChunk, TILE_COLUMNS, TILE_ROWS},
+        bin::StreakChunk,
         project::{DropSelection, PerDropRegion, StreakProjection},
-        rasterize::{PackedStreak, tile::TileBuffer},
+        rasterize::{
+            PackedStreak,
+            tile::{TILE_COLUMNS, TILE_ROWS, TileBuffer},
+        },
         splashes::Splashes,
     },
 };
@@ -78,11 +81,11 @@ pub(crate) struct PreparedRain<'a> {
 
 impl<'a> PreparedRain<'a> {
     pub(crate) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
-        let exposure = ExposureState::new(rain, view, surroundings);
+        let exposure = ShutterState::new(rain, view, surroundings);
         let extinctions = rain.extinctions(view.shutter.middle());
         let lights = &surroundings.others.lights;
         let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinctions[0] };
-        let sky_lighting = rain.skies.of(&rain.optics.lens, view, surroundings.sky);
+        let sky_lighting = rain.skies.of(&rain.optics.phase_function, view, surroundings.sky);
         let (tiles, sky) = &sky_lighting.coarse;
         let prepared_lights = lighting.prepare_lights(exposure.cameras.middle().position);
         let frame = Frame {
@@ -121,7 +124,7 @@ impl<'a> PreparedRain<'a> {
 /// The inputs of a frame.
 struct Frame<'a> {
     rain: &'a Rain,
-    exposure: &'a ExposureState,
+    exposure: &'a ShutterState,
     lighting: &'a DropLighting<'a>,
     prepared_lights: &'a [PreparedLight],
     tiles: &'a TileGrid,
@@ -190,13 +193,13 @@ impl Prepared for PreparedRain<'_> {
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let rect = strip.rect;
         for tile_row in rect.y / TILE_ROWS..rect.bottom().div_ceil(TILE_ROWS) {
-            let rows =
-                Rect { x: rect.x, y: tile_row * TILE_ROWS, width: rect.width, height: TILE_ROWS }.intersection(&rect);
+            let tile = tile_row * TILE_ROWS..(tile_row + 1) * TILE_ROWS;
+            let rows = Rect { x: rect.x, y: tile.start, width: rect.width, height: TILE_ROWS }.intersection(&rect);
             if slice.near < self.streaks_end {
                 dispatch!(self.level, simd => self.draw_streaks(simd, tile_row, slice, rows, strip));
             }
             if let Some(single_scattering) = &self.single_scattering {
-                single_scattering.draw(slice, tile_row, rows, strip);
+                single_scattering.draw(slice, tile, rows, strip);
             }
         }
     }

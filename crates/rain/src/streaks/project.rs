@@ -17,8 +17,8 @@ use super::{
 };
 use crate::{
     drops::{
-        exposure::{DropClassState, ExposureState, Sphere},
         lattice::{CELL_SIZE, Cell},
+        shutter_state::{DropClassState, ShutterState, Sphere},
     },
     lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min, smoothstep},
     lighting::{
@@ -39,7 +39,7 @@ pub(crate) const FADE_IN: f64 = 0.02;
 #[derive(Clone, Copy)]
 pub(crate) struct StreakProjection<'a> {
     pub(crate) level: Level,
-    pub(crate) exposure: &'a ExposureState,
+    pub(crate) exposure: &'a ShutterState,
     pub(crate) lighting: &'a DropLighting<'a>,
     /// The same lights, prepared for SIMD.
     pub(crate) lights: &'a [PreparedLight],
@@ -256,7 +256,7 @@ pub(crate) struct PerDropRegion {
 }
 
 impl PerDropRegion {
-    pub(crate) fn new(exposure: &ExposureState, lights: &[Light]) -> Self {
+    pub(crate) fn new(exposure: &ShutterState, lights: &[Light]) -> Self {
         let eye = exposure.cameras.middle().position;
         let lamp = |light: &Light| match light.emitter {
             Emitter::Directional { .. } => None,

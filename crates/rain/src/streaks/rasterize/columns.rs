@@ -4,12 +4,9 @@ use bansho_base::math::MulAdd;
 
 use super::{
     StreakSegment,
-    tile::{TileBuffer, TileRows},
+    tile::{TILE_COLUMNS, TILE_ROWS, TileBuffer, TileRows},
 };
-use crate::{
-    lanes::{fast_max, fast_min},
-    streaks::bin::{TILE_COLUMNS, TILE_ROWS},
-};
+use crate::lanes::{fast_max, fast_min};
 
 /// Cumulative distribution of a disc's area: the fraction left of `t`, for a disc from -1 to 1. The integral of `2
 /// sqrt(1 - t^2) / pi`, which is the streak's profile. A series whose last term is chosen so that it ends at 1; the

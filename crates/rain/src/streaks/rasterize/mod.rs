@@ -131,8 +131,9 @@ mod tests {
     use bansho_base::{image::Rect, phenomenon::strip::Strip};
     use fearless_simd::{Level, dispatch};
 
+    use super::tile::TILE_ROWS;
     use super::{tile::TileBuffer, *};
-    use crate::streaks::{bin::TILE_ROWS, coverage::Streak};
+    use crate::streaks::coverage::Streak;
 
     /// What a drop hides that does not overlap itself.
     fn disc(radius: f32) -> f32 {
