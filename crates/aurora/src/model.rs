@@ -26,8 +26,8 @@ use crate::{
         integrate::emission_profile::EmissionProfiles,
         project::field_lines::FieldLines,
         shade::attenuation::EmitterColors,
+        single_collisions::collision_pass::CollisionRenderer,
     },
-    single_collisions::collision_pass::CollisionRenderer,
 };
 
 /// Sheets are thin: their bright parts seen aslant beside what looks straight up through one.

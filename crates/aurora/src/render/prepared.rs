@@ -3,10 +3,10 @@
 use std::{ops::Range, sync::OnceLock};
 
 use bansho_base::{
-    camera::{Camera, directions::Directions},
+    camera::Camera,
     host::observer::{Cancelled, Observer, check},
     image::Rect,
-    math::{self, DVec2, DVec3, MulAdd, approximations},
+    math::{self, DVec2, DVec3, MulAdd},
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
@@ -20,20 +20,19 @@ use crate::{
     physics::emission::{Emitter, PerEmitter},
     render::{
         aovs::{BRIGHTNESSES, brightnesses},
-        bin::{source_bins::SourceBins, sources::Sources},
-        integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer},
+        bin::{source_bins::SortedSources, sources::Sources},
+        integrate::columns::ColumnBuffer,
         project::{
-            chart::{Chart, Coverage, STRIP_COLUMNS},
-            field_lines::{EARTH_RADIUS_KM, FieldLines, dot},
+            chart::{BLOCK_COLUMNS, Chart, Coverage},
+            field_lines::{EARTH_RADIUS_KM, FieldLines},
+            pixel_batch::{PIXEL_BATCH, PixelBatch},
         },
         shade::{attenuation::EmitterColors, chart_sampler::ChartSampler},
+        single_collisions::{blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS},
     },
     simulate::AuroraSimulation,
-    single_collisions::blur::BlurredImage,
 };
 
-/// Pixels per batch.
-pub(crate) const PIXEL_BATCH: usize = 16;
 /// Altitude that defines the aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
 /// Minimum brightness for a depth value, kR.
@@ -122,14 +121,14 @@ impl ChartBuilder<'_> {
         // The angle of the spread at the minimum distance of such light.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let sorted = |strip| SourceBins::new(&sources.sharp, (&chart, strip), self.field, spread_km);
+        let sorted = |columns| SortedSources::new(&sources.sharp, &chart, columns, self.field, spread_km);
         let Some(collisions) = self.aurora.collisions() else {
-            let source_bins = sorted(STRIP_COLUMNS);
-            return ColumnBuffer::new(chart, self.field, self.aurora.profiles(), &source_bins);
+            let sorted_sources = sorted(BLOCK_COLUMNS);
+            return ColumnBuffer::new(chart, self.field, self.aurora.profiles(), &sorted_sources);
         };
-        let source_bins = sorted(BLOCK_COLUMNS);
+        let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
         let step = (self.aurora.simulation().time() / AuroraSimulation::STEP_S).round() as i64 as u32;
-        collisions.draw(chart, self.field, &source_bins, step)
+        collisions.draw(chart, self.field, &sorted_sources, step)
     }
 
     /// The coarser chart of the red afterglow.
@@ -138,44 +137,11 @@ impl ChartBuilder<'_> {
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
         // Laterally it is as smooth as its sources, vertically it follows the atmosphere.
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
-        let source_bins = SourceBins::new(&sources.soft, (&chart, STRIP_COLUMNS), self.field, spread_km);
+        let sorted_sources = SortedSources::new(&sources.soft, &chart, BLOCK_COLUMNS, self.field, spread_km);
         // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
-        let mut picture = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &source_bins);
+        let mut picture = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &sorted_sources);
         picture.sum_red_altitudes();
         picture
-    }
-}
-
-/// Directions of a batch of pixels in the field frame.
-#[derive(Default)]
-pub(crate) struct PixelBatch {
-    /// Colatitude and longitude about the magnetic zenith.
-    pub(crate) colatitude: [f32; PIXEL_BATCH],
-    pub(crate) longitude: [f32; PIXEL_BATCH],
-    /// Sine of the elevation.
-    sine: [f32; PIXEL_BATCH],
-    /// Length of the direction that [`Camera::direction`] gives.
-    length: [f32; PIXEL_BATCH],
-    /// Whether the lens maps the pixel to a direction.
-    in_view: [bool; PIXEL_BATCH],
-}
-
-impl PixelBatch {
-    /// Pixels from `x` on in row `y`.
-    #[inline(always)]
-    pub(crate) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
-        let mut directions = Directions::new(camera, x, y);
-        let mut batch = Self { length: directions.normalize(), in_view: directions.visible, ..Self::default() };
-        let [xs, ys, zs] = directions.components;
-        let [along, first, second] = field.axes_f32();
-        for i in 0..PIXEL_BATCH {
-            let direction = [xs[i], ys[i], zs[i]];
-            let (x, y) = (dot(first, direction), dot(second, direction));
-            batch.colatitude[i] = approximations::atan2(x.fma(x, y * y).sqrt(), dot(along, direction));
-            batch.longitude[i] = approximations::atan2(y, x);
-        }
-        batch.sine = ys;
-        batch
     }
 }
 

@@ -3,10 +3,6 @@
 use bansho_base::{host::assets::Assets, math::DVec2};
 
 use super::{
-    gap::Gap,
-    spline_track::{ControlPointTrack, Knot},
-};
-use crate::shapes::{
     Correspondence, MorphingParameters, ShapeError, ShapeErrorKind, ShapeParameters,
     correspondence::{
         links::LinkConstraints,
@@ -15,6 +11,10 @@ use crate::shapes::{
         time_warping::warp_through,
     },
     geometry::polyline::{Polyline, length_fractions},
+    interpolation::{
+        gap::Gap,
+        spline_track::{ControlPointTrack, Knot},
+    },
     strokes::validate::{DrawnSheet, ShapeContext, drawn_sheets},
 };
 

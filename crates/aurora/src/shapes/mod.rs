@@ -5,6 +5,7 @@
 //! Coordinates are km in the plane at 100 km altitude: x east, z south, the observer's zenith at the origin. Points are
 //! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
 
+pub(crate) mod control_points;
 pub(crate) mod correspondence;
 mod error;
 mod form;

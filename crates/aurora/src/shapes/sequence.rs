@@ -11,8 +11,8 @@ use super::{
     parameters::TRANSITION_S,
 };
 use crate::shapes::{
+    control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
     interpolation::{
-        control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
         gap::{self, Bridge, Gap, GapFlux},
         spline_track::{Knot, ShapeTiming, find_velocities},
     },

@@ -14,7 +14,7 @@ use super::{
     field::Grid2,
     forces::{Integrator, Repulsion},
     relocation::{Relocation, near_cells},
-    snapshot,
+    state::SimulationState,
 };
 use crate::{
     AuroraParameters,
@@ -58,24 +58,6 @@ struct TargetBuilder {
     sequence: Arc<Sequence>,
     fold_model: FoldModel,
     fields: FieldBuilder,
-}
-
-/// State that a step changes.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct SimulationState {
-    pub(super) steps: u64,
-    pub(super) next_id: u64,
-    /// Support radius h of the repulsion, km.
-    pub(super) support_km: f64,
-    /// Arc-length map of the current sheets.
-    pub(super) arc_map: ArcLengthMap,
-    /// Arc-length map of the target shape, and its time, s.
-    pub(super) target_arc_map: ArcLengthMap,
-    pub(super) target_time: f64,
-    /// Number of updates of the target.
-    pub(super) renewals: u32,
-    pub(super) particles: AuroraParticles,
-    pub(super) afterglow: Afterglow,
 }
 
 #[derive(Clone, Debug)]
@@ -235,7 +217,7 @@ impl AuroraSimulation {
     /// Serializes the state.
     #[must_use]
     pub fn snapshot(&self) -> Vec<u8> {
-        snapshot::write(&self.state)
+        self.state.serialize()
     }
 
     /// Restores a state from [`Self::snapshot`] of an aurora with the same parameters.
@@ -244,7 +226,7 @@ impl AuroraSimulation {
     ///
     /// Invalid bytes; the state is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
-        let mut state = snapshot::read(bytes, &self.state)?;
+        let mut state = SimulationState::deserialize(bytes, &self.state)?;
         let time = state.steps as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
         let (now, then) =
             (self.targets.sequence.control_point_ids(time), self.targets.sequence.control_point_ids(state.target_time));

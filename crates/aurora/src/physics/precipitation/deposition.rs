@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use super::{
     energy_grid::{self, NODES, node_energy_ev},
     fang2010::{AirLayer, MonoenergeticBeam},
-    hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
     spectrum::Spectrum,
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, locate_level};
@@ -46,13 +45,8 @@ impl Deposition {
         Self::from_profiles(monoenergetic, spectrum)
     }
 
-    /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
-    #[must_use]
-    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
-        Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
-    }
-
-    fn from_profiles(monoenergetic: Vec<AltitudeProfile>, spectrum: Spectrum) -> Self {
+    /// The table for a spectrum, from the profiles of monoenergetic electrons of every node.
+    pub(super) fn from_profiles(monoenergetic: Vec<AltitudeProfile>, spectrum: Spectrum) -> Self {
         let weights: Vec<_> = (0..NODES).into_par_iter().map(|node| spectrum.flux_fractions(node)).collect();
         let mixed = weights.par_iter().map(|weights| weighted_sum(&monoenergetic, weights)).collect();
         let cumulative_fractions: Vec<_> = weights.iter().map(running_sum).collect();

@@ -7,9 +7,10 @@ use bansho_base::{
 
 use super::{
     COLLISION_EV, EV_PER_S_PER_MW, ION_PAIR_EV,
-    deposition::AltitudeProfile,
+    deposition::{AltitudeProfile, Deposition},
     electron_track::{Collision, TrackState, collision_count},
     energy_grid::{NODES, node_energy_ev},
+    spectrum::Spectrum,
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, level_altitude_km};
 
@@ -94,6 +95,14 @@ impl HardSphereAtmosphere {
         let Some(above) = from_top.checked_sub(1) else { return Some(low_km) };
         let high = self.columns[above];
         Some(low_km + math::ln(low / column) / math::ln(low / high))
+    }
+}
+
+impl Deposition {
+    /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
+    #[must_use]
+    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+        Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
     }
 }
 

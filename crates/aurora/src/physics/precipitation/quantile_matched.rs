@@ -2,7 +2,7 @@
 
 use bansho_base::math::random::Key;
 
-use crate::physics::precipitation::{
+use super::{
     electron_track::{Collision, TRACKS_PER_ENERGY, TrackSampler, collision_count},
     energy_grid::node_energy_ev,
     hard_sphere::HardSphereAtmosphere,

@@ -20,9 +20,9 @@ use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_
 use crate::{
     physics::emission::PerEmitter,
     render::{
-        bin::source_bins::{Bin, DistanceBins, SourceBins, StripBins},
+        bin::source_bins::{Bin, BlockBins, DistanceBins, MAX_ENTRY_PER_STEP, SortedSources},
         project::{
-            chart::{Chart, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart},
             field_lines::{FieldLine, FieldLines, Meridian, altitude},
         },
     },
@@ -40,10 +40,9 @@ const KNOTS_ABOVE: f32 = 0.1;
 /// nearly parallel to the field.
 const STEP_KM: f32 = 1.5;
 
-/// Entry spacing of prefiltered tables relative to the step: at least 1 / [`STEP_KM`]. Steps as large as the emission
-/// layer need 2, else linear interpolation shows the pattern of the bins; smaller steps need less because the profile
-/// is smooth, and the lower border stays sharp.
-pub(crate) const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
+/// Minimum and maximum entry spacing of prefiltered tables relative to the step. Small steps need less than the maximum
+/// because the profile is smooth, and the lower border stays sharp.
+const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, MAX_ENTRY_PER_STEP];
 /// Steps above which the entry spacing exceeds the step, km.
 const SMOOTH_KM: f32 = 12.0;
 
@@ -72,27 +71,34 @@ struct ProfilePass<'a> {
 
 impl ColumnBuffer {
     /// Integrates the binned sources.
-    pub(crate) fn new(chart: Chart, field: &FieldLines, profiles: &EmissionProfiles, source_bins: &SourceBins) -> Self {
+    pub(crate) fn new(
+        chart: Chart,
+        field: &FieldLines,
+        profiles: &EmissionProfiles,
+        sorted_sources: &SortedSources,
+    ) -> Self {
         let level = Level::new();
         let [cotangents, inverse_sines] = chart.row_tables(ROWS * KNOT_ROWS);
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
-        let distances: Vec<_> = (0..source_bins.bins().count).map(|bin| source_bins.bins().distance(bin)).collect();
+        let distances: Vec<_> =
+            (0..sorted_sources.bins().count).map(|bin| sorted_sources.bins().distance(bin)).collect();
         let mut picture = Self::zeros(chart);
-        let (chart, strips) = picture.strips(STRIP_COLUMNS);
+        let (chart, blocks) = picture.blocks(BLOCK_COLUMNS);
         let pass = ProfilePass {
             chart,
             field,
             profiles,
-            bins: source_bins.bins(),
+            bins: sorted_sources.bins(),
             distances: &distances,
             cotangents: &cotangents,
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
         let spares = ScratchPool::new(ProfileScratch::default);
-        strips.with_max_len(1).for_each(|strip| {
-            spares
-                .with(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
+        blocks.with_max_len(1).for_each(|block| {
+            spares.with(
+                |workspace| dispatch!(level, simd => pass.integrate_block(simd, block, sorted_sources, workspace)),
+            );
         });
         picture
     }
@@ -116,11 +122,11 @@ impl ColumnBuffer {
         }
     }
 
-    /// Strips of columns, each for one thread.
-    pub(crate) fn strips(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = ColumnStrip<'_>>) {
+    /// The chart, and the buffer in blocks of that many columns, each for one thread.
+    pub(crate) fn blocks(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = ColumnBlock<'_>>) {
         let light = self.light.par_chunks_mut(columns * self.chart.rows);
-        let strips = light.zip(self.valid_rows.par_chunks_mut(columns)).enumerate();
-        (&self.chart, strips.map(|(number, (light, valid_rows))| ColumnStrip { number, light, valid_rows }))
+        let blocks = light.zip(self.valid_rows.par_chunks_mut(columns)).enumerate();
+        (&self.chart, blocks.map(|(number, (light, valid_rows))| ColumnBlock { number, light, valid_rows }))
     }
 
     /// Union of the valid rows of two columns.
@@ -131,14 +137,14 @@ impl ColumnBuffer {
     }
 }
 
-/// Adjacent columns of a buffer.
-pub(crate) struct ColumnStrip<'a> {
+/// A block of adjacent columns of a buffer.
+pub(crate) struct ColumnBlock<'a> {
     pub(crate) number: usize,
     pub(crate) light: &'a mut [PerEmitter<f32>],
     pub(crate) valid_rows: &'a mut [[u32; 2]],
 }
 
-impl ColumnStrip<'_> {
+impl ColumnBlock<'_> {
     /// A column whose valid range includes these rows.
     ///
     /// New rows are cleared explicitly although the allocation is zeroed: a first read maps the shared zero page and
@@ -222,34 +228,34 @@ impl KnotBuffer {
     }
 }
 
-/// Buffers that a thread reuses from strip to strip.
+/// Buffers that a thread reuses from block to block.
 #[derive(Default)]
 struct ProfileScratch {
-    sums: StripBins,
+    sums: BlockBins,
     slow: KnotBuffer,
 }
 
 impl ProfilePass<'_> {
     #[inline(always)]
-    fn integrate_strip<S: Simd>(
+    fn integrate_block<S: Simd>(
         &self,
         simd: S,
-        mut strip: ColumnStrip,
-        source_bins: &SourceBins,
+        mut block: ColumnBlock,
+        sorted_sources: &SortedSources,
         workspace: &mut ProfileScratch,
     ) {
         let ProfileScratch { sums, slow } = workspace;
-        source_bins.accumulate(simd, strip.number, self.chart, &self.chart.strip_cos_sin(strip.number), sums);
-        for column in 0..STRIP_COLUMNS {
-            let meridian = self.field.meridian(self.chart.longitude_cos_sin(strip.number * STRIP_COLUMNS + column));
+        sorted_sources.accumulate(simd, block.number, self.chart, &self.chart.block_cos_sin(block.number), sums);
+        for column in 0..BLOCK_COLUMNS {
+            let meridian = self.field.meridian(self.chart.longitude_cos_sin(block.number * BLOCK_COLUMNS + column));
             let (first, bins) = sums.column(column, self.bins);
             slow.clear(self.chart.rows);
             for (number, bin) in bins.iter().enumerate() {
-                self.accumulate_bin(simd, &meridian, (first + number, bin), (&mut strip, column), slow);
+                self.accumulate_bin(simd, &meridian, (first + number, bin), (&mut block, column), slow);
             }
-            let [first, end] = strip.valid_rows[column].map(|row| row as usize);
+            let [first, end] = block.valid_rows[column].map(|row| row as usize);
             let valid = first.min(end)..end;
-            let light = &mut strip.light[column * self.chart.rows..][..self.chart.rows];
+            let light = &mut block.light[column * self.chart.rows..][..self.chart.rows];
             // The last knots may extend past the valid rows.
             slow.add_to(simd, &mut light[..end]);
             for (light, inverse) in light[valid.clone()].iter_mut().zip(&self.inverse_sines[valid]) {
@@ -267,7 +273,7 @@ impl ProfilePass<'_> {
         simd: S,
         meridian: &Meridian,
         (number, bin): (usize, &Bin),
-        (strip, column): (&mut ColumnStrip, usize),
+        (block, column): (&mut ColumnBlock, usize),
         slow: &mut KnotBuffer,
     ) {
         let [green, red, prompt, by_node] = *bin;
@@ -292,7 +298,7 @@ impl ProfilePass<'_> {
         let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let (distance, width) = (distance as f32, width as f32);
         let bin_rows = BinRows { line: &line, profile: &profile, distance, width, near, weights };
-        let light = strip.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
+        let light = block.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
         let rest = if near { first } else { self.add_knot_rows(&bin_rows, first..end, slow) };
         self.add_dense_rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
         if near {

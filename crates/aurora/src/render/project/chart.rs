@@ -10,8 +10,8 @@ use bansho_base::{
 
 use super::field_lines::FieldLines;
 
-/// Columns per strip; one thread works on a strip.
-pub(crate) const STRIP_COLUMNS: usize = 16;
+/// Columns per block. Blocks are the unit of work of a thread.
+pub(crate) const BLOCK_COLUMNS: usize = 16;
 /// Samples per side of the picture for the coverage.
 const SAMPLES_PER_SIDE: usize = 24;
 /// Maximum number of columns and of rows.
@@ -36,7 +36,7 @@ pub(crate) struct Coverage {
 /// A grid of directions; columns are meridians, rows parallels.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
-    /// Number of columns, a multiple of [`STRIP_COLUMNS`].
+    /// Number of columns, a multiple of [`BLOCK_COLUMNS`].
     pub(crate) columns: usize,
     /// Number of rows, at least 2.
     pub(crate) rows: usize,
@@ -118,7 +118,7 @@ impl Chart {
         let wraps = reach >= PI;
         let range = 2.0 * reach;
         let columns = (range * widest / column).min(MAX_SIZE).ceil() as usize;
-        let columns = columns.max(1).next_multiple_of(STRIP_COLUMNS);
+        let columns = columns.max(1).next_multiple_of(BLOCK_COLUMNS);
         let column_step = if wraps { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
         // Aligned to multiples of the step, so that the chart does not crawl as the camera turns.
         let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
@@ -144,11 +144,11 @@ impl Chart {
         [cos, sin]
     }
 
-    /// Cosines and sines of the longitudes of a strip's columns.
-    pub(crate) fn strip_cos_sin(&self, strip: usize) -> [[f32; STRIP_COLUMNS]; 2] {
-        let mut units = [[0.0; STRIP_COLUMNS]; 2];
-        for column in 0..STRIP_COLUMNS {
-            for (values, value) in units.iter_mut().zip(self.longitude_cos_sin(strip * STRIP_COLUMNS + column)) {
+    /// Cosines and sines of the longitudes of a block's columns.
+    pub(crate) fn block_cos_sin(&self, block: usize) -> [[f32; BLOCK_COLUMNS]; 2] {
+        let mut units = [[0.0; BLOCK_COLUMNS]; 2];
+        for column in 0..BLOCK_COLUMNS {
+            for (values, value) in units.iter_mut().zip(self.longitude_cos_sin(block * BLOCK_COLUMNS + column)) {
                 values[column] = value as f32;
             }
         }

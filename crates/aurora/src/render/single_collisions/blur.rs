@@ -16,8 +16,10 @@ use crate::{
     parameters::BlurParameters,
     physics::emission::{EMITTERS, Emitter, PerEmitter},
     render::{
-        prepared::{PIXEL_BATCH, PixelBatch},
-        project::field_lines::FieldLines,
+        project::{
+            field_lines::FieldLines,
+            pixel_batch::{PIXEL_BATCH, PixelBatch},
+        },
         shade::chart_sampler::ChartSampler,
     },
 };

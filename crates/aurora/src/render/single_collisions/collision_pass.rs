@@ -16,7 +16,7 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    quantile_matched::QuantileMatchedTracks,
+    collision_block::{COLLISION_BLOCK_COLUMNS, CollisionBlock},
     rasterize::{RowRange, SPLAT_LANES, SplatBatch, TrackRasterizer},
     track_table::{CollisionBatch, TrackTable},
 };
@@ -30,18 +30,16 @@ use crate::{
             energy_grid::{NODES, node_energy_ev},
             hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
             lateral_spread::lateral_spread_km,
+            quantile_matched::QuantileMatchedTracks,
         },
     },
     render::{
         RenderingParameters, TrackModel,
-        bin::source_bins::{FieldLineSource, PatchWeights, REACH, SourceBins},
-        integrate::{
-            column_block::{BLOCK_COLUMNS, ColumnBlock},
-            columns::{ColumnBuffer, ColumnStrip},
-        },
+        bin::source_bins::{FieldLineSource, PatchWeights, REACH, SortedSources},
+        integrate::columns::{ColumnBlock, ColumnBuffer},
         project::{
             altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials, altitudes_km},
-            chart::{Chart, ChartProjection, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart, ChartProjection},
             field_lines::FieldLines,
         },
     },
@@ -114,14 +112,20 @@ impl CollisionRenderer {
         }
     }
 
-    /// Renders sources that are sorted by [`BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
-    pub(crate) fn draw(&self, chart: Chart, field: &FieldLines, source_bins: &SourceBins, step: u32) -> ColumnBuffer {
+    /// Renders sources that are sorted by [`COLLISION_BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
+    pub(crate) fn draw(
+        &self,
+        chart: Chart,
+        field: &FieldLines,
+        sorted_sources: &SortedSources,
+        step: u32,
+    ) -> ColumnBuffer {
         let level = Level::new();
         let mut picture = ColumnBuffer::zeros(chart);
-        let (chart, blocks) = picture.strips(BLOCK_COLUMNS);
-        let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), source_bins, step };
+        let (chart, blocks) = picture.blocks(COLLISION_BLOCK_COLUMNS);
+        let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), sorted_sources, step };
         // Largest block first (LPT scheduling), for load balance.
-        let mut blocks: Vec<_> = blocks.map(|block| (source_bins.count(block.number), block)).collect();
+        let mut blocks: Vec<_> = blocks.map(|block| (sorted_sources.count(block.number), block)).collect();
         blocks.sort_by_key(|(count, _)| *count);
         let blocks = Mutex::new(blocks);
         let next = || blocks.lock().unwrap_or_else(PoisonError::into_inner).pop();
@@ -191,7 +195,7 @@ struct SourceTrack<'a> {
 
 /// Buffers that a thread reuses.
 struct CollisionScratch {
-    block: ColumnBlock,
+    block: CollisionBlock,
     rasterizer: TrackRasterizer,
     points: [SplatBatch; PIPELINED_BATCHES],
 }
@@ -199,7 +203,7 @@ struct CollisionScratch {
 impl CollisionScratch {
     fn new(chart: &Chart) -> Self {
         Self {
-            block: ColumnBlock::new(chart),
+            block: CollisionBlock::new(chart),
             rasterizer: TrackRasterizer::new(chart.rows),
             points: [SplatBatch::NONE; PIPELINED_BATCHES],
         }
@@ -230,20 +234,20 @@ struct CollisionPass<'a> {
     collisions: &'a CollisionRenderer,
     chart: &'a Chart,
     projection: ChartProjection,
-    source_bins: &'a SourceBins<'a>,
+    sorted_sources: &'a SortedSources<'a>,
     step: u32,
 }
 
 impl CollisionPass<'_> {
     /// Rasterizes a block: each source once for all its columns.
     #[inline(always)]
-    fn draw_block<S: Simd>(&self, simd: S, strip: ColumnStrip, field: &FieldLines, scratch: &mut CollisionScratch) {
-        let entries = scratch.block.begin(strip.number, self.chart, self.source_bins, field);
+    fn draw_block<S: Simd>(&self, simd: S, block: ColumnBlock, field: &FieldLines, scratch: &mut CollisionScratch) {
+        let entries = scratch.block.begin(block.number, self.chart, self.sorted_sources, field);
         let (mut sources, mut tracks) = (Vec::with_capacity(LOOKAHEAD_SOURCES), Vec::with_capacity(LOOKAHEAD_SOURCES));
         for entries in entries.chunks(LOOKAHEAD_SOURCES) {
             sources.clear();
             for entry in entries {
-                sources.push(*self.source_bins.source(entry.source));
+                sources.push(*self.sorted_sources.source(entry.source));
             }
             tracks.clear();
             for source in &sources {
@@ -253,7 +257,7 @@ impl CollisionPass<'_> {
                 self.splat_source(simd, entry.columns(), track, scratch);
             }
         }
-        scratch.block.write(strip, self.chart.rows);
+        scratch.block.write(block, self.chart.rows);
         scratch.block.recycle(entries);
     }
 
@@ -274,9 +278,9 @@ impl CollisionPass<'_> {
         if shared {
             self.rasterize_at_column(simd, track, (columns.start + columns.end) / 2, scratch);
         }
-        for from in columns.clone().step_by(STRIP_COLUMNS) {
+        for from in columns.clone().step_by(BLOCK_COLUMNS) {
             let patch = PatchWeights::new(source, self.chart, &scratch.block.units(from));
-            for column in from..columns.end.min(from + STRIP_COLUMNS) {
+            for column in from..columns.end.min(from + BLOCK_COLUMNS) {
                 let weight = patch.column_weights[column - from];
                 if weight <= 0.0 {
                     continue;
@@ -302,7 +306,7 @@ impl CollisionPass<'_> {
         rasterizer.reset();
         let (meridian, distance) = block.meridian_and_distance(column, &track.source);
         let line = ProjectedFieldLine::new(meridian, distance, &self.projection);
-        let reach = track.source.reach.max(self.source_bins.bins().min_reach(distance));
+        let reach = track.source.reach.max(self.sorted_sources.bins().min_reach(distance));
         if distance < EXACT_REACHES * reach {
             self.add(simd, track, (reach, 0.0), &LineProjection::Exact(line), (rasterizer, points));
             return;

@@ -19,10 +19,7 @@ use bansho_base::{
     },
 };
 
-use super::{
-    BlurParameters, RenderingParameters, Sampling, TrackModel,
-    prepared::{ChartBuilder, PixelBatch},
-};
+use super::{BlurParameters, RenderingParameters, Sampling, TrackModel, prepared::ChartBuilder};
 use crate::{
     Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
@@ -33,18 +30,21 @@ use crate::{
     render::{
         aovs::{brightnesses, measured_lines},
         bin::{
-            source_bins::{FieldLineSource, REACH, SourceBins},
+            source_bins::{FieldLineSource, REACH, SortedSources},
             sources::{EmitterWeights, SourceBuilder, Sources, nearest_node},
         },
-        integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer, emission_profile::EmissionProfiles},
+        integrate::{columns::ColumnBuffer, emission_profile::EmissionProfiles},
         project::{
-            chart::{Chart, Coverage, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart, Coverage},
             field_lines::{EARTH_RADIUS_KM, FieldLines},
+            pixel_batch::PixelBatch,
+        },
+        single_collisions::{
+            blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS, collision_pass::CollisionRenderer,
         },
     },
     shapes::{ShapeParameters, SheetParameters},
     simulate::afterglow::AfterglowCell,
-    single_collisions::{blur::BlurredImage, collision_pass::CollisionRenderer},
 };
 
 const ENERGY_EV: f64 = 5000.0;
@@ -97,8 +97,8 @@ fn draw(
     step: f64,
 ) -> ColumnBuffer {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
-    let source_bins = SourceBins::new(sources, (&chart, STRIP_COLUMNS), field, spread_of(sources));
-    ColumnBuffer::new(chart, field, profiles, &source_bins)
+    let sorted_sources = SortedSources::new(sources, &chart, BLOCK_COLUMNS, field, spread_of(sources));
+    ColumnBuffer::new(chart, field, profiles, &sorted_sources)
 }
 
 /// Cells of one mW/m^2 over a wide square.
