@@ -110,7 +110,7 @@ pub fn locate_level(altitude_km: f64) -> (usize, f64) {
     (level, coordinate - level as f64)
 }
 
-/// Whether an altitude lies within the levels.
+/// Whether an altitude is within the levels.
 #[must_use]
 pub fn covers(altitude_km: f64) -> bool {
     (LOWEST_KM..=HIGHEST_KM).contains(&altitude_km)

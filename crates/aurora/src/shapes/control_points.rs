@@ -113,7 +113,7 @@ pub(crate) fn track_control_points(
 
 /// Checks the number of control points up to shape `index`.
 fn check_count(found: usize, index: usize) -> Result<(), ShapeError> {
-    let kind = ShapeErrorKind::TooManyPoints { found, most: MAX_POINTS };
+    let kind = ShapeErrorKind::TooManyPoints { found, max: MAX_POINTS };
     let error = || ShapeError { key: format!("shapes.{index}.sheets"), kind };
     if found > MAX_POINTS { Err(error()) } else { Ok(()) }
 }

@@ -3,17 +3,17 @@
 use bansho_base::math::{self, DVec2, lerp, saturate, smoothstep};
 
 bansho_base::choice! {
-    /// A form that an aurora takes.
+    /// Auroral form.
     pub enum Form {
-        /// A quiet arc, its middle to the north.
+        /// A quiet arc with its middle to the north.
         Arc = "arc",
         /// A band with shallow waves (`wave_count`).
         Band = "band",
-        /// An S whose middle runs back.
+        /// An S whose middle section runs backward.
         SShape = "s_shape",
         /// A band that winds up at its eastern end (`bend_deg` 630 is one turn and three quarters).
         Spiral = "spiral",
-        /// A band with `wave_count` folds whose flanks run back.
+        /// A band with `wave_count` folds whose flanks run backward.
         Fold = "fold",
         /// A substorm's surge: a band that rises to the north and curls over.
         Surge = "surge",

@@ -347,7 +347,7 @@ fn more_control_points_than_can_be_held_are_refused() {
     let motion = MorphingParameters { control_points: Auto::Set(512), ..MorphingParameters::default() };
     let error = Sequence::new(&begun(&vec![full; 32]), &motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
     assert_eq!(error.key, "shapes.30.sheets");
-    assert_eq!(error.kind, ShapeErrorKind::TooManyPoints { found: 31 * 256 * 512, most: 4_000_000 });
+    assert_eq!(error.kind, ShapeErrorKind::TooManyPoints { found: 31 * 256 * 512, max: 4_000_000 });
 }
 
 /// Two sheets that stay where they are, with links to the second shape.

@@ -6,11 +6,11 @@ use bansho_base::{math, world::gravity::STANDARD_GRAVITY};
 const WATER_DENSITY: f64 = 998.2;
 
 bansho_base::choice! {
-    /// Where terminal velocities come from.
+    /// Law of the terminal velocities.
     pub enum VelocityLaw {
-        /// Measured by Gunn and Kinzer: large drops flatten and fall no faster than 9.2 m/s.
+        /// Measured by Gunn and Kinzer: large drops flatten and fall at 9.2 m/s at most.
         GunnKinzer = "gunn_kinzer",
-        /// The paper's formula (2)-(4) for a rigid sphere: 4 % slow at 1 mm, 29 % fast at 5 mm.
+        /// The paper's equations (2) to (4) for a rigid sphere: 4 % too slow at 1 mm, 29 % too fast at 5 mm.
         RigidSphere = "rigid_sphere",
     }
 }

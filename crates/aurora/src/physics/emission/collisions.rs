@@ -21,7 +21,7 @@ const ATOMIC_MASS: f64 = 1.660_539e-27;
 const MOLECULAR_RADIUS: f64 = 1.85e-10;
 
 impl Emission {
-    /// Column brightness that one collision of a track stands for, in kR of ion pairs per mW m^-2. Multiplied by
+    /// Column brightness per collision of a track, in kR of ion pairs per mW m^-2. Multiplied by
     /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
     ///
     /// # Panics

@@ -20,9 +20,9 @@ pub use hard_sphere::HardSphereAtmosphere;
 pub use spectrum::Spectrum;
 
 bansho_base::choice! {
-    /// What stops the electrons and what shines where they are stopped.
+    /// Model of the energy loss of the electrons and of the light that they excite.
     pub enum TrackModel {
-        /// Air as it is measured: heights after Fang et al. (2010), colors and brightness as observed.
+        /// The measured atmosphere: altitudes after Fang et al. (2010), colors and brightness as observed.
         Fang2010 = "fang_2010",
         /// Hard spheres, as in the thesis (2.4): one radius for all energies, and green light only above 190 km.
         HardSphereAtmosphere = "hard_sphere",

@@ -32,10 +32,9 @@ use crate::{
 const ROWS: usize = 16;
 /// Where light varies slowly with altitude, it is computed every fourth row and interpolated linearly.
 const KNOT_ROWS: usize = 4;
-/// It does so from this altitude on, where the knot spacing is at most this fraction of the distance from that
-/// altitude, km.
+/// Altitude above which light varies slowly, km, and maximum spacing of knots as a fraction of their height above it.
 const SLOW_KM: f32 = 110.0;
-const KNOTS_ABOVE: f32 = 0.1;
+const MAX_KNOT_FRACTION: f32 = 0.1;
 /// Altitude step between bins above which prefiltered tables are used, km: near the magnetic zenith a line of sight is
 /// nearly parallel to the field.
 const STEP_KM: f32 = 1.5;
@@ -82,8 +81,8 @@ impl ColumnBuffer {
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> =
             (0..sorted_sources.bins().count).map(|bin| sorted_sources.bins().distance(bin)).collect();
-        let mut picture = Self::zeros(chart);
-        let (chart, blocks) = picture.blocks(BLOCK_COLUMNS);
+        let mut buffer = Self::zeros(chart);
+        let (chart, blocks) = buffer.blocks(BLOCK_COLUMNS);
         let pass = ProfilePass {
             chart,
             field,
@@ -94,13 +93,12 @@ impl ColumnBuffer {
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        let spares = ScratchPool::new(ProfileScratch::default);
+        let scratch_pool = ScratchPool::new(ProfileScratch::default);
         blocks.with_max_len(1).for_each(|block| {
-            spares.with(
-                |workspace| dispatch!(level, simd => pass.integrate_block(simd, block, sorted_sources, workspace)),
-            );
+            scratch_pool
+                .with(|scratch| dispatch!(level, simd => pass.integrate_block(simd, block, sorted_sources, scratch)));
         });
-        picture
+        buffer
     }
 
     /// A buffer without light.
@@ -145,7 +143,7 @@ pub(crate) struct ColumnBlock<'a> {
 }
 
 impl ColumnBlock<'_> {
-    /// A column whose valid range includes these rows.
+    /// A column of `row_count` rows, with its valid range extended to include `rows`.
     ///
     /// New rows are cleared explicitly although the allocation is zeroed: a first read maps the shared zero page and
     /// the later write faults again with a TLB shootdown on all threads.
@@ -154,10 +152,10 @@ impl ColumnBlock<'_> {
         &mut self,
         column: usize,
         rows: &Range<usize>,
-        of: usize,
+        row_count: usize,
     ) -> &mut [PerEmitter<f32>] {
         let [first, end] = self.valid_rows[column].map(|row| row as usize);
-        let light = &mut self.light[column * of..][..of];
+        let light = &mut self.light[column * row_count..][..row_count];
         if first > end {
             light[rows.clone()].fill([0.0; 4]);
             self.valid_rows[column] = [rows.start as u32, rows.end as u32];
@@ -193,7 +191,7 @@ pub(crate) fn lerp_emitters<S: Simd>(
 struct KnotBuffer {
     light: Vec<[PerEmitter<f32>; 2]>,
     /// First group that may be non-zero, and one past the last.
-    valid_rows: [usize; 2],
+    valid_groups: [usize; 2],
 }
 
 impl KnotBuffer {
@@ -201,23 +199,23 @@ impl KnotBuffer {
     fn clear(&mut self, rows: usize) {
         self.light.clear();
         self.light.resize(rows.div_ceil(KNOT_ROWS), [[0.0; 4]; 2]);
-        self.valid_rows = [usize::MAX, 0];
+        self.valid_groups = [usize::MAX, 0];
     }
 
     /// Adds light at knots from index `first` on.
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, first: usize, knots: &[PerEmitter<f32>]) {
-        self.valid_rows = [self.valid_rows[0].min(first), self.valid_rows[1].max(first + knots.len() - 1)];
-        for (own, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
-            let own = own.as_flattened_mut();
-            (HalfLanes::from_slice(simd, ends.as_flattened()) + HalfLanes::from_slice(simd, own)).store_slice(own);
+        self.valid_groups = [self.valid_groups[0].min(first), self.valid_groups[1].max(first + knots.len() - 1)];
+        for (sum, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
+            let sum = sum.as_flattened_mut();
+            (HalfLanes::from_slice(simd, ends.as_flattened()) + HalfLanes::from_slice(simd, sum)).store_slice(sum);
         }
     }
 
     /// Interpolates it to the rows of the column.
     #[inline(always)]
     fn add_to<S: Simd>(&self, simd: S, light: &mut [PerEmitter<f32>]) {
-        for knot in self.valid_rows[0]..self.valid_rows[1] {
+        for knot in self.valid_groups[0]..self.valid_groups[1] {
             let [low, high] = &self.light[knot];
             let end = light.len().min((knot + 1) * KNOT_ROWS);
             for (row, light) in light[knot * KNOT_ROWS..end].iter_mut().enumerate() {
@@ -242,16 +240,16 @@ impl ProfilePass<'_> {
         simd: S,
         mut block: ColumnBlock,
         sorted_sources: &SortedSources,
-        workspace: &mut ProfileScratch,
+        scratch: &mut ProfileScratch,
     ) {
-        let ProfileScratch { sums, slow } = workspace;
+        let ProfileScratch { sums, slow } = scratch;
         sorted_sources.accumulate(simd, block.number, self.chart, &self.chart.block_cos_sin(block.number), sums);
         for column in 0..BLOCK_COLUMNS {
             let meridian = self.field.meridian(self.chart.longitude_cos_sin(block.number * BLOCK_COLUMNS + column));
             let (first, bins) = sums.column(column, self.bins);
             slow.clear(self.chart.rows);
             for (number, bin) in bins.iter().enumerate() {
-                self.accumulate_bin(simd, &meridian, (first + number, bin), (&mut block, column), slow);
+                self.accumulate_bin(simd, &meridian, first + number, bin, &mut block, column, slow);
             }
             let [first, end] = block.valid_rows[column].map(|row| row as usize);
             let valid = first.min(end)..end;
@@ -272,8 +270,10 @@ impl ProfilePass<'_> {
         &self,
         simd: S,
         meridian: &Meridian,
-        (number, bin): (usize, &Bin),
-        (block, column): (&mut ColumnBlock, usize),
+        number: usize,
+        bin: &Bin,
+        block: &mut ColumnBlock,
+        column: usize,
         slow: &mut KnotBuffer,
     ) {
         let [green, red, prompt, by_node] = *bin;
@@ -315,8 +315,12 @@ impl ProfilePass<'_> {
         let distance = bin_rows.distance;
         // Altitude difference between knots.
         let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32) * (SLOW_KM * SLOW_KM / distance + distance);
-        let end =
-            self.row_of_altitude(bin_rows.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
+        let end = self.row_of_altitude(
+            bin_rows.line,
+            f64::from(distance),
+            0.0,
+            SLOW_KM + knot_km * (1.0 / MAX_KNOT_FRACTION),
+        );
         let end = (end.max(0.0) as usize).min(rows.end.next_multiple_of(KNOT_ROWS));
         let (mut knot, last) = (rows.start / KNOT_ROWS, end / KNOT_ROWS);
         if knot >= last {
@@ -382,24 +386,24 @@ impl<S: Simd> BinRows<'_, S> {
             self.add_rows(self.profile.table(0), &altitudes, light);
             return;
         }
-        let spacings = self.spacings(cotangents);
+        let mip_levels = self.mip_levels(cotangents);
         for i in 0..light.len() {
-            let altitude = altitudes[i].fma(approximations::exp2(-spacings[i]), 1.0);
-            self.add_row(self.profile.table(spacings[i] as usize), altitude, &mut light[i]);
+            let altitude = altitudes[i].fma(approximations::exp2(-mip_levels[i]), 1.0);
+            self.add_row(self.profile.table(mip_levels[i] as usize), altitude, &mut light[i]);
         }
     }
 
     /// Mip level per row: coarser where the altitude changes more from bin to bin.
     #[inline(always)]
-    fn spacings(&self, cotangents: &[f32; ROWS]) -> [f32; ROWS] {
-        const MOST: f32 = (MIP_LEVELS - 1) as f32;
-        let mut spacings = [0.0; ROWS];
+    fn mip_levels(&self, cotangents: &[f32; ROWS]) -> [f32; ROWS] {
+        const MAX_LEVEL: f32 = (MIP_LEVELS - 1) as f32;
+        let mut mip_levels = [0.0; ROWS];
         for i in 0..ROWS {
             let step = self.width * cotangents[i].abs();
             let entry = step * (step * (1.0 / SMOOTH_KM)).clamp(ENTRY_PER_STEP[0], ENTRY_PER_STEP[1]);
-            spacings[i] = approximations::log2(entry.max(1.0)).ceil().min(MOST);
+            mip_levels[i] = approximations::log2(entry.max(1.0)).ceil().min(MAX_LEVEL);
         }
-        spacings
+        mip_levels
     }
 
     /// Adds the light at altitudes above the lowest level, km.

@@ -223,7 +223,7 @@ fn merged_ends(
     let end = |side: usize| match at[side] {
         0.0 => Ok((pair[side], 0)),
         1.0 => Ok((pair[side], 1)),
-        at => Err(ShapeErrorKind::NotAnEnd { sheet: pair[side] + 1, at }),
+        length_fraction => Err(ShapeErrorKind::NotAnEnd { sheet: pair[side] + 1, length_fraction }),
     };
     Ok([end(0)?, end(1)?])
 }
@@ -390,12 +390,12 @@ mod tests {
     fn faults_name_sheet_and_segment() {
         let kind = |parameters: &ShapeParameters| change(parameters, 2).unwrap_err();
         for (parameters, expected) in [
-            (split(3, None, None), "shapes.1.split.0: there is no sheet 3 in the shape before; allowed: 1 to 2"),
+            (split(3, None, None), "shapes.1.split.0: there is no sheet 3 in the previous shape; allowed: 1 to 2"),
             (split(2, Some(4), None), "shapes.1.split.0: sheet 2 has no segment 4; allowed: 1 to 3"),
-            (split(2, Some(1), Some(0.5)), "says both `segment` and `length_fraction`"),
+            (split(2, Some(1), Some(0.5)), "has both `segment` and `length_fraction`"),
             (merge(&[([1, 5], Auto::Auto)]), "shapes.1.merge.0: there is no sheet 5"),
             (merge(&[([1, 2], Auto::Set([1.0, 0.4]))]), "the point at 0.4 of sheet 2 is not an end"),
-            (merge(&[([2, 2], Auto::Set([0.0, 1.0]))]), "would close sheet 2 to a ring"),
+            (merge(&[([2, 2], Auto::Set([0.0, 1.0]))]), "would close sheet 2 into a ring"),
             (
                 merge(&[([1, 2], Auto::Set([1.0, 0.0])), ([1, 2], Auto::Set([0.0, 1.0]))]),
                 "shapes.1.merge.1: this merge would close",

@@ -90,7 +90,7 @@ pub(crate) fn drawn_sheets(
     for (entry, parameters) in entries.iter().enumerate() {
         draw_entry(parameters, entry, context, assets, &mut sheets)?;
         if sheets.len() > MAX_SHEETS {
-            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), most: MAX_SHEETS };
+            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), max: MAX_SHEETS };
             return Err(context.error(".sheets", kind));
         }
     }
