@@ -23,7 +23,7 @@ pub use geometry::{
     nearest_segment::NearestSegmentGrid,
     segments::{SheetSample, SheetSampler},
 };
-pub use interpolation::gap::Bridge;
+pub use interpolation::gap::{Bridge, SheetEnd};
 pub use parameters::{
     Correspondence, FRAME_S, LinkParameters, MergeParameters, MorphingParameters, ShapeParameters, SheetParameters,
     Spacing, SplitParameters,

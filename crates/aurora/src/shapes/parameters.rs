@@ -20,7 +20,7 @@ const KM: Range = Range::new(-20_000.0, 20_000.0);
 const DEGREES: Range = Range::new(-3600.0, 3600.0);
 
 /// A constant factor of 1.
-fn even() -> Curve {
+fn unit_curve() -> Curve {
     Curve::new(vec![[0.0, 1.0]], Interpolation::Monotone).expect("one finite point is a curve")
 }
 
@@ -79,11 +79,11 @@ bansho_base::parameters! {
         /// Draws a smooth line through the points of a sketch; strokes of 256 points or more are used unchanged.
         smooth: bool = true;
         /// Factor of the aurora's flux along the sheet, by fraction of its length.
-        flux_factor: Curve = even(), limits(CurveLimits::unit_to(0.0, 100.0));
+        flux_factor: Curve = unit_curve(), limits(CurveLimits::unit_to(0.0, 100.0));
         /// Fraction of the sheet's length over which its flux rises from 0, at both ends; at 0 the flux begins at once, as in the thesis.
         end_taper: f64 = 0.3, limits(Range::new(0.0, 0.5));
         /// Factor of the aurora's energy along the sheet, by fraction of its length.
-        energy_factor: Curve = even(), limits(CurveLimits::unit_to(0.05, 20.0));
+        energy_factor: Curve = unit_curve(), limits(CurveLimits::unit_to(0.05, 20.0));
     }
 }
 

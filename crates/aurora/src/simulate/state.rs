@@ -26,7 +26,7 @@ pub(super) struct SimulationState {
     pub(super) target_arc_map: ArcLengthMap,
     pub(super) target_time: f64,
     /// Number of updates of the target.
-    pub(super) renewals: u32,
+    pub(super) target_updates: u32,
     pub(super) particles: AuroraParticles,
     pub(super) afterglow: Afterglow,
 }
@@ -88,7 +88,7 @@ impl SimulationState {
         self.next_id.put(&mut bytes);
         self.support_km.put(&mut bytes);
         self.target_time.put(&mut bytes);
-        self.renewals.put(&mut bytes);
+        self.target_updates.put(&mut bytes);
         write_arc_map(&mut bytes, &self.arc_map);
         write_arc_map(&mut bytes, &self.target_arc_map);
         write_particles(&mut bytes, &self.particles);
@@ -115,7 +115,7 @@ impl SimulationState {
             next_id: reader.item()?,
             support_km: reader.item()?,
             target_time: reader.item()?,
-            renewals: reader.item()?,
+            target_updates: reader.item()?,
             arc_map: read_arc_map(&mut reader)?,
             target_arc_map: read_arc_map(&mut reader)?,
             particles: read_particles(&mut reader)?,
@@ -135,8 +135,8 @@ impl SimulationState {
         };
         let arrays = self.particles.float_arrays();
         [self.steps, self.next_id].iter().all(|count| *count < MAX_EXACT_COUNT)
-            && u64::from(self.renewals) <= self.steps
-            && self.renewals < u32::MAX
+            && u64::from(self.target_updates) <= self.steps
+            && self.target_updates < u32::MAX
             && self.support_km.is_finite()
             && self.support_km > 0.0
             && self.target_time.is_finite()

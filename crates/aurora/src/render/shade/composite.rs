@@ -52,10 +52,10 @@ impl ColumnBuffer {
             sines.push(sine as f32);
             soft_rows.push(soft_projection.row(colatitude as f32) - 0.5);
         }
-        let coloring = ColorPass { chart, soft, soft_projection, emitter_colors, field, cosines, sines, soft_rows };
-        let spares = ScratchPool::new(Vec::new);
+        let pass = ColorPass { chart, soft, soft_projection, emitter_colors, field, cosines, sines, soft_rows };
+        let scratch_pool = ScratchPool::new(Vec::new);
         blocks.with_max_len(1).for_each(|block| {
-            spares.with(|column| dispatch!(level, simd => coloring.color_block(simd, block, column)));
+            scratch_pool.with(|column| dispatch!(level, simd => pass.color_block(simd, block, column)));
         });
         self
     }
@@ -67,8 +67,7 @@ impl ColorPass<'_> {
         for column in 0..BLOCK_COLUMNS {
             let number = block.number * BLOCK_COLUMNS + column;
             let [soft_first, soft_end] = self.soft_column(simd, self.chart.longitude(number) as f32, soft);
-            let own = block.valid_rows[column];
-            let [mut first, mut end] = own.map(|row| row as usize);
+            let [mut first, mut end] = block.valid_rows[column].map(|row| row as usize);
             if soft_first < soft_end {
                 let row = |soft_row: usize| self.row_of_soft(soft_row);
                 first = first.min(row(soft_first.saturating_sub(1)));
@@ -121,9 +120,9 @@ impl ColorPass<'_> {
     ) {
         let last = (soft.len() - 1) as f32;
         let [cosine, sine] = self.chart.longitude_cos_sin(number);
-        let [one, other] = self.field.across;
+        let [first_axis, second_axis] = self.field.across;
         let along = self.field.along.y as f32;
-        let outward = (one.y * cosine + other.y * sine) as f32;
+        let outward = (first_axis.y * cosine + second_axis.y * sine) as f32;
         for (batch, light) in light.chunks_mut(ROWS).enumerate() {
             let from = first + batch * ROWS;
             let (cosines, sines) = (&self.cosines[from..][..ROWS], &self.sines[from..][..ROWS]);

@@ -33,7 +33,7 @@ pub(crate) struct CachedProjection {
     column: u32,
     /// Distance of that line, km.
     pub(crate) distance: f32,
-    pub(crate) descent: RowPolynomials,
+    pub(crate) polynomials: RowPolynomials,
 }
 
 /// The accumulation buffer of a block, which a thread reuses from block to block.
@@ -137,13 +137,14 @@ impl CollisionBlock {
         simd: S,
         column: usize,
         distance: f32,
-        (descents, projection): (&RowPolynomialBasis, &ChartProjection),
+        basis: &RowPolynomialBasis,
+        projection: &ChartProjection,
     ) -> &CachedProjection {
         let range = ((approximations::log2(distance) * RANGES_PER_OCTAVE).max(0.0) as usize).min(RANGES - 1);
         let cached = &mut self.cache[2 * range + column % 2];
         if cached.column != column as u32 {
             let line = ProjectedFieldLine::new(&self.meridians[column], cached.distance, projection);
-            (cached.column, cached.descent) = (column as u32, descents.fit(simd, &line));
+            (cached.column, cached.polynomials) = (column as u32, basis.fit(simd, &line));
         }
         cached
     }
@@ -162,17 +163,17 @@ impl CollisionBlock {
     /// Writes the block to the picture.
     pub(crate) fn write(&self, block: ColumnBlock, rows: usize) {
         let columns = block.light.chunks_mut(rows).zip(block.valid_rows);
-        for ((own, valid), (light, rows_lit)) in self.light.chunks(self.stride).zip(&self.valid).zip(columns) {
+        for ((quads, valid), (light, valid_rows)) in self.light.chunks(self.stride).zip(&self.valid).zip(columns) {
             let [first, end] = *valid;
             if first >= end {
                 continue;
             }
             let last = rows.min(end * QUAD_ROWS);
-            for (quad, light) in own[first..end].iter().zip(light[first * QUAD_ROWS..last].chunks_mut(QUAD_ROWS)) {
+            for (quad, light) in quads[first..end].iter().zip(light[first * QUAD_ROWS..last].chunks_mut(QUAD_ROWS)) {
                 let light = light.as_flattened_mut();
                 light.copy_from_slice(&quad.0[..light.len()]);
             }
-            *rows_lit = [(first * QUAD_ROWS) as u32, last as u32];
+            *valid_rows = [(first * QUAD_ROWS) as u32, last as u32];
         }
     }
 }
@@ -180,7 +181,7 @@ impl CollisionBlock {
 impl CachedProjection {
     fn none(range: usize) -> Self {
         let distance = math::exp2((range as f64 + 0.5) / f64::from(RANGES_PER_OCTAVE)) as f32;
-        Self { column: NONE, distance, descent: RowPolynomials::default() }
+        Self { column: NONE, distance, polynomials: RowPolynomials::default() }
     }
 }
 

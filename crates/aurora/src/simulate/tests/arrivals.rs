@@ -49,7 +49,7 @@ impl Seen {
     ) -> Self {
         let folds = FoldModel::new(parameters, KEY);
         let (shape, bridges) = (sequence.at(time), sequence.bridges(time));
-        let refined = RefinedShape::new((&shape, &bridges), along, &folds, time, 40.0);
+        let refined = RefinedShape::new(&shape, &bridges, along, &folds, time, 40.0);
         let rays = RayPattern::new(parameters, KEY);
         let table = rays.table(&refined.sheet_lengths(), |sheet, last| refined.arc_coordinates(sheet, last), time);
         let bright = |position: &DVec2| {

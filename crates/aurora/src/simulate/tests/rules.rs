@@ -30,7 +30,7 @@ fn sheet(points: &[[f64; 2]]) -> Sheet {
 
 fn refined(parameters: &AuroraParameters, sheets: &[&[[f64; 2]]], reach: f64) -> RefinedShape {
     let shape = Shape { sheets: sheets.iter().map(|points| sheet(points)).collect() };
-    RefinedShape::new((&shape, &[]), &ArcLengthMap::alone(&shape), &FoldModel::new(parameters, KEY), 0.0, reach)
+    RefinedShape::new(&shape, &[], &ArcLengthMap::alone(&shape), &FoldModel::new(parameters, KEY), 0.0, reach)
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn relocated(
         particles.push(id, position(u, v), [2.0, -1.0], 1.0);
     }
     let mut next = count as u64;
-    Relocation::new(&parameters, KEY).relocate(&mut particles, (&field, &refined, &scattered), 0, &mut next);
+    Relocation::new(&parameters, KEY).relocate(&mut particles, &field, &refined, &scattered, 0, &mut next);
     (particles, next)
 }
 

@@ -289,7 +289,7 @@ fn what_is_found_along_the_sheets_is_bounded_by_the_particles_not_by_the_drawn_s
         let refined = simulation(parameters).refined_shape();
         let lengths = refined.sheet_lengths().iter().sum::<f64>();
         let spacing = AuroraParameters::default().cell_km();
-        let charge = SheetCharge::even(&refined, spacing, particles as f64).count();
+        let charge = SheetCharge::uniform(&refined, spacing, particles as f64).count();
         (lengths, refined.pieces(|_| 1.0).count(), charge)
     };
     let (short, pieces, charge) = of(1, 120_000);
