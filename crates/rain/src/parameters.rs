@@ -1,4 +1,4 @@
-//! What a scene says of rain.
+//! Parameters of rain.
 
 use bansho_base::parameters::{Length, Range, animated::Animated};
 

@@ -47,7 +47,7 @@ impl<const D: usize> Cells<D> {
     /// Cells for a support radius, finite and above 0, in the unit of positions.
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
-        const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
+        const { assert!(D == 2 || D == 3, "particles have two or three dimensions") };
         let empty = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
         let (order, ids, occupied, row_chunks, batches) = Default::default();
@@ -91,7 +91,7 @@ impl<const D: usize> Cells<D> {
     }
 
     /// Sorts particles by cell, then by id, and finds the candidate neighbors of each group. [`Cells::reorder`] and
-    /// [`Cells::reorder_all`] then bring other arrays into that order.
+    /// [`Cells::reorder_all`] then permute other arrays into that order.
     ///
     /// # Panics
     /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
@@ -143,7 +143,7 @@ impl<const D: usize> Cells<D> {
             }
             keys.key(cell)
         };
-        sorting.sort(key, keys.bits, ids, (order, occupied));
+        sorting.sort(key, keys.bits, ids, order, occupied);
         occupied.resize(occupied.len() + SEARCH_WIDTH, Cell { key: u64::MAX, start: ids.len() as u32 });
         self.keys = keys;
     }
@@ -171,7 +171,7 @@ impl<const D: usize> Cells<D> {
         }
     }
 
-    /// Brings values, given in the order of [`Cells::assign`], into the sorted order.
+    /// Permutes values from the order of the arguments of [`Cells::assign`] into the sorted order.
     ///
     /// # Panics
     /// If there is not one value per particle.

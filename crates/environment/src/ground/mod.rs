@@ -25,8 +25,8 @@
 //! | blur by unresolved slopes, `sigma = 2 s f` pixels | `lake_reflection::blurred_reflection` |
 //!
 //! # Data flow
-//! `Surface` is the pattern of the ground, made once from [`GroundParameters`]: octaves of noise for albedo, puddles
-//! and films. For a frame, `Ground::lake` makes the waves of the time and the blurred reflection, and `prepare`
+//! `Surface` is the pattern of the ground, built once from [`GroundParameters`]: octaves of noise for albedo, puddles
+//! and films. For a frame, `Ground::lake` computes the waves of the time and the blurred reflection, and `prepare`
 //! collects them in a `PreparedGround`. `PreparedGround` intersects each pixel's line of sight with the plane, samples
 //! the surface with a filter of the pixel's footprint, and adds the diffuse and the specular radiance. A ground of kind
 //! `plate` only darkens the plate and adds reflections, where the plate's depth says that it is ground.

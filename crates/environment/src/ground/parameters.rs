@@ -1,4 +1,4 @@
-//! What a scene may say of its ground.
+//! Parameters of the ground.
 
 use bansho_base::{
     parameters::{Range, animated::Animated},

@@ -21,7 +21,7 @@ use super::{
     wet_reflection::{fresnel, glossy_reflection},
 };
 
-/// Depth at which the ground ends, m: in front of the sky, behind everything else.
+/// Depth at which the ground ends, m: in front of the sky, behind all other phenomena.
 pub(super) const HORIZON: f64 = 1e6;
 /// Fraction of its albedo that soaked ground loses, by total internal reflection in the water (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
@@ -57,7 +57,7 @@ pub(super) struct PreparedGround<'a> {
     pub(super) surroundings: &'a Surroundings<'a>,
     pub(super) wetness: f64,
     pub(super) lake: Option<LakeFrame>,
-    /// The plate and its sky, as a film too rough for sharp reflections mirrors them.
+    /// The plate and its sky, blurred as a rough film of water reflects them.
     pub(super) backdrop: Option<Backdrop>,
 }
 
@@ -107,14 +107,14 @@ impl PreparedGround<'_> {
             GroundKind::Water => [WATER_ALBEDO; 3],
             GroundKind::Plate => sample.albedo.map(|value| value * self.wet_albedo_factor()),
             GroundKind::Land => {
-                let standing = 1.0 - PUDDLE_DARKENING * self.wetness * sample.puddle;
-                sample.albedo.map(|value| value * self.wet_albedo_factor() * standing as f32)
+                let puddle_factor = 1.0 - PUDDLE_DARKENING * self.wetness * sample.puddle;
+                sample.albedo.map(|value| value * self.wet_albedo_factor() * puddle_factor as f32)
             }
         };
         [0, 1, 2].map(|c| illuminance[c] * albedo[c] / PI)
     }
 
-    /// Albedo of the wet ground relative to dry ground.
+    /// Albedo of the ground relative to dry ground.
     fn wet_albedo_factor(&self) -> f32 {
         wet_albedo_factor(self.wetness) as f32
     }
@@ -184,8 +184,8 @@ impl PreparedGround<'_> {
     /// The transmittance of the sample; `None` if it is hidden.
     fn transmittance(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
         if self.parameters.kind == GroundKind::Plate {
-            let here = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
-            return here.then_some(self.wet_albedo_factor());
+            let is_ground = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
+            return is_ground.then_some(self.wet_albedo_factor());
         }
         strip.visible(index, hit.depth as f32).then_some(1.0 - hit.coverage as f32)
     }

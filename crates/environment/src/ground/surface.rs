@@ -57,7 +57,7 @@ pub(super) struct SurfaceSample {
 
 impl Surface {
     pub(super) fn new(parameters: &GroundParameters, key: Key) -> Self {
-        let words = [0, 1].map(|part| key.words(part, 0, Purpose::named("ground")));
+        let words = [0, 1].map(|id| key.words(id, 0, Purpose::named("ground")));
         let octaves =
             words.as_flattened().iter().take(OCTAVES).filter_map(|&seed| Noise::new(seed, SINGLE_OCTAVE, [0, 0]).ok());
         Self {

@@ -71,8 +71,8 @@ pub(super) fn glossy_reflection(
     viewer: DVec3,
     microfacets: &Microfacets,
 ) -> [f32; 3] {
-    // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and reflect what is
-    // higher.
+    // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and from higher
+    // directions.
     let rise = math::hypot(viewer.y, microfacets.mean_slope());
     let specular = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
     let backdrop_radiance = backdrop.unwrap_or_else(|| surroundings.sky.radiance(specular));

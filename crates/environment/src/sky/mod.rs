@@ -19,7 +19,7 @@
 //! | Moffat's point spread function, `(1 + (r / core)^2)^-5/2` | `stars::StarImage::psf_row` |
 //!
 //! # Data flow
-//! [`SkyBackdrop`] makes stars and skyline once. For a frame, `night::NightSky` tabulates the night by elevation, and
+//! [`SkyBackdrop`] generates stars and skyline once. For a frame, `night::NightSky` tabulates the night by elevation, and
 //! `stars` projects the visible stars into images; both are kept in a `row_cache::SkyCache` for following frames with
 //! the same camera and sky. `PreparedSky` draws rows of sixteen pixels at a time, averaged over the cameras of the
 //! exposure: first the hills of `skyline` at their distance, then the sky behind everything else, with the stars added

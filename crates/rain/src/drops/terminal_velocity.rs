@@ -15,7 +15,7 @@ bansho_base::choice! {
     }
 }
 
-/// Properties of the air.
+/// Properties of the air that determine the fall of drops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FallAir {
     /// Density rho_f, kg/m^3.
@@ -41,17 +41,17 @@ impl FallAir {
     }
 }
 
-/// The paper's fixed point does not exist, or lies outside the range of its drag coefficient.
+/// The paper's fixed point does not exist, or is outside the range of its drag coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoTerminalVelocity {
     /// The drag coefficient (3) jumps from 24 to 28.6 at Re = 1, and the drop would need a value between.
-    #[error("formula (2)-(4) has no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
+    #[error("equations (2) to (4) have no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
     DragJump {
         /// Diameter D, mm.
         diameter_mm: f64,
     },
     /// Re is 1e4 or more, where the paper gives no drag coefficient.
-    #[error("formula (2)-(4) ends at Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
+    #[error("equations (2) to (4) are valid up to Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
     TooFast {
         /// Diameter D, mm.
         diameter_mm: f64,
@@ -63,7 +63,7 @@ pub enum NoTerminalVelocity {
 /// Terminal velocity of drops: a law and the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TerminalVelocity {
-    /// Where the velocities come from.
+    /// Law of the velocities.
     pub law: VelocityLaw,
     /// The air.
     pub air: FallAir,
