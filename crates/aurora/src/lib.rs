@@ -1,7 +1,7 @@
 //! An aurora: sheets drawn by an artist, electrons that follow them, and the light that these excite in the atmosphere.
 //!
 //! The artist draws the sheets as curves in the plane at 100 km altitude. An electric field attracts particles to the curves; each particle
-//! stands for many precipitating electrons. These ionize and excite O and N2, whose emission lines are integrated along field lines for every
+//! represents many precipitating electrons. These ionize and excite O and N2, whose emission lines are integrated along field lines for every
 //! pixel.
 //!
 //! # References

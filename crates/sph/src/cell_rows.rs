@@ -96,7 +96,7 @@ impl RowChunk {
     }
 }
 
-/// Ranges of particles that may lie within the support radius of row chunks, which are visited in ascending order.
+/// Ranges of particles that may be within the support radius of row chunks, which are visited in ascending order.
 pub(super) struct NeighborRuns<'a> {
     occupied: &'a [Cell],
     rows: Vec<NeighborRow>,

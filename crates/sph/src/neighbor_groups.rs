@@ -68,7 +68,7 @@ impl<const D: usize> BoundingBox<D> {
     }
 }
 
-/// Writes the particles of a run that lie within the support radius of a box to the front of `candidates` and returns their number.
+/// Writes the particles of a run within the support radius of a box to the front of `candidates` and returns their number.
 /// Entries after them are overwritten.
 #[inline(always)]
 fn list_near<S: Simd, const D: usize>(

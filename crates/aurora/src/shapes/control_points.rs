@@ -161,8 +161,8 @@ impl TrackedControlPoints {
         let sheets = self.shapes[0].iter().zip(&self.shapes[last]).filter(same_count);
         let pairs = sheets.flat_map(|(firsts, lasts)| lasts.iter().zip(firsts).map(|(&last, &first)| [last, first]));
         let meets = |pair: &[usize; 2]| {
-            let [there, here] = [self.tracks[pair[0]].knot(last), self.tracks[pair[1]].knot(0)];
-            there.position.distance(here.position) < SAME_KM
+            let [last_knot, first_knot] = [self.tracks[pair[0]].knot(last), self.tracks[pair[1]].knot(0)];
+            last_knot.position.distance(first_knot.position) < SAME_KM
         };
         let mut pairs: Vec<[usize; 2]> = pairs.filter(meets).collect();
         pairs.sort_unstable();

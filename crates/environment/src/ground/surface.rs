@@ -29,7 +29,7 @@ const SINGLE_OCTAVE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 const BUMP_SIZE: f64 = 0.15;
 const BUMP_OCTAVES: usize = 3;
 const BUMP_VARIANCE_FRACTION: f64 = 0.4;
-/// Slope of grains that stand out of the film, relative to that of the film.
+/// Slope of grains that protrude from the film, relative to that of the film.
 const GRAIN_SLOPE_RATIO: f64 = 3.0;
 /// Largest fraction of wet ground that is film between the grains.
 const MAX_FILM_FRACTION: f64 = 0.6;
@@ -51,7 +51,7 @@ pub(super) struct SurfaceSample {
     pub(super) albedo: [f32; 3],
     /// Fraction covered by puddles when wet.
     pub(super) puddle: f64,
-    /// Fraction of the rest with an unbroken film of water; high ground has grains that stand out of it.
+    /// Fraction of the rest with an unbroken film of water; high ground has grains that protrude from it.
     pub(super) film: f64,
 }
 

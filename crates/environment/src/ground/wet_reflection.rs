@@ -20,7 +20,7 @@ pub(super) fn fresnel(cos: f64) -> f64 {
 pub(super) struct Microfacets {
     /// Mean slope: that of the bumps that are resolved.
     pub(super) tilt: DVec2,
-    /// Slopes of the unresolved film and of the grains that stand out of it: r.m.s. along each axis of a Gaussian with
+    /// Slopes of the unresolved film and of the grains that protrude from it: r.m.s. along each axis of a Gaussian with
     /// the same median.
     pub(super) slopes: [f64; 2],
     /// Fraction of the film.

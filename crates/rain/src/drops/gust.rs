@@ -46,7 +46,7 @@ impl GustField {
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
     }
 
-    /// A box that contains every point whose displaced position lies in the box between two corners.
+    /// A box that contains every point whose displaced position is in the box between two corners.
     pub(crate) fn source_bounds(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         /// After this many iterations the box hardly shrinks any more.
         const ITERATIONS: usize = 8;
@@ -60,7 +60,7 @@ impl GustField {
     }
 
     /// Minimum and maximum displacement along each axis within a box. The interpolant is linear along each axis, so
-    /// extrema lie at nodes and on the faces of the box.
+    /// extrema are at nodes and on the faces of the box.
     fn displacement_range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         let ends = |axis: usize| {
             let node = |index: usize| (self.first[axis] + index as i64) as f64 * self.spacing;

@@ -239,7 +239,7 @@ impl SizeBin {
     /// Width of a single bin, mm: that of the paper.
     pub const DEFAULT_WIDTH_MM: f64 = 0.2;
 
-    /// Bins around ascending diameters. Bounds lie half way between neighbors; the outer bins are symmetric.
+    /// Bins around ascending diameters. Bounds are halfway between neighbors; the outer bins are symmetric.
     pub fn around(diameters_mm: &[f64]) -> Vec<Self> {
         let gap = |index: usize| diameters_mm.get(index..index + 2).map(|pair| 0.5 * (pair[1] - pair[0]));
         let bin = |(index, &diameter_mm): (usize, &f64)| {

@@ -184,7 +184,7 @@ fn stokes_velocity(diameter_mm: f64, air: &FallAir) -> f64 {
 /// Terminal velocity by the paper's iteration of (2)-(4), converged to one part in 1e12, m/s; 0 for no drop.
 ///
 /// # Errors
-/// There is no such velocity, or it lies where (3) gives no drag.
+/// There is no such velocity, or it is outside the range of (3).
 pub fn fixed_point_velocity(diameter_mm: f64, air: &FallAir) -> Result<f64, NoTerminalVelocity> {
     /// Steps for the slowest convergence: far below Re = 1 each step halves the error.
     const STEPS: usize = 200;

@@ -320,7 +320,7 @@ impl<'a> SingleScattering<'a> {
         (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(end)))
     }
 
-    /// Draws the pixels of `rows` under the contents of the strip. They lie within a row of tiles, which spans the rows
+    /// Draws the pixels of `rows` under the contents of the strip. They are within a row of tiles, which spans the rows
     /// `tile` of the picture.
     pub(crate) fn draw(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         if strip.has_plate() {

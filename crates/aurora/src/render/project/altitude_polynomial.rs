@@ -81,7 +81,7 @@ impl<'a> ProjectedFieldLine<'a> {
             let per_far = far_squared.simd_rsqrt();
             let slope = distance.fma((outward + distance) * per_upward[i], coordinates[i]) * (per_far * per_far);
             projected.slopes[i] = projection.rows(slope);
-            // A source's power is per area perpendicular to the field; a collision stands for all of it, so the cosine
+            // A source's power is per area perpendicular to the field; a collision represents all of it, so the cosine
             // to the vertical cancels.
             let slant = (RADIUS + altitudes[i]) * per_upward[i] * per_far;
             projected.brightness[i] = if distance > 0.0 && far_squared > 1.0 { slant } else { 0.0 };

@@ -130,9 +130,9 @@ impl TrackRasterizer {
             let even = &mut even[2 * from..][..2 * SPLAT_LANES];
             let odd = &mut odd[2 * from..][..2 * SPLAT_LANES + 1];
             // The second and third odd pair of a quad are at the next byte.
-            let [own, odd_own, odd_next] =
+            let [touched_even, touched_odd, touched_next_odd] =
                 [&*even, &odd[..2 * SPLAT_LANES], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
-            let touched: u16x16<S> = (own | odd_own | odd_next).bitcast();
+            let touched: u16x16<S> = (touched_even | touched_odd | touched_next_odd).bitcast();
             none.store_slice(even);
             none.store_slice(&mut odd[..2 * SPLAT_LANES]);
             let quads = quads + from as u16;

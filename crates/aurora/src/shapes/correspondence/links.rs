@@ -75,14 +75,14 @@ impl LinkConstraints {
     fn constrain_chain(&mut self, transition: &Transition, track: usize, to: usize) -> Result<(), ShapeErrorKind> {
         let contains_track = |chain: &usize| transition.tracks_of(*chain).contains(&track);
         // Every track of a sheet is in one of its strands.
-        let own = (0..transition.chains.len()).find(contains_track).unwrap_or_default();
+        let chain = (0..transition.chains.len()).find(contains_track).unwrap_or_default();
         let other = self.chain_constraints.iter().position(|chain_constraint| chain_constraint.target == Some(to));
-        if self.chain_constraints[own].target.is_some_and(|target| target != to)
-            || other.is_some_and(|other| other != own)
+        if self.chain_constraints[chain].target.is_some_and(|target| target != to)
+            || other.is_some_and(|other| other != chain)
         {
             return Err(ShapeErrorKind::LinkedTwice { sheet: to + 1 });
         }
-        self.chain_constraints[own].target = Some(to);
+        self.chain_constraints[chain].target = Some(to);
         Ok(())
     }
 

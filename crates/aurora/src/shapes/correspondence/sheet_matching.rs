@@ -71,8 +71,8 @@ pub(crate) fn match_sheets(
     // Larger than any possible total motion.
     let forbidden = 1.0 + best.iter().map(|(motion, _)| motion).sum::<f64>();
     let columns = assign(count, |source, target| {
-        let elsewhere = constraints[source].target.is_some_and(|own| own != target);
-        best[source * count + target].0 + if elsewhere { forbidden } else { 0.0 }
+        let is_forbidden = constraints[source].target.is_some_and(|required| required != target);
+        best[source * count + target].0 + if is_forbidden { forbidden } else { 0.0 }
     });
     let sheet_match =
         |(source, target): (usize, usize)| SheetMatch { target, reversed: best[source * count + target].1 };

@@ -164,12 +164,12 @@ pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
         return false;
     }
     let pairs =
-        || (0..count).flat_map(|own| (0..count).filter(move |other| *other != own).map(move |other| (own, other)));
-    pairs().any(|(own, other)| {
-        let [own, other] = [own, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
+        || (0..count).flat_map(|one| (0..count).filter(move |other| *other != one).map(move |other| (one, other)));
+    pairs().any(|(one, other)| {
+        let [one, other] = [one, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
         let max_motion = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
         TESTED_QUARTERS.iter().any(|quarters| {
-            let point = own.map(|points| points[quarters * (points.len() - 1) / 4]);
+            let point = one.map(|points| points[quarters * (points.len() - 1) / 4]);
             let sides = [0, 1].map(|time| signed_distance(point[time], other[time]));
             let [Some(was), Some(is)] = sides else { return false };
             was * is < 0.0 && was.abs() + is.abs() < MAX_RELATIVE_DISTANCE * (max_motion + point[0].distance(point[1]))

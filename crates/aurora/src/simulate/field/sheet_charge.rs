@@ -23,7 +23,7 @@ const MAX_TILT: f64 = 0.9;
 /// Charge per scattered particle as a function of the position along the sheets, linear between nodes; 1 on a long,
 /// straight, isolated sheet.
 ///
-/// With uniform charge the potential would be half as deep at the ends of sheets and deeper where they wind up or lie
+/// With uniform charge the potential would be half as deep at the ends of sheets and deeper where they wind up or are
 /// close together, and particles would collect there. Here the potential is constant along all sheets, as on
 /// conductors. Next to a bend or another sheet the charge is also tilted across the sheet until both edges have the
 /// same potential; otherwise particles would rest beside the drawn line.

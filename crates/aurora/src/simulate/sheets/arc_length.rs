@@ -151,7 +151,7 @@ impl<'a> PreviousArcMap<'a> {
     }
 
     fn slot(&self, track: usize) -> Option<[usize; 2]> {
-        let index = self.slots.binary_search_by_key(&track, |(own, _)| *own).ok()?;
+        let index = self.slots.binary_search_by_key(&track, |(id, _)| *id).ok()?;
         Some(self.slots[index].1)
     }
 

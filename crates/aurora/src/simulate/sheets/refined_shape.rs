@@ -121,17 +121,17 @@ impl RefinedShape {
         let piece = folds.piece_km.max(shape.length() / (folds.max_pieces - segments as f64).max(1.0));
         let (mut fine, mut arc_positions) = (Shape::default(), Vec::new());
         for (index, sheet) in shape.sheets.iter().enumerate() {
-            let (mut refined, own) = refine(sheet, piece, |point, t| arc_map.interpolate(index, point, t));
+            let (mut refined, positions) = refine(sheet, piece, |point, t| arc_map.interpolate(index, point, t));
             if folds.parameters.amplitude_km > 0.0 {
-                fold(&mut refined, &own, folds, time);
+                fold(&mut refined, &positions, folds, time);
             }
             fine.sheets.push(refined);
-            arc_positions.push(own);
+            arc_positions.push(positions);
         }
         for bridge in bridges {
-            let (refined, own) = bridge_sheet(bridge, &fine, &arc_positions, piece);
+            let (refined, positions) = bridge_sheet(bridge, &fine, &arc_positions, piece);
             fine.sheets.push(refined);
-            arc_positions.push(own);
+            arc_positions.push(positions);
         }
         let (mut fractions, mut starts) = (Vec::new(), Vec::new());
         for (index, sheet) in fine.sheets.iter().enumerate() {
@@ -320,15 +320,15 @@ fn bridge_sheet(
     let direction = if first_end.is_end { start.direction } else { -start.direction };
     let length = from.distance(to);
     let pieces = (length / piece_km).ceil().max(1.0) as usize;
-    let (mut sheet, mut own) = (Sheet::default(), Vec::new());
+    let (mut sheet, mut arc_positions) = (Sheet::default(), Vec::new());
     for number in 0..=pieces {
         let t = number as f64 / pieces as f64;
         sheet.points.push(from.lerp(to, t));
         sheet.flux.push(bridge.flux);
         sheet.energy.push(bridge.energy);
-        own.push(ArcPosition { coordinate: start.coordinate + direction * t * length, direction });
+        arc_positions.push(ArcPosition { coordinate: start.coordinate + direction * t * length, direction });
     }
-    (sheet, own)
+    (sheet, arc_positions)
 }
 
 /// Swaps neighboring points closer than `near_km` that are in the wrong order, as occurs where a fold forms. Otherwise
