@@ -119,7 +119,7 @@ fn a_wall_stays_dry_three_centimeters_above_the_ground() {
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, size, 0);
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings::from_wind(&wind);
-    // What the ground lets through of a plate that stands everywhere this high above the ground, in a row 6 m away.
+    // Transmittance of the ground in front of a plate that is everywhere at this height above the ground, in a row 6 m away.
     let transmittance = |above: f64, plate_tolerance: f64| {
         let wet =
             GroundParameters { kind: GroundKind::Plate, wetness: 1.0.into(), puddles: 0.0, plate_tolerance, ..plain() };

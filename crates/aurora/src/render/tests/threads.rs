@@ -1,4 +1,4 @@
-//! Pictures are the same however many threads draw them.
+//! Pictures do not depend on the number of threads.
 
 use super::*;
 
