@@ -28,7 +28,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 const STRIP_ROWS: usize = 8;
 /// One particle of so many is splatted the naive way.
 const SPLATTED: usize = 10;
-/// Reach of a naive point's Gaussian, pixels, and its standard deviation.
+/// Half-width of the support of a naive point's Gaussian, pixels, and its standard deviation.
 const REACH: i64 = 3;
 const SIGMA: f64 = 1.2;
 

@@ -1,4 +1,4 @@
-//! The aurora's tables: opening them, and what they save against the formulas for every point.
+//! The aurora's tables: their construction, and lookups compared with evaluation of the formulas at every point.
 
 use std::hint::black_box;
 

@@ -6,7 +6,7 @@ use bansho_base::host::assets::MemoryAssets;
 use bansho_aurora::{AuroraParameters, FieldSolver, shapes::Sequence, simulate::AuroraSimulation};
 use criterion::{Criterion, criterion_group, criterion_main};
 
-/// The aurora of a scene that says nothing, developed and in motion; renewed every so many frames.
+/// The default aurora, developed and in motion; its target is updated at intervals of so many frames.
 fn simulation(update_interval_frames: f64, solver: FieldSolver) -> Option<AuroraSimulation> {
     let mut parameters = AuroraParameters::default();
     parameters.particles.count = 120_000;

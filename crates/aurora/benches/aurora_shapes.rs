@@ -1,4 +1,4 @@
-//! Checking strokes, sampling a shape, and finding what lies near it, each beside the naive way.
+//! Validation of strokes, sampling of a shape and nearest-segment queries, each compared with the naive algorithm.
 
 use std::hint::black_box;
 
@@ -14,7 +14,7 @@ use bansho_base::{
 use bansho_aurora::shapes::{MorphingParameters, NearestSegmentGrid, Sequence, Shape, SheetSampler, first_crossing};
 use criterion::{Criterion, criterion_group, criterion_main};
 
-/// A spiral of `count` points that nowhere meets itself.
+/// A spiral of `count` points that does not intersect itself.
 fn spiral(count: usize) -> Vec<DVec2> {
     let point = |index: usize| {
         let (sin, cos) = sin_cos(index as f64 * 0.05);
@@ -44,7 +44,7 @@ fn strokes(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The aurora of a scene that says nothing, in mid-motion.
+/// The default aurora in the middle of a transition.
 fn shape() -> Shape {
     let sequence = Sequence::new(&[], &MorphingParameters::default(), 1000.0, &MemoryAssets::default(), None);
     sequence.map(|sequence| sequence.at(7.0)).unwrap_or_default()
@@ -71,7 +71,7 @@ fn scatter(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The thesis's way: points in the bounding box until enough lie within reach of a segment.
+/// The thesis's algorithm: random points in the bounding box until enough are within reach of a segment.
 fn rejection(shape: &Shape) -> f64 {
     let points = || shape.sheets.iter().flat_map(|sheet| sheet.points.iter().copied());
     let low = points().fold(DVec2::INFINITY, DVec2::min) - REACH_KM;

@@ -1,7 +1,7 @@
 //! An aurora: sheets drawn by an artist, electrons that follow them, and the light that these excite in the atmosphere.
 //!
 //! The artist draws the sheets as curves in the plane at 100 km altitude. An electric field attracts particles to the curves; each particle
-//! stands for many precipitating electrons. These ionize and excite O and N2, whose emission lines are integrated along field lines for every
+//! represents many precipitating electrons. These ionize and excite O and N2, whose emission lines are integrated along field lines for every
 //! pixel.
 //!
 //! # References
@@ -38,7 +38,7 @@
 //! | (2.25) | probability of quenching | [`hard_sphere_quenching`](physics::emission::collisions::hard_sphere_quenching), [`radiated_fraction`](physics::emission::quenching::radiated_fraction) |
 //! | (2.26) | mean thermal speed | [`thermal_speed`](physics::emission::collisions::thermal_speed) |
 //! | (2.27) | attenuation by distance, replaced by the extinction of the lower atmosphere | [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
-//! | (2.28) | Gaussian blur in the picture | `single_collisions::blur::BlurKernel::new`, `single_collisions::blur::BlurredImage::new` |
+//! | (2.28) | Gaussian blur in the picture | `render::single_collisions::blur::BlurKernel::new`, `render::single_collisions::blur::BlurredImage::new` |
 //! | (2.29) | XYZ of spectral lines | `physics::emission::emitter::absolute_xyz` |
 //! | (2.30) | XYZ to RGB, here ACEScg | [`ACESCG_FROM_XYZ`](bansho_base::color::space::ACESCG_FROM_XYZ) |
 //! | section 2.2.2 | in-between shapes by cubic splines | [`Sequence::at`](shapes::Sequence::at) |
@@ -57,7 +57,7 @@
 //! 6. [`physics`] has the tables: ionization by energy and altitude, photons per ion pair, lifetimes, colors.
 //! 7. [`render`] projects field lines to a chart about the magnetic zenith (`project`), bins particles and afterglow cells by longitude and
 //!    distance (`bin`),
-//! 8. integrates the emission along each line of sight (`integrate`), or rasterizes single collisions instead ([`single_collisions`]),
+//! 8. integrates the emission along each line of sight (`integrate`), or rasterizes single collisions instead (`single_collisions`),
 //! 9. applies the extinction and converts to color (`shade`); pixels of any lens sample the chart (`prepared`).
 
 pub(crate) mod model;
@@ -67,7 +67,6 @@ pub mod physics;
 pub mod render;
 pub mod shapes;
 pub mod simulate;
-pub mod single_collisions;
 
 pub use model::Aurora;
 pub use parameters::{

@@ -1,4 +1,4 @@
-//! An aurora: what is built from its parameters, and its state.
+//! An aurora: the constants that are computed from its parameters, and the state of a run.
 
 use std::sync::{Arc, OnceLock};
 
@@ -26,38 +26,41 @@ use crate::{
         integrate::emission_profile::EmissionProfiles,
         project::field_lines::FieldLines,
         shade::attenuation::EmitterColors,
+        single_collisions::collision_pass::CollisionRenderer,
     },
-    single_collisions::collision_pass::CollisionRenderer,
 };
 
-/// Sheets are thin: their bright parts seen aslant beside what looks straight up through one.
-pub(super) const BRIGHT_PER_COLUMN: f64 = 0.75;
+/// Luminance of the bright parts of a picture relative to that of the brightest vertical column. Sheets are thin, and most
+/// lines of sight pass them obliquely.
+pub(super) const OBLIQUE_LUMINANCE_FACTOR: f64 = 0.75;
 
-/// How far a spectrum reaches beyond its energy, and rays beyond that, in nodes of the grid of energies: sixfold.
+/// Energy nodes above the nominal energy for which tables are computed: a factor of six, for the width of the spectrum and
+/// the energy variation of rays.
 pub(super) const SPECTRUM_NODES: usize = 25;
 
-/// An aurora, ready to be stepped and drawn. The one that is built stands at its beginning; runs are copies of it, which share what is fixed.
+/// An aurora, ready to be stepped and drawn. The prototype that is built is at its initial state; runs are copies of it, which share
+/// all constants.
 #[derive(Clone, Debug)]
 pub struct Aurora {
     pub(super) name: String,
     pub(super) seed: u64,
     pub(super) parameters: AuroraParameters,
     pub(super) sequence: Arc<Sequence>,
-    /// Made when it is first stepped or drawn: there may be hundreds of auroras, each of which is made to be checked.
-    pub(super) working: OnceLock<Working>,
-    /// How every run begins: made by the first run that needs it, shared by all.
-    pub(super) beginning: Arc<OnceLock<Working>>,
+    /// Created when the run is first stepped or drawn: a scene may have hundreds of auroras, and checking it constructs them all.
+    pub(super) run_state: OnceLock<RunState>,
+    /// Initial state of every run: created by the first run that needs it, shared by all.
+    pub(super) initial_state: Arc<OnceLock<RunState>>,
     /// Luminance of the brightest column of all shapes, cd/m^2.
-    pub(super) brightest: f64,
-    /// The shape, counted from 0, on whose way sheets first pass through each other.
+    pub(super) max_column_luminance: f64,
+    /// The first shape, counted from 0, whose transition has sheets that cross.
     pub(super) crossing: Option<usize>,
-    /// In a loop: for how long one run passes into the next, s.
-    pub(super) dissolve: f64,
+    /// In a loop, duration of the crossfade from one run to the next, s.
+    pub(super) crossfade_s: f64,
 }
 
-/// An aurora at work: its state, and what it is drawn with.
+/// State of a run, and the tables with which it is drawn.
 #[derive(Clone, Debug)]
-pub(super) struct Working {
+pub(super) struct RunState {
     pub(super) simulation: AuroraSimulation,
     pub(super) profiles: Arc<EmissionProfiles>,
     pub(super) red_profiles: Arc<EmissionProfiles>,
@@ -65,22 +68,23 @@ pub(super) struct Working {
     pub(super) collisions: Option<Arc<CollisionRenderer>>,
 }
 
-/// Longest dissolve in a loop, s: by then particles have gone a long way along their sheets.
-pub(super) const LONGEST_DISSOLVE_S: f64 = 10.0;
+/// Maximum duration of the crossfade of a loop, s: in this time particles move far along their sheets.
+pub(super) const MAX_CROSSFADE_S: f64 = 10.0;
 
-/// Makes what is keyed repeat after `turn` seconds, and room in the preroll for half the dissolve that it gives.
-pub(super) fn close_loop(parameters: &mut AuroraParameters, turn: f64) -> Result<f64, ShapeError> {
-    if let Some(key) = parameters.close_loop(turn) {
-        return Err(ShapeError { key, kind: ShapeErrorKind::LoopJumps { seconds: turn } });
+/// Makes animated parameters periodic in `loop_s` seconds and extends the preroll by half the duration of the crossfade,
+/// which is returned.
+pub(super) fn close_loop(parameters: &mut AuroraParameters, loop_s: f64) -> Result<f64, ShapeError> {
+    if let Some(key) = parameters.close_loop(loop_s) {
+        return Err(ShapeError { key, kind: ShapeErrorKind::LoopJumps { seconds: loop_s } });
     }
-    let dissolve = turn.min(LONGEST_DISSOLVE_S);
-    parameters.preroll_s += 0.5 * dissolve;
-    Ok(dissolve)
+    let crossfade_s = loop_s.min(MAX_CROSSFADE_S);
+    parameters.preroll_s += 0.5 * crossfade_s;
+    Ok(crossfade_s)
 }
 
-/// Luminance of the brightest column among control points with these factors of flux and energy, cd/m^2: the softest electrons at the
-/// greatest flux.
-pub(super) fn brightest(parameters: &AuroraParameters, emission: &Emission, factors: &[[f64; 2]]) -> f64 {
+/// Maximum luminance of a vertical column at control points with these factors of flux and energy, cd/m^2: that at the lowest
+/// energy and the highest flux.
+pub(super) fn max_column_luminance(parameters: &AuroraParameters, emission: &Emission, factors: &[[f64; 2]]) -> f64 {
     let (flux, energy_ev) = (parameters.flux_mw_per_m2.bounds()[1], parameters.energy_ev.bounds()[0]);
     let luminance = |[flux_factor, energy_factor]: &[f64; 2]| {
         let column = emission.column_color(energy_ev * energy_factor).map(|value| value as f32);
@@ -90,10 +94,10 @@ pub(super) fn brightest(parameters: &AuroraParameters, emission: &Emission, fact
 }
 
 impl Aurora {
-    /// The aurora `name` of a scene; drawings of its shapes come from `assets`.
+    /// The aurora `name` of a scene; SVG files of its shapes are loaded from `assets`.
     ///
     /// # Errors
-    /// Shapes that are no aurora's, flux or energy that do not end a loop as they begin it.
+    /// Invalid shapes; energies outside the tables; flux or energy that differ between the start and the end of a loop.
     pub fn new(
         mut parameters: AuroraParameters,
         name: &str,
@@ -103,7 +107,7 @@ impl Aurora {
     ) -> Result<Self, ShapeError> {
         constructions::count("aurora");
         let sequence = Sequence::new(&parameters.shapes, &parameters.morphing, parameters.extent_km, assets, loop_s)?;
-        let dissolve = loop_s.map_or(Ok(0.0), |turn| close_loop(&mut parameters, turn))?;
+        let crossfade_s = loop_s.map_or(Ok(0.0), |loop_s| close_loop(&mut parameters, loop_s))?;
         check_energies(&parameters)?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
@@ -111,30 +115,30 @@ impl Aurora {
         Ok(Self {
             name: name.to_owned(),
             seed,
-            brightest: brightest(&parameters, emission, &factors),
-            working: OnceLock::new(),
-            beginning: Arc::default(),
+            max_column_luminance: max_column_luminance(&parameters, emission, &factors),
+            run_state: OnceLock::new(),
+            initial_state: Arc::default(),
             parameters,
             sequence: Arc::new(sequence),
             crossing,
-            dissolve,
+            crossfade_s,
         })
     }
 
-    pub(super) fn working(&self) -> &Working {
-        get_or_compute(&self.working, || get_or_compute(&self.beginning, || self.set_to_work()).clone())
+    pub(super) fn run_state(&self) -> &RunState {
+        get_or_compute(&self.run_state, || get_or_compute(&self.initial_state, || self.new_run_state()).clone())
     }
 
-    pub(super) fn set_to_work(&self) -> Working {
+    pub(super) fn new_run_state(&self) -> RunState {
         let simulation = AuroraSimulation::new(self.parameters.clone(), self.sequence.clone(), &self.name, self.seed);
         let (parameters, emission) = (simulation.parameters(), simulation.emission());
         let by_collisions = parameters.rendering.sampling == Sampling::SingleCollisions;
-        let hardest = self.sequence.factors().fold(1.0, |most: f64, [_, energy]| most.max(energy));
-        let hardest = (hardest * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
-        let hardest = nearest_node(hardest) + SPECTRUM_NODES;
+        let max_factor = self.sequence.factors().fold(1.0, |max: f64, [_, energy]| max.max(energy));
+        let max_energy_ev = (max_factor * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
+        let highest_node = nearest_node(max_energy_ev) + SPECTRUM_NODES;
         let key = Key::new(self.seed, &self.name);
-        let collisions = || CollisionRenderer::new(emission, &parameters.rendering, hardest, key);
-        Working {
+        let collisions = || CollisionRenderer::new(emission, &parameters.rendering, highest_node, key);
+        RunState {
             collisions: by_collisions.then(|| Arc::new(collisions())),
             profiles: Arc::new(EmissionProfiles::new(emission)),
             red_profiles: Arc::new(EmissionProfiles::red_by_altitude(emission)),
@@ -146,40 +150,40 @@ impl Aurora {
     /// Its particles, field and afterglow.
     #[must_use]
     pub fn simulation(&self) -> &AuroraSimulation {
-        &self.working().simulation
+        &self.run_state().simulation
     }
 
-    /// The same, to step it or to set its state.
+    /// Mutable [`Self::simulation`].
     pub(super) fn simulation_mut(&mut self) -> Option<&mut AuroraSimulation> {
-        self.working();
-        self.working.get_mut().map(|working| &mut working.simulation)
+        self.run_state();
+        self.run_state.get_mut().map(|state| &mut state.simulation)
     }
 
     pub(super) fn profiles(&self) -> &EmissionProfiles {
-        &self.working().profiles
+        &self.run_state().profiles
     }
 
-    /// Red light alone, by its heights in position of the emitters.
+    /// Profiles of the red light only, by its altitudes instead of emitters.
     pub(super) fn red_profiles(&self) -> &EmissionProfiles {
-        &self.working().red_profiles
+        &self.run_state().red_profiles
     }
 
     pub(super) fn emitter_colors(&self) -> &EmitterColors {
-        &self.working().emitter_colors
+        &self.run_state().emitter_colors
     }
 
-    /// What single collisions are drawn from, where they are asked for.
+    /// The renderer of single collisions, if the scene selects them.
     pub(super) fn collisions(&self) -> Option<&CollisionRenderer> {
-        self.working().collisions.as_deref()
+        self.run_state().collisions.as_deref()
     }
 
     /// The magnetic field about an observer at a position in m.
-    pub(super) fn field_lines(&self, place: DVec3) -> FieldLines {
-        FieldLines::new(self.parameters.dip_deg, self.parameters.declination_deg, place)
+    pub(super) fn field_lines(&self, position: DVec3) -> FieldLines {
+        FieldLines::new(self.parameters.dip_deg, self.parameters.declination_deg, position)
     }
 
-    /// What the light of a state of its simulation is made from at a time, s.
-    pub(super) fn light<'a>(&self, simulation: &'a AuroraSimulation, t: f64) -> EmissionInputs<'a> {
+    /// Inputs of the light sources of a simulation state at time `t`, s.
+    pub(super) fn emission_inputs<'a>(&self, simulation: &'a AuroraSimulation, t: f64) -> EmissionInputs<'a> {
         let parameters = simulation.parameters();
         let energy_ev = parameters.energy_ev.at(t);
         EmissionInputs {

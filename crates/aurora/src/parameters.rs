@@ -23,13 +23,13 @@ use crate::physics::{
 const FRACTION: Range = Range::new(0.0, 1.0);
 
 bansho_base::choice! {
-    /// How the energies of the electrons are spread.
+    /// Energy spectrum of the electrons.
     pub enum SpectrumShape {
-        /// About one energy, as in arcs: a third wide.
+        /// Gaussian about `energy_ev` with a standard deviation of 35 % of it, as in arcs.
         Gaussian = "gaussian",
-        /// A hot plasma's, as in diffuse auroras; `energy_ev` is its characteristic energy.
+        /// Maxwellian, the spectrum of a hot plasma, as in diffuse auroras; `energy_ev` is the characteristic energy, half the mean energy.
         Maxwellian = "maxwellian",
-        /// All alike.
+        /// All electrons have the energy `energy_ev`.
         Monoenergetic = "monoenergetic",
     }
 }
@@ -47,21 +47,21 @@ impl SpectrumShape {
 }
 
 bansho_base::choice! {
-    /// How Poisson's equation is solved.
+    /// Solver of Poisson's equation.
     pub enum FieldSolver {
-        /// Exactly, by sine transform.
+        /// Direct solution by sine transform.
         SineTransform = "sine_transform",
-        /// By Gauss-Seidel sweeps, eq. (2.6), stopped as `sweeps` and `tolerance` say.
+        /// Gauss-Seidel sweeps, eq. (2.6), until `sweeps` or `tolerance` is reached.
         GaussSeidel = "gauss_seidel",
     }
 }
 
 bansho_base::choice! {
-    /// How charge lies on the sheets.
+    /// Distribution of the charge along the sheets.
     pub enum FieldCharge {
-        /// As on conductors: all sheets are at one potential, and particles stay where they are along them.
+        /// As on conductors: all sheets have the same potential, so particles do not drift along them.
         Conductor = "conductor",
-        /// All scattered particles have the same, eq. (2.2): particles draw away from the ends of sheets and into spirals.
+        /// All scattered particles have the same charge, eq. (2.2): particles move away from the ends of sheets and into spirals.
         Uniform = "uniform",
     }
 }
@@ -69,104 +69,109 @@ bansho_base::choice! {
 bansho_base::choice! {
     /// Kernels of the repulsion.
     pub enum RepulsionKernel {
-        /// Cubic spline, eqs. (2.17) and (2.18): lets particles come close to each other, so that their own pattern stays.
+        /// Cubic spline, eqs. (2.17) and (2.18): particles may come close to each other and keep their pattern.
         CubicSpline = "cubic_spline",
-        /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): parts close particles, and evens their pattern out. As
-        /// light is drawn, spread as far as neighbors are, both look nearly alike.
+        /// Poly6 for the density, spiky for the force, eqs. (2.12) and (2.16): separates close particles and evens out their pattern. The light of a
+        /// particle spreads as far as its neighbors are, so both kernels look nearly the same.
         Poly6Spiky = "poly6_spiky",
     }
 }
 
 bansho_base::parameters! {
-    /// The field that pulls particles to the shape (2.2.3). Lengths of the grid are cells, times frames of 1/30 s, the charge is such that a sheet's potential is of order one.
+    /// The electric field that attracts particles to the shape (2.2.3). Its constants are in cells of the grid and frames of 1/30 s, and the charge
+    /// is such that the potential of a sheet is of order one.
     pub struct FieldParameters {
-        /// Cells of the grid along each side; 255 is solved fastest, the thesis has 256.
+        /// Number of cells of the grid along each side; 255 is solved fastest, the thesis has 256.
         cells: i64 = 255, limits(Range::new(16.0, 511.0));
-        /// How the potential is found.
+        /// Solver of Poisson's equation.
         solver: FieldSolver = FieldSolver::SineTransform;
-        /// How charge lies on the sheets.
+        /// Distribution of the charge along the sheets.
         charge: FieldCharge = FieldCharge::Conductor;
-        /// Most Gauss-Seidel sweeps.
+        /// Maximum number of Gauss-Seidel sweeps.
         sweeps: i64 = 200, limits(Range::new(1.0, 2000.0));
-        /// Greatest change at which Gauss-Seidel sweeps stop, as a share of the potential of a sheet.
+        /// Maximum change of the potential, as a fraction of the potential of a sheet, below which Gauss-Seidel sweeps stop.
         tolerance: f64 = 1e-4, limits(Range::new(0.0, 1.0));
-        /// How far the sheets reach out for particles (screening length); `"auto"` is three cells.
+        /// Screening length: distance from which the sheets attract particles; `"auto"` is three cells.
         screening_length_km: Auto<f64> = Auto::Auto, limits(Range::new(0.05, 20_000.0)), unit("km");
-        /// Strength of the pull; 1 draws a particle in from three cells within about half a second.
+        /// Strength of the attraction; at 1 a particle arrives from a distance of three cells within about half a second.
         attraction: f64 = 1.0, limits(Range::new(0.0, 20.0));
-        /// Magnetic field across the plane: how far it turns a particle's way in a frame. Particles drift along the sheet, east on one side and west on the other.
+        /// Magnetic field perpendicular to the plane, as the angle by which it turns the velocity of a particle per frame. Particles drift along the
+        /// sheet, east on one side and west on the other.
         gyration_deg_per_frame: f64 = 4.0, limits(Range::new(-60.0, 60.0)), unit("degrees");
-        /// Strength of the noise in the potential, as a share of the depth of a sheet.
+        /// Amplitude of the noise in the potential, as a fraction of the depth of the potential of a sheet.
         noise: f64 = 0.08, limits(Range::new(0.0, 4.0));
-        /// Size of the noise's swirls.
+        /// Length scale of the noise.
         noise_scale_km: f64 = 30.0, limits(Range::new(0.1, 20_000.0)), unit("km");
-        /// Time in which the noise becomes another.
+        /// Correlation time of the noise.
         noise_correlation_time_s: f64 = 1.5, limits(Range::new(0.01, 1e5)), unit("s");
     }
 }
 
 bansho_base::parameters! {
-    /// When particles are born and die as the shape changes (2.3.4, table 3.3).
+    /// Births and deaths of particles when the shape changes (2.3.4, table 3.3).
     pub struct RelocationParameters {
-        /// A cell is near the shape if its scatter count is at least this share of the mean of all cells.
+        /// A cell is near the shape if its scatter count is at least this fraction of the mean over all cells, and its potential is below
+        /// `potential_threshold`.
         scatter_count_threshold: f64 = 0.10, limits(Range::new(0.0, 100.0));
-        /// And if its potential is below this multiple of the mean of all cells.
+        /// Maximum potential of a near cell, as a multiple of the mean over all cells.
         potential_threshold: f64 = 0.25, limits(Range::new(0.0, 100.0));
-        /// Below this many particles, some are born in a near cell.
+        /// Particles are created in a near cell that has fewer than this number.
         births_below: f64 = 50.0, limits(Range::new(0.0, 1e6));
-        /// At most this many at a time.
+        /// Maximum number of births in a near cell per update of the shape.
         max_births: f64 = 10.0, limits(Range::new(0.0, 1e6));
-        /// Above this many particles, those farthest from the shape die in a near cell.
+        /// In a near cell with more particles than this, those farthest from the shape are removed.
         deaths_above: f64 = 500.0, limits(Range::new(1.0, 1e6));
-        /// At most this many at a time.
+        /// Maximum number of deaths in a near cell per update of the shape.
         max_deaths: f64 = 100.0, limits(Range::new(0.0, 1e6));
-        /// Takes the four counts as those of a near cell that holds 75 particles on average, and scales them to as many as there are, so that the look does not depend on `count` of the particles; births then go by stretches of the sheets, to those that lack most, and deaths to those that hold too many. If not, they are taken as they are, cell by cell.
+        /// Scales the four counts, which refer to near cells of 75 particles on average, to the number of particles, so that the look does not depend
+        /// on `count` of the particles. Births are then distributed over intervals of the sheets in proportion to their deficit, and deaths to
+        /// intervals with a surplus. If `false`, the counts are applied literally, cell by cell.
         scale_counts: bool = true;
     }
 }
 
 bansho_base::parameters! {
-    /// The particles and how they move (2.3).
+    /// Number and motion of the particles (2.3).
     pub struct ParticleParameters {
-        /// About how many there are.
+        /// Approximate number of particles.
         count: i64 = 60_000, limits(Range::new(100.0, 1e6));
         /// Weight w_L of the Lorentz force, eq. (2.20).
         lorentz_weight: f64 = 0.6, limits(Range::new(0.0, 10.0));
         /// Weight w_P of the repulsion, eq. (2.20).
         repulsion_weight: f64 = 0.4, limits(Range::new(0.0, 10.0));
-        /// Gas constant k of the repulsion, eq. (2.13): 1 fills the sheet's thickness against the pull.
+        /// Gas constant k of the repulsion, eq. (2.13); at 1 the repulsion fills the thickness of the sheet against the attraction.
         repulsion: f64 = 1.0, limits(Range::new(0.0, 20.0));
         /// Kernels of the repulsion.
         kernel: RepulsionKernel = RepulsionKernel::CubicSpline;
-        /// How many neighbors a particle has on average, which sets the support radius h.
+        /// Mean number of neighbors of a particle, which determines the support radius h.
         neighbor_count: f64 = 35.0, limits(Range::new(6.0, 200.0));
-        /// How fast motion through the field dies down; the thesis has none.
+        /// Decay rate of the velocity; the thesis has no friction.
         friction_per_s: f64 = 6.0, limits(Range::new(0.0, 30.0)), unit("1/s");
-        /// Holds the sum of kinetic and potential energy, so that particles do not speed up without end.
+        /// Limits the sum of kinetic and potential energy, so that particles do not accelerate without bound.
         limit_energy: bool = true;
-        /// Time in which particles appear and vanish.
+        /// Duration of the fade-in and the fade-out of particles.
         fade_s: f64 = 0.4, limits(Range::new(0.0, 10.0)), unit("s");
-        /// Births and deaths.
+        /// Births and deaths when the shape changes.
         relocation: RelocationParameters = RelocationParameters::default();
     }
 }
 
 bansho_base::parameters! {
-    /// Rays: streaks of brightness along the sheet, and dark ones.
+    /// Rays: bright and dark streaks along the sheet.
     pub struct RayParameters {
-        /// How much the brightness varies along the sheet: the standard deviation of its logarithm.
+        /// Variation of the brightness along the sheet: the standard deviation of its logarithm.
         contrast: f64 = 0.7, limits(Range::new(0.0, 3.0));
-        /// Distance from ray to ray.
+        /// Distance between rays.
         spacing_km: f64 = 2.5, limits(Range::new(0.05, 1000.0)), unit("km");
-        /// How fast rays run along the sheet, one way on its one side and the other way on the other.
+        /// Speed of the rays along the sheet, in opposite directions on its two sides.
         shear_km_per_s: f64 = 1.5, limits(Range::new(-100.0, 100.0)), unit("km/s");
-        /// How long a ray lives.
+        /// Lifetime of a ray.
         lifetime_s: f64 = 3.0, limits(Range::new(0.01, 1e5)), unit("s");
-        /// How much the energy of the electrons varies with the rays: bright ones reach lower. The standard deviation of its logarithm.
+        /// Variation of the electron energy with the rays: bright rays reach lower altitudes. The standard deviation of its logarithm.
         energy_variation: f64 = 0.05, limits(Range::new(0.0, 2.0));
-        /// Depth of black rays: thin gaps that run along the sheet.
+        /// Depth of black rays, thin dark gaps that travel along the sheet.
         black_ray_depth: f64 = 0.0, limits(FRACTION);
-        /// Distance from one black ray to the next.
+        /// Distance between black rays.
         black_ray_spacing_km: f64 = 8.0, limits(Range::new(0.1, 1000.0)), unit("km");
     }
 }
@@ -174,15 +179,15 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// Folds and curls that travel along the drawn sheets.
     pub struct FoldParameters {
-        /// How far they swing to each side of the drawn line.
+        /// Amplitude of the displacement to each side of the drawn line.
         amplitude_km: f64 = 3.0, limits(Range::new(0.0, 500.0)), unit("km");
-        /// Distance from fold to fold.
+        /// Distance between folds.
         wavelength_km: f64 = 40.0, limits(Range::new(0.5, 10_000.0)), unit("km");
-        /// How fast they travel along the sheet.
+        /// Speed of the folds along the sheet.
         speed_km_per_s: f64 = 2.0, limits(Range::new(-100.0, 100.0)), unit("km/s");
-        /// How long a fold lives.
+        /// Lifetime of a fold.
         lifetime_s: f64 = 8.0, limits(Range::new(0.01, 1e5)), unit("s");
-        /// How far their crests lean over: 0 for waves, 1 for curls.
+        /// Lean of the crests: 0 for waves, 1 for curls.
         curl: f64 = 0.3, limits(Range::new(0.0, 2.0));
     }
 }
@@ -190,9 +195,9 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// Patches of the sheet that brighten and fade.
     pub struct PulsationParameters {
-        /// How far they fade: 0 not at all, 1 to nothing.
+        /// Depth of the fading: 0 for none, 1 for complete darkness.
         modulation_depth: f64 = 0.0, limits(FRACTION);
-        /// Time from bright to bright.
+        /// Period of the pulsation.
         period_s: f64 = 8.0, limits(Range::new(0.05, 1e5)), unit("s");
         /// Length of a patch along the sheet.
         patch_length_km: f64 = 60.0, limits(Range::new(0.1, 20_000.0)), unit("km");
@@ -200,44 +205,44 @@ bansho_base::parameters! {
 }
 
 bansho_base::parameters! {
-    /// An aurora (Sekiguchi): shapes drawn in the plane at 100 km altitude, particles that follow them, the light of the air that they strike.
+    /// An aurora (Sekiguchi): shapes drawn in the plane at 100 km altitude, particles that follow them, and the light of the air that they strike.
     pub struct AuroraParameters {
-        /// Side of the drawn square, its middle under the observer's zenith.
+        /// Side of the drawn square, which is centered on the observer's zenith.
         extent_km: f64 = 600.0, limits(Range::new(1.0, 20_000.0)), unit("km");
-        /// Energy flux of the electrons within a sheet; 10 is a faint arc, 50 a bright one, 300 a storm.
+        /// Energy flux of the electrons within a sheet: 10 for a faint arc, 50 for a bright one, 300 for a storm.
         flux_mw_per_m2: Animated<f64> = Animated::from(50.0), limits(Range::new(0.0, 10_000.0)), unit("mW/m^2");
-        /// Energy of the electrons: 500 eV gives a high and red aurora, 5000 a green one, 30000 one with a low rosy edge. With the factor of a sheet
-        /// it is held to what the tables of the air know, 100 eV to 100 keV.
+        /// Energy of the electrons: 500 eV for a high, red aurora, 5000 eV for a green one, 30000 eV for one with a low, pink lower border. The
+        /// product with the factor of a sheet must be within the range of the tables, 100 eV to 100 keV.
         energy_ev: Animated<f64> = Animated::from(5000.0), limits(Range::new(100.0, 100_000.0)), unit("eV");
-        /// How their energies are spread.
+        /// Energy spectrum of the electrons.
         spectrum: SpectrumShape = SpectrumShape::Gaussian;
         /// Thickness of a sheet, twice L_thr; `"auto"` is two cells of the field.
         thickness_km: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("km");
-        /// Dip of the magnetic field: 90 is upright, rays lean to the south (north of the equator) by what is missing. Field lines flatter than 30
-        /// degrees leave the drawn region and are drawn at 30.
+        /// Dip of the magnetic field. At 90 rays are vertical; otherwise they lean by the difference, toward the south (north of the equator). Field
+        /// lines with a dip below 30 degrees leave the drawn region and are drawn at 30.
         dip_deg: f64 = 77.0, limits(Range::new(-90.0, 90.0)), unit("degrees");
         /// Direction of magnetic north, east of true north.
         declination_deg: f64 = 0.0, limits(Range::new(-180.0, 180.0)), unit("degrees");
-        /// How many seconds of the aurora pass in one of the picture: so much sooner does light that lingers fade. At 1 the green light of a sheet
-        /// that crosses the sky in seconds stays behind, and its front is purple; most films of auroras are quickened, and theirs is green.
+        /// Seconds of the aurora per second of the picture; the afterglow fades faster by this factor. At 1 the green light of a sheet that crosses
+        /// the sky in seconds stays behind, and its front is purple. Most films of auroras are time lapses, in which the front is green.
         time_lapse: f64 = 1.0, limits(Range::new(0.01, 1e4));
-        /// Time that it runs before the shot.
+        /// Simulated time before the shot.
         preroll_s: f64 = 1.5, limits(Range::new(0.0, 60.0)), unit("s");
-        /// The shapes that it takes one after the other; two curtains that wave where the list is empty.
+        /// The shapes in chronological order; two waving curtains if the list is empty.
         shapes: Vec<ShapeParameters> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
-        /// How one shape becomes the next.
+        /// Transition from one shape to the next.
         morphing: MorphingParameters = MorphingParameters::default();
-        /// The electric field that draws particles to the shapes.
+        /// The electric field that attracts particles to the shapes.
         field: FieldParameters = FieldParameters::default();
-        /// The particles that stand for the electrons.
+        /// The particles that represent the electrons.
         particles: ParticleParameters = ParticleParameters::default();
-        /// Rays: fine streaks of more and less light along a sheet.
+        /// Rays: fine bright and dark streaks along a sheet.
         rays: RayParameters = RayParameters::default();
-        /// Folds that run along a sheet.
+        /// Folds that travel along a sheet.
         folds: FoldParameters = FoldParameters::default();
         /// Patches that brighten and fade.
         pulsation: PulsationParameters = PulsationParameters::default();
-        /// How light is drawn.
+        /// Rendering of the light.
         rendering: RenderingParameters = RenderingParameters::default();
     }
 }
@@ -260,9 +265,9 @@ impl AuroraParameters {
 }
 
 bansho_base::choice! {
-    /// How the falls of the electrons become light.
+    /// How the tracks of the electrons become light.
     pub enum Sampling {
-        /// By the mean of infinitely many falls: no noise.
+        /// By the mean of infinitely many tracks: no noise.
         MeanProfile = "mean_profile",
         /// By single collisions, as in the thesis (2.4).
         SingleCollisions = "single_collisions",
@@ -289,17 +294,17 @@ impl TrackModel {
 }
 
 bansho_base::choice! {
-    /// How single collisions are smoothed to light.
+    /// Where the light of particles is blurred.
     pub enum Blur {
-        /// On the sky, across the field, as far as `blur_radius_km` says: a near ray is wider than a far one.
+        /// On the sky, perpendicular to the field, by `blur_radius_km`: a near ray is wider than a far one.
         World = "world",
-        /// In the picture, by `blur_radii`, wherever they are, as in the thesis (2.28).
+        /// In the picture, by `blur_radii`, at any distance, as in the thesis (2.28).
         Screen = "screen",
     }
 }
 
 bansho_base::parameters! {
-    /// Radii (standard deviations) of the thesis's blur, eq. (2.28), which depend on the line alone; it does not say how large they are.
+    /// Radii (standard deviations) of the thesis's blur, eq. (2.28), which depend on the spectral line only; the thesis does not state their values.
     pub struct BlurParameters {
         /// Of the green line of oxygen, 557.7 nm.
         green_px: f64 = 1.5, limits(Range::new(0.0, 100.0)), unit("pixels");
@@ -317,21 +322,22 @@ bansho_base::parameters! {
 pub(crate) const MAX_COLLISION_DEFLECTION: f64 = 0.05;
 
 bansho_base::parameters! {
-    /// How the light of an aurora is drawn.
+    /// Rendering of the light of an aurora.
     pub struct RenderingParameters {
-        /// By the mean fall, or by collisions.
+        /// How the tracks of the electrons become light.
         sampling: Sampling = Sampling::MeanProfile;
-        /// What stops the electrons: measured air, or the thesis's hard spheres.
+        /// Model of the energy loss of the electrons: the measured atmosphere, or the thesis's hard spheres.
         energy_deposition: TrackModel = TrackModel::Fang2010;
-        /// Where light is smoothed: on the sky in km, or in the picture in pixels.
+        /// Where light is blurred: on the sky in km, or in the picture in pixels.
         blur_space: Blur = Blur::World;
-        /// Radii of the blur in pixels.
+        /// Radii of the blur in the picture.
         blur_radii: BlurParameters = BlurParameters::default();
-        /// How far the light of a particle spreads across the field (standard deviation); `"auto"` is as far as its neighbors are, and rays stay sharp.
+        /// Blur radius of a particle's light perpendicular to the field (standard deviation). With `"auto"` it follows the distance between
+        /// neighboring particles, and rays stay sharp.
         blur_radius_km: Auto<f64> = Auto::Auto, limits(Range::new(0.005, 100.0)), unit("km");
-        /// How far a collision turns an electron from the field: rms tangent of the angle, the vector omega of (2.21) and (2.24).
+        /// Deflection of an electron from the field by a collision: RMS tangent of the angle, the vector omega of (2.21) and (2.24).
         collision_deflection: f64 = 0.002, limits(Range::new(0.0, MAX_COLLISION_DEFLECTION));
-        /// The air below, which dims what is low in the sky.
+        /// The lower atmosphere, which attenuates light near the horizon.
         extinction: Extinction = Extinction::default();
     }
 }
@@ -346,9 +352,9 @@ const RELATIVE_ROUNDING: f64 = 1e-9;
 /// The first point where a sheet's factor takes the aurora's energy out of the range.
 pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeError> {
     let energy_ev = parameters.energy_ev.bounds();
-    for (shape, of) in parameters.shapes.iter().enumerate() {
-        for (entry, sheet) in of.sheets.iter().enumerate() {
-            if let Some((point, kind)) = outside(sheet, entry + 1, energy_ev) {
+    for (shape, shape_parameters) in parameters.shapes.iter().enumerate() {
+        for (entry, sheet) in shape_parameters.sheets.iter().enumerate() {
+            if let Some((point, kind)) = first_outside(sheet, entry + 1, energy_ev) {
                 return Err(ShapeError { key: format!("shapes.{shape}.sheets.{entry}.energy_factor.{point}"), kind });
             }
         }
@@ -357,17 +363,17 @@ pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeE
 }
 
 /// The first point of a sheet's energy curve outside the tables. The curve does not overshoot its points.
-fn outside(sheet: &SheetParameters, number: usize, [low, high]: [f64; 2]) -> Option<(usize, ShapeErrorKind)> {
-    let of_point = |(point, [at, factor]): (usize, &[f64; 2])| {
-        let (least, greatest) = (low * factor, high * factor);
-        let energy_ev = if greatest > HIGHEST_EV * (1.0 + RELATIVE_ROUNDING) {
-            greatest
-        } else if least < LOWEST_EV * (1.0 - RELATIVE_ROUNDING) {
-            least
+fn first_outside(sheet: &SheetParameters, number: usize, [low, high]: [f64; 2]) -> Option<(usize, ShapeErrorKind)> {
+    let error_at = |(point, [length_fraction, factor]): (usize, &[f64; 2])| {
+        let (min_ev, max_ev) = (low * factor, high * factor);
+        let energy_ev = if max_ev > HIGHEST_EV * (1.0 + RELATIVE_ROUNDING) {
+            max_ev
+        } else if min_ev < LOWEST_EV * (1.0 - RELATIVE_ROUNDING) {
+            min_ev
         } else {
             return None;
         };
-        Some((point, ShapeErrorKind::EnergyOutside { sheet: number, at: *at, energy_ev }))
+        Some((point, ShapeErrorKind::EnergyOutside { sheet: number, length_fraction: *length_fraction, energy_ev }))
     };
-    sheet.energy_factor.points().iter().enumerate().find_map(of_point)
+    sheet.energy_factor.points().iter().enumerate().find_map(error_at)
 }

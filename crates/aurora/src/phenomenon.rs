@@ -15,7 +15,7 @@ use bansho_base::{
 
 use super::{
     AuroraParameters,
-    model::{Aurora, BRIGHT_PER_COLUMN},
+    model::{Aurora, OBLIQUE_LUMINANCE_FACTOR},
     render::aovs::AOVS,
     shapes::ShapeErrorKind,
     simulate::AuroraSimulation,
@@ -41,7 +41,7 @@ impl Describe for AuroraParameters {
         "folds.amplitude_km",
     ];
     const IN_THE_SKY: bool = true;
-    // From the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky stays darker than the curtains.
+    // View from the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky is darker than the curtains.
     const SETTING: &'static str = "\
         picture = { exposure_ev100 = -6.9, white_balance_k = 4000.0 }\n\
         camera = { position = [0.0, 1.7, 0.0], target = [0.0, 32.0, -57.0], vertical_fov_deg = 62.0 }\n\
@@ -50,9 +50,9 @@ impl Describe for AuroraParameters {
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match Aurora::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
             Ok(aurora) => Ok(Arc::new(aurora)),
-            Err(fault) => Err(match fault.kind {
-                ShapeErrorKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
-                other => BuildError::new(fault.key, other),
+            Err(error) => Err(match error.kind {
+                ShapeErrorKind::Asset(asset_error) => BuildError { key: error.key, kind: asset_error.into() },
+                other => BuildError::new(error.key, other),
             }),
         }
     }
@@ -61,12 +61,12 @@ impl Describe for AuroraParameters {
 impl Phenomenon for Aurora {
     fn info(&self) -> PhenomenonInfo<'_> {
         let preroll = self.parameters.preroll_s;
-        let stepping = Stepping { step: AuroraSimulation::STEP_S, preroll, crossfade: self.dissolve };
+        let stepping = Stepping { step: AuroraSimulation::STEP_S, preroll, crossfade: self.crossfade_s };
         PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
     fn luminance(&self) -> f64 {
-        BRIGHT_PER_COLUMN * self.brightest
+        OBLIQUE_LUMINANCE_FACTOR * self.max_column_luminance
     }
 
     fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
@@ -80,7 +80,7 @@ impl Phenomenon for Aurora {
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
-        // A run takes its state from the beginning that all share when it is first stepped or drawn: remarks start hundreds that never are.
+        // A run copies the shared initial state when it is first stepped or drawn: remarks start hundreds of runs that never are.
         Box::new((*self).clone())
     }
 }
@@ -108,7 +108,7 @@ impl Run for Aurora {
         if t - self.simulation().time() <= step {
             return Some(point_cloud(self.simulation().particles(), t - self.simulation().time()));
         }
-        // In the midst of a long exposure.
+        // Within a long exposure, `t` may be many steps after the state.
         let mut simulation = self.simulation().clone();
         shutter::step_until(&mut simulation, t);
         Some(point_cloud(simulation.particles(), t - simulation.time()))

@@ -210,7 +210,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ smooth = false, points = [[0, 0], [100, 0], [100, 50], [50, 50], [50, -50]] }]\n",
-            "points.3 (shape 1, sheet 1, point 4): sheet 1 crosses itself: after point 4 it meets its part after point 1",
+            "points.3 (shape 1, sheet 1, point 4): sheet 1 crosses itself: after point 4 it meets the segment after point 1",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ points = [[0, 0], [9, 0]] }, { points = [[5, -5], [5, 5]] }]\n",
@@ -222,7 +222,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n",
-            "test.toml:5:10: aurora.0.shapes.1.sheets (shape 2): has 2 sheets, but 1 comes from the shape before",
+            "test.toml:5:10: aurora.0.shapes.1.sheets (shape 2): has 2 sheets, but 1 comes from the previous shape",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsplit = [{ segment = 99 }]\n",
@@ -252,11 +252,11 @@ fn faults_stand_at_their_sheet_and_point() {
         ("[[aurora.shapes]]\nsheets = [{ svg_file = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
             "[[aurora.shapes]]\ntransition_s = 3\n[[aurora.shapes]]\n",
-            "test.toml:4:16: aurora.0.shapes.0.transition_s (shape 1): the first shape is there at the beginning",
+            "test.toml:4:16: aurora.0.shapes.0.transition_s (shape 1): the first shape exists from the beginning",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nlink = [{ from_length_fraction = 0.5 }]\n",
-            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): says `from_length_fraction`, but not where that point arrives",
+            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): has `from_length_fraction`, but no position at which that point arrives",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nmerge = [{ sheets = [1, 2.5] }]\n",
@@ -264,12 +264,12 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ svg_file = \"shapes.svg\", form = \"arc\" }]\n",
-            "says more than one of `points`, `svg_file` and `form`",
+            "has more than one of `points`, `svg_file` and `form`",
         ),
         ("[[aurora.shapes]]\nsheets = [{ form = \"arcc\" }]\n", "`arcc` is not known, did you mean `arc`?"),
         (
             "[[aurora.shapes]]\ntransition_s = 3\ntransition_frames = 3\n",
-            "says both `transition_s` and `transition_frames`",
+            "has both `transition_s` and `transition_frames`",
         ),
         ("energy_ev = 0\n", "test.toml:3:13: aurora.0.energy_ev: 0 is out of range; allowed: 100 to 100000 eV"),
         ("energy_ev = 1e6\n", "test.toml:3:13: aurora.0.energy_ev: 1000000 is out of range; allowed: 100 to 100000 eV"),

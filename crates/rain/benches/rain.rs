@@ -1,5 +1,5 @@
-//! A frame of rain by billboards and drop by drop, each with the naive way beside it: every drop projected and its bounding box filled
-//! pixel by pixel by the distance from its axis.
+//! A frame of rain by billboards and drop by drop, each compared with the naive algorithm: every drop is projected, and its bounding box
+//! is filled pixel by pixel by the distance from its axis.
 
 use std::hint::black_box;
 
@@ -64,7 +64,7 @@ fn draw_frame(rain: &Rain, view: &View, surroundings: &Surroundings) {
     });
 }
 
-/// Streaks at random places of the picture, as long and wide as those of a real frame.
+/// Streaks at random positions in the picture, as long and wide as those of a real frame.
 fn naive(count: u64, pixels: &mut [[f32; 4]]) {
     let key = Key::new(1, "naive");
     for index in 0..count {

@@ -1,5 +1,5 @@
-//! The paper's 24 streak textures of 512 x 512, drops and all, with the naive way beside it: each sample of each pixel
-//! that a streak touches by itself.
+//! The paper's 24 streak textures of 512 x 512 with their drops, compared with the naive algorithm: each sample of each pixel
+//! that a streak touches.
 
 use std::hint::black_box;
 

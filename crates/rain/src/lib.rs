@@ -36,7 +36,7 @@
 //!
 //! # Data flow
 //! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins with terminal velocities.
-//! 2. For a frame, `shutter_cameras` holds the cameras when the shutter opens, at its middle and when it closes, and `drops::exposure` the state of
+//! 2. For a frame, `shutter_cameras` holds the cameras when the shutter opens, at its middle and when it closes, and `drops::shutter_state` the state of
 //!    the rain: a `lattice` of cells for each diameter, displaced by the wind, with `gust`s on top.
 //! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
 //! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`) into lit streaks. On

@@ -1,4 +1,4 @@
-//! Rain: what is built once from its parameters.
+//! Rain: the constants that are computed once from its parameters.
 
 use std::{ops::RangeInclusive, sync::LazyLock};
 
@@ -12,20 +12,20 @@ use bansho_base::{
 use super::parameters::RainParameters;
 use crate::{
     drops::{
-        exposure::{DropClassState, ground_height},
         lattice::{Lattice, LatticeMotion},
+        shutter_state::{DropClassState, ground_height},
         size_distribution::{DropSizeDistribution, SizeBin},
-        terminal_velocity::{Air, TerminalVelocity},
+        terminal_velocity::{FallAir, TerminalVelocity},
     },
     lighting::{
         drop_lighting::ScatteringTable,
         drop_phase_function::DropPhaseFunction,
-        extinction::{ExtinctionEfficiency, extinction},
+        extinction::{ExtinctionEfficiency, RainExtinction, extinction},
         sky::SkyLightingCache,
     },
 };
 
-/// How far it rains over ground that leads to the horizon, m.
+/// Extent of the rain over ground that extends to the horizon, m.
 pub(super) const HORIZON: f64 = 2e4;
 
 /// Rain, ready to be drawn at any time.
@@ -36,35 +36,35 @@ pub struct Rain {
     pub(super) key: Key,
     pub(super) optics: &'static Optics,
     pub(super) skies: SkyLightingCache,
-    pub(super) classes: Vec<Class>,
+    pub(super) classes: Vec<DropClass>,
     pub(super) loop_s: Option<f64>,
 }
 
-/// How a drop sends light on: the same for all rain.
+/// Scattering of light by drops, the same for all rain.
 #[derive(Debug)]
 pub(super) struct Optics {
-    pub(super) lens: DropPhaseFunction,
+    pub(super) phase_function: DropPhaseFunction,
     pub(super) scattering: ScatteringTable,
 }
 
 pub(super) static OPTICS: LazyLock<Optics> = LazyLock::new(|| {
-    let lens = DropPhaseFunction::new();
-    Optics { scattering: ScatteringTable::new(&lens), lens }
+    let phase_function = DropPhaseFunction::new();
+    Optics { scattering: ScatteringTable::new(&phase_function), phase_function }
 });
 
-/// The drops that one diameter stands for.
+/// A bin of drop sizes, represented by one diameter.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Class {
+pub(super) struct DropClass {
     pub(super) bin: SizeBin,
-    /// Most drops a cubic meter in the shot.
-    pub(super) most: f64,
+    /// Maximum number of drops per cubic meter in the shot.
+    pub(super) max_density: f64,
 }
 
 impl Rain {
     /// The rain `name` of a scene; in a seamless loop it repeats every `loop_s` seconds.
     ///
     /// # Errors
-    /// Diameters that do not ascend, or a loop that is no length of time.
+    /// Diameters that are not ascending, or a loop whose length is not a positive number.
     pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
@@ -74,9 +74,9 @@ impl Rain {
             return Err(ParameterError { key: "diameters_mm", kind });
         }
         constructions::count("rain");
-        let [_, heaviest] = parameters.rate_mm_per_h.bounds();
-        let sizes = DropSizeDistribution::marshall_palmer(heaviest);
-        let class = |bin: SizeBin| Class { bin, most: bin.count(&sizes) };
+        let [_, max_rate] = parameters.rate_mm_per_h.bounds();
+        let sizes = DropSizeDistribution::marshall_palmer(max_rate);
+        let class = |bin: SizeBin| DropClass { bin, max_density: bin.count(&sizes) };
         let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
         Ok(Self {
             name: name.to_owned(),
@@ -94,7 +94,7 @@ impl Rain {
         &self.parameters
     }
 
-    /// Rain rate R at time `t`, mm/h. A loop ends with the rate that it begins with.
+    /// Rain rate R at time `t`, mm/h; periodic in a loop.
     pub(super) fn rate(&self, t: f64) -> f64 {
         self.parameters.rate_mm_per_h.at(self.loop_s.map_or(t, |seconds| t.rem_euclid(seconds)))
     }
@@ -108,47 +108,47 @@ impl Rain {
         heights: RangeInclusive<f64>,
     ) -> Vec<DropClassState> {
         let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
-        let air = Air::at(surroundings.air.temperature_k, surroundings.air.pressure_pa);
+        let air = FallAir::at(surroundings.air.temperature_k, surroundings.air.pressure_pa);
         let velocity = TerminalVelocity { law: self.parameters.terminal_velocity, air };
         let (wind, response, loop_s) = (surroundings.wind, self.parameters.wind_response, self.loop_s);
-        let now = |(index, class): (usize, &Class)| {
+        let state = |(index, class): (usize, &DropClass)| {
             let speed = velocity.speed(class.bin.diameter_mm);
             DropClassState {
                 index,
                 diameter_mm: class.bin.diameter_mm,
                 speed,
-                max_density: class.most,
-                fraction: if class.most > 0.0 { class.bin.count(&sizes) / class.most } else { 0.0 },
+                max_density: class.max_density,
+                fraction: if class.max_density > 0.0 { class.bin.count(&sizes) / class.max_density } else { 0.0 },
                 lattice: Lattice::new(&LatticeMotion { speed, wind, response, ground, loop_s }, heights.clone(), t),
             }
         };
-        self.classes.iter().enumerate().map(now).collect()
+        self.classes.iter().enumerate().map(state).collect()
     }
 
-    /// No streak is further from the camera, m.
+    /// Maximum distance of a streak from the camera, m.
     pub(super) fn streaks_end(&self) -> f64 {
         (1.2 * self.parameters.distance).max(self.parameters.splashes.distance + 1.0)
     }
 
-    /// How far from the camera there is any rain before a plate, m.
+    /// Maximum distance of rain from the camera in front of a plate, m.
     pub(super) fn near_reach(&self) -> f64 {
         1.2 * self.parameters.distance + self.parameters.airlight_distance
     }
 
-    /// How far from the camera there is any rain, m: over ground that leads to the horizon as far as it.
+    /// Maximum distance of rain from the camera, m: that of the horizon over ground that extends to it.
     pub(super) fn reach(&self, surroundings: &Surroundings) -> f64 {
-        let horizon =
+        let is_endless =
             self.parameters.airlight_distance > 0.0 && ground_height(&surroundings.others.occluders).is_some();
-        if horizon { HORIZON.max(self.near_reach()) } else { self.near_reach() }
+        if is_endless { HORIZON.max(self.near_reach()) } else { self.near_reach() }
     }
 
-    /// Extinction of all drops, and of those alone that are drawn as streaks, at time `t`, Q = 1, 1/m.
-    pub(super) fn extinctions(&self, t: f64) -> [f64; 2] {
+    /// Extinction coefficients at time `t`, with Q = 1.
+    pub(super) fn extinction(&self, t: f64) -> RainExtinction {
         let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
         let gain = self.parameters.opacity_gain;
-        let disc = |class: &Class| 0.25e-6 * std::f64::consts::PI * class.bin.diameter_mm * class.bin.diameter_mm;
-        let drawn: f64 = self.classes.iter().map(|class| class.bin.count(&sizes) * disc(class)).sum();
+        let disc = |class: &DropClass| 0.25e-6 * std::f64::consts::PI * class.bin.diameter_mm * class.bin.diameter_mm;
+        let streaks: f64 = self.classes.iter().map(|class| class.bin.count(&sizes) * disc(class)).sum();
         let all = extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL);
-        [gain * all.max(drawn), gain * drawn]
+        RainExtinction { all: gain * all.max(streaks), streaks: gain * streaks }
     }
 }

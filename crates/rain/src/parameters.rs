@@ -1,4 +1,4 @@
-//! What a scene says of rain.
+//! Parameters of rain.
 
 use bansho_base::parameters::{Length, Range, animated::Animated};
 
@@ -12,47 +12,48 @@ bansho_base::choice! {
     pub enum Method {
         /// Textures of all drops of one diameter in a cubic meter, on upright billboards (Yoshida, Dobashi & Yamamoto).
         Billboards = "billboards",
-        /// Every drop by itself: the reference, slower the more it rains.
+        /// Every drop individually: the reference, slower the heavier the rain.
         Drops = "drops",
     }
 }
 
 bansho_base::parameters! {
-    /// What drops do where they hit the ground.
+    /// Splashes of drops on the ground.
     pub struct SplashParameters {
-        /// Share of the drops that are seen to splash; 0 for none.
+        /// Fraction of the drops with a visible splash; 0 for none.
         fraction: f64 = 1.0, limits(Range::new(0.0, 1.0));
-        /// Speed of the droplets that a splash throws up, beside the usual.
+        /// Factor of the speed of the droplets of a splash.
         speed_scale: f64 = 1.0, limits(Range::new(0.1, 3.0));
-        /// Splashes further away than this are not drawn.
+        /// Distance beyond which splashes are not drawn.
         distance: f64 = 8.0, limits(Range::new(0.0, 30.0)), unit("m");
     }
 }
 
 bansho_base::parameters! {
-    /// Rain: near drops as streaks, far rain as a veil.
+    /// Rain: near drops as streaks, far rain as a participating medium (airlight).
     pub struct RainParameters {
         /// Rain rate R.
         rate_mm_per_h: Animated<f64> = Animated::from(10.0), limits(Range::new(0.0, 300.0)), unit("mm/h");
         /// How near rain is drawn.
         method: Method = Method::Billboards;
-        /// Diameters that stand for all drops that are seen one by one, ascending; all others only veil.
+        /// Diameters of the drops that are drawn as streaks, ascending; each represents a bin of diameters. All other drops only contribute to the
+        /// airlight.
         diameters_mm: Vec<f64> = PAPER_DIAMETERS_MM.to_vec(), limits(Length { min: 1, max: 12, item: Range::new(0.1, 8.0) }), unit("mm");
-        /// Where terminal velocities come from.
+        /// Law of the terminal velocities.
         terminal_velocity: VelocityLaw = VelocityLaw::GunnKinzer;
-        /// How far from the camera streaks are drawn; rain further away only veils.
+        /// Distance from the camera up to which streaks are drawn; rain beyond it only contributes to the airlight.
         distance: f64 = 5.0, limits(Range::new(1.0, 40.0)), unit("m");
-        /// How far it rains beyond, over a `[ground]` without a plate to the horizon; 0 for no veil at all.
+        /// Depth of the rain beyond the streaks. Over a `[ground]` without a plate it extends to the horizon. 0 for no airlight.
         airlight_distance: f64 = 100.0, limits(Range::new(0.0, 5000.0)), unit("m");
         /// Height of the ground, where drops end, in a scene without `[ground]`.
         ground_height: f64 = 0.0, unit("m");
-        /// Opacity beside what optics gives.
+        /// Factor of the physical opacity.
         opacity_gain: f64 = 1.0, limits(Range::new(0.0, 20.0));
-        /// How much the wind carries the drops; 1 as it carries air.
+        /// Response of the drops to the wind; at 1 they drift with the air.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 2.0));
-        /// Whether the light of streaks is left out where no display would show it.
+        /// Whether the light of streaks is omitted where no display would show it.
         culling: bool = true;
-        /// What drops do where they hit the ground.
+        /// Splashes of drops on the ground.
         splashes: SplashParameters = SplashParameters::default();
     }
 }

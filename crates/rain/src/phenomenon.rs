@@ -19,7 +19,7 @@ impl Describe for RainParameters {
     const KEY: &'static str = "rain";
     const FIRST_KEYS: &'static [&'static str] =
         &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"];
-    // Lamps at dusk along a wet street: drops only show the light of others.
+    // Lamps at dusk along a wet street: drops only scatter the light of others.
     const SETTING: &'static str = "\
         camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
         sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
@@ -32,7 +32,7 @@ impl Describe for RainParameters {
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match Rain::new(self.clone(), context.name, context.seed, context.loop_s) {
             Ok(rain) => Ok(Arc::new(rain)),
-            Err(fault) => Err(BuildError::new(fault.key, fault.kind)),
+            Err(error) => Err(BuildError::new(error.key, error.kind)),
         }
     }
 }
@@ -43,7 +43,7 @@ impl Phenomenon for Rain {
         PhenomenonInfo { aovs: AOVS, strengthened_by, ..PhenomenonInfo::new(&self.name) }
     }
 
-    /// Rain sends no light of its own.
+    /// Rain emits no light.
     fn luminance(&self) -> f64 {
         0.0
     }
@@ -62,23 +62,23 @@ impl Phenomenon for Rain {
 
 impl Run for Rain {
     fn publish(&self, shutter: Shutter) -> Publication {
-        Publication { extinction: self.extinctions(shutter.middle())[0], ..Publication::default() }
+        Publication { extinction: self.extinction(shutter.middle()).all, ..Publication::default() }
     }
 
-    /// Rain fills all depths; it is cut where lights stand, so that a fire has streaks before, within and behind it.
+    /// Rain fills all depths. Its intervals end at the depths of lights, so that a fire has streaks in front of, within and behind it.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
-        const MOST: usize = 8;
-        const CLOSEST: f64 = 0.05;
+        const MAX_LIGHTS: usize = 8;
+        const MIN_LENGTH: f64 = 0.05;
         let (near, far) = (view.camera.near, self.reach(surroundings));
         let depth = |light: &Light| match light.emitter {
             Emitter::Directional { .. } => None,
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(view.camera.depth(position)),
         };
         let lights = surroundings.others.lights.iter().filter_map(depth);
-        let mut edges: Vec<f64> = lights.filter(|depth| *depth > near && *depth < far).take(MOST).collect();
+        let mut edges: Vec<f64> = lights.filter(|depth| *depth > near && *depth < far).take(MAX_LIGHTS).collect();
         edges.extend([near, far]);
         edges.sort_by(f64::total_cmp);
-        edges.dedup_by(|next, last| *next - *last < CLOSEST);
+        edges.dedup_by(|next, last| *next - *last < MIN_LENGTH);
         edges.windows(2).map(|pair| DepthInterval { near: pair[0], far: pair[1] }).collect()
     }
 

@@ -173,7 +173,7 @@ impl ShutterCameras {
         let projectors = cameras.map(|camera| Projector::new(camera, view.camera.position));
         let window = &view.window;
         let window =
-            [[window.x, window.right()], [window.y, window.bottom()]].map(|planes| planes.map(|side| side as f32));
+            [[window.x, window.right()], [window.y, window.bottom()]].map(|sides| sides.map(|side| side as f32));
         Self { cameras, projectors, window, exposure_time: shutter.duration(), frusta }
     }
 

@@ -4,29 +4,23 @@
 //! spread. A cell is one support radius wide, and a quarter of that along x. Cells are ordered along x, so the near cells of one
 //! row hold one contiguous range of particles: 3 ranges in 2-D, 9 in 3-D.
 
-use std::ops::Range;
-
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    neighbor_groups::GroupBatch,
+    cell_rows::{CELLS_PER_RADIUS_X, CellRows, Keys, RowChunk, SEARCH_WIDTH},
+    neighbor_groups::{BATCH, GroupBatch},
     sorting::{Cell, MIN_PARTICLES_PER_TASK, SampleSort},
 };
-use crate::neighbor_groups::BATCH;
 
 /// Cell coordinates are clamped to this distance from the origin, in support radii, so that a key of three axes fits 64 bits.
 const MAX_CELL_COORDINATE: i32 = 1 << 18;
 /// Cells are larger than the support radius by this factor, so that rounding never separates two neighbors by more than one cell.
 const CELL_SIZE_MARGIN: f32 = 1.001;
-/// Cells along x per support radius. Short cells keep the candidate ranges of a row short.
-const CELLS_PER_RADIUS_X: i32 = 4;
 /// Maximum length of a group, in cells along x: all particles within that length become candidates of the group.
 const MAX_GROUP_LENGTH: u64 = 8 * CELLS_PER_RADIUS_X as u64;
-/// Particles farther away than this, or at NaN, are placed here. The square of such a distance is still finite.
+/// Particles farther away than this, or at NaN, are moved to this coordinate. The square of such a distance is still finite.
 pub(super) const OUT_OF_RANGE: f32 = 1e12;
-/// Cells compared per iteration of a search, without branches: the length of a search is hard to predict.
-const SEARCH_WIDTH: usize = 4;
 
 /// Particles sorted into cells of one support radius. The result does not depend on the order in which particles are given.
 #[derive(Clone, Debug)]
@@ -49,66 +43,11 @@ pub struct Cells<const D: usize> {
     scratch: Vec<Vec<f32>>,
 }
 
-/// Up to [`BATCH`] consecutive particles of a row of cells, with the keys of the first and last cell.
-#[derive(Clone, Debug)]
-pub(super) struct RowChunk {
-    pub(super) particles: Range<u32>,
-    first: u64,
-    last: u64,
-}
-
-/// Packs cell coordinates into 64-bit keys, x in the lowest bits.
-#[derive(Clone, Copy, Debug)]
-struct Keys<const D: usize> {
-    lower: [i32; D],
-    shift: [u32; D],
-    bits: u32,
-}
-
-impl<const D: usize> Keys<D> {
-    /// For cells from `lower` to `upper`, with a margin of one support radius on each side.
-    fn new(mut lower: [i32; D], upper: [i32; D]) -> Self {
-        let mut shift = [0; D];
-        let mut bits = 0;
-        for c in 0..D {
-            let margin = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
-            shift[c] = bits;
-            bits += u32::BITS - ((upper[c] - lower[c] + 2 * margin) as u32).leading_zeros();
-            lower[c] -= margin;
-        }
-        Self { lower, shift, bits }
-    }
-
-    fn key(&self, cell: [i32; D]) -> u64 {
-        let mut key = 0;
-        for c in 0..D {
-            key |= ((cell[c] - self.lower[c]) as u64) << self.shift[c];
-        }
-        key
-    }
-
-    /// The row of a cell: its key without the bits of x.
-    fn row(&self, key: u64) -> u64 {
-        key >> self.shift[1]
-    }
-
-    /// Key offsets to the cell of the same x in each neighboring row; wrapping.
-    fn rows(&self) -> impl Iterator<Item = u64> {
-        let shift = self.shift;
-        (0..3_usize.pow(D as u32 - 1)).map(move |row| {
-            (1..D).fold(0, |sum: u64, c| {
-                let step = row / 3_usize.pow(c as u32 - 1) % 3;
-                sum.wrapping_add((step as u64).wrapping_sub(1) << shift[c])
-            })
-        })
-    }
-}
-
 impl<const D: usize> Cells<D> {
     /// Cells for a support radius, finite and above 0, in the unit of positions.
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
-        const { assert!(D == 2 || D == 3, "particles live in two or three dimensions") };
+        const { assert!(D == 2 || D == 3, "particles have two or three dimensions") };
         let empty = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
         let (order, ids, occupied, row_chunks, batches) = Default::default();
@@ -152,7 +91,7 @@ impl<const D: usize> Cells<D> {
     }
 
     /// Sorts particles by cell, then by id, and finds the candidate neighbors of each group. [`Cells::reorder`] and
-    /// [`Cells::reorder_all`] then bring other arrays into that order.
+    /// [`Cells::reorder_all`] then permute other arrays into that order.
     ///
     /// # Panics
     /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
@@ -183,9 +122,14 @@ impl<const D: usize> Cells<D> {
         self.ids.clear();
         self.ids.par_extend(self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| ids[*i as usize]));
         self.chunk_rows();
-        let mut batches = std::mem::take(&mut self.batches);
-        GroupBatch::find_all(&mut batches, self, &self.row_chunks);
-        self.batches = batches;
+        let rows = CellRows { keys: &self.keys, occupied: &self.occupied };
+        GroupBatch::find_all(
+            &mut self.batches,
+            self.positions.each_ref().map(Vec::as_slice),
+            self.support_radius,
+            rows,
+            &self.row_chunks,
+        );
     }
 
     /// Sorts by key, then by id, and lists the occupied cells; `bounds` are the first and last cell along each axis.
@@ -199,7 +143,7 @@ impl<const D: usize> Cells<D> {
             }
             keys.key(cell)
         };
-        sorting.sort(key, keys.bits, ids, (order, occupied));
+        sorting.sort(key, keys.bits, ids, order, occupied);
         occupied.resize(occupied.len() + SEARCH_WIDTH, Cell { key: u64::MAX, start: ids.len() as u32 });
         self.keys = keys;
     }
@@ -227,7 +171,7 @@ impl<const D: usize> Cells<D> {
         }
     }
 
-    /// Brings values, given in the order of [`Cells::assign`], into the sorted order.
+    /// Permutes values from the order of the arguments of [`Cells::assign`] into the sorted order.
     ///
     /// # Panics
     /// If there is not one value per particle.
@@ -270,60 +214,6 @@ impl<const D: usize> Cells<D> {
     pub(super) fn batches(&self) -> &[GroupBatch] {
         &self.batches
     }
-
-    /// The ranges of neighbor candidates of row chunks, from `first` on.
-    pub(super) fn neighbor_runs(&self, first: &RowChunk) -> NeighborRuns<'_> {
-        let start = |row: u64| self.occupied.partition_point(|cell| cell.key < first.min_key(row));
-        let rows: Vec<(u64, usize, usize)> = self.keys.rows().map(|row| (row, start(row), 0)).collect();
-        NeighborRuns { occupied: &self.occupied, runs: vec![0..0; rows.len()], rows }
-    }
-}
-
-impl RowChunk {
-    /// Smallest key of cells within the support radius in the row at the key offset `row`.
-    fn min_key(&self, row: u64) -> u64 {
-        self.first.wrapping_add(row) - CELLS_PER_RADIUS_X as u64
-    }
-
-    /// Largest such key.
-    fn max_key(&self, row: u64) -> u64 {
-        self.last.wrapping_add(row) + CELLS_PER_RADIUS_X as u64
-    }
-}
-
-/// Ranges of particles that may lie within the support radius of row chunks, which are visited in ascending order.
-pub(super) struct NeighborRuns<'a> {
-    occupied: &'a [Cell],
-    /// For each neighboring row its key offset, and the first and last cell that were near the previous chunk. Both only move
-    /// forward, so all searches together take one pass.
-    rows: Vec<(u64, usize, usize)>,
-    runs: Vec<Range<usize>>,
-}
-
-impl NeighborRuns<'_> {
-    /// The candidate ranges of a chunk; chunks must be asked for in ascending order.
-    pub(super) fn near(&mut self, chunk: &RowChunk) -> &[Range<usize>] {
-        for (run, (row, start, end)) in self.runs.iter_mut().zip(&mut self.rows) {
-            let (min_key, max_key) = (chunk.min_key(*row), chunk.max_key(*row));
-            *start = first_cell_from(self.occupied, *start, min_key);
-            *end = first_cell_from(self.occupied, (*end).max(*start), max_key + 1);
-            *run = self.occupied[*start].start as usize..self.occupied[*end].start as usize;
-        }
-        &self.runs
-    }
-}
-
-/// The first cell from `start` on whose key is not below `key`.
-#[inline(always)]
-fn first_cell_from(cells: &[Cell], mut start: usize, key: u64) -> usize {
-    while let Some(ahead) = cells.get(start..start + SEARCH_WIDTH) {
-        let below = ahead.iter().map(|cell| usize::from(cell.key < key)).sum::<usize>();
-        start += below;
-        if below < SEARCH_WIDTH {
-            break;
-        }
-    }
-    start
 }
 
 /// Cell coordinates of one component, `scale` cells per unit; returns the minimum and the maximum. `floor` is avoided: without

@@ -12,7 +12,7 @@ bansho_base::choice! {
     pub enum KernelShape {
         /// Smooth at the center, where its gradient vanishes (Mueller et al. 2003).
         Poly6 = "poly6",
-        /// With a cusp at the center, so that near particles repel most (Mueller et al. 2003, after Desbrun and Gascuel 1996).
+        /// With a cusp at the center, so that the repulsion is largest at small distances (Mueller et al. 2003, after Desbrun and Gascuel 1996).
         Spiky = "spiky",
         /// Cubic spline (Monaghan and Lattanzio 1985).
         CubicSpline = "cubic_spline",

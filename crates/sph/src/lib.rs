@@ -29,8 +29,9 @@
 //! # Data flow
 //! 1. [`Particles::sort`] hands positions and ids to [`Cells::assign`] (`cells`), which sorts by cell key and id (`sorting`: a sample sort
 //!    by ranges of keys, a radix sort within each) and lists the occupied cells.
-//! 2. Rows of cells are cut into groups of up to eight consecutive particles, each with its list of candidate neighbors (`neighbor_groups`).
-//! 3. [`Cells::reorder`] brings the caller's own arrays into the sorted order.
+//! 2. Rows of cells (`cell_rows`) are divided into groups of up to eight consecutive particles, each with its list of candidate neighbors
+//!    (`neighbor_groups`).
+//! 3. [`Cells::reorder`] permutes the caller's other arrays into the sorted order.
 //! 4. [`Cells::sum`] (`neighbor_sums`) evaluates a [`PairTerm`] for eight particles at a time over their common candidates.
 //! 5. Density, pressure force and mixing (`forces`) are such terms, with the kernels of `kernel`.
 //! 6. [`Particles::advance`] integrates (`particles`).
@@ -57,6 +58,7 @@
 //! assert!(particles.velocities[0][0] < 0.0 && particles.velocities[0][1] > 0.0);
 //! ```
 
+mod cell_rows;
 mod cells;
 mod forces;
 mod kernel;

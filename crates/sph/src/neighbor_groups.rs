@@ -2,7 +2,7 @@
 //!
 //! The batch operations loop over arrays instead of calling `map`: its closures do not vectorize.
 
-use super::cells::{Cells, RowChunk};
+use super::cell_rows::{CellRows, RowChunk};
 use bansho_base::math::simd::{HalfLanes, Real};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
@@ -68,7 +68,7 @@ impl<const D: usize> BoundingBox<D> {
     }
 }
 
-/// Writes the particles of a run that lie within the support radius of a box to the front of `candidates` and returns their number.
+/// Writes the particles of a run within the support radius of a box to the front of `candidates` and returns their number.
 /// Entries after them are overwritten.
 #[inline(always)]
 fn list_near<S: Simd, const D: usize>(
@@ -112,41 +112,47 @@ const SET_BIT_INDICES: [[u8; BATCH]; 256] = {
 };
 
 impl GroupBatch {
-    /// Splits row chunks into batches and finds the candidates of every group.
-    pub(super) fn find_all<const D: usize>(batches: &mut Vec<Self>, cells: &Cells<D>, chunks: &[RowChunk]) {
+    /// Splits row chunks into batches and finds the candidates of every group. `positions` are sorted and padded with one batch.
+    pub(super) fn find_all<const D: usize>(
+        batches: &mut Vec<Self>,
+        positions: [&[f32]; D],
+        support_radius: f32,
+        rows: CellRows<D>,
+        chunks: &[RowChunk],
+    ) {
         let level = Level::new();
         batches.resize_with(chunks.len().div_ceil(GROUPS_PER_TASK), Self::default);
         batches.par_iter_mut().with_max_len(1).zip(chunks.par_chunks(GROUPS_PER_TASK)).for_each(|(batch, chunks)| {
-            dispatch!(level, simd => batch.find(simd, cells, chunks));
+            dispatch!(level, simd => batch.find(simd, &positions, support_radius * support_radius, rows, chunks));
         });
     }
 
     /// Finds the candidates of some row chunks.
     #[inline(always)]
-    fn find<S: Simd, const D: usize>(&mut self, simd: S, cells: &Cells<D>, chunks: &[RowChunk]) {
-        let (positions, support) = (cells.positions(), cells.support_radius());
+    fn find<S: Simd, const D: usize>(
+        &mut self,
+        simd: S,
+        positions: &[&[f32]; D],
+        support_squared: f32,
+        rows: CellRows<D>,
+        chunks: &[RowChunk],
+    ) {
         let Self { groups, candidates } = self;
         groups.clear();
         candidates.clear();
         let Some(first) = chunks.first() else { return };
-        let mut neighbor_runs = cells.neighbor_runs(first);
+        let mut neighbor_runs = rows.neighbor_runs(first);
         let mut count_so_far = 0;
         for chunk in chunks {
             let particles = chunk.particles.start as usize..chunk.particles.end as usize;
-            let bounds = BoundingBox::of(&positions, particles.clone());
+            let bounds = BoundingBox::of(positions, particles.clone());
             let runs = neighbor_runs.near(chunk);
             let max_candidates: usize = runs.iter().map(|run| run.len() + BATCH).sum();
             candidates.resize(count_so_far + max_candidates, 0);
             let first = count_so_far;
             for run in runs {
-                count_so_far += list_near(
-                    simd,
-                    &positions,
-                    &bounds,
-                    support * support,
-                    run.clone(),
-                    &mut candidates[count_so_far..],
-                );
+                let free = &mut candidates[count_so_far..];
+                count_so_far += list_near(simd, positions, &bounds, support_squared, run.clone(), free);
             }
             groups.push(Group { particles, candidates: first..count_so_far });
         }
@@ -170,11 +176,11 @@ pub(super) fn length_squared<R: Real, const D: usize>(offset: &[R; D]) -> R {
 /// Truncates arrays to one length, so that one bounds check serves all.
 #[inline(always)]
 pub(super) fn truncate_all<const N: usize>(arrays: [&[f32]; N], length: usize) -> [&[f32]; N] {
-    let mut truncate_all = arrays;
+    let mut truncated = arrays;
     for k in 0..N {
-        truncate_all[k] = &arrays[k][..length];
+        truncated[k] = &arrays[k][..length];
     }
-    truncate_all
+    truncated
 }
 
 /// Loads the batch that begins at an index from each array.

@@ -60,7 +60,7 @@ impl<const D: usize> Particles<D> {
 
     /// Sorts by cell, then by id.
     ///
-    /// Afterwards bring other arrays into the same order with [`Cells::reorder`].
+    /// Other arrays are permuted into the same order by [`Cells::reorder`].
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
         cells.reorder_all(self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]));
@@ -76,8 +76,8 @@ impl<const D: usize> Particles<D> {
         for c in 0..D {
             assert_eq!(accelerations[c].len(), self.len(), "one acceleration per particle");
             let positions = self.positions[c].par_chunks_mut(MIN_PARTICLES_PER_TASK);
-            let moving = positions.zip(self.velocities[c].par_chunks_mut(MIN_PARTICLES_PER_TASK));
-            moving.zip(accelerations[c].par_chunks(MIN_PARTICLES_PER_TASK)).for_each(
+            let chunks = positions.zip(self.velocities[c].par_chunks_mut(MIN_PARTICLES_PER_TASK));
+            chunks.zip(accelerations[c].par_chunks(MIN_PARTICLES_PER_TASK)).for_each(
                 |((positions, velocities), accelerations)| {
                     dispatch!(level, _simd => advance(positions, velocities, accelerations, seconds));
                 },

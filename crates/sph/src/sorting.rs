@@ -12,8 +12,13 @@ const DIGIT_BITS: u32 = 11;
 /// Sampled keys per range. Their quantiles split the keys into ranges of about equal size.
 const SAMPLES: usize = 64;
 
-/// A key and the index of its particle.
-type Entry = (u64, u32);
+/// A particle to be sorted.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    key: u64,
+    /// Index of the particle.
+    particle: u32,
+}
 
 /// An occupied cell: its key and the index of its first particle.
 #[derive(Clone, Copy, Debug)]
@@ -46,10 +51,11 @@ impl SampleSort {
         key: impl Fn(usize) -> u64 + Sync,
         bits: u32,
         ids: &[u64],
-        (order, cells): (&mut Vec<u32>, &mut Vec<Cell>),
+        order: &mut Vec<u32>,
+        cells: &mut Vec<Cell>,
     ) {
         let all = (0..ids.len()).into_par_iter().with_min_len(MIN_PARTICLES_PER_TASK);
-        all.map(|index| (key(index), index as u32)).collect_into_vec(&mut self.entries);
+        all.map(|index| Entry { key: key(index), particle: index as u32 }).collect_into_vec(&mut self.entries);
         let count = rayon::current_num_threads().min(ids.len() / MIN_PARTICLES_PER_TASK).max(1);
         self.ranges.resize_with(count, KeyRange::default);
         let starts = self.starts_of_ranges();
@@ -61,9 +67,9 @@ impl SampleSort {
         order.resize(ids.len(), 0);
         let (mut rest, mut start, mut slices) = (order.as_mut_slice(), 0, Vec::with_capacity(count));
         for range in ranges {
-            let (own, others) = rest.split_at_mut(range.entries.len());
-            slices.push((own, start));
-            (rest, start) = (others, start + range.entries.len() as u32);
+            let (head, tail) = rest.split_at_mut(range.entries.len());
+            slices.push((head, start));
+            (rest, start) = (tail, start + range.entries.len() as u32);
         }
         self.ranges.par_iter_mut().zip(slices).for_each(|(range, (order, start))| range.write(order, start));
         cells.clear();
@@ -75,7 +81,7 @@ impl SampleSort {
         let count = self.ranges.len();
         self.sample.clear();
         let step = (self.entries.len() / (count * SAMPLES)).max(1);
-        self.sample.extend(self.entries.iter().step_by(step).map(|entry| entry.0));
+        self.sample.extend(self.entries.iter().step_by(step).map(|entry| entry.key));
         self.sample.sort_unstable();
         let start = |number: usize| if number == 0 { 0 } else { self.sample[number * self.sample.len() / count] };
         (0..count).map(start).collect()
@@ -87,31 +93,31 @@ impl KeyRange {
     fn take(&mut self, all: &[Entry], start: u64, end: Option<u64>) {
         self.entries.clear();
         let last = end.map_or(u64::MAX, |end| end.wrapping_sub(1));
-        let is_own = |entry: &&Entry| start <= entry.0 && entry.0 <= last && end != Some(start);
-        self.entries.extend(all.iter().filter(is_own));
+        let is_in_range = |entry: &&Entry| start <= entry.key && entry.key <= last && end != Some(start);
+        self.entries.extend(all.iter().filter(is_in_range));
     }
 
     /// Sorts them by key, then by id.
     fn sort(&mut self, bits: u32, ids: &[u64]) {
         let Self { entries, scratch, .. } = self;
-        scratch.resize(entries.len(), (0, 0));
+        scratch.resize(entries.len(), Entry::default());
         let passes = bits.div_ceil(DIGIT_BITS);
         for pass in 0..passes {
             let [from, to] = [pass, pass + 1].map(|pass| bits * pass / passes);
             radix_pass(entries, scratch, from..to);
             std::mem::swap(entries, scratch);
         }
-        for cell in entries.chunk_by_mut(|a, b| a.0 == b.0).filter(|cell| cell.len() > 1) {
-            cell.sort_unstable_by_key(|entry| ids[entry.1 as usize]);
+        for cell in entries.chunk_by_mut(|a, b| a.key == b.key).filter(|cell| cell.len() > 1) {
+            cell.sort_unstable_by_key(|entry| ids[entry.particle as usize]);
         }
     }
 
     /// Writes the sorted indices and lists the occupied cells; `start` is the index of the first particle.
     fn write(&mut self, order: &mut [u32], mut start: u32) {
-        order.iter_mut().zip(&self.entries).for_each(|(index, entry)| *index = entry.1);
+        order.iter_mut().zip(&self.entries).for_each(|(index, entry)| *index = entry.particle);
         self.cells.clear();
-        for cell in self.entries.chunk_by(|a, b| a.0 == b.0) {
-            self.cells.push(Cell { key: cell[0].0, start });
+        for cell in self.entries.chunk_by(|a, b| a.key == b.key) {
+            self.cells.push(Cell { key: cell[0].key, start });
             start += cell.len() as u32;
         }
     }
@@ -122,13 +128,13 @@ fn radix_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
     let mut offsets = [0_u32; 1 << DIGIT_BITS];
     let mask = (1 << bits.len()) - 1;
     let digit = |key: u64| (key >> bits.start) as usize & mask;
-    from.iter().for_each(|entry| offsets[digit(entry.0)] += 1);
+    from.iter().for_each(|entry| offsets[digit(entry.key)] += 1);
     let mut sum = 0;
     for offset in &mut offsets[..=mask] {
         sum += std::mem::replace(offset, sum);
     }
     for entry in from {
-        let offset = &mut offsets[digit(entry.0)];
+        let offset = &mut offsets[digit(entry.key)];
         to[*offset as usize] = *entry;
         *offset += 1;
     }
@@ -155,7 +161,7 @@ mod tests {
             for threads in [1, 2, 7] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("few threads");
                 let (mut order, mut cells) = (Vec::new(), Vec::new());
-                pool.install(|| SampleSort::default().sort(key, 21, &ids, (&mut order, &mut cells)));
+                pool.install(|| SampleSort::default().sort(key, 21, &ids, &mut order, &mut cells));
                 assert!(order == expected, "{key_count} keys, {threads} threads");
                 let firsts = (0..50_000).filter(|offset| {
                     let key = |offset: u32| key(expected[offset as usize] as usize);

@@ -1,4 +1,4 @@
-//! What benchmarks share.
+//! Support for benchmarks.
 
 /// A pool whose threads each stay on a core of their own: unpinned they are often packed onto one.
 pub(crate) fn pinned_pool(threads: usize) -> rayon::ThreadPool {

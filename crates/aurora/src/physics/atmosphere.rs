@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use bansho_base::math;
 
-/// Table for a typical auroral night: a comment, a header, then altitude in km and the seven fields of [`Air`].
+/// Table for a typical auroral night: a comment, a header, then altitude in km and the seven fields of [`AirLevel`].
 const TABLE_TEXT: &str = include_str!("data/nrlmsise00.csv");
 
 /// Altitude of the lowest level, km.
@@ -18,7 +18,7 @@ pub const LEVEL_SPACING: f64 = 1000.0;
 
 /// The air at one altitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Air {
+pub struct AirLevel {
     /// Number density of N2, m^-3.
     pub n2: f64,
     /// Number density of O2, m^-3.
@@ -35,7 +35,7 @@ pub struct Air {
     pub column_above: f64,
 }
 
-impl Air {
+impl AirLevel {
     const fn from_fields([n2, o2, o, temperature, density, scale_height, column_above]: [f64; 7]) -> Self {
         Self { n2, o2, o, temperature, density, scale_height, column_above }
     }
@@ -60,7 +60,7 @@ impl Air {
 /// The atmosphere as levels 1 km apart.
 #[derive(Clone, Debug)]
 pub struct Atmosphere {
-    levels: Vec<Air>,
+    levels: Vec<AirLevel>,
 }
 
 /// The atmosphere that all auroras share, parsed on first use.
@@ -84,13 +84,13 @@ impl Atmosphere {
 
     /// The [`LEVELS`] levels, from [`LOWEST_KM`] up.
     #[must_use]
-    pub fn levels(&self) -> &[Air] {
+    pub fn levels(&self) -> &[AirLevel] {
         &self.levels
     }
 
     /// The air at an altitude, clamped to 80-800 km; logarithmic interpolation between levels.
     #[must_use]
-    pub fn at(&self, altitude_km: f64) -> Air {
+    pub fn at(&self, altitude_km: f64) -> AirLevel {
         let (level, fraction) = locate_level(altitude_km);
         self.levels[level].interpolate(&self.levels[level + 1], fraction)
     }
@@ -110,19 +110,19 @@ pub fn locate_level(altitude_km: f64) -> (usize, f64) {
     (level, coordinate - level as f64)
 }
 
-/// Whether an altitude lies within the levels.
+/// Whether an altitude is within the levels.
 #[must_use]
 pub fn covers(altitude_km: f64) -> bool {
     (LOWEST_KM..=HIGHEST_KM).contains(&altitude_km)
 }
 
 /// Altitude in km and air of each row of the table.
-fn read_rows() -> Vec<(f64, Air)> {
+fn read_rows() -> Vec<(f64, AirLevel)> {
     let rows = TABLE_TEXT.lines().skip(2).map(|line| {
         // The table is compiled in and a test parses every field, so NaN cannot occur.
         let mut fields = line.split(',').map(|field| field.parse().unwrap_or(f64::NAN));
         let mut next = || fields.next().unwrap_or(f64::NAN);
-        (next(), Air::from_fields(std::array::from_fn(|_| next())))
+        (next(), AirLevel::from_fields(std::array::from_fn(|_| next())))
     });
     rows.collect()
 }

@@ -21,7 +21,7 @@ const ENERGIES_KEV: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0];
 /// Column quantities for one energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColumnMetrics {
-    /// The energy that names the spectrum: its central or characteristic one, keV.
+    /// Nominal energy of the spectrum, its central or characteristic energy, keV.
     pub energy_kev: f64,
     /// Altitude of the deposition peak, km.
     pub deposition_peak_km: f64,
@@ -110,7 +110,7 @@ const SPECTRUM_BOUNDS: [SpectrumBounds; 3] = [
     },
 ];
 
-/// Computes and checks all spectra.
+/// Computes the tables of all spectra and checks them.
 #[must_use]
 pub fn calibrate(air: &Atmosphere) -> Calibration {
     let (mut spectra, mut checks) = (Vec::new(), check_violet());
@@ -153,8 +153,8 @@ fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
 /// Altitude of the level with the maximum value, km.
 fn peak_km(value: impl Fn(usize) -> f64) -> f64 {
     let values: Vec<f64> = (0..LEVELS).map(value).collect();
-    let greatest = (0..LEVELS).fold(0, |best, level| if values[level] > values[best] { level } else { best });
-    level_altitude_km(greatest)
+    let peak = (0..LEVELS).fold(0, |best, level| if values[level] > values[best] { level } else { best });
+    level_altitude_km(peak)
 }
 
 fn requirement(requirement: String, found: f64, allowed: [f64; 2]) -> CalibrationCheck {
@@ -215,7 +215,7 @@ fn check_peaks(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<Calibr
 /// Both ratios decrease with energy above a mean of 1 keV.
 fn check_slopes(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
     let pairs = metrics.windows(2).filter(|pair| bounds.mean_ratio * pair[0].energy_kev >= 1.0);
-    let falls = pairs.flat_map(|pair| {
+    let checks = pairs.flat_map(|pair| {
         let changes = |what: &str| {
             format!("{}: {what} changes from {} to {} keV by", bounds.name, pair[0].energy_kev, pair[1].energy_kev)
         };
@@ -225,7 +225,7 @@ fn check_slopes(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<Calib
             requirement(changes("I(630.0)/I(427.8)"), red, [0.0, 0.8]),
         ]
     });
-    falls.collect()
+    checks.collect()
 }
 
 impl fmt::Display for SpectrumMetrics {
@@ -260,9 +260,9 @@ impl fmt::Display for Calibration {
             write!(f, "{spectrum}")?;
         }
         for check in &self.checks {
-            let [least, greatest] = check.allowed;
+            let [min, max] = check.allowed;
             let verdict = if check.holds() { "holds" } else { "FAILS" };
-            writeln!(f, "{verdict}  {}: {:.4} in [{least:.4}, {greatest:.4}]", check.requirement, check.found)?;
+            writeln!(f, "{verdict}  {}: {:.4} in [{min:.4}, {max:.4}]", check.requirement, check.found)?;
         }
         Ok(())
     }

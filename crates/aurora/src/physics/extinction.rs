@@ -10,16 +10,16 @@ const MAGNITUDES_PER_OPTICAL_DEPTH: f64 = 1.085_736_204_758_13;
 const MAGNITUDES: Range = Range::new(0.0, 5.0);
 
 bansho_base::parameters! {
-    /// The air above an observer. The default is a clear night near sea level: 0.22 magnitudes in the middle of the spectrum (Hayes & Latham
-    /// 1975; ozone of 300 Dobson units).
+    /// Extinction by the atmosphere above the observer. The default is a clear night near sea level: 0.22 magnitudes in the middle of the spectrum
+    /// (Hayes & Latham 1975; ozone of 300 Dobson units).
     pub struct Extinction {
-        /// Rayleigh scattering at 550 nm, overhead.
+        /// Rayleigh scattering at 550 nm, at the zenith.
         rayleigh: f64 = 0.106, limits(MAGNITUDES), unit("mag");
-        /// Aerosols at 550 nm, overhead; 0.3 is haze.
+        /// Aerosols at 550 nm, at the zenith; 0.3 is haze.
         aerosol: f64 = 0.09, limits(MAGNITUDES), unit("mag");
-        /// Angstrom's exponent of the aerosols: how much more they take from shorter waves.
+        /// Angstrom exponent of the aerosols: the larger, the stronger the extinction of short wavelengths.
         angstrom_exponent: f64 = 1.3, limits(Range::new(0.0, 4.0));
-        /// Ozone at its visible maximum near 600 nm, overhead.
+        /// Ozone at its visible maximum near 600 nm, at the zenith.
         ozone: f64 = 0.04, limits(MAGNITUDES), unit("mag");
     }
 }

@@ -1,4 +1,4 @@
-//! What an aurora can write beside its light: brightness of lines and bands in kilorayleigh, and maps.
+//! AOVs of an aurora: brightness of lines and bands in kilorayleighs, and maps of the simulation grid.
 
 use bansho_base::phenomenon::strip::{AovDescriptor, AovRule};
 
@@ -7,7 +7,7 @@ use crate::physics::emission::{Emitter, LINES, Line};
 
 /// Wavelengths of the lines that the AOVs measure, nm.
 pub(crate) const MEASURED: [f64; 6] = [557.7, 630.0, 636.4, 427.8, 391.4, 670.5];
-/// How many brightnesses the AOVs measure: those lines, and all the light of N2.
+/// Number of brightness AOVs: those of the lines, and that of all first positive bands of N2.
 pub(crate) const BRIGHTNESSES: usize = MEASURED.len() + 1;
 
 /// The lines of [`MEASURED`].
@@ -15,7 +15,7 @@ pub(crate) fn measured_lines() -> impl Iterator<Item = &'static Line> {
     MEASURED.iter().filter_map(|nm| LINES.iter().find(|line| (line.wavelength_nm - nm).abs() < 0.05))
 }
 
-/// What radiates each of the [`BRIGHTNESSES`], and how many of its photons for each that it is counted in.
+/// Emitter of each of the [`BRIGHTNESSES`], and its photons per counted photon of the emitter.
 pub(crate) fn brightnesses() -> impl Iterator<Item = (Emitter, f64)> {
     let lines = measured_lines().map(|line| (line.emitter, line.photons));
     lines.chain([(Emitter::Nitrogen, 1.0)])
@@ -25,26 +25,35 @@ const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
     AovDescriptor { name, unit: "kR", doc, rule: AovRule::Sum }
 }
 
-/// What an aurora can write beside its light, in the order of [`brightnesses`] and then of [`MAPS`].
+/// AOVs of an aurora, in the order of [`brightnesses`] and then of [`MAPS`].
 pub(crate) const AOVS: &[AovDescriptor] = &[
     brightness(
         "kilorayleigh_557",
-        "Brightness of the green line of oxygen, 557.7 nm, above the air; 0 where there is none.",
+        "Brightness of the green line of oxygen, 557.7 nm, without extinction; 0 where there is none.",
     ),
     brightness(
         "kilorayleigh_630",
-        "Brightness of the red line of oxygen, 630.0 nm, above the air; 0 where there is none.",
+        "Brightness of the red line of oxygen, 630.0 nm, without extinction; 0 where there is none.",
     ),
     brightness(
         "kilorayleigh_636",
-        "Brightness of the fainter red line of oxygen, 636.4 nm, above the air; 0 where there is none.",
+        "Brightness of the fainter red line of oxygen, 636.4 nm, without extinction; 0 where there is none.",
     ),
-    brightness("kilorayleigh_427", "Brightness of the band of N2+ at 427.8 nm, above the air; 0 where there is none."),
-    brightness("kilorayleigh_391", "Brightness of the band of N2+ at 391.4 nm, above the air; 0 where there is none."),
-    brightness("kilorayleigh_670", "Brightness of the band of N2 at 670.5 nm, above the air; 0 where there is none."),
+    brightness(
+        "kilorayleigh_427",
+        "Brightness of the band of N2+ at 427.8 nm, without extinction; 0 where there is none.",
+    ),
+    brightness(
+        "kilorayleigh_391",
+        "Brightness of the band of N2+ at 391.4 nm, without extinction; 0 where there is none.",
+    ),
+    brightness(
+        "kilorayleigh_670",
+        "Brightness of the band of N2 at 670.5 nm, without extinction; 0 where there is none.",
+    ),
     brightness(
         "kilorayleigh_first_positive",
-        "Brightness of all first positive bands of N2, most of them infrared, above the air; 0 where there is none.",
+        "Brightness of all first positive bands of N2, most of them infrared, without extinction; 0 where there is none.",
     ),
     MAPS[0],
     MAPS[1],

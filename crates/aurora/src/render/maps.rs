@@ -17,12 +17,12 @@ pub(crate) const MAPS: [AovDescriptor; 4] = [
     of_cells(
         "scatter_count",
         "1",
-        "How many particles were scattered about the in-between shape, N(i, j), in the cell where the line of sight passes 100 km altitude; 0 outside the drawn square.",
+        "Number of particles scattered about the in-between shape, N(i, j), in the cell where the line of sight passes 100 km altitude; 0 outside the drawn square.",
     ),
     of_cells(
         "particle_count",
         "1",
-        "How many particles are in the cell where the line of sight passes 100 km altitude; 0 outside the drawn square.",
+        "Number of particles in the cell where the line of sight passes 100 km altitude; 0 outside the drawn square.",
     ),
     of_cells(
         "potential",
@@ -32,11 +32,11 @@ pub(crate) const MAPS: [AovDescriptor; 4] = [
     of_cells(
         "potential_noise",
         "km^2/s^2",
-        "What noise adds to the potential where the line of sight passes 100 km altitude; 0 outside the drawn square.",
+        "Noise in the potential where the line of sight passes 100 km altitude; 0 outside the drawn square.",
     ),
 ];
 
-/// The maps of one state.
+/// The maps of one simulation state.
 pub(super) struct CellMaps<'a> {
     simulation: &'a AuroraSimulation,
     particle_counts: Grid2,

@@ -3,7 +3,7 @@
 //! Field lines of a uniform field appear as meridians about the magnetic zenith (`project`: `field_lines`), so the
 //! aurora is drawn on a chart of the sky in longitude and colatitude about that point (`chart`). Precipitation is
 //! binned by longitude and distance (`bin`); the emission profile of every field line is integrated along its
-//! meridian (`integrate`). Extinction and color are applied to the chart (`shade`), and the pixels of any lens
+//! meridian (`integrate`), or single collisions are rasterized (`single_collisions`). Extinction and color are applied to the chart (`shade`), and the pixels of any lens
 //! sample it (`prepared`). The cost is linear in pixels and particles and independent of the shapes.
 
 pub(crate) mod aovs;
@@ -15,6 +15,7 @@ pub(crate) mod prepared;
 pub(crate) mod project;
 pub(crate) mod shade;
 pub(crate) mod shutter;
+pub(crate) mod single_collisions;
 #[cfg(test)]
 mod tests;
 

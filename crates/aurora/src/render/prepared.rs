@@ -3,10 +3,10 @@
 use std::{ops::Range, sync::OnceLock};
 
 use bansho_base::{
-    camera::{Camera, directions::Directions},
+    camera::Camera,
     host::observer::{Cancelled, Observer, check},
     image::Rect,
-    math::{self, DVec2, DVec3, MulAdd, approximations},
+    math::{self, DVec2, DVec3, MulAdd},
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
@@ -20,24 +20,23 @@ use crate::{
     physics::emission::{Emitter, PerEmitter},
     render::{
         aovs::{BRIGHTNESSES, brightnesses},
-        bin::{source_bins::SourceBins, sources::Sources},
-        integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer},
+        bin::{source_bins::SortedSources, sources::Sources},
+        integrate::columns::ColumnBuffer,
         project::{
-            chart::{Chart, Coverage, STRIP_COLUMNS},
-            field_lines::{EARTH_RADIUS_KM, FieldLines, dot},
+            chart::{BLOCK_COLUMNS, Chart, Coverage},
+            field_lines::{EARTH_RADIUS_KM, FieldLines},
+            pixel_batch::{PIXEL_BATCH, PixelBatch},
         },
         shade::{attenuation::EmitterColors, chart_sampler::ChartSampler},
+        single_collisions::{blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS},
     },
     simulate::AuroraSimulation,
-    single_collisions::blur::BlurredImage,
 };
 
-/// Pixels per batch.
-pub(crate) const PIXEL_BATCH: usize = 16;
 /// Altitude that defines the aurora's depth, km.
 const DEPTH_KM: f64 = 110.0;
 /// Minimum brightness for a depth value, kR.
-const FAINTEST: f32 = 0.05;
+const MIN_BRIGHTNESS_KR: f32 = 0.05;
 
 const TAU: f32 = std::f32::consts::TAU;
 
@@ -54,7 +53,7 @@ pub(crate) struct PreparedAurora<'a> {
     /// Sine of the horizon's elevation.
     horizon: f32,
     /// Distance of the observer from the Earth's center, km.
-    from_middle: f32,
+    observer_radius: f32,
     /// Image that pixels sample.
     displayed: DisplayedLight,
     /// Brightness by emitter on the sharp and the soft chart, kept if AOVs are requested.
@@ -81,11 +80,11 @@ impl<'a> PreparedAurora<'a> {
         let charts = ChartBuilder { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
-        let drawing = &aurora.simulation().parameters().rendering;
+        let rendering = &aurora.simulation().parameters().rendering;
         let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);
-        let displayed = if drawing.blur_space == Blur::Screen {
+        let displayed = if rendering.blur_space == Blur::Screen {
             let samplers = [sharp.sampler(), soft.sampler()];
-            DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &drawing.blur_radii))
+            DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &rendering.blur_radii))
         } else {
             DisplayedLight::Chart(sharp.composite(&soft, &field, aurora.emitter_colors()))
         };
@@ -98,7 +97,7 @@ impl<'a> PreparedAurora<'a> {
             level: Level::new(),
             cameras,
             horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
-            from_middle: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
+            observer_radius: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
             displayed,
             measured,
@@ -122,14 +121,14 @@ impl ChartBuilder<'_> {
         // The angle of the spread at the minimum distance of such light.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let sorted = |strip| SourceBins::new(&sources.sharp, (&chart, strip), self.field, spread_km);
+        let sorted = |columns| SortedSources::new(&sources.sharp, &chart, columns, self.field, spread_km);
         let Some(collisions) = self.aurora.collisions() else {
-            let source_bins = sorted(STRIP_COLUMNS);
-            return ColumnBuffer::new(chart, self.field, self.aurora.profiles(), &source_bins);
+            let sorted_sources = sorted(BLOCK_COLUMNS);
+            return ColumnBuffer::new(chart, self.field, self.aurora.profiles(), &sorted_sources);
         };
-        let source_bins = sorted(BLOCK_COLUMNS);
+        let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
         let step = (self.aurora.simulation().time() / AuroraSimulation::STEP_S).round() as i64 as u32;
-        collisions.draw(chart, self.field, &source_bins, step)
+        collisions.draw(chart, self.field, &sorted_sources, step)
     }
 
     /// The coarser chart of the red afterglow.
@@ -138,50 +137,17 @@ impl ChartBuilder<'_> {
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
         // Laterally it is as smooth as its sources, vertically it follows the atmosphere.
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
-        let source_bins = SourceBins::new(&sources.soft, (&chart, STRIP_COLUMNS), self.field, spread_km);
+        let sorted_sources = SortedSources::new(&sources.soft, &chart, BLOCK_COLUMNS, self.field, spread_km);
         // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
-        let mut picture = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &source_bins);
-        picture.sum_red_altitudes();
-        picture
-    }
-}
-
-/// Directions of a batch of pixels in the field frame.
-#[derive(Default)]
-pub(crate) struct PixelBatch {
-    /// Colatitude and longitude about the magnetic zenith.
-    pub(crate) colatitude: [f32; PIXEL_BATCH],
-    pub(crate) longitude: [f32; PIXEL_BATCH],
-    /// Sine of the elevation.
-    sine: [f32; PIXEL_BATCH],
-    /// Length of the direction that [`Camera::direction`] gives.
-    length: [f32; PIXEL_BATCH],
-    /// Whether the lens maps the pixel to a direction.
-    in_view: [bool; PIXEL_BATCH],
-}
-
-impl PixelBatch {
-    /// Pixels from `x` on in row `y`.
-    #[inline(always)]
-    pub(crate) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
-        let mut directions = Directions::new(camera, x, y);
-        let mut batch = Self { length: directions.normalize(), in_view: directions.visible, ..Self::default() };
-        let [xs, ys, zs] = directions.components;
-        let [along, first, second] = field.axes_f32();
-        for i in 0..PIXEL_BATCH {
-            let direction = [xs[i], ys[i], zs[i]];
-            let (x, y) = (dot(first, direction), dot(second, direction));
-            batch.colatitude[i] = approximations::atan2(x.fma(x, y * y).sqrt(), dot(along, direction));
-            batch.longitude[i] = approximations::atan2(y, x);
-        }
-        batch.sine = ys;
-        batch
+        let mut buffer = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &sorted_sources);
+        buffer.sum_red_altitudes();
+        buffer
     }
 }
 
 impl PreparedAurora<'_> {
     #[inline(always)]
-    fn draw_rows<S: Simd>(&self, simd: S, depths_shown: &DepthInterval, strip: &mut Strip) {
+    fn draw_rows<S: Simd>(&self, simd: S, slice: &DepthInterval, strip: &mut Strip) {
         let sampler = match &self.displayed {
             DisplayedLight::Chart(chart) => Some(chart.sampler()),
             DisplayedLight::BlurredImage(_) => None,
@@ -194,7 +160,7 @@ impl PreparedAurora<'_> {
             let measured = !strip.aovs.is_empty();
             if measured || !sampler.as_ref().is_some_and(|sampler| self.is_dark(sampler, x, [rect.y, rect.bottom()])) {
                 for y in rect.y..rect.bottom() {
-                    self.draw_batch(simd, sampler.as_ref(), depths_shown, strip, [x, y]);
+                    self.draw_batch(simd, sampler.as_ref(), slice, strip, [x, y]);
                 }
             }
             x += PIXEL_BATCH;
@@ -208,7 +174,7 @@ impl PreparedAurora<'_> {
             return false;
         }
         let (mut longitudes, mut colatitudes) = ([f32::INFINITY, -f32::INFINITY], [f32::INFINITY, -f32::INFINITY]);
-        let mut middle = None;
+        let mut reference = None;
         for y in rows {
             for x in [x, x + PIXEL_BATCH] {
                 let Some(direction) = self.view.camera.direction(DVec2::new(x as f64, y as f64)) else { return false };
@@ -217,9 +183,8 @@ impl PreparedAurora<'_> {
                 let colatitude = math::atan2(math::hypot(first, second), along) as f32;
                 let longitude = math::atan2(second, first) as f32;
                 // Relative to the first corner, so that the region is not split at the seam of longitude.
-                let about = *middle.get_or_insert(longitude);
-                let turned = longitude - about;
-                let longitude = longitude - (turned * (1.0 / TAU)).round() * TAU;
+                let difference = longitude - *reference.get_or_insert(longitude);
+                let longitude = longitude - (difference * (1.0 / TAU)).round() * TAU;
                 longitudes = [longitudes[0].min(longitude), longitudes[1].max(longitude)];
                 colatitudes = [colatitudes[0].min(colatitude), colatitudes[1].max(colatitude)];
             }
@@ -242,7 +207,7 @@ impl PreparedAurora<'_> {
         &self,
         simd: S,
         sampler: Option<&ChartSampler>,
-        depths_shown: &DepthInterval,
+        slice: &DepthInterval,
         strip: &mut Strip,
         [x, y]: [usize; 2],
     ) {
@@ -256,29 +221,30 @@ impl PreparedAurora<'_> {
             if sky == [0.0; PIXEL_BATCH] {
                 continue;
             }
-            let colors = self.look_up(simd, sampler, &batch, [x, y]);
+            let colors = self.sample_colors(simd, sampler, &batch, [x, y]);
             if strip.aovs.is_empty() && colors == [[0.0; 4]; PIXEL_BATCH] {
                 continue;
             }
-            mask_occluded(&mut sky, &depths, depths_shown, strip, (first, inside.clone()));
+            mask_occluded(&mut sky, &depths, slice, strip, first, inside.clone());
             let mut planes = [[0.0; PIXEL_BATCH]; 3];
             for i in 0..PIXEL_BATCH {
                 let [red, green, blue, brightness] = colors[i];
                 (planes[0][i], planes[1][i], planes[2][i]) = (sky[i] * red, sky[i] * green, sky[i] * blue);
-                depths[i] = if sky[i] * brightness > FAINTEST * camera_weight { depths[i] } else { f32::INFINITY };
+                depths[i] =
+                    if sky[i] * brightness > MIN_BRIGHTNESS_KR * camera_weight { depths[i] } else { f32::INFINITY };
             }
             let [red, green, blue] = &planes;
             let radiance = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
             strip.add_row_behind(first, radiance, None, &depths[inside.clone()]);
             if !strip.aovs.is_empty() {
-                self.measure(simd, camera, &batch, (strip, first), ([x, y], &inside), (&sky, camera_weight));
+                self.measure(simd, camera, &batch, strip, first, [x, y], &inside, &sky, camera_weight);
             }
         }
     }
 
     /// Colors and brightness of a batch.
     #[inline(always)]
-    fn look_up<S: Simd>(
+    fn sample_colors<S: Simd>(
         &self,
         simd: S,
         sampler: Option<&ChartSampler>,
@@ -315,16 +281,19 @@ impl PreparedAurora<'_> {
         (sky, depths)
     }
 
-    /// Accumulates the AOVs of a batch; its pixels `inside` start at index `first` of the strip.
+    /// Accumulates the AOVs of a batch whose first pixel is `[x, y]`. Its pixels `inside` start at index `first` of the strip.
     #[inline(always)]
     fn measure<S: Simd>(
         &self,
         simd: S,
         camera: &Camera,
         batch: &PixelBatch,
-        (strip, first): (&mut Strip, usize),
-        ([x, y], inside): ([usize; 2], &Range<usize>),
-        (sky, camera_weight): (&[f32; PIXEL_BATCH], f32),
+        strip: &mut Strip,
+        first: usize,
+        [x, y]: [usize; 2],
+        inside: &Range<usize>,
+        sky: &[f32; PIXEL_BATCH],
+        camera_weight: f32,
     ) {
         let mut light = [[0.0; 4]; PIXEL_BATCH];
         match &self.displayed {
@@ -366,8 +335,8 @@ impl PreparedAurora<'_> {
     #[inline(always)]
     fn depth(&self, sine: f32) -> f32 {
         const SHELL: f32 = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
-        let along = self.from_middle * sine;
-        let squared = along.fma(along, (SHELL - self.from_middle) * (SHELL + self.from_middle));
+        let along = self.observer_radius * sine;
+        let squared = along.fma(along, (SHELL - self.observer_radius) * (SHELL + self.observer_radius));
         1e3 * (squared.max(0.0).sqrt() - along).abs()
     }
 }
@@ -378,13 +347,14 @@ impl PreparedAurora<'_> {
 fn mask_occluded(
     sky: &mut [f32; PIXEL_BATCH],
     depths: &[f32; PIXEL_BATCH],
-    depths_shown: &DepthInterval,
+    slice: &DepthInterval,
     strip: &Strip,
-    (first, inside): (usize, Range<usize>),
+    first: usize,
+    inside: Range<usize>,
 ) {
     for i in 0..PIXEL_BATCH {
         let depth = f64::from(depths[i]);
-        sky[i] = if depth >= depths_shown.near && depth < depths_shown.far { sky[i] } else { 0.0 };
+        sky[i] = if depth >= slice.near && depth < slice.far { sky[i] } else { 0.0 };
     }
     if strip.has_plate() {
         for i in inside.clone() {
@@ -394,17 +364,13 @@ fn mask_occluded(
 }
 
 impl Prepared for PreparedAurora<'_> {
-    fn bounds(&self, depths_shown: &DepthInterval) -> Rect {
-        if depths_shown.overlaps(&DEPTHS) {
-            Rect::from_size(self.view.size[0], self.view.size[1])
-        } else {
-            Rect::default()
-        }
+    fn bounds(&self, slice: &DepthInterval) -> Rect {
+        if slice.overlaps(&DEPTHS) { Rect::from_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
     }
 
-    fn draw(&self, depths_shown: &DepthInterval, strip: &mut Strip) {
-        if depths_shown.overlaps(&DEPTHS) {
-            dispatch!(self.level, simd => self.draw_rows(simd, depths_shown, strip));
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        if slice.overlaps(&DEPTHS) {
+            dispatch!(self.level, simd => self.draw_rows(simd, slice, strip));
         }
     }
 }

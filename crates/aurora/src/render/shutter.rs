@@ -42,14 +42,14 @@ impl Aurora {
 
     /// Extrapolated particles of the current state, and its afterglow.
     fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
-        let light = self.light(self.simulation(), view.shutter.middle());
+        let inputs = self.emission_inputs(self.simulation(), view.shutter.middle());
         let distance_km = rms_speed(self.simulation()) * view.shutter.duration();
         let count =
-            (2.0 * distance_km / (SPREADS_PER_INSTANT * light.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
+            (2.0 * distance_km / (SPREADS_PER_INSTANT * inputs.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
         let now = self.simulation().time();
         let offsets_s = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
         Sources::new(
-            &light,
+            &inputs,
             field,
             &SampleTimes { offsets_s, first_index: 0, smear_km: smear_km(distance_km / count as f64) },
         )
@@ -69,12 +69,12 @@ impl Aurora {
             step_until(&mut simulation, t);
             let distance_km = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
             let first = instant as u32;
-            let moments = SampleTimes {
+            let times = SampleTimes {
                 offsets_s: vec![t - simulation.time()],
                 first_index: first,
                 smear_km: smear_km(distance_km),
             };
-            mean.add(&Sources::new(&self.light(&simulation, t), field, &moments), 1.0 / LONG_INSTANTS as f32);
+            mean.add(&Sources::new(&self.emission_inputs(&simulation, t), field, &times), 1.0 / LONG_INSTANTS as f32);
         }
         mean
     }

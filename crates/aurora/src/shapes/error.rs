@@ -1,8 +1,8 @@
-//! Faults of drawn shapes, each at its sheet and point.
+//! Errors in drawn shapes, with sheet and point.
 
 use bansho_base::host::{assets::AssetError, plural::counted};
 
-/// Shapes from which no aurora can be made.
+/// An invalid shape, and the key of the parameter at fault.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: {kind}")]
 pub struct ShapeError {
@@ -12,18 +12,18 @@ pub struct ShapeError {
     pub kind: ShapeErrorKind,
 }
 
-/// What can be wrong with shapes. Sheets, points and segments count from 1 here, as a person counts.
+/// Reasons why a shape is invalid. Sheets, points and segments are counted from 1 here, as in messages.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeErrorKind {
-    /// Nothing that could be a line.
-    #[error("sheet {sheet} has {}; allowed: at least 2, at different places", counted(*.found, "point"))]
+    /// Fewer than two distinct points.
+    #[error("sheet {sheet} has {}; allowed: at least 2 distinct points", counted(*.found, "point"))]
     TooFewPoints {
         /// The sheet.
         sheet: usize,
-        /// How many different points it has.
+        /// Number of distinct points.
         found: usize,
     },
-    /// A point beyond the square that is drawn on.
+    /// A point outside the drawn square.
     #[error(
         "sheet {sheet}, point {point} lies at ({x:.1}, {z:.1}) km, outside the drawn square; allowed: -{half} to {half} km east and south (see `extent_km`)"
     )]
@@ -39,14 +39,14 @@ pub enum ShapeErrorKind {
         /// Half the square's side, km.
         half: f64,
     },
-    /// A smooth line that leaves the square between points that lie in it.
+    /// A smooth line that leaves the square between points that are inside.
     #[error(
         "after point {point} the smooth line of sheet {sheet} passes ({x:.1}, {z:.1}) km, outside the drawn square; allowed: -{half} to {half} km east and south (see `extent_km`), or `smooth = false`"
     )]
     BendsOutside {
         /// The sheet.
         sheet: usize,
-        /// The point before.
+        /// The last point before.
         point: usize,
         /// East, km.
         x: f64,
@@ -55,19 +55,19 @@ pub enum ShapeErrorKind {
         /// Half the square's side, km.
         half: f64,
     },
-    /// A sheet that meets itself.
+    /// A sheet that intersects itself.
     #[error(
-        "sheet {sheet} crosses itself: after point {point} it meets its part after point {earlier}; a sheet may bend back, but needs a gap"
+        "sheet {sheet} crosses itself: after point {point} it meets the segment after point {earlier}; a sheet may turn back, but must keep a gap"
     )]
     CrossesItself {
         /// The sheet.
         sheet: usize,
         /// Point before the crossing.
         point: usize,
-        /// Point before it where the crossed part begins.
+        /// First point of the segment that is crossed.
         earlier: usize,
     },
-    /// A sheet that meets another.
+    /// A sheet that intersects another.
     #[error(
         "sheet {sheet} meets sheet {other}: after point {point} and after point {other_point}; sheets neither cross nor branch"
     )]
@@ -76,76 +76,76 @@ pub enum ShapeErrorKind {
         sheet: usize,
         /// Its point before the crossing.
         point: usize,
-        /// The sheet that it crosses.
+        /// The other sheet.
         other: usize,
-        /// That one's point before the crossing.
+        /// Its point before the crossing.
         other_point: usize,
     },
-    /// Sheets that come from nowhere or go nowhere.
+    /// The wrong number of sheets.
     #[error(
-        "has {}, but {expected} from the shape before; allowed: as many as come, or `split` and `merge` that make up the difference",
+        "has {}, but {expected} from the previous shape; allowed: the same number, or `split` and `merge` for the difference",
         counted(*.found, "sheet"), expected = come(*.expected)
     )]
     Unmatched {
-        /// Sheets drawn.
+        /// Number of sheets drawn.
         found: usize,
-        /// Sheets that the shape before becomes.
+        /// Number of sheets after the splits and merges of the previous shape.
         expected: usize,
     },
-    /// More sheets than can be followed.
-    #[error("has {}; allowed: up to {most}", counted(*.found, "sheet"))]
+    /// Too many sheets.
+    #[error("has {}; allowed: up to {max}", counted(*.found, "sheet"))]
     TooManySheets {
-        /// Sheets drawn.
+        /// Number of sheets drawn.
         found: usize,
-        /// Most allowed.
-        most: usize,
+        /// Maximum number.
+        max: usize,
     },
-    /// More control points than can be followed.
+    /// Too many control points.
     #[error(
-        "all shapes up to this one have {found} control points together; allowed: up to {most} (fewer shapes or sheets, or a lower `control_points`)"
+        "all shapes up to this one have {found} control points together; allowed: up to {max} (fewer shapes or sheets, or a lower `control_points`)"
     )]
     TooManyPoints {
         /// Control points of all shapes so far.
         found: usize,
-        /// Most allowed.
-        most: usize,
+        /// Maximum number.
+        max: usize,
     },
-    /// The first shape comes from nothing.
+    /// A split, merge or link of the first shape, which has no previous one.
     #[error(
-        "the first shape has none before it; `split`, `merge` and `link` stand at the shape that the change leads to"
+        "the first shape has no previous one; `split`, `merge` and `link` belong to the shape at the end of the transition"
     )]
     ChangeBeforeFirstShape,
-    /// A sheet that is not there.
-    #[error("there is no sheet {sheet} in the shape before; allowed: 1 to {count}")]
+    /// A sheet that the previous shape does not have.
+    #[error("there is no sheet {sheet} in the previous shape; allowed: 1 to {count}")]
     NoSuchSheet {
-        /// The sheet asked for.
+        /// The requested sheet.
         sheet: i64,
-        /// Sheets that there are.
+        /// Number of sheets.
         count: usize,
     },
-    /// A link to a sheet that is not there.
+    /// A link to a sheet that the shape does not have.
     #[error("there is no sheet {sheet} in this shape; allowed: 1 to {count}")]
     NoSuchTarget {
-        /// The sheet asked for.
+        /// The requested sheet.
         sheet: i64,
-        /// Sheets that there are.
+        /// Number of sheets.
         count: usize,
     },
-    /// A segment that is not there.
+    /// A segment that the sheet does not have.
     #[error("sheet {sheet} has no segment {segment}; allowed: 1 to {count}")]
     NoSuchSegment {
         /// The sheet.
         sheet: usize,
-        /// The segment asked for.
+        /// The requested segment.
         segment: i64,
-        /// Segments that there are.
+        /// Number of segments.
         count: usize,
     },
-    /// A split said in two ways.
-    #[error("says both `segment` and `length_fraction`; allowed: one of them")]
+    /// A split at both a segment and a fraction of the length.
+    #[error("has both `segment` and `length_fraction`; allowed: one of them")]
     SegmentAndPosition,
     /// Two splits of one segment.
-    #[error("segment {segment} of sheet {sheet} is split already; allowed: one split a segment")]
+    #[error("segment {segment} of sheet {sheet} is split already; allowed: one split per segment")]
     SplitTwice {
         /// The sheet.
         sheet: usize,
@@ -154,24 +154,24 @@ pub enum ShapeErrorKind {
     },
     /// A merge of a point within a sheet.
     #[error(
-        "the point at {at} of sheet {sheet} is not an end, and sheets never branch; allowed: 0 (its start) or 1 (its end)"
+        "the point at {length_fraction} of sheet {sheet} is not an end, and sheets never branch; allowed: 0 (its start) or 1 (its end)"
     )]
     NotAnEnd {
         /// The sheet.
         sheet: usize,
         /// Fraction of its length.
-        at: f64,
+        length_fraction: f64,
     },
     /// Two merges of one end.
-    #[error("the {} of sheet {sheet} is merged already; allowed: one merge an end", if *.is_end { "end" } else { "start" })]
+    #[error("the {} of sheet {sheet} is merged already; allowed: one merge per end", if *.is_end { "end" } else { "start" })]
     MergedTwice {
         /// The sheet.
         sheet: usize,
-        /// Its end rather than its start.
+        /// Whether it is its end, else its start.
         is_end: bool,
     },
-    /// Merges that leave no end.
-    #[error("this merge would close sheet {sheet} to a ring; allowed: sheets with two ends")]
+    /// Merges that close a sheet into a ring.
+    #[error("this merge would close sheet {sheet} into a ring; allowed: sheets with two ends")]
     Ring {
         /// The sheet.
         sheet: usize,
@@ -182,69 +182,69 @@ pub enum ShapeErrorKind {
         /// The sheet of this shape.
         sheet: usize,
     },
-    /// A link that says where a point arrives and not where it leaves.
-    #[error("says `to_length_fraction`, but not which point does; allowed: together with `from_length_fraction`")]
+    /// A link with a position of arrival, but without a point.
+    #[error("has `to_length_fraction`, but no point that arrives there; allowed: together with `from_length_fraction`")]
     ArrivalWithoutPoint,
-    /// A link that says where a point leaves and not where it arrives, of a sheet that is all one.
+    /// A link with a point of a sheet that does not split, but without its position of arrival.
     #[error(
-        "says `from_length_fraction`, but not where that point arrives; allowed: together with `to_length_fraction`, or alone where the sheet splits"
+        "has `from_length_fraction`, but no position at which that point arrives; allowed: together with `to_length_fraction`, or alone where the sheet splits"
     )]
     PointWithoutArrival,
-    /// Linked points that change their order.
-    #[error("two linked points of a sheet would pass each other; allowed: points in the order of the sheet")]
+    /// Linked points that exchange their order.
+    #[error("two linked points of a sheet exchange their order; allowed: points in the order of the sheet")]
     LinksCross,
-    /// A link where nothing goes by position.
-    #[error("sheets and points go in drawing order here; allowed with `correspondence = \"automatic\"`")]
+    /// A link with correspondence by drawing order.
+    #[error("sheets and points are matched in drawing order; links are allowed with `correspondence = \"automatic\"`")]
     LinkInOrder,
-    /// A sheet that is said in several ways.
-    #[error("sheet {sheet} says more than one of `points`, `svg_file` and `form`; allowed: one of them")]
+    /// A sheet with more than one of points, SVG file and form.
+    #[error("sheet {sheet} has more than one of `points`, `svg_file` and `form`; allowed: one of them")]
     SeveralSources {
         /// The sheet.
         sheet: usize,
     },
-    /// A path of an SVG file that is not named.
+    /// An SVG path without an SVG file.
     #[error("names a path of an SVG file, but no file; allowed: together with `svg_file`")]
     StrokeWithoutFile,
-    /// A time that is said in two ways.
-    #[error("says both `transition_s` and `transition_frames`; allowed: one of them")]
+    /// A transition time in both seconds and frames.
+    #[error("has both `transition_s` and `transition_frames`; allowed: one of them")]
     SecondsAndFrames,
-    /// A time before the first shape.
+    /// A transition time of the first shape.
     #[error(
-        "the first shape is there at the beginning; allowed: at the shapes after it, and `hold_s` here says how long it stays"
+        "the first shape exists from the beginning; allowed: in later shapes; `hold_s` is the time for which the first one is held"
     )]
     TimeBeforeFirstShape,
-    /// Electrons of an energy that the tables of the air do not hold.
+    /// Electrons of an energy outside the tables.
     #[error(
-        "at {at} of its length sheet {sheet} has electrons of {energy_ev:.0} eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV"
+        "sheet {sheet} has electrons of {energy_ev:.0} eV at the fraction {length_fraction} of its length, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV"
     )]
     EnergyOutside {
         /// The entry of the shape's list of sheets.
         sheet: usize,
         /// Fraction of its length.
-        at: f64,
+        length_fraction: f64,
         /// The energy, eV.
         energy_ev: f64,
     },
-    /// A loop that is no length of time.
+    /// A loop whose length is not a positive number.
     #[error("a loop of {seconds} s; allowed: more than 0")]
     LoopLength {
-        /// The length asked for, s.
+        /// Requested length, s.
         seconds: f64,
     },
-    /// A keyed value that does not end as it begins.
+    /// An animated value that differs between the start and the end of the loop.
     #[error(
-        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
+        "the loop of {seconds} s jumps: its first and last values differ; allowed: the same value at 0 s and at {seconds} s"
     )]
     LoopJumps {
         /// Length of the loop, s.
         seconds: f64,
     },
-    /// A drawing that cannot be had.
+    /// An asset that cannot be loaded.
     #[error("{0}")]
     Asset(#[from] AssetError),
 }
 
-/// How many sheets come from the shape before.
+/// "n come" with the verb in agreement.
 fn come(count: usize) -> String {
     if count == 1 { "1 comes".to_owned() } else { format!("{count} come") }
 }

@@ -3,17 +3,17 @@
 use bansho_base::math::{self, DVec2, lerp, saturate, smoothstep};
 
 bansho_base::choice! {
-    /// A form that an aurora takes.
+    /// Auroral form.
     pub enum Form {
-        /// A quiet arc, its middle to the north.
+        /// A quiet arc with its middle to the north.
         Arc = "arc",
         /// A band with shallow waves (`wave_count`).
         Band = "band",
-        /// An S whose middle runs back.
+        /// An S whose middle section runs backward.
         SShape = "s_shape",
         /// A band that winds up at its eastern end (`bend_deg` 630 is one turn and three quarters).
         Spiral = "spiral",
-        /// A band with `wave_count` folds whose flanks run back.
+        /// A band with `wave_count` folds whose flanks run backward.
         Fold = "fold",
         /// A substorm's surge: a band that rises to the north and curls over.
         Surge = "surge",
@@ -24,8 +24,8 @@ bansho_base::choice! {
     }
 }
 
-/// Segments of a form's line.
-const PIECES: usize = 256;
+/// Number of segments of a form's line.
+const SEGMENTS: usize = 256;
 
 impl Form {
     /// Default bend, degrees.
@@ -42,6 +42,7 @@ impl Form {
         }
     }
 
+    /// Default number of waves or folds.
     fn default_count(self) -> i64 {
         match self {
             Self::Arc | Self::SShape | Self::Spiral | Self::Surge | Self::Peel => 1,
@@ -84,10 +85,10 @@ impl Form {
         let count = count.unwrap_or_else(|| self.default_count()) as f64;
         let mut at = DVec2::ZERO;
         let mut line = vec![at];
-        for piece in 0..PIECES {
-            let s = (piece as f64 + 0.5) / PIECES as f64;
+        for segment in 0..SEGMENTS {
+            let s = (segment as f64 + 0.5) / SEGMENTS as f64;
             let (sin, cos) = math::sin_cos(bend * self.heading(s, count));
-            at += DVec2::new(cos, sin) / PIECES as f64;
+            at += DVec2::new(cos, sin) / SEGMENTS as f64;
             line.push(at);
         }
         let low = line.iter().copied().fold(DVec2::INFINITY, DVec2::min);
@@ -117,7 +118,7 @@ mod tests {
     #[test]
     fn an_arc_is_part_of_a_circle() {
         let line = Form::Arc.line(Some(60.0), None);
-        let (first, middle, last) = (line[0], line[PIECES / 2], line[PIECES]);
+        let (first, middle, last) = (line[0], line[SEGMENTS / 2], line[SEGMENTS]);
         let radius = 3.0 / std::f64::consts::PI;
         assert!((first.distance(last) - radius).abs() < 1e-5);
         assert!((first.y - middle.y - radius * (1.0 - 3.0_f64.sqrt() / 2.0)).abs() < 1e-5);
@@ -126,9 +127,9 @@ mod tests {
     #[test]
     fn an_s_runs_back_in_its_middle_and_looks_the_same_upside_down() {
         let line = Form::SShape.line(None, None);
-        assert!(line[PIECES / 2 + 1].x < line[PIECES / 2 - 1].x);
-        for index in 0..=PIECES {
-            assert!((line[index] + line[PIECES - index]).length() < 1e-9);
+        assert!(line[SEGMENTS / 2 + 1].x < line[SEGMENTS / 2 - 1].x);
+        for index in 0..=SEGMENTS {
+            assert!((line[index] + line[SEGMENTS - index]).length() < 1e-9);
         }
     }
 }

@@ -5,6 +5,7 @@
 //! Coordinates are km in the plane at 100 km altitude: x east, z south, the observer's zenith at the origin. Points are
 //! [`DVec2`](bansho_base::math::DVec2)s whose second component is z.
 
+pub(crate) mod control_points;
 pub(crate) mod correspondence;
 mod error;
 mod form;
@@ -22,7 +23,7 @@ pub use geometry::{
     nearest_segment::NearestSegmentGrid,
     segments::{SheetSample, SheetSampler},
 };
-pub use interpolation::gap::Bridge;
+pub use interpolation::gap::{Bridge, SheetEnd};
 pub use parameters::{
     Correspondence, FRAME_S, LinkParameters, MergeParameters, MorphingParameters, ShapeParameters, SheetParameters,
     Spacing, SplitParameters,

@@ -20,136 +20,143 @@ const KM: Range = Range::new(-20_000.0, 20_000.0);
 const DEGREES: Range = Range::new(-3600.0, 3600.0);
 
 /// A constant factor of 1.
-fn even() -> Curve {
+fn unit_curve() -> Curve {
     Curve::new(vec![[0.0, 1.0]], Interpolation::Monotone).expect("one finite point is a curve")
 }
 
 bansho_base::choice! {
-    /// Which point of a shape becomes which of the next.
+    /// Which sheet and which control point of a shape becomes which of the next.
     pub enum Correspondence {
-        /// By place: sheets pair so that all move least, and points along them by length and nearness, whichever way they were drawn. The drawing shows the sheets after their splits and merges.
+        /// By position: sheets are matched with the minimum total motion, points along them by arc length and distance, whatever their drawing
+        /// direction. Sheets that split or merge are drawn as they are afterward.
         Automatic = "automatic",
-        /// As in the thesis: the first sheet drawn becomes the first, its first point the first. The drawing shows the sheets just before they split and after they were joined up: as many as the shape before.
+        /// As in the thesis: the first sheet becomes the first, its first point the first. A shape has as many sheets as the one before: a sheet that
+        /// splits is drawn just before it splits, and sheets that merge are drawn separately.
         DrawingOrder = "drawing_order",
     }
 }
 
 bansho_base::choice! {
-    /// How control points lie on a stroke.
+    /// Spacing of the control points along a stroke.
     pub enum Spacing {
-        /// At equal distances.
+        /// Equal arc lengths.
         ArcLength = "arc_length",
-        /// Evenly over the recorded points, eq. (2.1): close together where the hand was slow.
+        /// Uniform over the recorded points, eq. (2.1): closer together where the stroke was drawn slowly.
         Recorded = "recorded",
     }
 }
 
 bansho_base::parameters! {
-    /// One sheet of the aurora, seen from above, x east and z south of the point under the observer's zenith: a stroke (`points`), the paths of an SVG file (`svg_file`), or a named form.
+    /// One sheet of the aurora, seen from above, x east and z south of the observer's zenith: a stroke (`points`), the paths of an SVG file
+    /// (`svg_file`), or a named form.
     pub struct SheetParameters {
         /// Points [east, south] of the stroke.
         points: Option<Vec<[f64; 2]>> = None, limits(Length { min: 0, max: 100_000, item: KM }), unit("km");
         /// An SVG file whose paths are the strokes. Its view box is fitted to the drawn square.
         svg_file: Option<AssetPath> = None;
-        /// The id of the one path of the SVG file that is meant; all of them where it is not given.
+        /// Id of the path of the SVG file; all of its paths if it is not given.
         svg_path_id: Option<String> = None;
-        /// A named form; an arc where neither `points` nor `svg_file` is given.
+        /// A named form; an arc if neither `points` nor `svg_file` is given.
         form: Option<Form> = None;
         /// Length of the form along the sheet; `"auto"` is 0.6 of the drawn square.
         length_km: Auto<f64> = Auto::Auto, limits(Range::new(1.0, 20_000.0)), unit("km");
-        /// How far the form bends; `"auto"` is what looks like its name.
+        /// Bend of the form; `"auto"` is the value that is typical of the form.
         bend_deg: Auto<f64> = Auto::Auto, limits(Range::new(-1440.0, 1440.0)), unit("degrees");
-        /// How many waves or folds the form has; `"auto"` is what looks like its name.
+        /// Number of waves or folds of the form; `"auto"` is the value that is typical of the form.
         wave_count: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 40.0));
-        /// How many such sheets lie side by side.
+        /// Number of parallel copies of the sheet.
         copies: i64 = 1, limits(Range::new(1.0, 32.0));
-        /// How far apart they lie, toward the south.
+        /// Distance between the copies, toward the south.
         spacing_km: f64 = 60.0, limits(Range::new(-2000.0, 2000.0)), unit("km");
-        /// Where the origin of points and drawing, or the middle of a form, comes to lie: [east, south].
+        /// Position of the origin of points and drawings, or of the center of a form: [east, south].
         position_km: [f64; 2] = [0.0, 0.0], limits(KM), unit("km");
-        /// Turn from east toward south.
+        /// Rotation from east toward south.
         rotation_deg: f64 = 0.0, limits(DEGREES), unit("degrees");
-        /// Size beside that given.
+        /// Scale factor.
         scale: f64 = 1.0, limits(Range::new(0.001, 1000.0));
-        /// Exchanges north and south before it is turned.
+        /// Exchanges north and south before the rotation.
         mirror: bool = false;
-        /// Draws a smooth line through the points of a sketch; strokes of 256 points and more are taken as they are.
+        /// Draws a smooth line through the points of a sketch; strokes of 256 points or more are used unchanged.
         smooth: bool = true;
-        /// Flux along the sheet as a factor of the aurora's, over the share of its length.
-        flux_factor: Curve = even(), limits(CurveLimits::unit_to(0.0, 100.0));
-        /// Share of the sheet's length over which its flux rises from nothing, at both ends; 0 lets it begin at once, as in the thesis.
+        /// Factor of the aurora's flux along the sheet, by fraction of its length.
+        flux_factor: Curve = unit_curve(), limits(CurveLimits::unit_to(0.0, 100.0));
+        /// Fraction of the sheet's length over which its flux rises from 0, at both ends; at 0 the flux begins at once, as in the thesis.
         end_taper: f64 = 0.3, limits(Range::new(0.0, 0.5));
-        /// Energy along the sheet as a factor of the aurora's, over the share of its length.
-        energy_factor: Curve = even(), limits(CurveLimits::unit_to(0.05, 20.0));
+        /// Factor of the aurora's energy along the sheet, by fraction of its length.
+        energy_factor: Curve = unit_curve(), limits(CurveLimits::unit_to(0.05, 20.0));
     }
 }
 
 bansho_base::parameters! {
-    /// A sheet of the shape before that splits on the way to this one.
+    /// A sheet of the previous shape that splits in the transition to this one.
     pub struct SplitParameters {
         /// The sheet, counted from 1.
         sheet: i64 = 1, limits(Range::new(1.0, 1000.0));
-        /// The segment between two control points that opens, counted from 1.
+        /// The segment between two control points at which the sheet opens, counted from 1.
         segment: Option<i64> = None, limits(Range::new(1.0, 100_000.0));
-        /// Or the share of the sheet's length where it opens; the middle where neither is given.
+        /// Or the fraction of the sheet's length at which it opens; the middle if neither is given.
         length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
     }
 }
 
 bansho_base::parameters! {
-    /// Two ends of sheets of the shape before that grow together on the way to this one.
+    /// Two ends of sheets of the previous shape that merge in the transition to this one.
     pub struct MergeParameters {
         /// The two sheets, counted from 1.
         sheets: [i64; 2] = [1, 2], limits(Range::new(1.0, 1000.0));
-        /// Which end of each: 0 its start, 1 its end; `"auto"` takes the two that are nearest to each other.
+        /// The end of each sheet: 0 for its start, 1 for its end; `"auto"` selects the nearest pair of ends.
         ends: Auto<[f64; 2]> = Auto::Auto, limits(Range::new(0.0, 1.0));
     }
 }
 
 bansho_base::parameters! {
-    /// A sheet of the shape before that becomes the sheet told, where it would become another by place; or a point on it that arrives where told.
+    /// A sheet of the previous shape that becomes the given sheet instead of the one matched by position, or a point on it that arrives at the given
+    /// position.
     pub struct LinkParameters {
-        /// The sheet of the shape before, counted from 1.
+        /// The sheet of the previous shape, counted from 1.
         from: i64 = 1, limits(Range::new(1.0, 1000.0));
         /// The sheet of this shape that it becomes, counted from 1.
         to: i64 = 1, limits(Range::new(1.0, 1000.0));
-        /// Share of the first one's length at which a point leaves; where that sheet splits, the part that is meant.
+        /// Fraction of the first sheet's length at which the linked point starts; if that sheet splits, the point selects one of its strands.
         from_length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
-        /// Share of the second one's length at which that point arrives; the whole sheet is linked where it is not given. Ends of sheets go to ends.
+        /// Fraction of the second sheet's length at which that point arrives; without it the whole sheet is linked. Ends of sheets always become
+        /// ends.
         to_length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
     }
 }
 
 bansho_base::parameters! {
-    /// The aurora's shape at a moment: its sheets, and what splits or merges on the way there.
+    /// A key shape of the aurora: its sheets, and their splits and merges in the transition from the previous shape.
     pub struct ShapeParameters {
-        /// Time since the shape before was left; 4.667 s (140 frames of the thesis) where nothing is said. The first shape is there at the beginning.
+        /// Duration of the transition from the previous shape; 4.667 s (140 frames of the thesis) by default. The first shape exists from the
+        /// beginning.
         transition_s: Option<f64> = None, limits(Range::new(0.01, 1e5)), unit("s");
         /// The same in frames of 1/30 s.
         transition_frames: Option<f64> = None, limits(Range::new(1.0, 1e6));
-        /// How long it stays as it is.
+        /// Time for which the shape is held.
         hold_s: f64 = 0.0, limits(Range::new(0.0, 1e5)), unit("s");
-        /// Its sheets; one arc where the list is empty.
+        /// Its sheets; one arc if the list is empty.
         sheets: Vec<SheetParameters> = Vec::new(), limits(Length { min: 0, max: 64, item: () });
-        /// Sheets of the shape before that split on the way.
+        /// Sheets of the previous shape that split in the transition.
         split: Vec<SplitParameters> = Vec::new(), limits(Length { min: 0, max: 64, item: () });
-        /// Ends of sheets of the shape before that merge on the way.
+        /// Ends of sheets of the previous shape that merge in the transition.
         merge: Vec<MergeParameters> = Vec::new(), limits(Length { min: 0, max: 64, item: () });
-        /// Sheets of the shape before, and points on them, that go where told rather than by place.
+        /// Sheets of the previous shape, and points on them, with a given target instead of the one matched by position.
         link: Vec<LinkParameters> = Vec::new(), limits(Length { min: 0, max: 256, item: () });
     }
 }
 
 bansho_base::parameters! {
-    /// How one shape becomes the next.
+    /// Transition from one shape to the next.
     pub struct MorphingParameters {
-        /// Which point becomes which.
+        /// Which sheet and which control point of a shape becomes which of the next.
         correspondence: Correspondence = Correspondence::Automatic;
-        /// Control points n of a sheet. `"auto"` is 32 in drawing order, as in the thesis, and 96 by place, so that folds that grow stay round.
+        /// Number n of control points of a sheet. `"auto"` is 32 in drawing order, as in the thesis, and 96 with the automatic correspondence, so
+        /// that growing folds stay round.
         control_points: Auto<i64> = Auto::Auto, limits(Range::new(4.0, 512.0));
-        /// How they lie on a drawn stroke.
+        /// Spacing of the control points along a drawn stroke.
         control_point_spacing: Spacing = Spacing::ArcLength;
-        /// Frames of 1/30 s from one in-between shape to the next; the thesis takes 5 to 10.
+        /// Frames of 1/30 s from one in-between shape to the next; 5 to 10 in the thesis.
         update_interval_frames: f64 = 6.0, limits(Range::new(1.0, 60.0));
     }
 }

@@ -11,20 +11,20 @@ use super::{
     parameters::TRANSITION_S,
 };
 use crate::shapes::{
+    control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
     interpolation::{
-        control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
-        gap::{self, Bridge, Gap, GapFlux},
+        gap::{self, Bridge, Gap, GapFlux, SheetEnd},
         spline_track::{Knot, ShapeTiming, find_velocities},
     },
     strokes::intersection::passes,
 };
 
-/// Weights of uniform spacing against distance, in order of preference: later ones are tried where sheets cross during
-/// a transition.
+/// Weights of uniform spacing relative to distance, in order of preference: larger ones are tried if sheets cross during a
+/// transition.
 const EVENNESS: [f64; 4] = [0.01, 0.03, 0.1, 1.0];
 
 /// Times per transition at which crossings are counted.
-const CHECKED_MOMENTS: usize = 32;
+const CHECKED_TIMES: usize = 32;
 
 /// All key shapes and in-between shapes (thesis, 2.2.2): splines in time through corresponding control points.
 ///
@@ -34,7 +34,7 @@ pub struct Sequence {
     tracked: TrackedControlPoints,
     timing: ShapeTiming,
     half_km: f64,
-    /// The first shape whose transition has sheets that pass through each other.
+    /// The first shape whose transition has crossing sheets.
     crossing: Option<usize>,
     loop_s: Option<f64>,
 }
@@ -82,7 +82,7 @@ impl Sequence {
     /// Invalid shapes, with sheet and point; see [`ShapeErrorKind`].
     pub fn new(
         shapes: &[ShapeParameters],
-        motion: &MorphingParameters,
+        morphing: &MorphingParameters,
         extent_km: f64,
         assets: &dyn Assets,
         loop_s: Option<f64>,
@@ -95,7 +95,7 @@ impl Sequence {
         let timing = timing(shapes)?;
         let drawn = drawn_shapes(shapes, extent_km, assets)?;
         let sequence = |evenness: f64| {
-            let mut tracked = track_control_points((shapes, &drawn), motion, extent_km, evenness)?;
+            let mut tracked = track_control_points(shapes, &drawn, morphing, extent_km, evenness)?;
             let closed = loop_s.is_some() && tracked.is_closed;
             find_velocities(&mut tracked.tracks, &timing, closed);
             let sequence =
@@ -103,8 +103,8 @@ impl Sequence {
             Ok((sequence.crossings(), sequence))
         };
         let mut best = sequence(EVENNESS[0])?;
-        let by_place = motion.correspondence == Correspondence::Automatic;
-        for &evenness in EVENNESS[1..].iter().filter(|_| by_place) {
+        let by_position = morphing.correspondence == Correspondence::Automatic;
+        for &evenness in EVENNESS[1..].iter().filter(|_| by_position) {
             if best.0 == 0 {
                 break;
             }
@@ -129,7 +129,7 @@ impl Sequence {
 
     /// The shape at time `t`, s, constant before the first and after the last key shape. The flux fades toward gaps.
     pub fn at(&self, t: f64) -> Shape {
-        let (index, fraction) = match self.moment(t) {
+        let (index, fraction) = match self.position_at(t) {
             SequencePosition::At(index) => {
                 return self.shape(&self.tracked.shapes[index], |track| self.tracked.tracks[track].knot(index));
             }
@@ -139,8 +139,8 @@ impl Sequence {
         let mut shape = self.shape(&self.tracked.strands[index], between);
         for gap in &self.tracked.gaps[index] {
             let (state, _) = self.gap(gap, index, fraction);
-            for (sheet, at_end) in gap.ends.iter().filter_map(|end| self.end(*end, index)) {
-                gap::fade_toward_gap(&mut shape.sheets[sheet], at_end, state.ends);
+            for SheetEnd { sheet, is_end } in gap.ends.iter().filter_map(|end| self.end(*end, index)) {
+                gap::fade_toward_gap(&mut shape.sheets[sheet], is_end, state.ends);
             }
         }
         shape
@@ -148,7 +148,7 @@ impl Sequence {
 
     /// Ids of the control points of [`Self::at`].
     pub(crate) fn control_point_ids(&self, t: f64) -> ControlPointIds<'_> {
-        let sheets = match self.moment(t) {
+        let sheets = match self.position_at(t) {
             SequencePosition::At(index) => &self.tracked.shapes[index],
             SequencePosition::Between(index, _) => &self.tracked.strands[index],
         };
@@ -158,7 +158,7 @@ impl Sequence {
 
     /// Bridges over narrow gaps between the sheets of [`Self::at`].
     pub fn bridges(&self, t: f64) -> Vec<Bridge> {
-        let SequencePosition::Between(index, fraction) = self.moment(t) else { return Vec::new() };
+        let SequencePosition::Between(index, fraction) = self.position_at(t) else { return Vec::new() };
         let bridge = |gap: &Gap| {
             let (state, knots) = self.gap(gap, index, fraction);
             let ends = [self.end(gap.ends[0], index)?, self.end(gap.ends[1], index)?];
@@ -170,7 +170,7 @@ impl Sequence {
     }
 
     /// Position of a time within the sequence.
-    fn moment(&self, t: f64) -> SequencePosition {
+    fn position_at(&self, t: f64) -> SequencePosition {
         let t = self.phase(t);
         let next = self.timing.arrivals.partition_point(|&arrival| arrival <= t).max(1);
         let index = next - 1;
@@ -191,13 +191,12 @@ impl Sequence {
         (GapFlux::new(width(now), width(widest), from_closed), now)
     }
 
-    /// The strand in the transition from shape `index` with this control point at an end, and whether it is the last
-    /// point.
-    fn end(&self, track: usize, index: usize) -> Option<(usize, bool)> {
+    /// The end of a strand in the transition from shape `index` at which this control point is.
+    fn end(&self, track: usize, index: usize) -> Option<SheetEnd> {
         let strands = self.tracked.strands[index].iter().enumerate();
-        let mut ends = strands.filter_map(|(number, strand)| {
-            let at_end = strand.last() == Some(&track);
-            (at_end || strand.first() == Some(&track)).then_some((number, at_end))
+        let mut ends = strands.filter_map(|(sheet, strand)| {
+            let is_end = strand.last() == Some(&track);
+            (is_end || strand.first() == Some(&track)).then_some(SheetEnd { sheet, is_end })
         });
         ends.next()
     }
@@ -210,15 +209,15 @@ impl Sequence {
         strands.map(|strand| strand.iter().map(path).collect()).collect()
     }
 
-    /// Times at which transitions are checked for crossings, s, with the index of the shape before.
+    /// Times at which transitions are checked for crossings, s, each with the index of the previous shape.
     fn checked_times(&self) -> Vec<(usize, f64)> {
         let ShapeTiming { arrivals, departures } = &self.timing;
-        let of_way = |index: usize| {
+        let of_transition = |index: usize| {
             let span = arrivals[index + 1] - departures[index];
-            let fraction = |moment: usize| (moment as f64 + 0.5) / CHECKED_MOMENTS as f64;
-            (0..CHECKED_MOMENTS).map(move |moment| (index, departures[index] + fraction(moment) * span))
+            let fraction = |check: usize| (check as f64 + 0.5) / CHECKED_TIMES as f64;
+            (0..CHECKED_TIMES).map(move |check| (index, departures[index] + fraction(check) * span))
         };
-        (0..arrivals.len() - 1).flat_map(of_way).collect()
+        (0..arrivals.len() - 1).flat_map(of_transition).collect()
     }
 
     /// Total number of crossings at these times.
@@ -288,9 +287,9 @@ fn timing(shapes: &[ShapeParameters]) -> Result<ShapeTiming, ShapeError> {
             (None, Some(frames)) => frames * FRAME_S,
             (None, None) => TRANSITION_S,
         };
-        let timed =
+        let times =
             [("transition_s", shape.transition_s.is_none()), ("transition_frames", shape.transition_frames.is_none())];
-        if let Some((key, _)) = timed.into_iter().find(|(_, none)| index == 0 && !none) {
+        if let Some((key, _)) = times.into_iter().find(|(_, none)| index == 0 && !none) {
             return Err(error(key, ShapeErrorKind::TimeBeforeFirstShape));
         }
         let changes =

@@ -22,7 +22,7 @@ fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
     ShapeParameters { transition_s: Some(4.0), sheets, ..ShapeParameters::default() }
 }
 
-/// The first of the shapes is there at the beginning.
+/// The shapes, without a transition time of the first one.
 fn begun(shapes: &[ShapeParameters]) -> Vec<ShapeParameters> {
     let mut shapes = shapes.to_vec();
     shapes[0].transition_s = None;
@@ -49,7 +49,7 @@ fn points(shape: &Shape) -> Vec<Vec<[f64; 2]>> {
     shape.sheets.iter().map(|sheet| sheet.points.iter().map(|point| point.to_array()).collect()).collect()
 }
 
-/// Greatest distance from a point of one shape to the other, both ways.
+/// Maximum distance from a point of one shape to the other, in both directions.
 fn apart(a: &Shape, b: &Shape) -> f64 {
     let one_way = |from: &Shape, to: &Shape| {
         let near = NearestSegmentGrid::new(to, 30.0);
@@ -107,7 +107,7 @@ fn automatic_splits_and_merges_need_only_source_and_target() {
     again.merge = vec![MergeParameters::default()];
     let sequence = sequence(&[one, two, again], &MorphingParameters::default());
     assert_no_jump(&sequence);
-    // The gap opens and closes little by little.
+    // The gap opens and closes gradually.
     let gap = |t: f64| {
         let shape = sequence.at(t);
         let ends = shape.sheets.iter().flat_map(|sheet| [sheet.points[0], sheet.points[sheet.points.len() - 1]]);
@@ -155,7 +155,7 @@ fn flux_and_energy_travel_with_the_sheet() {
     let first = sequence.at(0.0);
     let flux = &first.sheets[0].flux;
     assert_eq!((flux[0], flux[flux.len() - 1]), (0.0, 2.0));
-    // Just before the split opens, its new ends have what the middle of the sheet has.
+    // Just before the split opens, its new ends have the flux of the middle of the sheet.
     let open = sequence.at(1e-9);
     let [left, right] = [&open.sheets[0], &open.sheets[1]];
     assert!((left.flux[left.flux.len() - 1] - 1.0).abs() < 1e-6 && (right.energy[0] - 2.0).abs() < 1e-6);
@@ -211,7 +211,7 @@ fn random_shape(key: Key, case: u64, step: u32, sheets: usize) -> ShapeParameter
     shape((0..sheets).map(sheet).collect())
 }
 
-/// Random forms in four rows, one of which splits and of which two merge; some lie badly and are refused.
+/// Random forms in four rows, one of which splits and two of which merge; some of them intersect and are rejected.
 #[test]
 fn random_sequences_stay_finite_and_inside() {
     let key = Key::new(6, "sequences");
@@ -270,8 +270,8 @@ fn long_strokes_are_checked() {
     assert!(matches!(error.unwrap_err().kind, ShapeErrorKind::CrossesItself { sheet: 1, .. }));
 }
 
-/// A sheet that comes back to where it was, but with another flux there, is not the first again: that flux is reached, and in a loop
-/// it goes there and back without a jump.
+/// A sheet that returns to its first position with another flux does not close the sequence: the flux is reached, and a loop runs back
+/// and forth without a jump.
 #[test]
 fn a_shape_that_returns_with_another_flux_is_another() {
     let flux = |value: f64| Curve::new(vec![[0.0, value]], Interpolation::Linear).unwrap();
@@ -285,7 +285,7 @@ fn a_shape_that_returns_with_another_flux_is_another() {
         let [before, after] = [8.999, 9.001].map(|t| turn.at(t).sheets[0].flux[4]);
         assert!((before - after).abs() < 0.01, "{before} {after}");
     }
-    // Said in other words it is the same still.
+    // Other parameters for the same flux close it.
     let same = SheetParameters {
         flux_factor: Curve::new(vec![[0.0, 1.0], [1.0, 1.0]], Interpolation::Linear).unwrap(),
         ..straight(-200.0, 200.0, 0.0)
@@ -295,14 +295,14 @@ fn a_shape_that_returns_with_another_flux_is_another() {
     assert!((turn.at(4.0).sheets[0].points[0].y - 50.0).abs() < 1e-6, "round, not there and back");
 }
 
-/// Sheets that are told to exchange positions pass through each other on the way to the second shape; those that stay do not.
+/// Sheets that are linked to exchange their positions cross in the transition to the second shape; others do not.
 #[test]
 fn sheets_that_exchange_places_are_known_to_cross() {
     assert_eq!(linked(vec![]).unwrap().crossing(), None);
     assert_eq!(linked(vec![link(1, 2, None)]).unwrap().crossing(), Some(1));
 }
 
-/// Crossings are looked for on the way, however long shapes are held.
+/// Crossings are tested during transitions, however long shapes are held.
 #[test]
 fn sheets_that_cross_are_known_to_however_long_shapes_stay() {
     let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
@@ -316,7 +316,7 @@ fn sheets_that_cross_are_known_to_however_long_shapes_stay() {
     }
 }
 
-/// In drawing order the last drawing is that before the split: what it becomes is not the first shape.
+/// In drawing order the last shape is drawn before its split: after the split it does not equal the first shape.
 #[test]
 fn a_loop_in_drawing_order_does_not_end_where_a_sheet_has_split() {
     let [one, other] = [0.0, 80.0].map(|z| shape(vec![straight(0.0, 90.0, z)]));
@@ -347,10 +347,10 @@ fn more_control_points_than_can_be_held_are_refused() {
     let motion = MorphingParameters { control_points: Auto::Set(512), ..MorphingParameters::default() };
     let error = Sequence::new(&begun(&vec![full; 32]), &motion, EXTENT_KM, &MemoryAssets::default(), None).unwrap_err();
     assert_eq!(error.key, "shapes.30.sheets");
-    assert_eq!(error.kind, ShapeErrorKind::TooManyPoints { found: 31 * 256 * 512, most: 4_000_000 });
+    assert_eq!(error.kind, ShapeErrorKind::TooManyPoints { found: 31 * 256 * 512, max: 4_000_000 });
 }
 
-/// Two sheets that stay where they are, with links to the second shape.
+/// Two sheets that do not move, with links to the second shape.
 fn linked(link: Vec<LinkParameters>) -> Result<Sequence, ShapeError> {
     let sheets = vec![straight(-200.0, 200.0, 0.0), straight(-200.0, 200.0, 50.0)];
     let shapes = [shape(sheets.clone()), ShapeParameters { link, ..shape(sheets) }];

@@ -43,7 +43,7 @@ pub(super) struct EnergyFlux {
     rays: RayPattern,
 }
 
-/// Part of the arrays for one task.
+/// The particles of one task.
 struct ParticleChunk<'a> {
     positions: [&'a [f32]; 2],
     fades: &'a [f32],
@@ -69,14 +69,12 @@ impl EnergyFlux {
     fn target_power<'a>(&self, refined: &RefinedShape, layout: &'a NodeLayout, time: f64) -> NodeValues<'a> {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
-        let mut wanted = NodeValues::new(layout);
-        // Parts of at most half an interval: bridges have fewer segments than nodes.
-        refined.pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64).for_each(
-            |(sheet, arc_fraction, factor, length)| {
-                wanted.add(sheet as u32, arc_fraction as f32, flux * factor * length);
-            },
-        );
-        wanted
+        let mut target = NodeValues::new(layout);
+        // Pieces of at most half an interval: bridges have fewer segments than nodes.
+        for piece in refined.pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64) {
+            target.add(piece.sheet as u32, piece.fraction as f32, flux * piece.flux * piece.length_km);
+        }
+        target
     }
 
     /// The ray pattern along the sheets at a time.
@@ -92,12 +90,13 @@ impl EnergyFlux {
     pub(super) fn distribute_power(
         &self,
         particles: &mut AuroraParticles,
-        (refined, rays): (&RefinedShape, &RayTable),
+        refined: &RefinedShape,
+        rays: &RayTable,
         time: f64,
     ) {
         let lengths = refined.sheet_lengths();
         let [coarse, fine] = self.layouts(&lengths);
-        let weight_chunk = |chunk| self.weight_chunk(chunk, (refined, &fine), (rays, time));
+        let weight_chunk = |chunk| self.weight_chunk(chunk, refined, &fine, rays, time);
         let weighted: Vec<WeightedChunk> =
             chunks(particles).into_par_iter().with_max_len(1).map(weight_chunk).collect();
         let counts = weighted.iter().fold(NodeValues::new(&fine), |sum, chunk| sum.plus(&chunk.counts));
@@ -109,17 +108,19 @@ impl EnergyFlux {
             chunks(particles).into_par_iter().with_max_len(1).zip(&weighted).map(accumulate_weights).collect();
         let weights = weights.iter().fold(NodeValues::new(&coarse), |sum, chunk| sum.plus(chunk));
         let factors = self.target_power(refined, &coarse, time).distributed_by(&weights, MAX_CONCENTRATION);
-        let given: Vec<[f64; 2]> =
+        let totals: Vec<[f64; 2]> =
             chunks(particles).into_par_iter().with_max_len(1).map(|chunk| chunk.assign_powers(&factors)).collect();
-        balance(particles, &given);
+        balance(particles, &totals);
     }
 
     /// Computes weights of a chunk; they are stored as negative powers until normalized.
     fn weight_chunk<'a>(
         &self,
         chunk: ParticleChunk,
-        (refined, layout): (&RefinedShape, &'a NodeLayout),
-        (rays, time): (&RayTable, f64),
+        refined: &RefinedShape,
+        layout: &'a NodeLayout,
+        rays: &RayTable,
+        time: f64,
     ) -> WeightedChunk<'a> {
         let mut weighted = WeightedChunk { counts: NodeValues::new(layout), weights: vec![0.0; chunk.fades.len()] };
         let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
@@ -146,8 +147,8 @@ impl EnergyFlux {
                 weighted.counts.add(projection.sheet, projection.fraction as f32, f64::from(chunk.fades[index]));
                 weighted.weights[index] = weight;
                 chunk.powers[index] = -weight * pattern.dimming[lane];
-                let own = energy * projection.energy * f64::from(pattern.hardness[lane]);
-                chunk.energies[index] = own.clamp(LOWEST_EV, HIGHEST_EV) as f32;
+                let energy_ev = energy * projection.energy * f64::from(pattern.hardness[lane]);
+                chunk.energies[index] = energy_ev.clamp(LOWEST_EV, HIGHEST_EV) as f32;
                 chunk.arc_fractions[index] = projection.fraction as f32;
                 chunk.sheets[index] = projection.sheet;
             }
@@ -182,18 +183,18 @@ impl ParticleChunk<'_> {
     }
 
     /// Normalizes pending powers. The power relaxes toward its target, so a particle that moves between two adjacent
-    /// parts of a sheet does not flash. Returns the target and the actual total, W.
+    /// intervals of a sheet does not flash. Returns the target and the actual total, W.
     fn assign_powers(self, factors: &NodeValues) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (index, power) in self.powers.iter_mut().enumerate().filter(|(_, power)| power.is_sign_negative()) {
             let (sheet, arc_fraction) = (self.sheets[index], self.arc_fractions[index]);
-            let wanted = -*power * factors.at(sheet, arc_fraction) as f32;
+            let target = -*power * factors.at(sheet, arc_fraction) as f32;
             let full = &mut self.full_powers[index];
-            // New particles start at 0, as fast as the others give up their power.
-            let follows = *full > 0.0 || self.fades[index] < 1.0;
-            *full = if follows { *full + POWER_RELAXATION * (wanted - *full) } else { wanted };
+            // New particles start at 0 and gain power as fast as the others lose it.
+            let relaxes = *full > 0.0 || self.fades[index] < 1.0;
+            *full = if relaxes { *full + POWER_RELAXATION * (target - *full) } else { target };
             *power = self.fades[index] * *full;
-            sums[0] += f64::from(self.fades[index] * wanted);
+            sums[0] += f64::from(self.fades[index] * target);
             sums[1] += f64::from(*power);
         }
         sums
@@ -202,14 +203,15 @@ impl ParticleChunk<'_> {
 
 /// Corrects the total for the relaxation delay: otherwise the aurora would be too bright while many particles are being
 /// created.
-fn balance(particles: &mut AuroraParticles, given: &[[f64; 2]]) {
-    let [wanted, found] = given.iter().fold([0.0; 2], |sum, chunk| [sum[0] + chunk[0], sum[1] + chunk[1]]);
-    if found > 0.0 {
-        let factor = (wanted / found).clamp(BALANCE[0], BALANCE[1]) as f32;
+fn balance(particles: &mut AuroraParticles, totals: &[[f64; 2]]) {
+    let [target, actual] = totals.iter().fold([0.0; 2], |sum, chunk| [sum[0] + chunk[0], sum[1] + chunk[1]]);
+    if actual > 0.0 {
+        let factor = (target / actual).clamp(BALANCE[0], BALANCE[1]) as f32;
         particles.powers_w.par_chunks_mut(TASK).for_each(|powers| powers.iter_mut().for_each(|power| *power *= factor));
     }
 }
 
+/// The particles, divided into tasks.
 fn chunks(particles: &mut AuroraParticles) -> Vec<ParticleChunk<'_>> {
     let [xs, zs] = &particles.positions;
     let reads = xs.chunks(TASK).zip(zs.chunks(TASK)).zip(particles.fades.chunks(TASK));
@@ -245,13 +247,8 @@ mod tests {
         let points = vec![DVec2::ZERO, DVec2::new(17.0, 0.0)];
         let sheet = Sheet { points, flux: vec![1.0; 2], energy: vec![1.0; 2] };
         let shape = Shape { sheets: vec![sheet] };
-        let refined = RefinedShape::new(
-            (&shape, &[]),
-            &ArcLengthMap::alone(&shape),
-            &FoldModel::new(&parameters, key),
-            0.0,
-            20.0,
-        );
+        let refined =
+            RefinedShape::new(&shape, &[], &ArcLengthMap::alone(&shape), &FoldModel::new(&parameters, key), 0.0, 20.0);
         let energy_flux = EnergyFlux::new(&parameters, key);
         let [layout, _] = energy_flux.layouts(&refined.sheet_lengths());
         let intervals = layout.count(0) - 1;

@@ -59,8 +59,8 @@ impl Repulsion {
 
     /// Support radius h with the required number of neighbors at a density, km.
     pub(super) fn support_km(&self, density_per_km2: f64) -> f64 {
-        let [least, most] = self.bounds_km;
-        (self.neighbors / (std::f64::consts::PI * density_per_km2.max(f64::MIN_POSITIVE))).sqrt().clamp(least, most)
+        let [min, max] = self.bounds_km;
+        (self.neighbors / (std::f64::consts::PI * density_per_km2.max(f64::MIN_POSITIVE))).sqrt().clamp(min, max)
     }
 
     /// Sorts the particles and computes the repulsion, eqs. (2.11) to (2.18); `rest_density` per km^2 is delta_0.
@@ -78,10 +78,10 @@ impl Repulsion {
         compute_densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
         // A particle has its full mass in its own density: one that is fading in would otherwise have nearly no density
         // and be accelerated too much.
-        let whole = self.density_kernel.at_center::<2>(self.cells.support_radius());
+        let self_density = self.density_kernel.at_center::<2>(self.cells.support_radius());
         let state = StateEquation { rest_density: rest_density as f32, negative_pressure: true };
         let Self { masses, densities, pressures, stiffness, .. } = self;
-        dispatch!(level, _simd => add_missing_self_density(densities, masses, whole));
+        dispatch!(level, _simd => add_missing_self_density(densities, masses, self_density));
         pressures.clear();
         pressures.extend(densities.iter().map(|density| state.pressure(*stiffness, *density)));
         let (cells, masses) = (&self.cells, &self.masses);
@@ -101,11 +101,11 @@ fn particle_masses(fades: &[f32], masses: &mut Vec<f32>) {
     }
 }
 
-/// Completes densities to the full mass of the particle itself; `whole` is the self-density of a full particle.
+/// Completes densities to the full mass of the particle itself; `self_density` is that of a particle of full mass.
 #[inline(always)]
-fn add_missing_self_density(densities: &mut [f32], masses: &[f32], whole: f32) {
+fn add_missing_self_density(densities: &mut [f32], masses: &[f32], self_density: f32) {
     for (density, mass) in densities.iter_mut().zip(masses) {
-        *density += (1.0 - mass) * whole;
+        *density += (1.0 - mass) * self_density;
     }
 }
 
@@ -173,27 +173,27 @@ impl Integrator {
         field: &ElectricField,
     ) -> ([f32; 2], [f32; 2]) {
         const STEP: f32 = FRAME_S as f32;
-        let here = field.sample(position[0], position[1]);
+        let sample = field.sample(position[0], position[1]);
         let [cosine, sine] = self.rotation;
         let speed = [cosine.fma(speed[0], sine * speed[1]), cosine.fma(speed[1], -sine * speed[0])];
         let (mut to, mut new) = ([0.0; 2], [0.0; 2]);
         for c in 0..2 {
-            let force = self.lorentz_weight.fma(here.field[c], self.repulsion_weight * repulsion[c]);
+            let force = self.lorentz_weight.fma(sample.field[c], self.repulsion_weight * repulsion[c]);
             let moved = (0.5 * STEP * STEP).fma(force, STEP.fma(speed[c], position[c]));
             let clamped = if moved > -self.half_km { moved } else { -self.half_km };
             let clamped = if clamped < self.half_km { clamped } else { self.half_km };
             to[c] = if moved.is_finite() { clamped } else { position[c] };
             new[c] = self.friction_factor * STEP.fma(force, speed[c]);
         }
-        let fall = here.potential - field.sample(to[0], to[1]).potential;
-        let factor = self.energy_limit_factor(speed, new, fall);
+        let potential_drop = sample.potential - field.sample(to[0], to[1]).potential;
+        let factor = self.energy_limit_factor(speed, new, potential_drop);
         (to, if factor > 0.0 { [new[0] * factor, new[1] * factor] } else { [0.0; 2] })
     }
 
-    /// Velocity factor that limits kinetic plus potential energy; `fall` is the decrease of the potential.
+    /// Velocity factor that limits kinetic plus potential energy; `potential_drop` is the decrease of the potential.
     #[inline(always)]
-    fn energy_limit_factor(&self, before: [f32; 2], after: [f32; 2], fall: f32) -> f32 {
-        let energy = (2.0 * self.lorentz_weight).fma(fall, before[0].fma(before[0], before[1] * before[1]));
+    fn energy_limit_factor(&self, before: [f32; 2], after: [f32; 2], potential_drop: f32) -> f32 {
+        let energy = (2.0 * self.lorentz_weight).fma(potential_drop, before[0].fma(before[0], before[1] * before[1]));
         let energy = if energy > 0.0 { energy } else { 0.0 };
         let found = after[0].fma(after[0], after[1] * after[1]);
         if !found.is_finite() {

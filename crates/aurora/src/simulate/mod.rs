@@ -13,7 +13,7 @@ pub(crate) mod point_cloud;
 mod relocation;
 pub(crate) mod sheets;
 mod simulation;
-mod snapshot;
+mod state;
 #[cfg(test)]
 mod tests;
 

@@ -4,22 +4,22 @@ use bansho_base::math::DVec2;
 use bansho_sph::{self, Cells};
 use rayon::prelude::*;
 
-/// Precipitating electrons, each for many; one entry per particle in every array.
+/// Particles, each of which represents many precipitating electrons; one entry per particle in every array.
 ///
 /// Sorting reorders the particles; only the id is persistent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AuroraParticles {
-    /// Where they pass 100 km altitude, km: x east, z south.
+    /// Positions at 100 km altitude, km: x east, z south.
     pub positions: [Vec<f32>; 2],
-    /// Velocity of that position, km/s: x east, z south.
+    /// Velocities of these positions, km/s: x east, z south.
     pub velocities: [Vec<f32>; 2],
     /// Unique ids.
     pub ids: Vec<u64>,
     /// Fade-in and fade-out factor, 0 to 1; `powers_w` include it.
     pub fades: Vec<f32>,
-    /// Whether it is fading out.
+    /// Whether the particle is fading out.
     pub dying: Vec<bool>,
-    /// Central energy of the electrons that it stands for, eV.
+    /// Central energy of the electrons that it represents, eV.
     pub energies_ev: Vec<f32>,
     /// Power of precipitation, W. The sum is the sheets' energy flux times their area.
     pub powers_w: Vec<f32>,
@@ -27,11 +27,11 @@ pub struct AuroraParticles {
     pub full_powers_w: Vec<f32>,
     /// Index of the nearest sheet, or the last one it was near.
     pub sheets: Vec<u32>,
-    /// Fraction of that sheet's length before it, 0 to 1.
+    /// Position along that sheet as a fraction of its length, 0 to 1.
     pub arc_fractions: Vec<f32>,
 }
 
-/// Arrays of `f32` that a particle has an entry in.
+/// Number of arrays of `f32`.
 pub(super) const FLOAT_ARRAYS: usize = 9;
 
 impl AuroraParticles {
@@ -47,7 +47,7 @@ impl AuroraParticles {
         self.ids.is_empty()
     }
 
-    /// Power of all together, W.
+    /// Total power, W.
     #[must_use]
     pub fn power_w(&self) -> f64 {
         self.powers_w.iter().map(|power| f64::from(*power)).sum()
@@ -84,7 +84,7 @@ impl AuroraParticles {
     /// Adds a particle without power.
     pub(super) fn push(&mut self, id: u64, position: DVec2, [east, south]: [f32; 2], fade: f32) {
         let values = [position.x as f32, position.y as f32, east, south, fade, 0.0, 0.0, 0.0, 0.0];
-        self.float_arrays_mut().into_iter().zip(values).for_each(|(values, number)| values.push(number));
+        self.float_arrays_mut().into_iter().zip(values).for_each(|(array, value)| array.push(value));
         self.ids.push(id);
         self.dying.push(false);
         self.sheets.push(0);

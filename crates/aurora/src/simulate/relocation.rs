@@ -24,12 +24,17 @@ const THINNING: Purpose = Purpose::named("aurora thinning");
 const TABLE_COUNT: f64 = 75.0;
 /// Minimum particles per task.
 const TASK: usize = 4096;
-/// Intervals are filled by this factor more than the table says: until the next update they stretch by up to a half and
-/// particles move on.
+/// Factor by which intervals are filled beyond the counts of the table: until the next update they stretch by up to a half
+/// and particles move on.
 const FILL_FACTOR: f64 = 1.35;
 
-/// Position and velocity of a new particle, km and km/s.
-type Birth = (DVec2, [f32; 2]);
+/// A new particle.
+struct Birth {
+    /// km.
+    position: DVec2,
+    /// km/s.
+    velocity: [f32; 2],
+}
 
 /// Parameters of table 3.3 and the random key.
 #[derive(Clone, Debug)]
@@ -40,7 +45,7 @@ pub(super) struct Relocation {
     key: Key,
 }
 
-/// Living particles of each cell.
+/// Particles of each cell that are not fading out.
 struct CellOccupants {
     /// Start of each cell's list, and the total.
     starts: Vec<u32>,
@@ -57,13 +62,15 @@ impl Relocation {
         }
     }
 
-    /// Removes strays and surplus particles and adds missing ones, by the shape, scatter and field from before the
-    /// update.
+    /// Marks stray and surplus particles for removal and adds missing ones, by the shape, scattered particles and field
+    /// before the update.
     pub(super) fn relocate(
         &self,
         particles: &mut AuroraParticles,
-        (field, refined, scattered): (&ElectricField, &RefinedShape, &[ScatteredParticle]),
-        renewal: u32,
+        field: &ElectricField,
+        refined: &RefinedShape,
+        scattered: &[ScatteredParticle],
+        update_index: u32,
         next_id: &mut u64,
     ) {
         let near = near_cells(field, &self.parameters);
@@ -78,13 +85,13 @@ impl Relocation {
         let births = if self.parameters.scale_counts {
             let mut intervals = ArcIntervals::new(refined, scattered, self.count);
             intervals.fill(particles);
-            let births = self.births_by_interval(&mut intervals, scattered, particles.len(), renewal);
-            self.remove_surplus(particles, &mut intervals, renewal);
+            let births = self.births_by_interval(&mut intervals, scattered, particles.len(), update_index);
+            self.remove_surplus(particles, &mut intervals, update_index);
             births
         } else {
-            self.births_by_cell(particles, &occupants, (field, refined), &near, *next_id, renewal)
+            self.births_by_cell(particles, &occupants, field, refined, &near, *next_id, update_index)
         };
-        for (position, velocity) in births {
+        for Birth { position, velocity } in births {
             particles.push(*next_id, position, velocity, 0.0);
             *next_id += 1;
         }
@@ -116,10 +123,10 @@ impl Relocation {
         refined: &RefinedShape,
         scale: f64,
     ) {
-        let most = self.parameters.deaths_above * scale;
+        let max_count = self.parameters.deaths_above * scale;
         for cell in 0..occupants.starts.len() - 1 {
             let list = occupants.of(cell);
-            let excess = (list.len() as f64 - most).min(self.parameters.max_deaths * scale).ceil();
+            let excess = (list.len() as f64 - max_count).min(self.parameters.max_deaths * scale).ceil();
             if excess < 1.0 {
                 continue;
             }
@@ -136,27 +143,28 @@ impl Relocation {
         &self,
         particles: &AuroraParticles,
         occupants: &CellOccupants,
-        (field, refined): (&ElectricField, &RefinedShape),
+        field: &ElectricField,
+        refined: &RefinedShape,
         near: &[bool],
         first_id: u64,
-        renewal: u32,
+        update_index: u32,
     ) -> Vec<Birth> {
         let columns = field.counts.size()[0];
         let origin = DVec2::from(field.counts.origin());
         let mut births = Vec::new();
         for cell in (0..near.len()).filter(|cell| near[*cell]) {
-            let lack = self.parameters.births_below - occupants.of(cell).len() as f64;
-            let deficit = lack.min(self.parameters.max_births).round();
-            if deficit < 1.0 {
+            let deficit = self.parameters.births_below - occupants.of(cell).len() as f64;
+            let count = deficit.min(self.parameters.max_births).round();
+            if count < 1.0 {
                 continue;
             }
             let velocity = occupants.mean_velocity(particles, cell, columns);
             let corner = DVec2::new((cell % columns) as f64, (cell / columns) as f64);
-            for _ in 0..deficit.min(self.room(particles.len() + births.len())) as u64 {
+            for _ in 0..count.min(self.remaining_capacity(particles.len() + births.len())) as u64 {
                 let id = first_id + births.len() as u64;
-                let [u, v, ..] = self.key.words(id, renewal, BIRTH).map(|word| f64::from(uniform(word)));
+                let [u, v, ..] = self.key.words(id, update_index, BIRTH).map(|word| f64::from(uniform(word)));
                 let position = origin + (corner + DVec2::new(u, v)) * field.counts.spacing();
-                births.push((refined.clamp_distance(position, self.half_thickness), velocity));
+                births.push(Birth { position: refined.clamp_distance(position, self.half_thickness), velocity });
             }
         }
         births
@@ -170,28 +178,32 @@ impl Relocation {
         intervals: &mut ArcIntervals,
         scattered: &[ScatteredParticle],
         living: usize,
-        renewal: u32,
+        update_index: u32,
     ) -> Vec<Birth> {
-        let [below, most] = [self.parameters.births_below, self.parameters.max_births].map(|count| count / TABLE_COUNT);
-        let lack = |interval: &ArcInterval| (FILL_FACTOR * below * interval.target_count - interval.count).max(0.0);
-        let lacks: Vec<f64> = intervals.all().iter().map(lack).collect();
-        let lacking: f64 = lacks.iter().sum();
-        if lacking <= 0.0 {
+        let [births_below, max_births] =
+            [self.parameters.births_below, self.parameters.max_births].map(|count| count / TABLE_COUNT);
+        let deficit =
+            |interval: &ArcInterval| (FILL_FACTOR * births_below * interval.target_count - interval.count).max(0.0);
+        let deficits: Vec<f64> = intervals.all().iter().map(deficit).collect();
+        let total_deficit: f64 = deficits.iter().sum();
+        if total_deficit <= 0.0 {
             return Vec::new();
         }
-        let given = (most * self.count).min(self.room(living)).min(lacking) / lacking;
-        let chance = |(lack, interval): (&f64, &mut ArcInterval)| given * lack / interval.scattered.max(1.0);
-        let chances: Vec<f64> = lacks.iter().zip(intervals.all()).map(chance).collect();
-        let velocities: Vec<[f32; 2]> = (0..chances.len()).map(|index| intervals.velocity(index)).collect();
+        let filled_fraction =
+            (max_births * self.count).min(self.remaining_capacity(living)).min(total_deficit) / total_deficit;
+        let probability =
+            |(deficit, interval): (&f64, &mut ArcInterval)| filled_fraction * deficit / interval.scattered.max(1.0);
+        let probabilities: Vec<f64> = deficits.iter().zip(intervals.all()).map(probability).collect();
+        let velocities: Vec<[f32; 2]> = (0..probabilities.len()).map(|index| intervals.velocity(index)).collect();
         let mut births = Vec::new();
         for (number, particle) in scattered.iter().enumerate() {
             let Some(index) =
-                intervals.index(particle.sheet, particle.arc_fraction).filter(|index| chances[*index] > 0.0)
+                intervals.index(particle.sheet, particle.arc_fraction).filter(|index| probabilities[*index] > 0.0)
             else {
                 continue;
             };
-            if f64::from(self.key.uniforms(number as u64, renewal, BIRTH)[0]) < chances[index] {
-                births.push((particle.position, velocities[index]));
+            if f64::from(self.key.uniforms(number as u64, update_index, BIRTH)[0]) < probabilities[index] {
+                births.push(Birth { position: particle.position, velocity: velocities[index] });
                 intervals.all()[index].count += 1.0;
             }
         }
@@ -199,12 +211,12 @@ impl Relocation {
     }
 
     /// Remaining capacity for new particles.
-    fn room(&self, living: usize) -> f64 {
+    fn remaining_capacity(&self, living: usize) -> f64 {
         (MAX_PARTICLE_FACTOR * self.count - living as f64).max(0.0)
     }
 
     /// Removes the surplus over the requested count, from intervals with more than their target.
-    fn remove_surplus(&self, particles: &mut AuroraParticles, intervals: &mut ArcIntervals, renewal: u32) {
+    fn remove_surplus(&self, particles: &mut AuroraParticles, intervals: &mut ArcIntervals, update_index: u32) {
         let living: f64 = intervals.all().iter().map(|interval| interval.count).sum();
         let excess = |interval: &ArcInterval| (interval.count - interval.target_count).max(0.0);
         let excesses: Vec<f64> = intervals.all().iter().map(excess).collect();
@@ -212,15 +224,16 @@ impl Relocation {
         if fraction <= 0.0 {
             return;
         }
-        let chance =
+        let probability =
             |(excess, interval): (&f64, &mut ArcInterval)| (fraction * excess / interval.count.max(1.0)) as f32;
-        let chances: Vec<f32> = excesses.iter().zip(intervals.all()).map(chance).collect();
+        let probabilities: Vec<f32> = excesses.iter().zip(intervals.all()).map(probability).collect();
         for (index, dying) in particles.dying.iter_mut().enumerate().filter(|(_, dying)| !**dying) {
             let Some(interval) = intervals.index(particles.sheets[index], particles.arc_fractions[index]) else {
                 continue;
             };
-            let chance = chances[interval];
-            *dying = chance > 0.0 && self.key.uniforms(particles.ids[index], renewal, THINNING)[0] < chance;
+            let probability = probabilities[interval];
+            *dying =
+                probability > 0.0 && self.key.uniforms(particles.ids[index], update_index, THINNING)[0] < probability;
         }
     }
 }
@@ -232,9 +245,10 @@ const MAX_PARTICLE_FACTOR: f64 = 4.0;
 pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
     let (counts, potential) = (field.counts.values(), field.potential.values());
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let (least, greatest) = (table.scatter_count_threshold * mean(counts), table.potential_threshold * mean(potential));
+    let (min_count, max_potential) =
+        (table.scatter_count_threshold * mean(counts), table.potential_threshold * mean(potential));
     // An empty shape has no near cells, whatever the thresholds.
-    let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= least && *potential <= greatest;
+    let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= min_count && *potential <= max_potential;
     counts.iter().zip(potential).map(near).collect()
 }
 
@@ -305,7 +319,7 @@ pub(super) struct ArcInterval {
     pub(super) target_count: f64,
     /// Number of scattered particles: below the target where another sheet is close by.
     pub(super) scattered: f64,
-    /// Number of living particles, and the sum of their velocities, km/s.
+    /// Number of particles that are not fading out, and the sum of their velocities, km/s.
     pub(super) count: f64,
     momentum: [f64; 2],
 }
@@ -318,9 +332,10 @@ impl ArcIntervals {
         let number = INTERVALS.min(count / MIN_INTERVAL_COUNT);
         let mut intervals = Self { all: Vec::new(), starts: vec![0] };
         for fraction in lengths.into_iter().map(|length| length / whole) {
-            let own = (number * fraction).round().max(1.0);
-            let interval = ArcInterval { target_count: count * fraction / own, ..ArcInterval::default() };
-            intervals.all.extend(std::iter::repeat_n(interval, own as usize));
+            let intervals_of_sheet = (number * fraction).round().max(1.0);
+            let interval =
+                ArcInterval { target_count: count * fraction / intervals_of_sheet, ..ArcInterval::default() };
+            intervals.all.extend(std::iter::repeat_n(interval, intervals_of_sheet as usize));
             intervals.starts.push(intervals.all.len());
         }
         for particle in scattered {
@@ -350,7 +365,7 @@ impl ArcIntervals {
         Some(first + (coordinate as usize).min(end - first - 1))
     }
 
-    /// All of them, sheet by sheet.
+    /// All intervals, sheet by sheet.
     pub(super) fn all(&mut self) -> &mut [ArcInterval] {
         &mut self.all
     }

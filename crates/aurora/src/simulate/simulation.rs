@@ -14,7 +14,7 @@ use super::{
     field::Grid2,
     forces::{Integrator, Repulsion},
     relocation::{Relocation, near_cells},
-    snapshot,
+    state::SimulationState,
 };
 use crate::{
     AuroraParameters,
@@ -60,24 +60,6 @@ struct TargetBuilder {
     fields: FieldBuilder,
 }
 
-/// State that a step changes.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct SimulationState {
-    pub(super) steps: u64,
-    pub(super) next_id: u64,
-    /// Support radius h of the repulsion, km.
-    pub(super) support_km: f64,
-    /// Arc-length map of the current sheets.
-    pub(super) arc_map: ArcLengthMap,
-    /// Arc-length map of the target shape, and its time, s.
-    pub(super) target_arc_map: ArcLengthMap,
-    pub(super) target_time: f64,
-    /// Number of updates of the target.
-    pub(super) renewals: u32,
-    pub(super) particles: AuroraParticles,
-    pub(super) afterglow: Afterglow,
-}
-
 #[derive(Clone, Debug)]
 struct Target {
     refined: RefinedShape,
@@ -93,7 +75,7 @@ impl TargetBuilder {
     fn refined_shape(&self, arc_map: &ArcLengthMap, time: f64) -> RefinedShape {
         let reach = REACH * self.parameters.half_thickness_km();
         let (shape, bridges) = (self.sequence.at(time), self.sequence.bridges(time));
-        RefinedShape::new((&shape, &bridges), arc_map, &self.fold_model, time, reach)
+        RefinedShape::new(&shape, &bridges, arc_map, &self.fold_model, time, reach)
     }
 
     /// The arc-length map at a time, transferred from `before`.
@@ -105,7 +87,7 @@ impl TargetBuilder {
     fn target(&self, state: &SimulationState) -> Target {
         let refined = self.refined_shape(&state.target_arc_map, state.target_time);
         let count = self.parameters.particles.count as usize;
-        let scattered = scatter(&refined, self.parameters.half_thickness_km(), count, self.key, state.renewals);
+        let scattered = scatter(&refined, self.parameters.half_thickness_km(), count, self.key, state.target_updates);
         let field = self.fields.build(&refined, &scattered, state.target_time);
         let near = near_cells(&field, &self.parameters.particles.relocation);
         let near = near.into_iter().filter(|near| *near).count().max(1) as f64;
@@ -118,7 +100,8 @@ impl TargetBuilder {
 fn advance(
     state: &mut SimulationState,
     target: &Target,
-    (repulsion, integrator): (&mut Repulsion, &Integrator),
+    repulsion: &mut Repulsion,
+    integrator: &Integrator,
     fade_s: f64,
 ) {
     state.support_km = repulsion.compute_accelerations(&mut state.particles, state.support_km, target.rest_density);
@@ -138,7 +121,7 @@ impl AuroraSimulation {
     /// Length of a step, s.
     pub const STEP_S: f64 = FRAME_S;
 
-    /// The aurora `name` at the start of its preroll: particles uniformly about the first shape, at rest.
+    /// The aurora `name` at the start of its preroll: particles at rest, uniformly distributed about the first shape.
     #[must_use]
     pub fn new(parameters: AuroraParameters, sequence: impl Into<Arc<Sequence>>, name: &str, seed: u64) -> Self {
         let sequence = sequence.into();
@@ -154,7 +137,7 @@ impl AuroraSimulation {
             target_arc_map: arc_map.clone(),
             arc_map,
             target_time: time,
-            renewals: 0,
+            target_updates: 0,
             particles: AuroraParticles::default(),
             afterglow: Afterglow::new(parameters.extent_km, parameters.cell_km()),
         };
@@ -167,7 +150,7 @@ impl AuroraSimulation {
         state.next_id = target.scattered.len() as u64;
         state.support_km = repulsion.support_km(target.rest_density);
         let rays = energy_flux.ray_table(&target.refined, time);
-        energy_flux.distribute_power(&mut state.particles, (&target.refined, &rays), time);
+        energy_flux.distribute_power(&mut state.particles, &target.refined, &rays, time);
         state.afterglow.fill_steady_state(&state.particles);
         let parameters = &targets.parameters;
         let emission = parameters.rendering.energy_deposition.shared_emission(parameters.spectrum);
@@ -184,17 +167,19 @@ impl AuroraSimulation {
         }
     }
 
-    /// Updates the target: births and deaths by the previous one, then the field of the new one. It is the shape at the
-    /// time of the next update, so that particles arrive in time.
-    fn renew(&mut self, frames: u64) {
+    /// Updates the target: births and deaths by the previous target, then the field of the new one. The target is the shape
+    /// at the time of the next update, so that particles arrive in time.
+    fn update_target(&mut self, frames: u64) {
         let (state, target) = (&mut self.state, &self.target);
         self.relocation.relocate(
             &mut state.particles,
-            (&target.field, &target.refined, &target.scattered),
-            state.renewals,
+            &target.field,
+            &target.refined,
+            &target.scattered,
+            state.target_updates,
             &mut state.next_id,
         );
-        state.renewals += 1;
+        state.target_updates += 1;
         state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
         state.target_arc_map = self.targets.transfer_arc_map(&state.arc_map, state.target_time);
         self.target = self.targets.target(&self.state);
@@ -210,14 +195,14 @@ impl AuroraSimulation {
     pub fn step(&mut self) {
         let frames = self.targets.parameters.morphing.update_interval_frames.round().max(1.0) as u64;
         if self.state.steps.is_multiple_of(frames) {
-            self.renew(frames);
+            self.update_target(frames);
         }
         let time = (self.state.steps + 1) as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
         let Self { targets, repulsion, integrator, state, target, energy_flux, decay, .. } = self;
         let before = state.arc_map.clone();
         // The sheets do not depend on the particles and are computed in parallel.
         let (_, (arc_map, refined, rays)) = rayon::join(
-            || advance(state, target, (repulsion, integrator), targets.parameters.particles.fade_s),
+            || advance(state, target, repulsion, integrator, targets.parameters.particles.fade_s),
             || {
                 let mut arc_map = targets.transfer_arc_map(&before, time);
                 arc_map.relax(Self::STEP_S);
@@ -228,14 +213,14 @@ impl AuroraSimulation {
         );
         state.steps += 1;
         state.arc_map = arc_map;
-        energy_flux.distribute_power(&mut state.particles, (&refined, &rays), time);
+        energy_flux.distribute_power(&mut state.particles, &refined, &rays, time);
         state.afterglow.step(&state.particles, decay);
     }
 
     /// Serializes the state.
     #[must_use]
     pub fn snapshot(&self) -> Vec<u8> {
-        snapshot::write(&self.state)
+        self.state.serialize()
     }
 
     /// Restores a state from [`Self::snapshot`] of an aurora with the same parameters.
@@ -244,11 +229,11 @@ impl AuroraSimulation {
     ///
     /// Invalid bytes; the state is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
-        let mut state = snapshot::read(bytes, &self.state)?;
+        let mut state = SimulationState::deserialize(bytes, &self.state)?;
         let time = state.steps as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
-        let (now, then) =
+        let (ids, target_ids) =
             (self.targets.sequence.control_point_ids(time), self.targets.sequence.control_point_ids(state.target_time));
-        if !state.arc_map.take_control_point_ids(&now) || !state.target_arc_map.take_control_point_ids(&then) {
+        if !state.arc_map.take_control_point_ids(&ids) || !state.target_arc_map.take_control_point_ids(&target_ids) {
             return Err(SnapshotError::Damaged);
         }
         self.state = state;

@@ -38,14 +38,14 @@ pub(super) fn blurred_reflection(reflection: &Image<4>, side: usize, view: &View
     result
 }
 
-/// Alpha as coverage: beyond the horizon and the picture's edges nothing is known, and the blur is normalized by the
-/// rest.
-fn with_coverage([red, green, blue, _]: Pixel, seen: bool) -> Pixel {
-    if seen { [red, green, blue, 1.0] } else { [0.0; 4] }
+/// Stores coverage in alpha. It is 0 above the horizon and outside of the picture, where the reflection is undefined; the
+/// blur is normalized by the blurred coverage.
+fn with_coverage([red, green, blue, _]: Pixel, is_defined: bool) -> Pixel {
+    if is_defined { [red, green, blue, 1.0] } else { [0.0; 4] }
 }
 
-/// Sine of the angle at which the picture's center column, `y` pixels from its top, looks down on the plane; 0 above
-/// the horizon.
+/// Sine of the angle between the plane and the line of sight through the picture's center column, `y` pixels from its top;
+/// 0 above the horizon.
 fn elevation_sine(view: &View, y: f64) -> f64 {
     let direction = view.camera.direction(DVec2::new(0.5 * view.size[0] as f64, y));
     direction.map_or(0.0, |direction| (-direction.y / direction.length()).clamp(0.0, 1.0))

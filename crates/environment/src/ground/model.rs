@@ -1,4 +1,4 @@
-//! The ground: what is built once from its parameters.
+//! The ground: the pattern that is built once from its parameters.
 
 use bansho_base::{
     image::Image,
@@ -26,17 +26,17 @@ impl Ground {
         Self { surface: Surface::new(&parameters, key), parameters, key, loop_s }
     }
 
-    /// The lake, if that is what it is.
+    /// The lake in a frame; `None` for other kinds of ground.
     pub(super) fn lake(&self, view: &View, surroundings: &Surroundings) -> Option<LakeFrame> {
         let parameters = &self.parameters;
-        let sharp = surroundings.reflection.filter(|_| parameters.kind == GroundKind::Water)?;
+        let reflection = surroundings.reflection.filter(|_| parameters.kind == GroundKind::Water)?;
         let t = view.shutter.middle();
         let wind = surroundings.wind.mean(t);
         let heading = DVec2::new(wind.x, wind.z).try_normalize().unwrap_or(DVec2::X);
         let waves = Waves::new(self.key, parameters.waves, parameters.wave_length, heading, t, self.loop_s);
         Some(LakeFrame {
             waves,
-            blurred_reflection: lake_reflection::blurred_reflection(sharp, 1, view, parameters.waves),
+            blurred_reflection: lake_reflection::blurred_reflection(reflection, 1, view, parameters.waves),
         })
     }
 }

@@ -1,70 +1,55 @@
-//! What a scene may say of its ground.
+//! Parameters of the ground.
 
 use bansho_base::{
-    color::{acescg_from_srgb, luminance},
     parameters::{Range, animated::Animated},
     phenomenon::LevelMirror,
 };
 
-use super::shade::{WATER_ALBEDO, wet_albedo_factor};
-
 bansho_base::choice! {
-    /// What the ground is.
+    /// Kind of the ground.
     pub enum GroundKind {
         /// Soil, stone or asphalt.
         Land = "land",
         /// A lake.
         Water = "water",
-        /// The ground of the plate: only what light and wetness change of it is drawn.
+        /// The ground of the plate: only its changes by light and wetness are drawn.
         Plate = "plate",
     }
 }
 
 bansho_base::parameters! {
-    /// A level ground to the horizon, lit by lamps, fires and sky; wet, it darkens and mirrors them. A scene of rain alone that states neither sky,
-    /// ground nor light has a wet one.
+    /// A horizontal ground plane that extends to the horizon, lit by lamps, fires and the sky. When wet, it is darker and mirrors them. A scene with
+    /// rain only that states neither sky, ground nor light has a wet ground.
     pub struct GroundParameters {
-        /// What the ground is.
+        /// Kind of the ground.
         kind: GroundKind = GroundKind::Land;
-        /// How high it lies.
+        /// Height of the plane.
         height: f64 = 0.0, unit("m");
-        /// Share of light that it throws back when dry, linear sRGB.
+        /// Albedo when dry, linear sRGB.
         color: [f64; 3] = [0.13, 0.125, 0.12], limits(Range::new(0.0, 1.0));
-        /// How much it varies from place to place.
+        /// Variation of the albedo over the ground.
         texture: f64 = 0.5, limits(Range::new(0.0, 1.0));
-        /// Size of its largest patches.
+        /// Size of the largest patches of the texture.
         texture_size: f64 = 1.6, limits(Range::new(0.01, 1000.0)), unit("m");
-        /// How wet it is: 0 dry, 1 covered by a film of water.
+        /// Wetness: 0 is dry, 1 is covered by a film of water.
         wetness: Animated<f64> = Animated::from(0.0), limits(Range::new(0.0, 1.0));
-        /// Share of wet ground that is covered by puddles.
+        /// Fraction of wet ground that is covered by puddles.
         puddles: f64 = 0.25, limits(Range::new(0.0, 1.0));
-        /// R.m.s. slope of the film of water between puddles: it draws lamps out into streaks.
+        /// RMS slope of the film of water between puddles; it elongates the reflections of lamps.
         roughness: f64 = 0.06, limits(Range::new(0.0, 0.5));
-        /// How far above or below the ground, by its depth, what a plate shows still is ground; for `kind = "plate"`. More for a plate whose
-        /// depth is only a guess.
+        /// With `kind = "plate"`: maximum distance of a pixel of the plate from the ground plane, by its depth, at which it counts as ground. Larger
+        /// for a plate whose depth is estimated.
         plate_tolerance: f64 = 0.02, limits(Range::new(0.0, 10.0)), unit("m");
-        /// R.m.s. slope of the waves of a lake.
+        /// RMS slope of the waves of a lake.
         waves: f64 = 0.02, limits(Range::new(0.0, 0.3));
-        /// Longest waves of a lake.
+        /// Wavelength of the longest waves of a lake.
         wave_length: f64 = 4.0, limits(Range::new(0.05, 200.0)), unit("m");
     }
 }
 
 impl GroundParameters {
-    /// Share of light that it throws back to all sides, as wet as it is at time `t`.
-    #[must_use]
-    pub fn reflectance(&self, t: f64) -> f64 {
-        match self.kind {
-            GroundKind::Water => f64::from(WATER_ALBEDO),
-            GroundKind::Land | GroundKind::Plate => {
-                let dry = luminance(acescg_from_srgb(self.color.map(|value| value as f32)));
-                f64::from(dry) * wet_albedo_factor(self.wetness.at(t))
-            }
-        }
-    }
-
-    /// It as a mirror.
-    pub(super) fn level(&self) -> LevelMirror {
+    /// The ground plane as a mirror.
+    pub(super) fn mirror(&self) -> LevelMirror {
         LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance }
     }
 }

@@ -16,10 +16,10 @@ use super::{GroundKind, lake_reflection, model::Ground, shade, shade::PreparedGr
 impl Phenomenon for Ground {
     fn info(&self) -> PhenomenonInfo<'_> {
         let dry = self.parameters.wetness.constant() == Some(0.0) && self.parameters.kind != GroundKind::Water;
-        PhenomenonInfo { mirror: (!dry).then(|| self.parameters.level()), ..PhenomenonInfo::new(Self::NAME) }
+        PhenomenonInfo { mirror: (!dry).then(|| self.parameters.mirror()), ..PhenomenonInfo::new(Self::NAME) }
     }
 
-    /// It only shows the light of others.
+    /// The ground only reflects the light of others.
     fn luminance(&self) -> f64 {
         0.0
     }
@@ -32,8 +32,8 @@ impl Phenomenon for Ground {
 impl Run for Ground {
     fn publish(&self, _shutter: Shutter) -> Publication {
         let point = bansho_base::math::DVec3::new(0.0, self.parameters.height, 0.0);
-        let solid = Occluder::HalfSpace { point, normal: bansho_base::math::DVec3::Y };
-        Publication { occluders: vec![solid], ..Publication::default() }
+        let half_space = Occluder::HalfSpace { point, normal: bansho_base::math::DVec3::Y };
+        Publication { occluders: vec![half_space], ..Publication::default() }
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use bansho_base::{
+    color::{acescg_from_srgb, luminance},
     image::Rect,
     math::{self, DVec2, DVec3, MulAdd},
     phenomenon::{
@@ -15,23 +16,37 @@ use bansho_base::{
 use super::{
     model::LakeFrame,
     parameters::{GroundKind, GroundParameters},
-    surface::{Surface, SurfaceSample, fresnel},
+    surface::{Surface, SurfaceSample},
     waves::WaveSlope,
-    wet_reflection::glossy_reflection,
+    wet_reflection::{fresnel, glossy_reflection},
 };
 
-/// Depth at which the ground ends, m: in front of the sky, behind everything else.
+/// Depth at which the ground ends, m: in front of the sky, behind all other phenomena.
 pub(super) const HORIZON: f64 = 1e6;
 /// Fraction of its albedo that soaked ground loses, by total internal reflection in the water (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
 /// Fraction that puddles lose beyond that: they are deeper, and often turbid.
 const PUDDLE_DARKENING: f64 = 0.4;
 /// Albedo of deep water.
-pub(super) const WATER_ALBEDO: f32 = 0.02;
+const WATER_ALBEDO: f32 = 0.02;
 
 /// Albedo of wet ground relative to dry ground.
-pub(super) fn wet_albedo_factor(wetness: f64) -> f64 {
+fn wet_albedo_factor(wetness: f64) -> f64 {
     1.0 - WET_DARKENING * wetness
+}
+
+impl GroundParameters {
+    /// Luminance of the diffuse albedo at time `t`, with the darkening by wetness.
+    #[must_use]
+    pub fn reflectance(&self, t: f64) -> f64 {
+        match self.kind {
+            GroundKind::Water => f64::from(WATER_ALBEDO),
+            GroundKind::Land | GroundKind::Plate => {
+                let dry = luminance(acescg_from_srgb(self.color.map(|value| value as f32)));
+                f64::from(dry) * wet_albedo_factor(self.wetness.at(t))
+            }
+        }
+    }
 }
 
 /// One frame of the ground.
@@ -42,7 +57,7 @@ pub(super) struct PreparedGround<'a> {
     pub(super) surroundings: &'a Surroundings<'a>,
     pub(super) wetness: f64,
     pub(super) lake: Option<LakeFrame>,
-    /// The plate and its sky, as a film too rough for sharp reflections mirrors them.
+    /// The plate and its sky, blurred as a rough film of water reflects them.
     pub(super) backdrop: Option<Backdrop>,
 }
 
@@ -92,14 +107,14 @@ impl PreparedGround<'_> {
             GroundKind::Water => [WATER_ALBEDO; 3],
             GroundKind::Plate => sample.albedo.map(|value| value * self.wet_albedo_factor()),
             GroundKind::Land => {
-                let standing = 1.0 - PUDDLE_DARKENING * self.wetness * sample.puddle;
-                sample.albedo.map(|value| value * self.wet_albedo_factor() * standing as f32)
+                let puddle_factor = 1.0 - PUDDLE_DARKENING * self.wetness * sample.puddle;
+                sample.albedo.map(|value| value * self.wet_albedo_factor() * puddle_factor as f32)
             }
         };
         [0, 1, 2].map(|c| illuminance[c] * albedo[c] / PI)
     }
 
-    /// Albedo of the wet ground relative to dry ground.
+    /// Albedo of the ground relative to dry ground.
     fn wet_albedo_factor(&self) -> f32 {
         wet_albedo_factor(self.wetness) as f32
     }
@@ -163,14 +178,14 @@ impl PreparedGround<'_> {
     fn is_ground(&self, hit: &Hit, plate: f64) -> bool {
         let camera_height = self.view.camera.position.y - self.parameters.height;
         let above = camera_height * (1.0 - plate / hit.depth);
-        above.abs() < self.parameters.level().tolerance_at(plate, self.view.camera.focal_pixels)
+        above.abs() < self.parameters.mirror().tolerance_at(plate, self.view.camera.focal_pixels)
     }
 
     /// The transmittance of the sample; `None` if it is hidden.
     fn transmittance(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
         if self.parameters.kind == GroundKind::Plate {
-            let here = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
-            return here.then_some(self.wet_albedo_factor());
+            let is_ground = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
+            return is_ground.then_some(self.wet_albedo_factor());
         }
         strip.visible(index, hit.depth as f32).then_some(1.0 - hit.coverage as f32)
     }

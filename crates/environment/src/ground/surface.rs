@@ -29,7 +29,7 @@ const SINGLE_OCTAVE: Fractal = Fractal { octaves: 1, lacunarity: 2, gain: 0.5 };
 const BUMP_SIZE: f64 = 0.15;
 const BUMP_OCTAVES: usize = 3;
 const BUMP_VARIANCE_FRACTION: f64 = 0.4;
-/// Slope of grains that stand out of the film, relative to that of the film.
+/// Slope of grains that protrude from the film, relative to that of the film.
 const GRAIN_SLOPE_RATIO: f64 = 3.0;
 /// Largest fraction of wet ground that is film between the grains.
 const MAX_FILM_FRACTION: f64 = 0.6;
@@ -51,13 +51,13 @@ pub(super) struct SurfaceSample {
     pub(super) albedo: [f32; 3],
     /// Fraction covered by puddles when wet.
     pub(super) puddle: f64,
-    /// Fraction of the rest with an unbroken film of water; high ground has grains that stand out of it.
+    /// Fraction of the rest with an unbroken film of water; high ground has grains that protrude from it.
     pub(super) film: f64,
 }
 
 impl Surface {
     pub(super) fn new(parameters: &GroundParameters, key: Key) -> Self {
-        let words = [0, 1].map(|part| key.words(part, 0, Purpose::named("ground")));
+        let words = [0, 1].map(|id| key.words(id, 0, Purpose::named("ground")));
         let octaves =
             words.as_flattened().iter().take(OCTAVES).filter_map(|&seed| Noise::new(seed, SINGLE_OCTAVE, [0, 0]).ok());
         Self {
@@ -138,13 +138,6 @@ fn film_fraction(relief: f64) -> f64 {
     1.0 - math::smoothstep(-RELIEF_DEVIATION, RELIEF_DEVIATION, relief)
 }
 
-/// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
-pub(super) fn fresnel(cos: f64) -> f64 {
-    let grazing = 1.0 - cos.clamp(0.0, 1.0);
-    let fifth = grazing * grazing * grazing * grazing * grazing;
-    0.0204 + 0.9796 * fifth
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,12 +178,5 @@ mod tests {
         };
         let fraction = variance(&coarse) / variance(&all);
         assert!(fraction < 0.15, "{fraction}");
-    }
-
-    #[test]
-    fn water_mirrors_two_hundredths_from_above_and_all_at_the_horizon() {
-        assert!((fresnel(1.0) - 0.0204).abs() < 1e-12);
-        assert!((fresnel(0.0) - 1.0).abs() < 1e-12);
-        assert!((0.05..0.07).contains(&fresnel(0.5)));
     }
 }

@@ -12,7 +12,7 @@ use bansho_base::{
     world::wind::{Wind, WindParameters},
 };
 
-use super::{Ground, GroundKind, GroundParameters, surface};
+use super::{Ground, GroundKind, GroundParameters, wet_reflection};
 
 const SIZE: [usize; 2] = [64, 48];
 
@@ -94,7 +94,7 @@ fn a_wet_ground_is_darker_and_mirrors_what_fresnel_says() {
     let specular = at(&drawn(wet, Vec::new(), Some(&mirror)), DVec3::ZERO);
     // Seen from (0, 2, 6): the cosine to the normal is 2 / sqrt(40).
     let cos = 2.0 / bansho_base::math::sqrt(40.0);
-    assert!((specular / (1000.0 * surface::fresnel(cos)) - 1.0).abs() < 0.05, "{specular}");
+    assert!((specular / (1000.0 * wet_reflection::fresnel(cos)) - 1.0).abs() < 0.05, "{specular}");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn a_wall_stays_dry_three_centimeters_above_the_ground() {
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, size, 0);
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings::from_wind(&wind);
-    // What the ground lets through of a plate that stands everywhere this high above the ground, in a row 6 m away.
+    // Transmittance of the ground in front of a plate that is everywhere at this height above the ground, in a row 6 m away.
     let transmittance = |above: f64, plate_tolerance: f64| {
         let wet =
             GroundParameters { kind: GroundKind::Plate, wetness: 1.0.into(), puddles: 0.0, plate_tolerance, ..plain() };

@@ -70,11 +70,11 @@ impl Waves {
         let mut slope = WaveSlope::default();
         for wave in &self.waves {
             // Below two pixels a wave is not resolved, from six pixels on wholly.
-            let seen = math::smoothstep(2.0, 6.0, wave.length / footprint.max(1e-9));
-            if seen > 0.0 {
-                slope.resolved += wave.slope * (seen * math::cos(wave.vector.dot(position) + wave.phase));
+            let visibility = math::smoothstep(2.0, 6.0, wave.length / footprint.max(1e-9));
+            if visibility > 0.0 {
+                slope.resolved += wave.slope * (visibility * math::cos(wave.vector.dot(position) + wave.phase));
             }
-            slope.unresolved += (1.0 - seen * seen) / WAVE_COUNT as f64;
+            slope.unresolved += (1.0 - visibility * visibility) / WAVE_COUNT as f64;
         }
         slope
     }

@@ -7,7 +7,12 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Surroundings},
 };
 
-use super::surface::fresnel;
+/// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
+pub(super) fn fresnel(cos: f64) -> f64 {
+    let grazing = 1.0 - cos.clamp(0.0, 1.0);
+    let fifth = grazing * grazing * grazing * grazing * grazing;
+    0.0204 + 0.9796 * fifth
+}
 
 /// Microfacets of wet ground. The slope distribution has longer tails than a Gaussian (Burley 2012: GTR with exponent
 /// 3), so that highlights fade without an edge.
@@ -15,7 +20,7 @@ use super::surface::fresnel;
 pub(super) struct Microfacets {
     /// Mean slope: that of the bumps that are resolved.
     pub(super) tilt: DVec2,
-    /// Slopes of the unresolved film and of the grains that stand out of it: r.m.s. along each axis of a Gaussian with
+    /// Slopes of the unresolved film and of the grains that protrude from it: r.m.s. along each axis of a Gaussian with
     /// the same median.
     pub(super) slopes: [f64; 2],
     /// Fraction of the film.
@@ -66,8 +71,8 @@ pub(super) fn glossy_reflection(
     viewer: DVec3,
     microfacets: &Microfacets,
 ) -> [f32; 3] {
-    // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and reflect what is
-    // higher.
+    // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and from higher
+    // directions.
     let rise = math::hypot(viewer.y, microfacets.mean_slope());
     let specular = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
     let backdrop_radiance = backdrop.unwrap_or_else(|| surroundings.sky.radiance(specular));
@@ -150,5 +155,12 @@ mod tests {
         let tilt = DVec2::new(-half.x, -half.z) / half.y;
         let lobe = |tilt| Microfacets { tilt, ..even(0.03) }.specular_lobe(light, viewer, 0.0);
         assert!(lobe(tilt) > lobe(DVec2::ZERO) && lobe(tilt) > lobe(2.0 * tilt));
+    }
+
+    #[test]
+    fn water_mirrors_two_hundredths_from_above_and_all_at_the_horizon() {
+        assert!((fresnel(1.0) - 0.0204).abs() < 1e-12);
+        assert!((fresnel(0.0) - 1.0).abs() < 1e-12);
+        assert!((0.05..0.07).contains(&fresnel(0.5)));
     }
 }

@@ -12,10 +12,10 @@
 //! | glare `L = E k / (theta^2 + a^2)^(3/2)`, with a fade to 0 | `Glare::at`, normalized in `Glare::new` |
 //!
 //! # Data flow
-//! [`Lamps`] holds a function of time that gives the visible lights. `project_lamp` turns each into a `Disc` in the
+//! [`Lamps`] holds a function of time that returns the visible lights. `project_lamp` turns each into a `Disc` in the
 //! picture: center, radius, depth, radiance, and the illuminance at the camera. `PreparedLamps` draws the discs at
-//! their depths, antialiased, and the glare of all of them in the nearest depth interval. Their light on other things
-//! is the lights' own, not a matter of this module.
+//! their depths, antialiased, and the glare of all of them in the nearest depth interval. The illumination of
+//! other objects is that of the lights and not part of this module.
 
 mod model;
 mod phenomenon;

@@ -7,12 +7,12 @@ pub struct Lamps {
     pub(super) at: Box<dyn Fn(f64) -> Vec<Lamp> + Send + Sync>,
 }
 
-/// A light and the ball that it is seen as.
+/// A light, and the luminous sphere as which it is visible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
     /// The light.
     pub light: Light,
-    /// Radius of the ball, m.
+    /// Radius of the sphere, m.
     pub radius: f64,
 }
 
@@ -20,7 +20,7 @@ impl Lamps {
     /// The name of their layer.
     pub const NAME: &str = "lamps";
 
-    /// Lamps that `at` gives for a time in seconds.
+    /// The lamps that `at` returns for a time in seconds.
     pub fn new(at: impl Fn(f64) -> Vec<Lamp> + Send + Sync + 'static) -> Self {
         Self { at: Box::new(at) }
     }

@@ -21,7 +21,7 @@ impl Phenomenon for Lamps {
         PhenomenonInfo::new(Self::NAME)
     }
 
-    /// Lamps do not set the exposure: they are meant to be far brighter than what they light.
+    /// Lamps do not affect the automatic exposure: they are far brighter than the surfaces that they light.
     fn luminance(&self) -> f64 {
         0.0
     }
@@ -32,7 +32,7 @@ impl Phenomenon for Lamps {
 }
 
 impl Run for Lamps {
-    /// The lights are the scene's own, so all have them already.
+    /// The lights belong to the scene, so all phenomena have them already.
     fn publish(&self, _shutter: Shutter) -> Publication {
         Publication::default()
     }

@@ -91,10 +91,14 @@ pub(super) fn project_lamp(lamp: &Lamp, view: &View) -> Option<Disc> {
 /// A lamp in the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
+    /// Pixels.
     pub(super) center: DVec2,
+    /// Pixels.
     pub(super) radius: f64,
+    /// m.
     pub(super) depth: f64,
     pub(super) radiance: [f32; 3],
+    /// Whether it hides what is behind it: discs smaller than a pixel do not.
     pub(super) solid: bool,
     /// Illuminance at the camera, lux.
     pub(super) illuminance: [f32; 3],
@@ -142,6 +146,7 @@ pub(super) fn has_glare(view: &View) -> bool {
     view.mirror.is_none()
 }
 
+/// The lamps of a frame, nearest first.
 pub(super) struct PreparedLamps<'a> {
     pub(super) view: &'a View,
     pub(super) discs: Vec<Disc>,

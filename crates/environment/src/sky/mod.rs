@@ -13,13 +13,13 @@
 //! | equation | function |
 //! | --- | --- |
 //! | radiance by day, by elevation | [`Sky::radiance_at_elevations`](bansho_base::world::sky::Sky::radiance_at_elevations) |
-//! | radiance by night: an almucantar's even part, twilight glow and Milky Way | `night::NightSky::radiance` |
+//! | radiance by night: the azimuth-independent radiance of an almucantar, twilight glow and Milky Way | `night::NightSky::radiance` |
 //! | number of stars brighter than a magnitude | `stars::log_count`, `stars::magnitude_of_rank` |
 //! | illuminance of a star, `2.54e-6 lux * 10^(-0.4 m)` | `stars::star` |
 //! | Moffat's point spread function, `(1 + (r / core)^2)^-5/2` | `stars::StarImage::psf_row` |
 //!
 //! # Data flow
-//! [`SkyBackdrop`] makes stars and skyline once. For a frame, `night::NightSky` tabulates the night by elevation, and
+//! [`SkyBackdrop`] generates stars and skyline once. For a frame, `night::NightSky` tabulates the night by elevation, and
 //! `stars` projects the visible stars into images; both are kept in a `row_cache::SkyCache` for following frames with
 //! the same camera and sky. `PreparedSky` draws rows of sixteen pixels at a time, averaged over the cameras of the
 //! exposure: first the hills of `skyline` at their distance, then the sky behind everything else, with the stars added

@@ -1,4 +1,4 @@
-//! The sky of a scene: what is built once from its parameters.
+//! The sky of a scene: stars and skyline, which are built once from its parameters.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -11,14 +11,14 @@ use bansho_base::{
 
 use super::{night::NightSky, row_cache::SkyCache, skyline::Skyline, stars::Stars};
 
-/// The sky of a scene, infinitely far and opaque, with hills before it; at night with stars.
+/// The sky of a scene, infinitely far and opaque, with hills in front of it; at night with stars.
 pub struct SkyBackdrop {
     pub(super) parameters: SkyParameters,
     seed: u64,
-    /// Made when it is first drawn, as the skyline: a scene may be built only to be checked.
+    /// Created when first drawn, as is the skyline: a scene may be built only to be checked.
     stars: OnceLock<Option<Stars>>,
     skyline: OnceLock<Option<Skyline>>,
-    /// What the frame before showed, which the next one shows again if neither camera nor sky change.
+    /// The night sky of the previous frame, reused while neither camera nor sky change.
     pub(super) cache: Mutex<Option<SkyCache>>,
 }
 
@@ -31,7 +31,7 @@ impl SkyBackdrop {
         Self { seed, stars: OnceLock::new(), skyline: OnceLock::new(), parameters, cache: Mutex::default() }
     }
 
-    /// Its stars; none by day.
+    /// Its stars; `None` by day.
     fn stars(&self) -> Option<&Stars> {
         let has_stars = self.parameters.kind == SkyKind::Night && self.parameters.night.stars > 0.0;
         get_or_compute(&self.stars, || has_stars.then(|| Stars::new(self.seed))).as_ref()
@@ -42,10 +42,10 @@ impl SkyBackdrop {
         get_or_compute(&self.skyline, || Skyline::new(&self.parameters, self.seed)).as_ref()
     }
 
-    /// The night that a sky shows in a view; none by day.
+    /// The cached night sky of a view; `None` by day.
     pub(super) fn cache(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<SkyCache> {
         let night = sky.night()?;
-        // The lock is never held while threads work together.
+        // The lock is never held during parallel work.
         let cached = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cache) = cached().as_mut().filter(|cache| cache.matches(cameras, view.size, sky)) {
             cache.enable_row_cache();
@@ -64,7 +64,7 @@ impl SkyBackdrop {
         Some(cache)
     }
 
-    /// Where the hills stand.
+    /// Depth interval of the hills.
     pub(super) fn hills(&self) -> DepthInterval {
         let near = self.parameters.hills_distance;
         DepthInterval { near, far: near * (1.0 + 1e-4) }

@@ -13,7 +13,7 @@ use fearless_simd::prelude::*;
 
 use super::stars;
 
-/// Steps of elevation from the horizon to the zenith, even in the root of its sine.
+/// Steps of elevation from the horizon to the zenith, uniform in the square root of its sine.
 const ELEVATION_STEPS: usize = 512;
 /// Luminance of the Milky Way's center line, cd/m^2, its width in sines, and its color temperature, K.
 const MILKY_WAY_LUMINANCE: f64 = 1.6e-4;
@@ -32,8 +32,9 @@ pub(super) struct NightSky {
 
 /// The directions of one elevation; colors are red, green, blue and 0.
 struct Almucantar {
+    /// Radiance that does not depend on the azimuth.
     even: [f32; 4],
-    /// Twilight glow, by the fourth power of the alignment with the sun's azimuth, and a part in proportion to it.
+    /// Coefficients of the twilight glow: of the fourth power of the alignment with the sun's azimuth, and of the alignment.
     glow: [f32; 4],
     blue: [f32; 4],
     /// The Milky Way's center line.

@@ -1,4 +1,4 @@
-//! Draws the sky: rows of radiance, hills before them, stars where nothing hides them.
+//! Draws the sky: rows of radiance, hills in front of them, stars where they are not hidden.
 
 use std::{f64::consts::TAU, ops::Range};
 
@@ -23,15 +23,16 @@ use super::{
 /// Radiance of hills and trees relative to the zenith.
 pub(super) const HILL_SHADE: f32 = 0.04;
 
+/// The sky of a frame.
 pub(super) struct PreparedSky<'a> {
     pub(super) view: &'a View,
-    /// At as many instants as its motion needs, each for an equal part of the exposure.
+    /// Cameras at instants of the exposure, as many as its motion needs, with equal weights.
     pub(super) cameras: Vec<Camera>,
     pub(super) sky: Sky,
-    /// The night; none by day.
+    /// The night sky; `None` by day.
     pub(super) cache: Option<SkyCache>,
     pub(super) skyline: Option<&'a Skyline>,
-    /// Where it stands.
+    /// Depth interval of the hills.
     pub(super) hills: DepthInterval,
 }
 

@@ -31,12 +31,12 @@ pub(super) struct SkyCache {
 }
 
 impl SkyCache {
-    /// Whether a frame through these cameras shows the same.
+    /// Whether the cache is valid for a frame with these cameras.
     pub(super) fn matches(&self, cameras: &[Camera], size: [usize; 2], sky: &Sky) -> bool {
         self.cameras == cameras && self.size == size && self.sky == *sky
     }
 
-    /// Caches rows from now on.
+    /// Starts to cache rows.
     pub(super) fn enable_row_cache(&mut self) {
         if self.rows.is_none() && self.size[0] * self.size[1] <= MAX_CACHED_PIXELS {
             self.rows = Some(Arc::new((0..self.size[1]).map(|_| OnceLock::new()).collect()));

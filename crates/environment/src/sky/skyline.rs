@@ -85,14 +85,14 @@ fn add_trees(heights: &mut [f64], tree_deg: f64, key: Key) {
         let middle = position * SAMPLES as f64;
         let height = tree_deg * (0.4 + 0.6 * size * size);
         let half = (0.5 * TREE_WIDTH_RATIO * (0.6 + 0.8 * shape) * height / degrees_per_sample).max(1.0);
-        let foot = hills[middle as usize % SAMPLES];
+        let base = hills[middle as usize % SAMPLES];
         for sample in (middle - half).ceil() as i64..=(middle + half).floor() as i64 {
             let distance = (sample as f64 - middle - lean * 0.2 * half).abs() / half;
             // Branches in tiers: the ragged cone of a spruce.
             let tier = (distance * 6.0 + size * 7.0).fract() * 0.09;
-            let top = foot + height * (1.0 - distance - tier).max(0.0);
-            let slot = &mut heights[sample.rem_euclid(SAMPLES as i64) as usize];
-            *slot = slot.max(top);
+            let top = base + height * (1.0 - distance - tier).max(0.0);
+            let skyline_height = &mut heights[sample.rem_euclid(SAMPLES as i64) as usize];
+            *skyline_height = skyline_height.max(top);
         }
     }
 }

@@ -113,7 +113,7 @@ fn magnitude_of_rank(rank: f64) -> f64 {
         + (log - LOG_STAR_COUNTS[above - 1]) / (LOG_STAR_COUNTS[above] - LOG_STAR_COUNTS[above - 1])
 }
 
-/// The temperature, K, at this quantile of the stars.
+/// The temperature at a quantile of the naked-eye stars, K.
 fn temperature_of_quantile(fraction: f64) -> f64 {
     let above = SPECTRAL_CLASSES.partition_point(|class| class[0] < fraction).clamp(1, SPECTRAL_CLASSES.len() - 1);
     let [from, to] = [SPECTRAL_CLASSES[above - 1], SPECTRAL_CLASSES[above]];
@@ -124,9 +124,9 @@ fn star(key: Key, number: u64, count: u64) -> Star {
     let words = key.words(number, 0, STAR);
     let magnitude = magnitude_of_rank((number as f64 + f64::from(uniform(words[0]))).min(count as f64));
     let mut toward = direction([words[1], words[2]]).as_dvec3();
-    let more = key.words(number, 1, STAR);
+    let more_words = key.words(number, 1, STAR);
     // Faint stars are more distant and concentrate in the galactic plane.
-    if magnitude > MILKY_WAY_MIN_MAGNITUDE && uniform(more[0]) < 0.35 {
+    if magnitude > MILKY_WAY_MIN_MAGNITUDE && uniform(more_words[0]) < 0.35 {
         let pole = galactic_pole();
         let height = toward.dot(pole);
         toward = (toward - pole * (height * 0.85)).normalize();
@@ -153,8 +153,8 @@ fn image(star: &Star, camera: &Camera, size: [usize; 2], night: &Night, brightne
     if !turned && !is_near(pixel, radius, size) {
         return None;
     }
-    let fraction = night.transmittance(math::asin(star.direction.y));
-    let illuminance = star.illuminance * fraction * brightness;
+    let transmittance = night.transmittance(math::asin(star.direction.y));
+    let illuminance = star.illuminance * transmittance * brightness;
     let radiance = (illuminance / solid_angle(camera, pixel)?) as f32;
     Some(StarImage { pixel, radius, radiance: star.color.map(|value| value * radiance) })
 }

@@ -22,7 +22,7 @@ use bansho_base::{
 
 use super::{row_cache::FAR, *};
 
-/// Light of a night as a camera sees it that turns by so many degrees while the shutter is open: green, row by row.
+/// Light of a night sky through a camera that turns by an angle in degrees during the exposure: green, row by row.
 fn night_seen(turn_deg: f64, hills_deg: f64) -> Vec<f32> {
     let parameters = SkyParameters { kind: SkyKind::Night, hills_deg, ..SkyParameters::default() };
     let backdrop = SkyBackdrop::new(parameters.clone(), 3);
@@ -57,7 +57,7 @@ fn stars_draw_trails_where_the_camera_turns() {
 
 #[test]
 fn hills_are_soft_where_the_camera_turns() {
-    // OtherPhenomena along a row differ most at the hills' edges.
+    // Neighbors along a row differ most at the edges of the hills.
     let steepest = |light: Vec<f32>| {
         let rows = light.chunks(240).skip(120);
         let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());
@@ -67,7 +67,7 @@ fn hills_are_soft_where_the_camera_turns() {
     assert!(turning < 0.5 * still, "{turning} {still}");
 }
 
-/// Light of a night in a part of a picture, of which the plate hides every third pixel.
+/// Light of a night sky in a crop of a picture in which the plate hides every third pixel.
 fn night_in(backdrop: &SkyBackdrop, rect: Rect, has_plate: bool) -> [Vec<f32>; 3] {
     let camera = CameraParameters {
         position: [0.0; 3].into(),

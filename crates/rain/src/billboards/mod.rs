@@ -18,8 +18,8 @@ use fearless_simd::dispatch;
 
 use crate::{
     drops::{
-        exposure::{DropClassState, Sphere},
         lattice::{CELL_SIZE, Cell},
+        shutter_state::{DropClassState, Sphere},
     },
     lanes::{Lanes, ZERO_LANES, fast_max, fast_min},
     streaks::{
@@ -31,7 +31,7 @@ use crate::{
 const TEXTURE: Purpose = Purpose::named("rain texture");
 const OFFSET: Purpose = Purpose::named("rain billboard offset");
 const POSITION: Purpose = Purpose::named("rain billboard place");
-/// Greatest distance of any of a billboard's points from its center, m.
+/// Maximum distance of a point of a billboard from its center, m.
 const BILLBOARD_RADIUS: f64 = 0.75;
 /// Texture variants of each diameter, against visible repetition.
 const VARIANTS: usize = 2;
@@ -74,11 +74,14 @@ struct Billboard<'a> {
 }
 
 impl Billboard<'_> {
-    /// Visibility of a texture's last drop, of which the count contains `part`: that fraction of all billboards shows
-    /// it, each of them wholly, but for a short fade.
+    /// Visibility of a drop of the texture, from the drop count less its index. It is 1 for all but the last, fractional
+    /// drop, which that fraction of all billboards shows completely and the others do not, with a short fade.
     #[inline(always)]
-    fn visibility(&self, batch: f32) -> f32 {
-        fast_min(1.0, fast_max(0.0, (batch - self.threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32))
+    fn visibility(&self, remaining_count: f32) -> f32 {
+        fast_min(
+            1.0,
+            fast_max(0.0, (remaining_count - self.threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32),
+        )
     }
 }
 
@@ -88,7 +91,7 @@ fn wrapped(coordinate: f32) -> f32 {
     coordinate - coordinate.floor()
 }
 
-/// Makes the streaks of billboards.
+/// Generates the streaks of billboards.
 pub(super) struct Billboards<'a> {
     projection: StreakProjection<'a>,
     textures: DropTextures,
@@ -119,7 +122,7 @@ impl<'a> Billboards<'a> {
         let billboard = self.billboard(class, cell);
         let [base, right, up] = self.quad_edges(&billboard.quad);
         // The bound costs more than it saves without culling.
-        let least_peak = if self.culling_radiance > 0.0 {
+        let min_peak = if self.culling_radiance > 0.0 {
             self.culling_radiance
                 / self.projection.lighting.max_radiance(billboard.quad.point(0.5, 0.5), BILLBOARD_RADIUS)
         } else {
@@ -144,7 +147,7 @@ impl<'a> Billboards<'a> {
                     drops.positions[axis][i] = up[axis].fma(y, right[axis].fma(x, base[axis]));
                 }
             }
-            self.projection.add_drops(&drops, least_peak, builder);
+            self.projection.add_drops(&drops, min_peak, builder);
         }
     }
 

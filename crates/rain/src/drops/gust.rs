@@ -46,38 +46,38 @@ impl GustField {
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
     }
 
-    /// A box that contains every point whose displaced position lies in the box between two corners.
+    /// A box that contains every point whose displaced position is in the box between two corners.
     pub(crate) fn source_bounds(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         /// After this many iterations the box hardly shrinks any more.
-        const ROUNDS: usize = 8;
+        const ITERATIONS: usize = 8;
         // Fixed-point iteration: bounds on the displacement everywhere first, then on that within the box found so far.
-        let mut source_bounds = [DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)];
-        for _ in 0..ROUNDS {
-            let [lower, limit] = self.displacement_range(source_bounds);
-            source_bounds = [low - limit, high - lower];
+        let mut bounds = [DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)];
+        for _ in 0..ITERATIONS {
+            let [min, max] = self.displacement_range(bounds);
+            bounds = [low - max, high - min];
         }
-        source_bounds
+        bounds
     }
 
-    /// Least and greatest displacement along each axis within a box. The interpolant is linear along each axis, so
-    /// extrema lie at nodes and on the faces of the box.
+    /// Minimum and maximum displacement along each axis within a box. The interpolant is linear along each axis, so
+    /// extrema are at nodes and on the faces of the box.
     fn displacement_range(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         let ends = |axis: usize| {
             let node = |index: usize| (self.first[axis] + index as i64) as f64 * self.spacing;
             let inside = (0..self.count[axis])
                 .map(node)
-                .filter(move |grid_position| *grid_position > low[axis] && *grid_position < high[axis]);
+                .filter(move |coordinate| *coordinate > low[axis] && *coordinate < high[axis]);
             let border =
-                [low[axis], high[axis]].map(|grid_position| grid_position.clamp(node(0), node(self.count[axis] - 1)));
+                [low[axis], high[axis]].map(|coordinate| coordinate.clamp(node(0), node(self.count[axis] - 1)));
             inside.chain(border).collect::<Vec<f64>>()
         };
         let [xs, ys, zs] = [0, 1, 2].map(ends);
-        let mut displacement_range = [DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY)];
+        let mut range = [DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY)];
         for point in xs.iter().flat_map(|x| ys.iter().flat_map(|y| zs.iter().map(|z| DVec3::new(*x, *y, *z)))) {
             let [displacement, _] = self.at(point);
-            displacement_range = [displacement_range[0].min(displacement), displacement_range[1].max(displacement)];
+            range = [range[0].min(displacement), range[1].max(displacement)];
         }
-        displacement_range
+        range
     }
 
     /// Displacement (m) and velocity (m/s) at a point.
@@ -118,12 +118,12 @@ fn displacement_and_rate(wind: &Wind, point: DVec3, t: f64) -> [DVec3; 2] {
 fn displacement(wind: &Wind, point: DVec3, t: f64) -> DVec3 {
     let mean = horizontal(wind.mean(t));
     let step = GUST_MEMORY_S / HISTORY_STEPS as f64;
-    let fraction = |index: usize| {
+    let contribution = |index: usize| {
         let age = (index as f64 + 0.5) * step;
         let gust = wind.at(point + (DVec3::Y * TYPICAL_FALL_SPEED - mean) * age, t - age) - wind.mean(t - age);
         horizontal(gust) * (step * (1.0 - age / GUST_MEMORY_S))
     };
-    (0..HISTORY_STEPS).map(fraction).sum()
+    (0..HISTORY_STEPS).map(contribution).sum()
 }
 
 /// Limits a vector's length to less than `limit`, smoothly (C1); unchanged up to half of it.
@@ -132,7 +132,7 @@ fn soft_limited(vector: DVec3, limit: f64) -> DVec3 {
     if length <= half { vector } else { vector * ((limit - half * half / length) / length) }
 }
 
-/// The horizontal part: near the ground wind is horizontal.
+/// The horizontal component: near the ground wind is horizontal.
 fn horizontal(vector: DVec3) -> DVec3 {
     DVec3::new(vector.x, 0.0, vector.z)
 }

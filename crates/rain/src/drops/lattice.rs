@@ -12,7 +12,7 @@ use bansho_base::{
     world::wind::Wind,
 };
 
-/// Width of a cell, m; also its height, but for loops.
+/// Width of a cell, m; also its height, except in loops.
 pub(crate) const CELL_SIZE: f64 = 1.0;
 
 /// Lattice index of a cell: x, y (upward from the ground at time 0) and z.
@@ -25,7 +25,7 @@ pub(crate) struct LatticeMotion<'a> {
     /// Terminal velocity, m/s.
     pub(crate) speed: f64,
     pub(crate) wind: &'a Wind,
-    /// Response to the wind: 1 as the air.
+    /// Response to the wind: at 1 drops drift with the air.
     pub(crate) response: f64,
     /// Height of the ground, m.
     pub(crate) ground: f64,
@@ -54,8 +54,8 @@ pub(crate) struct Lattice {
 
 impl Lattice {
     /// The lattice at time `t`, for `heights` in a range, m.
-    pub(crate) fn new(falling: &LatticeMotion, heights: RangeInclusive<f64>, t: f64) -> Self {
-        let LatticeMotion { speed, wind, response, ground, loop_s } = *falling;
+    pub(crate) fn new(motion: &LatticeMotion, heights: RangeInclusive<f64>, t: f64) -> Self {
+        let LatticeMotion { speed, wind, response, ground, loop_s } = *motion;
         let (height, rows) = match loop_s {
             None => (CELL_SIZE, None),
             Some(seconds) => {
@@ -101,7 +101,7 @@ impl Lattice {
     }
 
     /// World position of a point of a cell, given as fractions of its edges, m.
-    pub(crate) fn world(&self, Cell([x, row, z]): Cell, fraction: DVec3) -> DVec3 {
+    pub(crate) fn point_in_world(&self, Cell([x, row, z]): Cell, fraction: DVec3) -> DVec3 {
         let horizontal = DVec2::new(x as f64 + fraction.x, z as f64 + fraction.z) * CELL_SIZE + self.drift(row);
         DVec3::new(horizontal.x, (row as f64 + fraction.y) * self.height + self.base, horizontal.y)
     }
@@ -147,7 +147,7 @@ mod tests {
     fn a_drop_falls_at_its_speed_and_drifts_with_the_wind() {
         let wind = wind([3.0, 0.0, -1.0], None);
         let (cell, fraction) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
-        let at = |t: f64| lattice(6.0, &wind, None, t).world(cell, fraction);
+        let at = |t: f64| lattice(6.0, &wind, None, t).point_in_world(cell, fraction);
         let displacement = at(100.5) - at(100.0);
         assert!((displacement - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{displacement}");
     }
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn a_drop_drifts_by_the_integral_of_a_keyed_wind() {
         let wind = wind(keyed(&[[0.0, 0.0], [4.0, 8.0]]), None);
-        let at = |t: f64| lattice(6.0, &wind, None, t).world(Cell([0, 12, 0]), DVec3::splat(0.5));
+        let at = |t: f64| lattice(6.0, &wind, None, t).point_in_world(Cell([0, 12, 0]), DVec3::splat(0.5));
         // The integral of 2 t from 1 to 2.
         assert!(((at(2.0) - at(1.0)) - DVec3::new(3.0, -6.0, 0.0)).length() < 1e-9);
     }
@@ -165,7 +165,8 @@ mod tests {
         for t in [1.0, 100.0, 5000.0] {
             let row = (6.0 * t) as i64 + 3;
             let at = |speed: f64| {
-                lattice(6.0, &wind([speed, 0.0, 0.0], None), None, t).world(Cell([0, row, 0]), DVec3::splat(0.5))
+                lattice(6.0, &wind([speed, 0.0, 0.0], None), None, t)
+                    .point_in_world(Cell([0, row, 0]), DVec3::splat(0.5))
             };
             let displacement = at(2.1) - at(2.0);
             // 3.5 m above the ground, which it comes to in 3.5 / 6 s.
@@ -178,7 +179,7 @@ mod tests {
         let [calm, storm] =
             [keyed(&[[0.0, 0.0], [50.0, 0.0], [51.0, 2.0]]), keyed(&[[0.0, 40.0], [50.0, 0.0], [51.0, 2.0]])];
         let at = |velocity: Animated<[f64; 3]>| {
-            lattice(6.0, &wind(velocity, None), None, 60.0).world(Cell([1, 361, 0]), DVec3::ZERO)
+            lattice(6.0, &wind(velocity, None), None, 60.0).point_in_world(Cell([1, 361, 0]), DVec3::ZERO)
         };
         assert!((at(calm) - at(storm)).length() < 1e-9);
     }
@@ -191,7 +192,7 @@ mod tests {
             let point = DVec3::new(-7.3, 2.2, 11.8);
             let row = lattice.row(point.y);
             let [x, z] = lattice.column(row, DVec2::new(point.x, point.z));
-            let fraction = point - lattice.world(Cell([x, row, z]), DVec3::ZERO);
+            let fraction = point - lattice.point_in_world(Cell([x, row, z]), DVec3::ZERO);
             let edges = DVec3::new(CELL_SIZE, lattice.height(), CELL_SIZE);
             assert!(fraction.cmpge(DVec3::ZERO).all() && fraction.cmplt(edges).all(), "{fraction}");
         }
@@ -205,11 +206,11 @@ mod tests {
             let [first, last] = [0.4, 2.4].map(|t| lattice(4.03, &wind, Some(2.0), t));
             assert!((first.height() - 1.0).abs() < 0.1);
             for cell in [[0, 0, 0], [3, 5, -2], [-4, -1, 7]] {
-                let point = first.world(Cell(cell), DVec3::splat(0.5));
+                let point = first.point_in_world(Cell(cell), DVec3::splat(0.5));
                 let row = last.row(point.y);
                 let [x, z] = last.column(row, DVec2::new(point.x, point.z));
                 let found = Cell([x, row, z]);
-                assert!((last.world(found, DVec3::splat(0.5)) - point).length() < 1e-9);
+                assert!((last.point_in_world(found, DVec3::splat(0.5)) - point).length() < 1e-9);
                 assert_eq!(last.contents(found), first.contents(Cell(cell)));
             }
         }

@@ -1,8 +1,8 @@
 //! Drops in the air: size distribution, terminal velocity, positions and motion in the wind.
 
 pub(crate) mod cell;
-pub(crate) mod exposure;
 pub(crate) mod gust;
 pub(crate) mod lattice;
+pub(crate) mod shutter_state;
 pub mod size_distribution;
 pub mod terminal_velocity;

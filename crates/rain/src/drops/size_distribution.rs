@@ -94,7 +94,7 @@ impl DropSizeDistribution {
     ///
     /// The fit of Marshall and Palmer does not reproduce its own rate: with measured velocities it gives 14 to 18 %
     /// more.
-    pub fn rain_rate(&self, fall: &TerminalVelocity, [low, high]: [f64; 2]) -> f64 {
+    pub fn rain_rate(&self, terminal_velocity: &TerminalVelocity, [low, high]: [f64; 2]) -> f64 {
         /// Midpoint rule with an error of 1e-6: the velocity is a table with steps of 0.1 to 0.2 mm.
         const STEPS: usize = 2000;
         let high = high.min(LARGEST_MM);
@@ -102,7 +102,7 @@ impl DropSizeDistribution {
         let flux: f64 = (0..STEPS)
             .map(|i| {
                 let range = [low + step * i as f64, low + step * (i + 1) as f64];
-                self.moment(3, range) * fall.speed(0.5 * (range[0] + range[1]))
+                self.moment(3, range) * terminal_velocity.speed(0.5 * (range[0] + range[1]))
             })
             .sum();
         // mm^3 per m^3 times m/s is 1e-9 m/s; 1 m/s is 3.6e6 mm/h.
@@ -128,18 +128,18 @@ fn exponential_tail(k: u32, slope: f64, x: f64) -> f64 {
     })
 }
 
-/// A tabulated distribution: points (D in mm, n per m^3 per mm).
+/// A tabulated distribution: points `[D in mm, n per m^3 per mm]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeTable(Vec<[f64; 2]>);
 
-/// Why a table is not a drop size distribution.
+/// An invalid table of a drop size distribution.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SizeTableError {
     /// Fewer than two points.
     #[error("a table of drop sizes needs at least two points")]
     TooShort,
     /// Diameters are negative, infinite, or not ascending.
-    #[error("diameters must rise from 0 mm on; point {} has {diameter_mm} mm", index + 1)]
+    #[error("diameters must ascend from 0 mm; point {} has {diameter_mm} mm", index + 1)]
     Diameter {
         /// Index of the point, from 0.
         index: usize,
@@ -147,7 +147,7 @@ pub enum SizeTableError {
         diameter_mm: f64,
     },
     /// A density is negative or infinite.
-    #[error("there cannot be {density} drops per m^3 and mm at {diameter_mm} mm; allowed: 0 or more")]
+    #[error("{density} drops per m^3 and mm at {diameter_mm} mm; allowed: 0 or more")]
     Density {
         /// Diameter, mm.
         diameter_mm: f64,
@@ -160,7 +160,7 @@ impl SizeTable {
     /// The distribution through these points.
     ///
     /// # Errors
-    /// Fewer than two points, diameters that do not rise, or negative numbers.
+    /// Fewer than two points, diameters that do not ascend, or negative numbers.
     pub fn new(points: Vec<[f64; 2]>) -> Result<Self, SizeTableError> {
         if points.len() < 2 {
             return Err(SizeTableError::TooShort);
@@ -239,7 +239,7 @@ impl SizeBin {
     /// Width of a single bin, mm: that of the paper.
     pub const DEFAULT_WIDTH_MM: f64 = 0.2;
 
-    /// Bins around ascending diameters. Bounds lie half way between neighbors; the outer bins are symmetric.
+    /// Bins around ascending diameters. Bounds are halfway between neighbors; the outer bins are symmetric.
     pub fn around(diameters_mm: &[f64]) -> Vec<Self> {
         let gap = |index: usize| diameters_mm.get(index..index + 2).map(|pair| 0.5 * (pair[1] - pair[0]));
         let bin = |(index, &diameter_mm): (usize, &f64)| {

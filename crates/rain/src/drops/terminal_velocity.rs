@@ -9,32 +9,32 @@ use bansho_base::{
 const WATER_DENSITY: f64 = 998.2;
 
 bansho_base::choice! {
-    /// Where terminal velocities come from.
+    /// Law of the terminal velocities.
     pub enum VelocityLaw {
-        /// Measured by Gunn and Kinzer: large drops flatten and fall no faster than 9.2 m/s.
+        /// Measured by Gunn and Kinzer: large drops flatten and fall at 9.2 m/s at most.
         GunnKinzer = "gunn_kinzer",
-        /// The paper's formula (2)-(4) for a rigid sphere: 4 % slow at 1 mm, 29 % fast at 5 mm.
+        /// The paper's equations (2) to (4) for a rigid sphere: 4 % too slow at 1 mm, 29 % too fast at 5 mm.
         RigidSphere = "rigid_sphere",
     }
 }
 
-/// Properties of the air.
+/// Properties of the air that determine the fall of drops.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Air {
+pub struct FallAir {
     /// Density rho_f, kg/m^3.
     pub density: f64,
     /// Dynamic viscosity mu, Pa s.
     pub viscosity: f64,
 }
 
-impl Default for Air {
+impl Default for FallAir {
     /// Dry air at 20 degrees Celsius and 1013.25 hPa.
     fn default() -> Self {
         Self { density: 1.204, viscosity: 1.81e-5 }
     }
 }
 
-impl Air {
+impl FallAir {
     /// Dry air as an ideal gas, with Sutherland's formula for the viscosity, both relative to the air of the measurements: at 20 degrees
     /// Celsius and 1013.25 hPa, exactly the default.
     pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
@@ -48,17 +48,17 @@ impl Air {
     }
 }
 
-/// The paper's fixed point does not exist, or lies outside the range of its drag coefficient.
+/// The paper's fixed point does not exist, or is outside the range of its drag coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoTerminalVelocity {
     /// The drag coefficient (3) jumps from 24 to 28.6 at Re = 1, and the drop would need a value between.
-    #[error("formula (2)-(4) has no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
+    #[error("equations (2) to (4) have no solution for a drop of {diameter_mm} mm: the drag jumps at Re = 1")]
     DragJump {
         /// Diameter D, mm.
         diameter_mm: f64,
     },
     /// Re is 1e4 or more, where the paper gives no drag coefficient.
-    #[error("formula (2)-(4) ends at Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
+    #[error("equations (2) to (4) are valid up to Re = 10000; a drop of {diameter_mm} mm falls with Re = {reynolds}")]
     TooFast {
         /// Diameter D, mm.
         diameter_mm: f64,
@@ -70,15 +70,15 @@ pub enum NoTerminalVelocity {
 /// Terminal velocity of drops: a law and the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TerminalVelocity {
-    /// Where the velocities come from.
+    /// Law of the velocities.
     pub law: VelocityLaw,
     /// The air.
-    pub air: Air,
+    pub air: FallAir,
 }
 
 impl Default for TerminalVelocity {
     fn default() -> Self {
-        Self { law: VelocityLaw::GunnKinzer, air: Air::default() }
+        Self { law: VelocityLaw::GunnKinzer, air: FallAir::default() }
     }
 }
 
@@ -158,8 +158,8 @@ pub fn measured_velocity(diameter_mm: f64) -> f64 {
 
 /// Correction of measured velocities for the density of the air: G. B. Foote and P. S. du Toit, J. Appl. Meteor. 8
 /// (1969).
-fn density_correction(air: &Air) -> f64 {
-    math::pow(Air::default().density / air.density, 0.4)
+fn density_correction(air: &FallAir) -> f64 {
+    math::pow(FallAir::default().density / air.density, 0.4)
 }
 
 /// Drag coefficient C of a rigid sphere, eq. (3).
@@ -173,17 +173,17 @@ pub fn drag_coefficient(reynolds: f64) -> f64 {
 }
 
 /// Reynolds number Re, eq. (4).
-pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &Air) -> f64 {
+pub fn reynolds_number(speed: f64, diameter_mm: f64, air: &FallAir) -> f64 {
     speed * air.density * 1e-3 * diameter_mm / air.viscosity
 }
 
 /// Velocity at which weight and drag are in equilibrium for the drag coefficient C, eq. (2).
-fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &Air) -> f64 {
+fn equilibrium_velocity(diameter_mm: f64, drag: f64, air: &FallAir) -> f64 {
     math::sqrt(4.0 * STANDARD_GRAVITY * 1e-3 * diameter_mm * (WATER_DENSITY - air.density) / (3.0 * air.density * drag))
 }
 
 /// Stokes' velocity: the solution for C = 24/Re.
-fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
+fn stokes_velocity(diameter_mm: f64, air: &FallAir) -> f64 {
     let diameter = 1e-3 * diameter_mm;
     STANDARD_GRAVITY * diameter * diameter * (WATER_DENSITY - air.density) / (18.0 * air.viscosity)
 }
@@ -191,8 +191,8 @@ fn stokes_velocity(diameter_mm: f64, air: &Air) -> f64 {
 /// Terminal velocity by the paper's iteration of (2)-(4), converged to one part in 1e12, m/s; 0 for no drop.
 ///
 /// # Errors
-/// There is no such velocity, or it lies where (3) gives no drag.
-pub fn fixed_point_velocity(diameter_mm: f64, air: &Air) -> Result<f64, NoTerminalVelocity> {
+/// There is no such velocity, or it is outside the range of (3).
+pub fn fixed_point_velocity(diameter_mm: f64, air: &FallAir) -> Result<f64, NoTerminalVelocity> {
     /// Steps for the slowest convergence: far below Re = 1 each step halves the error.
     const STEPS: usize = 200;
     if diameter_mm.is_nan() || diameter_mm <= 0.0 {
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_formula_gives_the_reference_velocities() {
-        let air = Air::default();
+        let air = FallAir::default();
         for [diameter, speed, re, c, ..] in rows::<13>(include_str!("../../data/raindrop_velocity.csv")) {
             let found = fixed_point_velocity(diameter, &air).expect("converges");
             assert!(near(found, speed, 1e-4), "{diameter} mm: {found}");
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_solution_satisfies_all_three_equations() {
-        let air = Air::at(273.15, 90_000.0);
+        let air = FallAir::at(273.15, 90_000.0);
         for diameter in [0.02, 0.05, 0.2, 1.0, 3.0, 6.0] {
             let speed = fixed_point_velocity(diameter, &air).expect("converges");
             assert!(near(
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn the_formula_says_where_it_has_no_solution() {
-        let air = Air::default();
+        let air = FallAir::default();
         let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
         for micrometer in (700..900).map(|tenth| tenth as f64 * 0.1) {
             match fixed_point_velocity(1e-3 * micrometer, &air) {
@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn velocities_rise_with_diameter_under_both_laws() {
         for law in [VelocityLaw::GunnKinzer, VelocityLaw::RigidSphere] {
-            let velocity = TerminalVelocity { law, air: Air::default() };
+            let velocity = TerminalVelocity { law, air: FallAir::default() };
             let speeds: Vec<f64> = (0..=800).map(|i| velocity.speed(0.01 * i as f64)).collect();
             assert!(speeds.is_sorted_by(|a, b| a <= b || (a - b) / a < 0.2), "{law:?}");
             assert!(speeds.iter().all(|speed| (0.0..20.0).contains(speed)));
@@ -285,12 +285,12 @@ mod tests {
     #[test]
     fn thin_air_lets_drops_fall_faster() {
         // Half the density: 2^0.4 = 1.3195.
-        let air = Air { density: 0.602, ..Air::default() };
+        let air = FallAir { density: 0.602, ..FallAir::default() };
         let velocity = TerminalVelocity { law: VelocityLaw::GunnKinzer, air };
         assert!(near(velocity.speed(2.0), 6.49 * 1.3195, 1e-4));
-        assert_eq!(Air::at(293.15, 101_325.0), Air::default());
+        assert_eq!(FallAir::at(293.15, 101_325.0), FallAir::default());
         // U.S. Standard Atmosphere (1976) at 2 km: 275.15 K, 795 hPa, 1.0066 kg/m^3, 1.7260e-5 Pa s.
-        assert!(near(Air::at(275.15, 79_501.4).density, 1.0066, 1e-3));
-        assert!(near(Air::at(275.15, 79_501.4).viscosity, 1.726e-5, 5e-3));
+        assert!(near(FallAir::at(275.15, 79_501.4).density, 1.0066, 1e-3));
+        assert!(near(FallAir::at(275.15, 79_501.4).viscosity, 1.726e-5, 5e-3));
     }
 }

@@ -17,24 +17,24 @@ const TABLE_STEPS: usize = 2048;
 pub(crate) struct ScatteringTable {
     table: Vec<[f32; 3]>,
     /// Maximum over all colors and angles, 1/sr.
-    greatest: f32,
+    max: f32,
 }
 
 impl ScatteringTable {
-    pub(crate) fn new(lens: &DropPhaseFunction) -> Self {
+    pub(crate) fn new(phase_function: &DropPhaseFunction) -> Self {
         let at = |step: usize| {
             let half_sine = step as f32 / TABLE_STEPS as f32;
-            lens.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
+            phase_function.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
         };
         let table: Vec<[f32; 3]> = (0..=TABLE_STEPS).map(at).collect();
-        let greatest = table.iter().flatten().copied().fold(0.0, f32::max);
-        Self { table, greatest }
+        let max = table.iter().flatten().copied().fold(0.0, f32::max);
+        Self { table, max }
     }
 
-    /// At the cosine of the scattering angle, 1/sr.
+    /// The value at the cosine of the scattering angle, 1/sr.
     #[inline(always)]
     pub(crate) fn at(&self, cos_deviation: f32) -> [f32; 3] {
-        self.of(Self::position(cos_deviation))
+        self.at_position(Self::position(cos_deviation))
     }
 
     /// Table position for the cosine of the scattering angle.
@@ -45,7 +45,7 @@ impl ScatteringTable {
 
     /// Linear interpolation at a table position.
     #[inline(always)]
-    fn of(&self, position: f32) -> [f32; 3] {
+    fn at_position(&self, position: f32) -> [f32; 3] {
         let step = (position as i32 as usize).min(TABLE_STEPS - 1);
         lerp_color(self.table[step], self.table[step + 1], position - step as i32 as f32)
     }
@@ -61,7 +61,7 @@ pub(crate) struct DropLighting<'a> {
 }
 
 impl DropLighting<'_> {
-    /// Mean radiance of a drop at `point` by one light, seen along `line` (unit vector from the eye), ACEScg, cd/m^2:
+    /// Mean radiance of a drop at `point` by one light, seen along `direction` (unit vector from the eye), ACEScg, cd/m^2:
     /// `E p / (4 pi)`.
     #[inline(always)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
@@ -69,9 +69,9 @@ impl DropLighting<'_> {
         if illuminance == [0.0; 3] {
             return [0.0; 3];
         }
-        let through = approximations::exp(-(self.extinction * distance) as f32);
+        let transmittance = approximations::exp(-(self.extinction * distance) as f32);
         let scattered = self.scattering.at(toward.dot(direction) as f32);
-        [0, 1, 2].map(|c| illuminance[c] * through * scattered[c])
+        [0, 1, 2].map(|c| illuminance[c] * transmittance * scattered[c])
     }
 
     /// The lights, prepared for drops whose positions are relative to `eye`.
@@ -79,20 +79,20 @@ impl DropLighting<'_> {
         self.lights.iter().map(|light| PreparedLight::new(light, eye)).collect()
     }
 
-    /// Adds the radiance of sixteen drops by a light, times `lit`.
+    /// Adds the radiance of sixteen drops by a light, times `weights`.
     ///
-    /// Without skipping those of weight 0: a branch for each would be mispredicted, and prevent vectorization.
+    /// Weights of 0 are not skipped: a branch for each drop would be mispredicted and prevent vectorization.
     #[inline(always)]
     pub(crate) fn add(
         &self,
         light: &PreparedLight,
         positions: &Vec3Lanes,
-        lit: &Lanes,
+        weights: &Lanes,
         radiance: &mut [[f32; 3]; LANES],
     ) {
-        let (factors, table_positions) = light.arriving(positions, self.extinction as f32);
+        let (factors, table_positions) = light.incident_light(positions, self.extinction as f32);
         for i in 0..LANES {
-            let (scattered, factor) = (self.scattering.of(table_positions[i]), factors[i] * lit[i]);
+            let (scattered, factor) = (self.scattering.at_position(table_positions[i]), factors[i] * weights[i]);
             for c in 0..3 {
                 radiance[i][c] += light.intensity[c] * factor * scattered[c];
             }
@@ -102,7 +102,7 @@ impl DropLighting<'_> {
     /// Upper bound on the radiance of drops within `radius` (m) of a point, in any color, cd/m^2.
     pub(crate) fn max_radiance(&self, center: DVec3, radius: f64) -> f32 {
         let max_radiance = |light: &Light| {
-            let intensity = light.intensity.into_iter().fold(0.0, f32::max) * self.scattering.greatest;
+            let intensity = light.intensity.into_iter().fold(0.0, f32::max) * self.scattering.max;
             let nearest = (light.incident_light(center).distance - radius).max(f64::MIN_POSITIVE);
             match light.emitter {
                 Emitter::Directional { .. } => intensity,
@@ -136,10 +136,10 @@ pub(crate) struct PreparedLight {
 
 impl PreparedLight {
     fn new(light: &Light, eye: DVec3) -> Self {
-        let even = ([0.0; 3], [0.0, 1.0]);
+        let no_cone = ([0.0; 3], [0.0, 1.0]);
         let (position, is_local, radius, (axis, cone)) = match light.emitter {
-            Emitter::Directional { toward } => (toward, 0.0, 0.0, even),
-            Emitter::Point { position, radius } => (position - eye, 1.0, radius, even),
+            Emitter::Directional { toward } => (toward, 0.0, 0.0, no_cone),
+            Emitter::Point { position, radius } => (position - eye, 1.0, radius, no_cone),
             Emitter::Spot { position, axis, cos_inner, cos_outer } => {
                 let rise = 1.0 / (cos_inner - cos_outer).max(1e-6);
                 (position - eye, 1.0, 0.0, (axis.as_vec3().to_array(), [rise as f32, (-cos_outer * rise) as f32]))
@@ -158,7 +158,7 @@ impl PreparedLight {
     /// For sixteen positions relative to the camera: illuminance over intensity, attenuated by the rain, and the table
     /// position in [`ScatteringTable`] of the scattering angle toward the camera.
     #[inline(always)]
-    fn arriving(&self, [xs, ys, zs]: &Vec3Lanes, extinction: f32) -> (Lanes, Lanes) {
+    fn incident_light(&self, [xs, ys, zs]: &Vec3Lanes, extinction: f32) -> (Lanes, Lanes) {
         let (mut factors, mut table_positions) = (ZERO_LANES, ZERO_LANES);
         let [x, y, z] = self.position;
         for i in 0..LANES {
@@ -170,8 +170,8 @@ impl PreparedLight {
             let from = -(offset[0] * self.axis[0] + offset[1] * self.axis[1] + offset[2] * self.axis[2]) * inverse;
             let cone = fast_min(1.0, fast_max(0.0, from.fma(self.cone[0], self.cone[1])));
             let cone_factor = cone * cone * (3.0 - 2.0 * cone);
-            let attenuation = fast_max(self.min_distance_squared, is_local * square + (1.0 - is_local));
-            factors[i] = cone_factor / attenuation * approximations::exp(-extinction * is_local * distance);
+            let distance_squared = fast_max(self.min_distance_squared, is_local * square + (1.0 - is_local));
+            factors[i] = cone_factor / distance_squared * approximations::exp(-extinction * is_local * distance);
             let drop_distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
             let along = offset[0] * xs[i] + offset[1] * ys[i] + offset[2] * zs[i];
             table_positions[i] =
@@ -183,12 +183,12 @@ impl PreparedLight {
 
 /// Whether a cone around `axis` misses a sphere at `offset` from its apex.
 fn cone_misses_sphere(offset: DVec3, radius: f64, axis: DVec3, cos_outer: f64) -> bool {
-    let drop_distance = offset.length();
-    if drop_distance <= radius {
+    let distance = offset.length();
+    if distance <= radius {
         return false;
     }
-    let angle = math::acos((offset.dot(axis) / drop_distance).clamp(-1.0, 1.0));
-    angle - math::asin(radius / drop_distance) > math::acos(cos_outer.clamp(-1.0, 1.0))
+    let angle = math::acos((offset.dot(axis) / distance).clamp(-1.0, 1.0));
+    angle - math::asin(radius / distance) > math::acos(cos_outer.clamp(-1.0, 1.0))
 }
 
 #[cfg(test)]

@@ -10,14 +10,14 @@ use bansho_base::math::{self, DVec3};
 
 /// Refractive index of water at 20 degrees Celsius and 630, 540 and 460 nm, about the wavelengths of ACEScg's red,
 /// green and blue.
-const WATER: [f64; 3] = [1.3317, 1.3346, 1.3380];
+const REFRACTIVE_INDICES: [f64; 3] = [1.3317, 1.3346, 1.3380];
 /// Steps of the table from 0 to 180 degrees.
 const ANGLE_STEPS: usize = 180;
-/// Paths followed; the rest carries 0.02 % of the light.
+/// Number of paths that are traced; all others together carry 0.02 % of the light.
 const PATHS: usize = 10;
-/// Angles of incidence traced.
+/// Number of angles of incidence that are traced.
 const RAYS: usize = 1024;
-/// Directions of the quadrature over a drop's surroundings.
+/// Number of directions of the quadrature over a drop's surroundings.
 const DIRECTIONS: usize = 48;
 
 /// The tabulated phase function of a water drop.
@@ -36,9 +36,9 @@ impl Default for DropPhaseFunction {
 }
 
 impl DropPhaseFunction {
-    /// Traces the rays; takes some milliseconds.
+    /// Traces the rays; takes a few milliseconds.
     pub fn new() -> Self {
-        let channels = WATER.map(|index| phase_table(&trace_rays(index)));
+        let channels = REFRACTIVE_INDICES.map(|index| phase_table(&trace_rays(index)));
         let phase = std::array::from_fn(|i| [0, 1, 2].map(|c| channels[c][i] as f32));
         Self { phase, directions: stratified_directions(&channels[1]) }
     }

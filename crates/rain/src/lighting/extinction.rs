@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use crate::drops::size_distribution::DropSizeDistribution;
 
-/// Which extinction efficiency Q of a drop is meant. Drops are large compared with the wavelength, so Q is 2 in all
-/// (the extinction paradox).
+/// Extinction efficiency Q of a drop. Drops are large compared with the wavelength, so the total Q is 2 (the extinction
+/// paradox).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExtinctionEfficiency {
     /// Geometric cross section, Q = 1: consistent with the opacity of single streaks.
@@ -28,6 +28,15 @@ impl ExtinctionEfficiency {
 pub fn extinction(sizes: &DropSizeDistribution, efficiency: ExtinctionEfficiency, diameters_mm: [f64; 2]) -> f64 {
     // n per m^3 per mm, D and dD in mm: mm^2 per m^3 are 1e-6 per m.
     efficiency.value() * 0.25e-6 * PI * sizes.moment(2, diameters_mm)
+}
+
+/// Extinction coefficients of a rain, with the gain of its opacity, 1/m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RainExtinction {
+    /// Of all drops.
+    pub(crate) all: f64,
+    /// Of the drops that are drawn as streaks near the camera.
+    pub(crate) streaks: f64,
 }
 
 /// Meteorological visibility, m: the distance at which a black object has 2 % contrast against the horizon sky

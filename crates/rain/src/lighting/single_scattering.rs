@@ -1,7 +1,7 @@
-//! Rain that is not drawn drop by drop, as a participating medium: extinction of the background, and single scattering
+//! Rain that is not drawn as streaks, as a participating medium: extinction of the background, and single scattering
 //! (airlight, halos around lamps).
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
     image::Rect,
@@ -15,10 +15,11 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     drop_lighting::DropLighting,
+    extinction::RainExtinction,
     sky::SkyLighting,
-    tiles::{FINE_TILE, FINEST_TILE, TileGrid, geometric_sequence, lerp_color},
+    tiles::{FINE_TILE, FINEST_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
 };
-use crate::{drops::exposure::ExposureState, streaks::bin::TILE_ROWS};
+use crate::drops::shutter_state::ShutterState;
 
 /// First distance at which accumulated in-scattering is stored, m, and the ratio of successive distances.
 const FIRST_DISTANCE: f64 = 0.5;
@@ -29,7 +30,7 @@ const FAR_DISTANCE_RATIO: f64 = 2.0;
 const SAMPLE_ANGLE: f64 = 0.15;
 /// Optical depth beyond which light of lamps is neglected: the transmittance is below 1e-17.
 const MAX_OPTICAL_DEPTH: f32 = 40.0;
-/// The medium writes no depth, m.
+/// Depth of the medium, m: it has none.
 const NO_DEPTH: [f32; FINE_TILE] = [f32::INFINITY; FINE_TILE];
 /// Smallest distance of a ray from a lamp, m.
 const MIN_LAMP_DISTANCE: f64 = 0.02;
@@ -37,14 +38,13 @@ const MIN_LAMP_DISTANCE: f64 = 0.02;
 /// Extinction coefficient as a function of the distance from the camera.
 #[derive(Clone, Copy)]
 struct ExtinctionProfile<'a> {
-    exposure: &'a ExposureState,
-    /// Of all drops, and of those that are drawn as streaks in the region, 1/m.
-    extinction: [f64; 2],
+    exposure: &'a ShutterState,
+    extinction: RainExtinction,
 }
 
 impl ExtinctionProfile<'_> {
     fn at(&self, distance: f64) -> f64 {
-        self.extinction[0] - self.extinction[1] * f64::from(self.exposure.streak_weight(distance as f32))
+        self.extinction.all - self.extinction.streaks * f64::from(self.exposure.streak_weight(distance as f32))
     }
 }
 
@@ -94,15 +94,24 @@ fn halo_rect(lamp: DVec2, size: [usize; 2]) -> Rect {
     rect.intersection(&Rect::from_size(size[0], size[1]))
 }
 
-/// Distance of a ray transmittance the camera from the point at `offset` from the camera, m.
+/// Distance of a ray from the camera to the point at `offset` from the camera, m.
 fn ray_distance(offset: DVec3, direction: DVec3) -> f32 {
     (offset - direction * offset.dot(direction)).length().max(MIN_LAMP_DISTANCE) as f32
 }
 
+/// A position between two stored distances.
+#[derive(Clone, Copy)]
+struct Bracket {
+    /// Index of the nearer one.
+    index: usize,
+    /// Interpolation fraction toward the next.
+    fraction: f32,
+}
+
 /// An interval of a line of sight.
 struct RaySegment {
-    /// Indices and fractions of its ends in the stored distances.
-    brackets: [(usize, f32); 2],
+    /// Its ends among the stored distances.
+    brackets: [Bracket; 2],
     /// Optical depths of its ends.
     depths: [f32; 2],
     /// Inverse transmittance from the camera to its near end; 0 beyond the range of lamps and where nothing is
@@ -116,8 +125,9 @@ impl RaySegment {
         if self.gain == 0.0 {
             return [0.0; 3];
         }
-        let [near, far] =
-            self.brackets.map(|(k, t)| lerp_color(in_scattering.0[k][corner], in_scattering.0[k + 1][corner], t));
+        let [near, far] = self.brackets.map(|Bracket { index, fraction }| {
+            lerp_color(in_scattering.0[index][corner], in_scattering.0[index + 1][corner], fraction)
+        });
         std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * self.gain)
     }
 }
@@ -142,17 +152,18 @@ pub(crate) struct SingleScattering<'a> {
 }
 
 impl<'a> SingleScattering<'a> {
-    /// The medium of drops with extinctions `[all, drawn as streaks]` up to the first of the two distances (m), and to
-    /// the second where there is no plate; `None` where there is none.
+    /// The medium up to the distance `end` (m) in front of a plate, and up to `farthest` (m) without a plate; `None` where
+    /// there is no rain.
     pub(crate) fn new(
-        exposure: &ExposureState,
+        exposure: &ShutterState,
         lighting: &DropLighting,
         sky: Arc<SkyLighting>,
         view: &'a View,
-        extinction: [f64; 2],
-        [end, farthest]: [f64; 2],
+        extinction: RainExtinction,
+        end: f64,
+        farthest: f64,
     ) -> Option<Self> {
-        if end <= 0.0 || extinction[0] <= 0.0 {
+        if end <= 0.0 || extinction.all <= 0.0 {
             return None;
         }
         let profile = ExtinctionProfile { exposure, extinction };
@@ -171,7 +182,7 @@ impl<'a> SingleScattering<'a> {
         let eye = exposure.cameras.middle().position;
         let integrator =
             InScatterIntegrator { lighting, extinction: profile, eye, distances: &distances, depths: &depths, end };
-        let tiles = &sky.fine.0;
+        let tiles = &sky.fine.tiles;
         let (visible, others) = integrator.split_lights(view);
         let halos: Vec<LampHalo> =
             visible.into_iter().map(|(light, pixel)| integrator.halo(&light, pixel, tiles, view)).collect();
@@ -196,33 +207,35 @@ impl<'a> SingleScattering<'a> {
 
     /// The grid at whose corners in-scattering is stored.
     fn tiles(&self) -> &TileGrid {
-        &self.sky.fine.0
+        &self.sky.fine.tiles
     }
 
-    /// The stored distances around a distance: index and fraction.
-    fn bracket(&self, distance: f64) -> (usize, f32) {
+    /// Position of a distance among the stored ones.
+    fn bracket(&self, distance: f64) -> Bracket {
         let last = self.distances.len() - 1;
-        let next = self.distances.partition_point(|known| *known <= distance).clamp(1, last);
+        let next = self.distances.partition_point(|stored| *stored <= distance).clamp(1, last);
         let (near, far) = (self.distances[next - 1], self.distances[next]);
-        (next - 1, ((distance - near) / (far - near)).clamp(0.0, 1.0) as f32)
+        Bracket { index: next - 1, fraction: ((distance - near) / (far - near)).clamp(0.0, 1.0) as f32 }
     }
 
     /// The interval between two distances.
     fn segment(&self, [near, far]: [f64; 2]) -> RaySegment {
         let brackets = [near, far.max(near)].map(|distance| self.bracket(distance));
-        let depths = brackets.map(|(k, t)| self.depths[k] + (self.depths[k + 1] - self.depths[k]) * t);
-        // Behind so much rain nothing is visible, and the gain would overflow.
+        let depths = brackets.map(|Bracket { index, fraction }| {
+            self.depths[index] + (self.depths[index + 1] - self.depths[index]) * fraction
+        });
+        // Beyond the maximum optical depth nothing is visible, and the gain would overflow.
         let is_lit = near < self.end && depths[0] < MAX_OPTICAL_DEPTH;
         let gain = if is_lit { math::approximations::exp(depths[0]) } else { 0.0 };
         RaySegment { brackets, depths, gain }
     }
 
-    /// Radiance and transmittance of an interval at a column of the grid, interpolated by `down` between `row` and the
-    /// next.
-    fn radiance_and_transmittance(&self, column: usize, (row, down): (usize, f32), segment: &RaySegment) -> [f32; 4] {
-        let (tiles, sky) = &self.sky.fine;
-        let index = row * tiles.size[0] + column;
-        let below = index + tiles.size[0];
+    /// Radiance and transmittance of an interval at a column of the grid, interpolated between `row` and the next.
+    fn radiance_and_transmittance(&self, column: usize, row: GridPosition, segment: &RaySegment) -> [f32; 4] {
+        let columns = self.tiles().size[0];
+        let index = row.index * columns + column;
+        let below = index + columns;
+        let down = row.fraction;
         let [near, far] = segment.depths;
         let transmittance = math::approximations::exp(near - far);
         let opacities = segment.depths.map(|depth| 1.0 - math::approximations::exp(-depth));
@@ -232,7 +245,8 @@ impl<'a> SingleScattering<'a> {
             }
             None => [0.0; 3],
         };
-        let [once, endless] = [0, 1].map(|k| lerp_color(sky[k][index], sky[k][below], down));
+        let [once, endless] =
+            [&self.sky.fine.radiance, &self.sky.endless].map(|sky| lerp_color(sky[index], sky[below], down));
         // Approximation of multiple scattering: rain of opacity o shows `o (1 - o)` of the sky light that is scattered
         // once, and `o^2` of that of infinitely deep rain.
         let rescattered = opacities[0] + opacities[1];
@@ -241,8 +255,15 @@ impl<'a> SingleScattering<'a> {
         [light[0], light[1], light[2], transmittance]
     }
 
-    /// Correction of a pixel near a lamp: the value by the finer grid less that interpolated from the picture's grid.
-    fn halo(&self, halo: &LampHalo, x: usize, y: usize, slice: &DepthInterval, plate: Option<f64>) -> Option<[f32; 3]> {
+    /// Correction of a pixel near a lamp: the value of the finer grid less that of the picture's grid.
+    fn halo_correction(
+        &self,
+        halo: &LampHalo,
+        x: usize,
+        y: usize,
+        slice: &DepthInterval,
+        plate: Option<f64>,
+    ) -> Option<[f32; 3]> {
         let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let range = self.distance_range(pixel, slice, plate).filter(|range| range[0] < range[1])?;
         let direction = self.view.camera.direction(pixel)?.normalize_or_zero();
@@ -272,7 +293,9 @@ impl<'a> SingleScattering<'a> {
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                     let plate = strip.has_plate().then(|| f64::from(strip.plate_depth(index)));
                     let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
-                    let Some(light) = self.halo(halo, x, y, slice, plate).filter(|_| fade > 0.0) else { continue };
+                    let Some(light) = self.halo_correction(halo, x, y, slice, plate).filter(|_| fade > 0.0) else {
+                        continue;
+                    };
                     // The medium in front of it is contained in the strip's transmittance too; its effect is small.
                     (0..3)
                         .for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + fade * light[c]).max(0.0));
@@ -281,8 +304,7 @@ impl<'a> SingleScattering<'a> {
         }
     }
 
-    /// The interval of distances within which a pixel sees the medium in a depth interval, in front of a `plate`
-    /// (depth, m).
+    /// The distances between which a pixel shows the medium in a depth interval, in front of a `plate` (depth, m).
     fn distance_range(&self, pixel: DVec2, slice: &DepthInterval, plate: Option<f64>) -> Option<[f64; 2]> {
         let hidden = plate.unwrap_or(f64::INFINITY);
         let end = if plate.is_some() { self.end } else { self.distances[self.distances.len() - 1] };
@@ -298,19 +320,20 @@ impl<'a> SingleScattering<'a> {
         (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(end)))
     }
 
-    /// Draws the pixels of `rows`, which lie in the row of tiles `band`, under what the strip holds.
-    pub(crate) fn draw(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
+    /// Draws the pixels of `rows` under the contents of the strip. They are within a row of tiles, which spans the rows
+    /// `tile` of the picture.
+    pub(crate) fn draw(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         if strip.has_plate() {
-            self.draw_before_plate(slice, rows, strip);
+            self.draw_in_front_of_plate(slice, rows, strip);
         } else {
-            dispatch!(self.level, _simd => self.draw_open(slice, band, rows, strip));
+            dispatch!(self.level, _simd => self.draw_without_plate(slice, tile, rows, strip));
         }
         self.add_halos(slice, rows, strip);
     }
 
-    /// Only the ground ends the medium: intervals are evaluated at the corners of the grid.
+    /// Without a plate only the ground bounds the medium: intervals are evaluated at the corners of the grid.
     #[inline(always)]
-    fn draw_open(&self, slice: &DepthInterval, band: usize, rows: Rect, strip: &mut Strip) {
+    fn draw_without_plate(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         let side = self.tiles().side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edge = |y: f64| -> Vec<[f32; 4]> {
@@ -323,9 +346,9 @@ impl<'a> SingleScattering<'a> {
             };
             columns.clone().map(corner).collect()
         };
-        let edges = [edge((band * TILE_ROWS) as f64), edge(((band + 1) * TILE_ROWS) as f64)];
+        let edges = [edge(tile.start as f64), edge(tile.end as f64)];
         for y in rows.y..rows.bottom() {
-            let down = ((y - band * TILE_ROWS) as f32 + 0.5) / TILE_ROWS as f32;
+            let down = ((y - tile.start) as f32 + 0.5) / tile.len() as f32;
             let corner = |column: usize, c: usize| {
                 let (top, bottom) = (edges[0][column][c], edges[1][column][c]);
                 (bottom - top).fma(down, top)
@@ -350,8 +373,8 @@ impl<'a> SingleScattering<'a> {
         }
     }
 
-    /// A plate may end the medium at any depth, so intervals are evaluated for each pixel.
-    fn draw_before_plate(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+    /// A plate may bound the medium at any depth, so intervals are evaluated for each pixel.
+    fn draw_in_front_of_plate(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         for y in rows.y..rows.bottom() {
             let position = self.tiles().row_at(y as f32 + 0.5);
             for x in rows.x..rows.right() {

@@ -9,35 +9,44 @@ use super::{
     tiles::{COARSE_TILE, FINE_TILE, TileGrid},
 };
 
-/// The sky as a camera sees it in and through the rain.
+/// Sky light that rain scatters toward a camera.
 #[derive(Debug)]
 pub(crate) struct SkyLighting {
     camera: Camera,
     size: [usize; 2],
     sky: Sky,
-    /// Grid for streaks, and the radiance of drops under the sky at each of its corners.
-    pub(crate) coarse: (TileGrid, Vec<[f32; 3]>),
-    /// Grid for single scattering, with the radiance of drops and that of infinitely deep rain.
-    pub(crate) fine: (TileGrid, [Vec<[f32; 3]>; 2]),
+    /// On the grid for streaks.
+    pub(crate) coarse: SkyOnDrops,
+    /// On the grid for single scattering.
+    pub(crate) fine: SkyOnDrops,
+    /// Radiance of infinitely deep rain at the corners of the fine grid.
+    pub(crate) endless: Vec<[f32; 3]>,
+}
+
+/// Radiance of drops under the sky at the corners of a grid.
+#[derive(Debug)]
+pub(crate) struct SkyOnDrops {
+    pub(crate) tiles: TileGrid,
+    /// Toward the camera, ACEScg, cd/m^2.
+    pub(crate) radiance: Vec<[f32; 3]>,
+}
+
+impl SkyOnDrops {
+    fn new(phase_function: &DropPhaseFunction, tiles: TileGrid, sky: &Sky) -> Self {
+        Self { radiance: sky_through_drops(phase_function, &tiles, sky), tiles }
+    }
 }
 
 impl SkyLighting {
     fn new(phase_function: &DropPhaseFunction, view: &View, sky: Sky) -> Self {
-        let (coarse, fine) = (TileGrid::new(view, COARSE_TILE), TileGrid::new(view, FINE_TILE));
-        let drops = [&coarse, &fine].map(|tiles| sky_through_drops(phase_function, tiles, &sky));
-        let [coarse_drops, fine_drops] = drops;
-        let endless = endless_rain(&fine, &sky);
-        Self {
-            camera: view.camera,
-            size: view.size,
-            sky,
-            coarse: (coarse, coarse_drops),
-            fine: (fine, [fine_drops, endless]),
-        }
+        let [coarse, fine] =
+            [COARSE_TILE, FINE_TILE].map(|side| SkyOnDrops::new(phase_function, TileGrid::new(view, side), &sky));
+        let endless = endless_rain(&fine.tiles, &sky);
+        Self { camera: view.camera, size: view.size, sky, coarse, fine, endless }
     }
 }
 
-/// Cache of recent skies, keyed by camera, picture size and sky.
+/// Cache of recent sky light, keyed by camera, picture size and sky.
 #[derive(Debug, Default)]
 pub(crate) struct SkyLightingCache(Mutex<Vec<Arc<SkyLighting>>>);
 
@@ -45,8 +54,8 @@ pub(crate) struct SkyLightingCache(Mutex<Vec<Arc<SkyLighting>>>);
 const CACHE_CAPACITY: usize = 2;
 
 impl SkyLightingCache {
-    /// What the camera of `view` sees.
-    pub(crate) fn of(&self, phase_function: &DropPhaseFunction, view: &View, sky: Sky) -> Arc<SkyLighting> {
+    /// The sky light for the camera of a view.
+    pub(crate) fn for_view(&self, phase_function: &DropPhaseFunction, view: &View, sky: Sky) -> Arc<SkyLighting> {
         // The list is always consistent, so a poisoned lock is usable.
         let cached = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let same = |seen: &&Arc<SkyLighting>| (seen.camera, seen.size, seen.sky) == (view.camera, view.size, sky);
@@ -87,22 +96,27 @@ mod tests {
         let view = view_at(1.0, 0.02, [64, 36]);
         let [dim, bright] = [1.0, 2.0]
             .map(|luminance: f64| SkyParameters { luminance: luminance.into(), ..SkyParameters::default() }.at(0.0));
-        let first = skies.of(&phase_function, &view, dim);
+        let first = skies.for_view(&phase_function, &view, dim);
         assert!(
-            Arc::ptr_eq(&first, &skies.of(&phase_function, &view_at(7.0, 0.02, [64, 36]), dim)),
+            Arc::ptr_eq(&first, &skies.for_view(&phase_function, &view_at(7.0, 0.02, [64, 36]), dim)),
             "time alone changes nothing"
         );
-        let other = skies.of(&phase_function, &view, bright);
-        assert!(other.coarse.1[0][1] > 1.5 * first.coarse.1[0][1]);
+        let other = skies.for_view(&phase_function, &view, bright);
+        assert!(other.coarse.radiance[0][1] > 1.5 * first.coarse.radiance[0][1]);
         let mut turned = view_at(1.0, 0.02, [64, 36]);
         turned.camera.position.y += 1.0;
         for (again, cached) in [
-            (skies.of(&phase_function, &turned, bright), &other),
-            (skies.of(&phase_function, &view_at(1.0, 0.02, [32, 18]), dim), &first),
+            (skies.for_view(&phase_function, &turned, bright), &other),
+            (skies.for_view(&phase_function, &view_at(1.0, 0.02, [32, 18]), dim), &first),
         ] {
             assert!(!Arc::ptr_eq(&again, cached));
         }
-        let anew = skies.of(&phase_function, &view, dim);
-        assert!(!Arc::ptr_eq(&anew, &first) && anew.coarse.1 == first.coarse.1 && anew.fine.1 == first.fine.1);
+        let anew = skies.for_view(&phase_function, &view, dim);
+        assert!(
+            !Arc::ptr_eq(&anew, &first)
+                && anew.coarse.radiance == first.coarse.radiance
+                && anew.fine.radiance == first.fine.radiance
+                && anew.endless == first.endless
+        );
     }
 }

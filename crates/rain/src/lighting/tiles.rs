@@ -29,6 +29,15 @@ pub(crate) struct TileGrid {
     pub(crate) directions: Vec<DVec3>,
 }
 
+/// A position between two rows or columns of corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GridPosition {
+    /// Index of the first.
+    pub(crate) index: usize,
+    /// Interpolation fraction toward the second.
+    pub(crate) fraction: f32,
+}
+
 impl TileGrid {
     pub(crate) fn new(view: &View, side: usize) -> Self {
         Self::over(view, side, Rect::from_size(view.size[0], view.size[1]))
@@ -45,21 +54,22 @@ impl TileGrid {
 
     /// One value for each corner, computed in parallel.
     pub(crate) fn map<T: Send>(&self, value: impl Fn(usize, DVec3) -> T + Sync) -> Vec<T> {
-        self.directions.par_iter().enumerate().map(|(index, pixel_direction)| value(index, *pixel_direction)).collect()
+        self.directions.par_iter().enumerate().map(|(index, direction)| value(index, *direction)).collect()
     }
 
     /// Interpolates colors at corners to a position in the picture (pixels), clamped to its edge.
     pub(crate) fn at(&self, corners: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
-        let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
-        let index = row * self.size[0] + column;
-        let row_color = |index: usize| lerp_color(corners[index], corners[index + 1], across);
-        lerp_color(row_color(index), row_color(index + self.size[0]), down)
+        let (column, row) = (self.column_at(x), self.row_at(y));
+        let index = row.index * self.size[0] + column.index;
+        let row_color = |index: usize| lerp_color(corners[index], corners[index + 1], column.fraction);
+        lerp_color(row_color(index), row_color(index + self.size[0]), row.fraction)
     }
 
     /// The four corners around a position in the picture (pixels), with their bilinear weights.
     pub(crate) fn corner_weights(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
-        let ((column, across), (row, down)) = (self.column_at(x), self.row_at(y));
-        let index = row * self.size[0] + column;
+        let (column, row) = (self.column_at(x), self.row_at(y));
+        let index = row.index * self.size[0] + column.index;
+        let (across, down) = (column.fraction, row.fraction);
         let below = index + self.size[0];
         [
             (index, (1.0 - across) * (1.0 - down)),
@@ -69,22 +79,21 @@ impl TileGrid {
         ]
     }
 
-    /// Row index and fraction of a vertical position (pixels).
-    pub(crate) fn row_at(&self, y: f32) -> (usize, f32) {
+    /// Row of corners at a vertical position (pixels).
+    pub(crate) fn row_at(&self, y: f32) -> GridPosition {
         self.split(y, 1)
     }
 
-    /// Column index and fraction of a horizontal position (pixels).
-    pub(crate) fn column_at(&self, x: f32) -> (usize, f32) {
+    /// Column of corners at a horizontal position (pixels).
+    pub(crate) fn column_at(&self, x: f32) -> GridPosition {
         self.split(x, 0)
     }
 
-    fn split(&self, coordinate: f32, axis: usize) -> (usize, f32) {
-        let corner_weights = self.size[axis];
-        let position =
-            ((coordinate - self.origin[axis] as f32) / self.side as f32).clamp(0.0, (corner_weights - 1) as f32);
-        let whole = (position as usize).min(corner_weights.saturating_sub(2));
-        (whole, position - whole as f32)
+    fn split(&self, coordinate: f32, axis: usize) -> GridPosition {
+        let corners = self.size[axis];
+        let position = ((coordinate - self.origin[axis] as f32) / self.side as f32).clamp(0.0, (corners - 1) as f32);
+        let index = (position as usize).min(corners.saturating_sub(2));
+        GridPosition { index, fraction: position - index as f32 }
     }
 }
 

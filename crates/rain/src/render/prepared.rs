@@ -13,18 +13,21 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::{
     Rain,
     billboards::Billboards,
-    drops::{exposure::ExposureState, size_distribution::DropSizeDistribution},
+    drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
     lighting::{
         drop_lighting::{DropLighting, PreparedLight},
         extinction::{ExtinctionEfficiency, extinction, visibility},
         single_scattering::SingleScattering,
-        tiles::TileGrid,
+        sky::SkyOnDrops,
     },
     parameters::Method,
     streaks::{
-        bin::{StreakChunk, TILE_COLUMNS, TILE_ROWS},
+        bin::StreakChunk,
         project::{DropSelection, PerDropRegion, StreakProjection},
-        rasterize::{PackedStreak, tile::TileBuffer},
+        rasterize::{
+            PackedStreak,
+            tile::{TILE_COLUMNS, TILE_ROWS, TileBuffer},
+        },
         splashes::Splashes,
     },
 };
@@ -34,7 +37,7 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
     AovDescriptor {
         name: "streak_opacity",
         unit: "",
-        doc: "Opacity of the streaks in a pixel, summed; 0 where there are none. The veil of far rain is not in it.",
+        doc: "Opacity of the streaks in a pixel, summed; 0 where there are none. The airlight of far rain is not included.",
         rule: AovRule::Sum,
     },
     AovDescriptor {
@@ -64,13 +67,13 @@ fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, dia
 /// Culling threshold as a fraction of display white: a hundred overlapping streaks below it stay below one 8-bit code.
 const CULLING_FRACTION: f64 = 1.0 / (255.0 * 128.0);
 
-/// A frame, ready to draw.
+/// A frame that is ready to be drawn in strips.
 pub(crate) struct PreparedRain<'a> {
     view: &'a View,
     level: Level,
-    /// Nearest first.
+    /// Chunks of streaks, nearest first.
     chunks: Vec<StreakChunk>,
-    /// Greatest distance of a streak, m.
+    /// Maximum distance of a streak, m.
     streaks_end: f64,
     single_scattering: Option<SingleScattering<'a>>,
     figures: Vec<Figure>,
@@ -78,20 +81,18 @@ pub(crate) struct PreparedRain<'a> {
 
 impl<'a> PreparedRain<'a> {
     pub(crate) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
-        let exposure = ExposureState::new(rain, view, surroundings);
-        let extinctions = rain.extinctions(view.shutter.middle());
+        let exposure = ShutterState::new(rain, view, surroundings);
+        let extinction = rain.extinction(view.shutter.middle());
         let lights = &surroundings.others.lights;
-        let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinctions[0] };
-        let sky_lighting = rain.skies.of(&rain.optics.lens, view, surroundings.sky);
-        let (tiles, sky) = &sky_lighting.coarse;
+        let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinction.all };
+        let sky_lighting = rain.skies.for_view(&rain.optics.phase_function, view, surroundings.sky);
         let prepared_lights = lighting.prepare_lights(exposure.cameras.middle().position);
         let frame = Frame {
             rain,
             exposure: &exposure,
             lighting: &lighting,
             prepared_lights: &prepared_lights,
-            tiles,
-            sky,
+            sky: &sky_lighting.coarse,
             view,
         };
         let bounds = exposure.around_camera(1.1 * exposure.distance);
@@ -109,10 +110,10 @@ impl<'a> PreparedRain<'a> {
             }
         };
         chunks.extend(frame.splashes());
-        let ends =
-            [if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 }, rain.reach(surroundings)];
+        let end = if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 };
+        let farthest = rain.reach(surroundings);
         let single_scattering =
-            SingleScattering::new(&exposure, &lighting, sky_lighting.clone(), view, extinctions, ends);
+            SingleScattering::new(&exposure, &lighting, sky_lighting.clone(), view, extinction, end, farthest);
         let figures = frame.figures(chunks.iter().map(StreakChunk::count).sum(), billboards);
         Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), single_scattering, figures }
     }
@@ -121,11 +122,10 @@ impl<'a> PreparedRain<'a> {
 /// The inputs of a frame.
 struct Frame<'a> {
     rain: &'a Rain,
-    exposure: &'a ExposureState,
+    exposure: &'a ShutterState,
     lighting: &'a DropLighting<'a>,
     prepared_lights: &'a [PreparedLight],
-    tiles: &'a TileGrid,
-    sky: &'a [[f32; 3]],
+    sky: &'a SkyOnDrops,
     view: &'a View,
 }
 
@@ -137,14 +137,14 @@ impl<'a> Frame<'a> {
             exposure: self.exposure,
             lighting: self.lighting,
             lights: self.prepared_lights,
-            sky: self.shining_sky(),
+            sky: self.bright_sky(),
             selection,
         }
     }
 
-    /// The sky through drops; `None` if it is dark.
-    fn shining_sky(&self) -> Option<(&'a TileGrid, &'a [[f32; 3]])> {
-        self.sky.iter().flatten().any(|value| *value > 0.0).then_some((self.tiles, self.sky))
+    /// Radiance of drops under the sky; `None` if it is dark.
+    fn bright_sky(&self) -> Option<&'a SkyOnDrops> {
+        self.sky.radiance.iter().flatten().any(|value| *value > 0.0).then_some(self.sky)
     }
 
     fn splashes(&self) -> Vec<StreakChunk> {
@@ -190,13 +190,13 @@ impl Prepared for PreparedRain<'_> {
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let rect = strip.rect;
         for tile_row in rect.y / TILE_ROWS..rect.bottom().div_ceil(TILE_ROWS) {
-            let rows =
-                Rect { x: rect.x, y: tile_row * TILE_ROWS, width: rect.width, height: TILE_ROWS }.intersection(&rect);
+            let tile = tile_row * TILE_ROWS..(tile_row + 1) * TILE_ROWS;
+            let rows = Rect { x: rect.x, y: tile.start, width: rect.width, height: TILE_ROWS }.intersection(&rect);
             if slice.near < self.streaks_end {
                 dispatch!(self.level, simd => self.draw_streaks(simd, tile_row, slice, rows, strip));
             }
             if let Some(single_scattering) = &self.single_scattering {
-                single_scattering.draw(slice, tile_row, rows, strip);
+                single_scattering.draw(slice, tile, rows, strip);
             }
         }
     }

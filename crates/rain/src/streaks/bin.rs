@@ -1,12 +1,10 @@
 //! Tile binning: for each tile of the picture, the streaks that may touch it.
 
-use super::rasterize::{PackedStreak, StreakSegment};
+use super::rasterize::{
+    PackedStreak, StreakSegment,
+    tile::{TILE_COLUMNS, TILE_ROWS},
+};
 use crate::shutter_cameras::PixelBounds;
-
-/// Rows of a tile: one SIMD vector.
-pub(crate) const TILE_ROWS: usize = 8;
-/// Columns of a tile: its pixels and their depths fit into the L1 cache.
-pub(crate) const TILE_COLUMNS: usize = 128;
 
 /// For each tile of a picture, the indices of the streaks that may touch it, in drawing order; stored as in a
 /// compressed sparse row matrix.

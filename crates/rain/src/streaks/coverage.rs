@@ -22,7 +22,7 @@ pub struct Streak {
 impl Streak {
     /// The streak of a drop of diameter D that falls with `speed` (m/s) through an exposure (s).
     pub fn new(diameter_mm: f64, speed: f64, exposure: f64) -> Self {
-        // The least length avoids a division by zero for a drop at rest, which covers the same points for the whole
+        // The minimum length avoids a division by zero for a drop at rest, which covers the same points for the whole
         // exposure.
         Self { radius: 0.5e-3 * diameter_mm, length: (speed * exposure).max(1e-12) }
     }

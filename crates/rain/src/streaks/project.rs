@@ -17,13 +17,13 @@ use super::{
 };
 use crate::{
     drops::{
-        exposure::{DropClassState, ExposureState, Sphere},
         lattice::{CELL_SIZE, Cell},
+        shutter_state::{DropClassState, ShutterState, Sphere, VisibleCell},
     },
     lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min, smoothstep},
     lighting::{
         drop_lighting::{DropLighting, PreparedLight},
-        tiles::TileGrid,
+        sky::SkyOnDrops,
     },
 };
 
@@ -35,21 +35,21 @@ const CELLS_PER_CHUNK: [usize; 2] = [8, 256];
 /// Range of the drop count over which a drop fades in, as a fraction of all drops, so that a rising rate does not pop.
 pub(crate) const FADE_IN: f64 = 0.02;
 
-/// Turns drops into lit streaks.
+/// Projects drops into lit streaks.
 #[derive(Clone, Copy)]
 pub(crate) struct StreakProjection<'a> {
     pub(crate) level: Level,
-    pub(crate) exposure: &'a ExposureState,
+    pub(crate) exposure: &'a ShutterState,
     pub(crate) lighting: &'a DropLighting<'a>,
     /// The same lights, prepared for SIMD.
     pub(crate) lights: &'a [PreparedLight],
-    /// Radiance of drops under the sky at grid corners; `None` for a dark sky.
-    pub(crate) sky: Option<(&'a TileGrid, &'a [[f32; 3]])>,
-    /// Which drops are drawn, by weight.
+    /// Radiance of drops under the sky; `None` for a dark sky.
+    pub(crate) sky: Option<&'a SkyOnDrops>,
+    /// Weights of the drops.
     pub(crate) selection: DropSelection<'a>,
 }
 
-/// The weight of drops, where near drops are drawn one by one and others on billboards.
+/// Weights of drops: near drops are drawn one by one, others on billboards.
 #[derive(Clone, Copy)]
 pub(crate) enum DropSelection<'a> {
     /// All drops.
@@ -63,7 +63,7 @@ pub(crate) enum DropSelection<'a> {
 impl DropSelection<'_> {
     /// Weights of drops at positions relative to the camera.
     #[inline(always)]
-    fn of(&self, positions: &Vec3Lanes) -> Lanes {
+    fn weights(&self, positions: &Vec3Lanes) -> Lanes {
         let mut weights = [1.0; LANES];
         match self {
             Self::All => {}
@@ -111,20 +111,15 @@ impl StreakProjection<'_> {
     ) -> Vec<StreakChunk> {
         let classes = self.exposure.classes.par_iter().filter(|class| class.fraction > 0.0);
         let lists: Vec<Vec<_>> = classes
-            .map(|class| {
-                self.cells(class, within, half_width)
-                    .into_iter()
-                    .map(|(distance, cell)| (distance, cell, class))
-                    .collect()
-            })
+            .map(|class| self.cells(class, within, half_width).into_iter().map(|visible| (visible, class)).collect())
             .collect();
         let mut cells = lists.concat();
-        cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+        cells.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance));
         let size = self.exposure.cameras.size();
-        let fill = |cells: &[(f64, Cell, &DropClassState)]| {
+        let fill = |cells: &[(VisibleCell, &DropClassState)]| {
             let mut builder = StreakChunkBuilder::new(size);
-            for (_, cell, class) in cells {
-                builder.add_cell(|builder| add(class, *cell, builder));
+            for (visible, class) in cells {
+                builder.add_cell(|builder| add(class, visible.cell, builder));
             }
             builder.build()
         };
@@ -133,11 +128,11 @@ impl StreakProjection<'_> {
     }
 
     /// The cells of a class, without duplicates.
-    fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<(f64, Cell)> {
+    fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<VisibleCell> {
         let mut cells: Vec<_> =
             within.iter().flat_map(|sphere| self.exposure.visible_cells(class, *sphere, half_width)).collect();
-        cells.sort_by_key(|(_, cell)| *cell);
-        cells.dedup_by_key(|(_, cell)| *cell);
+        cells.sort_by_key(|visible| visible.cell);
+        cells.dedup_by_key(|visible| visible.cell);
         cells
     }
 
@@ -148,7 +143,7 @@ impl StreakProjection<'_> {
         let contents = class.lattice.contents(cell);
         let words = key.words(contents, 0, class.purpose(COUNT));
         let count = random::poisson(class.max_density * class.lattice.volume(), [words[0], words[1]]) as usize;
-        let now = self.exposure.cell_state(class, cell);
+        let state = self.exposure.cell_state(class, cell);
         let rising = ((1.0 + FADE_IN) * class.fraction) as f32;
         for first in (0..count).step_by(LANES) {
             let [x, y, z, threshold] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
@@ -157,18 +152,18 @@ impl StreakProjection<'_> {
                 let risen = fast_min(1.0, fast_max(0.0, (rising - threshold[i]) * (1.0 / FADE_IN) as f32));
                 presence[i] = if first + i < count { risen } else { 0.0 };
             }
-            let (positions, velocities) = now.drop_states(&[x, y, z]);
+            let (positions, velocities) = state.drop_states(&[x, y, z]);
             let diameter_mm = class.diameter_mm as f32;
             self.add_drops(&DropBatch { positions, velocities, diameter_mm, presence }, 0.0, builder);
         }
     }
 
-    /// Adds the streaks of visible drops. Those with a peak opacity below `least_peak` are not lit by lamps and fires.
+    /// Adds the streaks of visible drops. Those with a peak opacity below `min_peak` are not lit by lamps and fires.
     #[inline(always)]
-    pub(crate) fn add_drops(&self, drops: &DropBatch, least_peak: f32, builder: &mut StreakChunkBuilder) {
+    pub(crate) fn add_drops(&self, drops: &DropBatch, min_peak: f32, builder: &mut StreakChunkBuilder) {
         let exposure = self.exposure;
         let [xs, ys, zs] = &drops.positions;
-        let weights = self.selection.of(&drops.positions);
+        let weights = self.selection.weights(&drops.positions);
         let half = 0.5 * exposure.cameras.exposure_time as f32;
         let mut paths = DropPaths {
             from: drops.positions,
@@ -198,7 +193,7 @@ impl StreakProjection<'_> {
                 }
             }
         }
-        self.add_streaks(&streaks, &drops.positions, &paths.diameter_mm, least_peak, builder);
+        self.add_streaks(&streaks, &drops.positions, &paths.diameter_mm, min_peak, builder);
     }
 
     /// Lights and adds the visible streaks of drops at some positions.
@@ -208,15 +203,15 @@ impl StreakProjection<'_> {
         streaks: &StreakBatch,
         positions: &Vec3Lanes,
         diameters_mm: &Lanes,
-        least_peak: f32,
+        min_peak: f32,
         builder: &mut StreakChunkBuilder,
     ) {
-        if !streaks.any() {
+        if !streaks.any_visible() {
             return;
         }
         let mut lit = ZERO_LANES;
         for i in 0..LANES {
-            lit[i] = if streaks.peak[i] >= least_peak { 1.0 } else { 0.0 };
+            lit[i] = if streaks.peak[i] >= min_peak { 1.0 } else { 0.0 };
         }
         let mut radiance = [[0.0; 3]; LANES];
         for light in self.lights {
@@ -227,8 +222,8 @@ impl StreakProjection<'_> {
                 continue;
             }
             let mut segment = streaks.segment(i, diameters_mm[i], radiance[i]);
-            if let Some((tiles, sky)) = self.sky {
-                segment.shading.add_light(tiles.at(sky, segment.center));
+            if let Some(sky) = self.sky {
+                segment.shading.add_light(sky.tiles.at(&sky.radiance, segment.center));
             }
             builder.add(&segment, streaks.extent(i));
         }
@@ -251,12 +246,20 @@ const FADE_WIDTH: f64 = 0.2;
 /// The region around the camera and around lamps in which drops are drawn one by one, beside billboards.
 pub(crate) struct PerDropRegion {
     spheres: Vec<Sphere>,
-    /// Centers relative to the camera and radii of the spheres, m.
-    from_camera: Vec<([f32; 3], f32)>,
+    /// The same spheres relative to the camera.
+    from_camera: Vec<SphereF32>,
+}
+
+/// A sphere in single precision, relative to the camera.
+struct SphereF32 {
+    /// m.
+    center: [f32; 3],
+    /// m.
+    radius: f32,
 }
 
 impl PerDropRegion {
-    pub(crate) fn new(exposure: &ExposureState, lights: &[Light]) -> Self {
+    pub(crate) fn new(exposure: &ShutterState, lights: &[Light]) -> Self {
         let eye = exposure.cameras.middle().position;
         let lamp = |light: &Light| match light.emitter {
             Emitter::Directional { .. } => None,
@@ -267,11 +270,14 @@ impl PerDropRegion {
         let lamps = lights.iter().filter_map(lamp).filter(near).map(|center| Sphere { center, radius });
         let spheres: Vec<Sphere> =
             [exposure.around_camera(CAMERA_RADIUS + FADE_WIDTH)].into_iter().chain(lamps).collect();
-        let from_camera = |sphere: &Sphere| ((sphere.center - eye).as_vec3().to_array(), sphere.radius as f32);
+        let from_camera = |sphere: &Sphere| SphereF32 {
+            center: (sphere.center - eye).as_vec3().to_array(),
+            radius: sphere.radius as f32,
+        };
         Self { from_camera: spheres.iter().map(from_camera).collect(), spheres }
     }
 
-    /// No drop outside of these is drawn one by one.
+    /// Spheres outside of which no drop is drawn one by one.
     pub(crate) fn spheres(&self) -> &[Sphere] {
         &self.spheres
     }
@@ -280,7 +286,7 @@ impl PerDropRegion {
     #[inline(always)]
     pub(super) fn weights(&self, [xs, ys, zs]: &Vec3Lanes) -> Lanes {
         let mut weights = ZERO_LANES;
-        for &([x, y, z], radius) in &self.from_camera {
+        for &SphereF32 { center: [x, y, z], radius } in &self.from_camera {
             for i in 0..LANES {
                 let offset = [xs[i] - x, ys[i] - y, zs[i] - z];
                 let distance = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();

@@ -122,9 +122,9 @@ impl StreakBatch {
         self.visible[i] = u32::from(meets & (gain > 0.0));
     }
 
-    /// Whether any is visible.
+    /// Whether any streak is visible.
     #[inline(always)]
-    pub(crate) fn any(&self) -> bool {
+    pub(crate) fn any_visible(&self) -> bool {
         let mut any = 0;
         for i in 0..LANES {
             any |= self.visible[i];
@@ -132,19 +132,19 @@ impl StreakBatch {
         any != 0
     }
 
-    /// Center of one, pixels.
+    /// Center of a streak, pixels.
     #[inline(always)]
     pub(crate) fn center(&self, i: usize) -> [f32; 2] {
         [self.center[0][i], self.center[1][i]]
     }
 
-    /// Bounding box of one.
+    /// Bounding box of a streak.
     #[inline(always)]
     pub(crate) fn extent(&self, i: usize) -> PixelBounds {
         [[self.bounds[0][i], self.bounds[1][i]], [self.bounds[2][i], self.bounds[3][i]]]
     }
 
-    /// One of them.
+    /// A streak with the light of its drop.
     #[inline(always)]
     pub(crate) fn segment(&self, i: usize, diameter_mm: f32, light: [f32; 3]) -> StreakSegment {
         StreakSegment {

@@ -21,7 +21,7 @@ use super::{
     project::StreakProjection,
     project_lanes::DropPaths,
 };
-use crate::{drops::exposure::DropClassState, lanes::ZERO_LANES, parameters::SplashParameters};
+use crate::{drops::shutter_state::DropClassState, lanes::ZERO_LANES, parameters::SplashParameters};
 
 /// Side of a ground square, m.
 const SQUARE_SIZE: f64 = 0.5;
@@ -41,7 +41,7 @@ const COUNT: Purpose = Purpose::named("rain splashes of a square");
 const IMPACT: Purpose = Purpose::named("rain splash");
 const DROPLET: Purpose = Purpose::named("rain splash droplet");
 
-/// Makes the streaks of splashes.
+/// Generates the streaks of splashes.
 #[derive(Clone, Copy)]
 pub(crate) struct Splashes<'a> {
     pub(crate) projection: StreakProjection<'a>,
@@ -66,13 +66,22 @@ struct Impact {
     strength: f64,
 }
 
+/// A period of time.
+struct Period {
+    index: i64,
+    /// Fraction that has elapsed.
+    phase: f64,
+    /// s.
+    length: f64,
+}
+
 impl Splashes<'_> {
     /// The streaks of all droplets that may be visible.
     pub(crate) fn chunks(&self) -> Vec<StreakChunk> {
         let (exposure, reach) = (self.projection.exposure, self.parameters.distance);
         let eye = exposure.cameras.middle().position;
-        let high = (eye.y - exposure.ground).abs();
-        if self.parameters.fraction <= 0.0 || high >= reach {
+        let eye_height = (eye.y - exposure.ground).abs();
+        if self.parameters.fraction <= 0.0 || eye_height >= reach {
             return Vec::new();
         }
         let range = |center: f64| {
@@ -82,7 +91,7 @@ impl Splashes<'_> {
         let middle = |[x, z]: [i64; 2]| {
             DVec3::new((x as f64 + 0.5) * SQUARE_SIZE, exposure.ground, (z as f64 + 0.5) * SQUARE_SIZE)
         };
-        let shows = |square: &&[i64; 2]| {
+        let is_visible = |square: &&[i64; 2]| {
             (middle(**square) - eye).length() < reach
                 && exposure.cameras.may_be_visible(
                     middle(**square),
@@ -90,26 +99,25 @@ impl Splashes<'_> {
                     0.3,
                 )
         };
-        let squares: Vec<&[i64; 2]> = squares.iter().filter(shows).collect();
-        let phase = |squares: &[&[i64; 2]]| {
+        let squares: Vec<&[i64; 2]> = squares.iter().filter(is_visible).collect();
+        let chunk = |squares: &[&[i64; 2]]| {
             let mut builder = StreakChunkBuilder::new(exposure.cameras.size());
             squares.iter().for_each(|square| self.square(**square, middle(**square), &mut builder));
             builder.build()
         };
-        squares.par_chunks(SQUARES_PER_CHUNK).map(phase).collect()
+        squares.par_chunks(SQUARES_PER_CHUNK).map(chunk).collect()
     }
 
-    /// Index of the current period, the elapsed fraction of it, and its length, s. A loop holds a whole number of
-    /// periods.
-    fn period(&self) -> (i64, f64, f64) {
+    /// The current period. A loop contains a whole number of periods.
+    fn period(&self) -> Period {
         let length = self.loop_s.map_or(SPLASH_PERIOD, |seconds| seconds / (seconds / SPLASH_PERIOD).floor().max(1.0));
         let turns = self.time / length;
-        (turns.floor() as i64, turns - turns.floor(), length)
+        Period { index: turns.floor() as i64, phase: turns - turns.floor(), length }
     }
 
     /// Adds the droplets above one ground square.
     fn square(&self, [x, z]: [i64; 2], middle: DVec3, builder: &mut StreakChunkBuilder) {
-        let (period, phase, length) = self.period();
+        let Period { index: period, phase, length } = self.period();
         let key = self.projection.exposure.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
         let distance = (middle - self.projection.exposure.cameras.middle().position).length();
@@ -183,11 +191,11 @@ impl Splashes<'_> {
         }
         let position = impact.position - cameras.middle().position;
         let at = |age: f64| position + velocity * age - DVec3::Y * (0.5 * STANDARD_GRAVITY * age * age);
-        let probability = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
+        let exposed_fraction = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
         for (vectors, point) in [(&mut paths.from, at(from)), (&mut paths.to, at(to))] {
             (0..3).for_each(|axis| vectors[axis][index] = point[axis] as f32);
         }
         paths.diameter_mm[index] = (impact.diameter_mm * (0.16 + 0.14 * random[3])) as f32;
-        paths.gain[index] = (impact.strength * probability) as f32;
+        paths.gain[index] = (impact.strength * exposed_fraction) as f32;
     }
 }

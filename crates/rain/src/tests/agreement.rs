@@ -1,4 +1,4 @@
-//! Billboards against every drop by itself.
+//! Billboards compared with individual drops.
 
 use bansho_base::phenomenon::surroundings::Surroundings;
 

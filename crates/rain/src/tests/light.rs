@@ -112,7 +112,7 @@ fn the_veil_is_single_scattering_along_each_line_of_sight() {
     let strip = lit_by(parameters.clone(), vec![light], None);
     let view = view_at(1.0, 1.0 / 60.0, SIZE);
     let rain = rain(parameters, 1);
-    let [beta, _] = rain.extinctions(1.0);
+    let beta = rain.extinction(1.0).all;
     let lighting = DropLighting { scattering: &rain.optics.scattering, lights: &[light], extinction: beta };
     for (x, y) in [(80, 20), (40, 32), (100, 40), (128, 16), (92, 33)] {
         let line = view.camera.direction(math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap().normalize();

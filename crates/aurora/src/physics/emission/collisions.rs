@@ -10,7 +10,7 @@ use super::{
     quenching::natural_lifetime,
 };
 use crate::physics::{
-    atmosphere::Air,
+    atmosphere::AirLevel,
     precipitation::{deposition::column_ion_pairs, electron_track::collision_count},
 };
 
@@ -21,7 +21,7 @@ const ATOMIC_MASS: f64 = 1.660_539e-27;
 const MOLECULAR_RADIUS: f64 = 1.85e-10;
 
 impl Emission {
-    /// Column brightness that one collision of a track stands for, in kR of ion pairs per mW m^-2. Multiplied by
+    /// Column brightness per collision of a track, in kR of ion pairs per mW m^-2. Multiplied by
     /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
     ///
     /// # Panics
@@ -43,7 +43,7 @@ pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
 /// Probability that a collision de-excites a state within its mean lifetime (2.25). It suppresses green light below 190
 /// km, which is not observed: few collisions with a molecule quench O(1S).
 #[must_use]
-pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
+pub fn hard_sphere_quenching(emitter: Emitter, air: &AirLevel) -> f64 {
     let mass_u = match emitter {
         Emitter::OxygenGreen | Emitter::OxygenRed => 15.999,
         Emitter::NitrogenIon | Emitter::Nitrogen => 28.014,
@@ -57,7 +57,7 @@ pub fn hard_sphere_quenching(emitter: Emitter, air: &Air) -> f64 {
 /// emits one line by production rate, unless it is quenched (2.25). O2 emits nothing. This is the expected value over
 /// all random choices.
 #[must_use]
-pub fn mean_hard_sphere_photons(air: &Air) -> PerEmitter<f64> {
+pub fn mean_hard_sphere_photons(air: &AirLevel) -> PerEmitter<f64> {
     EMITTERS.map(|emitter| {
         let struck = match emitter {
             Emitter::OxygenGreen | Emitter::OxygenRed => air.o,
@@ -133,7 +133,7 @@ mod tests {
     }
 
     /// What shines after a collision, drawn by the rules of the thesis.
-    fn drawn(air: &Air, uniforms: [f64; 3]) -> Option<Emitter> {
+    fn drawn(air: &AirLevel, uniforms: [f64; 3]) -> Option<Emitter> {
         use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
         let species_draw = uniforms[0] * air.number_density();
         let struck = match species_draw {

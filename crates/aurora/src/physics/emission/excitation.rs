@@ -10,7 +10,7 @@ use super::{
     emitter::{Emitter, PerEmitter},
     quenching::radiated_fraction,
 };
-use crate::physics::atmosphere::Air;
+use crate::physics::atmosphere::AirLevel;
 
 /// Fraction of N2 ionizations that leave N2+(B) (Borst & Zipf 1970), and branching ratio of 427.8 nm.
 const ION_B: f64 = 0.11;
@@ -48,7 +48,7 @@ struct IonizationFractions {
 }
 
 /// Weights 0.92, 1 and 0.56 of Rees (1989).
-fn ionization_fractions(air: &Air) -> IonizationFractions {
+fn ionization_fractions(air: &AirLevel) -> IonizationFractions {
     let (n2, o2, o) = (0.92 * air.n2, air.o2, 0.56 * air.o);
     let sum = n2 + o2 + o;
     IonizationFractions { n2: n2 / sum, o2: o2 / sum, o: o / sum }
@@ -56,7 +56,7 @@ fn ionization_fractions(air: &Air) -> IonizationFractions {
 
 /// Fraction of the ion pairs that become O2+: N2+ and O+ transfer their charge to O2 or form NO+ (rates of Lindinger et
 /// al. 1974 and McFarland et al. 1973). It increases downward with the density of O2.
-fn o2_ion_fraction(air: &Air, ionization_fractions: &IonizationFractions) -> f64 {
+fn o2_ion_fraction(air: &AirLevel, ionization_fractions: &IonizationFractions) -> f64 {
     let cold = 300.0 / air.temperature;
     let n2_by_o2 = 5e-17 * math::pow(cold, 0.8) * air.o2;
     let n2_by_o = 1.4e-16 * math::pow(cold, 0.44) * air.o;
@@ -68,14 +68,14 @@ fn o2_ion_fraction(air: &Air, ionization_fractions: &IonizationFractions) -> f64
 }
 
 /// Fraction of N2(A) that transfers its energy to O.
-fn n2a_transfer_fraction(air: &Air) -> f64 {
+fn n2a_transfer_fraction(air: &AirLevel) -> f64 {
     let by_o = NITROGEN_A_BY_O * air.o;
     by_o / (NITROGEN_A_RADIATION + by_o + NITROGEN_A_BY_O2 * air.o2)
 }
 
 /// Counted photons of each emitter per ion pair produced in this air.
 #[must_use]
-pub fn photons_per_ion_pair(air: &Air) -> PerEmitter<f64> {
+pub fn photons_per_ion_pair(air: &AirLevel) -> PerEmitter<f64> {
     let pairs = ionization_fractions(air);
     let oxygen_ions = o2_ion_fraction(air, &pairs);
     let green_made = DIRECT_GREEN * pairs.o

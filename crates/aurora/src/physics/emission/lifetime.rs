@@ -6,7 +6,7 @@ use super::{
     emitter::Emitter,
     quenching::{lifetime, natural_lifetime},
 };
-use crate::physics::atmosphere::Air;
+use crate::physics::atmosphere::AirLevel;
 
 /// Gyroradius of an electron of 1 eV perpendicular to a field of 50 microtesla, m: sqrt(2 m E) / (e B).
 const GYRORADIUS_AT_1_EV: f64 = 0.067_4;
@@ -15,7 +15,7 @@ const PROMPT: f64 = 1e-3;
 
 /// Coefficient of diffusion of O through the air, m^2/s (Colegrove et al. 1966: 9.69e16 T^0.774 / n cm^2/s for O in N2).
 #[must_use]
-pub fn diffusion_coefficient(air: &Air) -> f64 {
+pub fn diffusion_coefficient(air: &AirLevel) -> f64 {
     9.69e18 * math::pow(air.temperature, 0.774) / air.number_density()
 }
 
@@ -32,7 +32,7 @@ impl LifetimeAndDiffusion {
     /// Of an emitter in this air. Excited atoms diffuse during their lifetime, with variance 2 D tau; it is visible in
     /// the red line only.
     #[must_use]
-    pub fn new(emitter: Emitter, air: &Air) -> Self {
+    pub fn new(emitter: Emitter, air: &AirLevel) -> Self {
         let lifetime = lifetime(emitter, air);
         let moves = natural_lifetime(emitter) > PROMPT;
         Self { lifetime, diffusion_variance: if moves { 2.0 * diffusion_coefficient(air) * lifetime } else { 0.0 } }

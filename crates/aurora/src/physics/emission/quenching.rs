@@ -3,7 +3,7 @@
 use bansho_base::math;
 
 use super::emitter::{Emitter, PerEmitter};
-use crate::physics::atmosphere::Air;
+use crate::physics::atmosphere::AirLevel;
 
 /// Rate coefficient `A exp(B / T)`, m^3 s^-1.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +73,7 @@ pub fn natural_lifetime(emitter: Emitter) -> f64 {
 
 /// Fraction of the excited states that radiate, `1 / (1 + tau sum k_q n_q)` (Stern-Volmer).
 #[must_use]
-pub fn radiated_fraction(emitter: Emitter, air: &Air) -> f64 {
+pub fn radiated_fraction(emitter: Emitter, air: &AirLevel) -> f64 {
     let ExcitedState { lifetime, n2, o2, o } = STATES[emitter.index()];
     let t = air.temperature;
     1.0 / (1.0 + lifetime * (n2.at(t) * air.n2 + o2.at(t) * air.o2 + o.at(t) * air.o))
@@ -81,7 +81,7 @@ pub fn radiated_fraction(emitter: Emitter, air: &Air) -> f64 {
 
 /// Effective lifetime with quenching, s: the radiative lifetime times the radiated fraction.
 #[must_use]
-pub fn lifetime(emitter: Emitter, air: &Air) -> f64 {
+pub fn lifetime(emitter: Emitter, air: &AirLevel) -> f64 {
     natural_lifetime(emitter) * radiated_fraction(emitter, air)
 }
 

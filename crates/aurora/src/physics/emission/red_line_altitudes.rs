@@ -6,7 +6,7 @@
 use super::{Emitter, PerEmitter};
 use crate::physics::atmosphere::level_altitude_km;
 
-/// Number of these altitudes.
+/// Number of altitudes for which the afterglow stores red light.
 pub const RED_ALTITUDES: usize = 3;
 /// The altitudes, km: the best three round values for electrons of 1 to 10 keV.
 const RED_ALTITUDES_KM: [f64; RED_ALTITUDES] = [150.0, 220.0, 300.0];
@@ -36,10 +36,10 @@ pub fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
 /// Lifetimes in s, averaged over the levels with the weights and the emission. `levels` yields emission and lifetime.
 pub(super) fn mean_lifetimes(levels: impl Iterator<Item = (f64, f64)>) -> [f64; RED_ALTITUDES] {
     let (mut light, mut lifetimes) = ([0.0; RED_ALTITUDES], [0.0; RED_ALTITUDES]);
-    for (level, (own, lifetime)) in levels.enumerate() {
+    for (level, (emission, lifetime)) in levels.enumerate() {
         for (altitude, weight) in red_altitude_weights(level_altitude_km(level)).into_iter().enumerate() {
-            light[altitude] += weight * own;
-            lifetimes[altitude] += weight * own * lifetime;
+            light[altitude] += weight * emission;
+            lifetimes[altitude] += weight * emission * lifetime;
         }
     }
     std::array::from_fn(|altitude| lifetimes[altitude] / light[altitude].max(f64::MIN_POSITIVE))

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use super::{
     energy_grid::{self, NODES, node_energy_ev},
     fang2010::{AirLayer, MonoenergeticBeam},
-    hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
     spectrum::Spectrum,
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, locate_level};
@@ -18,13 +17,13 @@ pub type AltitudeProfile = [f64; LEVELS];
 /// spectrum about each node.
 #[derive(Clone, Debug)]
 pub struct Deposition {
-    monoenergetic: Vec<AltitudeProfile>,
+    monoenergetic_profiles: Vec<AltitudeProfile>,
     /// Cumulative fractions of the energy flux, by central energy, then by energy: for inverse transform sampling.
     cumulative_fractions: Vec<[f64; NODES]>,
     /// Guide tables (Chen and Asau): for each of [`GUIDE_ENTRIES`] intervals of (0, 1) the first node that a uniform
     /// number in it can select.
     guide_tables: Vec<[u8; GUIDE_ENTRIES]>,
-    mixed: Vec<AltitudeProfile>,
+    spectrum_profiles: Vec<AltitudeProfile>,
 }
 
 /// Entries of a guide table, a power of two: one or two steps lead from the guide to the sampled node.
@@ -36,28 +35,24 @@ impl Deposition {
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let layers: Vec<AirLayer> = air.levels().iter().map(AirLayer::new).collect();
-        let monoenergetic: Vec<AltitudeProfile> = (0..NODES)
+        let monoenergetic_profiles: Vec<AltitudeProfile> = (0..NODES)
             .into_par_iter()
             .map(|node| {
                 let beam = MonoenergeticBeam::new(node_energy_ev(node));
                 std::array::from_fn(|level| beam.ionization(&layers[level]))
             })
             .collect();
-        Self::from_profiles(monoenergetic, spectrum)
+        Self::from_profiles(monoenergetic_profiles, spectrum)
     }
 
-    /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
-    #[must_use]
-    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
-        Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
-    }
-
-    fn from_profiles(monoenergetic: Vec<AltitudeProfile>, spectrum: Spectrum) -> Self {
+    /// The table for a spectrum, from the profiles of monoenergetic electrons of every node.
+    pub(super) fn from_profiles(monoenergetic_profiles: Vec<AltitudeProfile>, spectrum: Spectrum) -> Self {
         let weights: Vec<_> = (0..NODES).into_par_iter().map(|node| spectrum.flux_fractions(node)).collect();
-        let mixed = weights.par_iter().map(|weights| weighted_sum(&monoenergetic, weights)).collect();
+        let spectrum_profiles =
+            weights.par_iter().map(|weights| weighted_sum(&monoenergetic_profiles, weights)).collect();
         let cumulative_fractions: Vec<_> = weights.iter().map(running_sum).collect();
-        let guide_tables = cumulative_fractions.iter().map(guide_tables).collect();
-        Self { monoenergetic, cumulative_fractions, guide_tables, mixed }
+        let guide_tables = cumulative_fractions.iter().map(guide_table).collect();
+        Self { monoenergetic_profiles, cumulative_fractions, guide_tables, spectrum_profiles }
     }
 
     /// Profile of monoenergetic electrons of a node.
@@ -67,7 +62,7 @@ impl Deposition {
     /// If the node is not in the grid.
     #[must_use]
     pub fn monoenergetic_profile(&self, node: usize) -> &AltitudeProfile {
-        &self.monoenergetic[node]
+        &self.monoenergetic_profiles[node]
     }
 
     /// Profile of the spectrum about the energy of a node.
@@ -77,14 +72,14 @@ impl Deposition {
     /// If the node is not in the grid.
     #[must_use]
     pub fn spectrum_profile(&self, node: usize) -> &AltitudeProfile {
-        &self.mixed[node]
+        &self.spectrum_profiles[node]
     }
 
     /// Ionization rate, m^-3 s^-1 per mW m^-2, for a spectrum about any energy at any altitude: linear between levels
     /// and, in log energy, between nodes; 0 outside 80-800 km.
     #[must_use]
     pub fn ionization(&self, energy_ev: f64, altitude_km: f64) -> f64 {
-        interpolate(&self.mixed, energy_ev, altitude_km)
+        interpolate(&self.spectrum_profiles, energy_ev, altitude_km)
     }
 
     /// Samples the energy node of one particle by energy flux: the mean of the
@@ -148,10 +143,11 @@ fn running_sum(weights: &[f64; NODES]) -> [f64; NODES] {
     })
 }
 
-fn guide_tables(sums: &[f64; NODES]) -> [u8; GUIDE_ENTRIES] {
-    std::array::from_fn(|fraction| {
-        let least = fraction as f64 / GUIDE_ENTRIES as f64;
-        sums.partition_point(|sum| *sum <= least).min(NODES - 1) as u8
+/// The guide table of a cumulative distribution.
+fn guide_table(sums: &[f64; NODES]) -> [u8; GUIDE_ENTRIES] {
+    std::array::from_fn(|entry| {
+        let lower_bound = entry as f64 / GUIDE_ENTRIES as f64;
+        sums.partition_point(|sum| *sum <= lower_bound).min(NODES - 1) as u8
     })
 }
 

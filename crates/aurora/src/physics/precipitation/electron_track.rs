@@ -57,7 +57,7 @@ impl TrackSampler {
 
     /// The collisions of particle number `particle` with the energy of `node`, from the highest to the lowest.
     ///
-    /// Stratified sampling: the k-th of n collisions lies where between k/n and (k + 1)/n of the energy is lost. The
+    /// Stratified sampling: at the k-th of n collisions, between k/n and (k + 1)/n of the energy has been lost. The
     /// mean over particles is the profile, and each track follows it approximately. Within one kilometer of a level the
     /// altitude has a triangular density, so the mean is linear between levels.
     ///
@@ -79,15 +79,15 @@ impl TrackSampler {
         let cumulative = &self.cumulative[node];
         let count = collision_count(node);
         let mut from_top = 0;
-        let mut path = TrackState::default();
+        let mut state = TrackState::default();
         (0..count).map(move |number| {
             let words = key.words(particle, number, COLLISION);
             let energy_fraction = (number as f64 + quantile(number, uniform_f64(words[0], 0))) / count as f64;
             from_top = next_level_from_top(cumulative, from_top, energy_fraction);
             let level = LEVELS - 1 - from_top;
-            let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
-            path.advance(level_altitude_km(level) + triangular(words[1]), turn);
-            path.collision(level)
+            let deflection = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
+            state.advance(level_altitude_km(level) + triangular(words[1]), deflection);
+            state.collision(level)
         })
     }
 }
@@ -112,18 +112,18 @@ impl TrackSampler {
         })
     }
 
-    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node: each takes another substratum, in a permutation that changes
-    /// with the collision.
+    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node. Each samples another substratum of every stratum, in a permutation
+    /// that differs between collisions.
     fn stratified_track(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
         let quantile = move |number: u32, uniform: f64| {
-            let fraction = variant ^ (key.words(node as u64, number, TRACK_VARIANT)[0] % TRACKS_PER_ENERGY);
-            (fraction as f64 + uniform) / TRACKS_PER_ENERGY as f64
+            let substratum = variant ^ (key.words(node as u64, number, TRACK_VARIANT)[0] % TRACKS_PER_ENERGY);
+            (substratum as f64 + uniform) / TRACKS_PER_ENERGY as f64
         };
         self.track_with(node, key, (node as u64) << 32 | variant as u64, quantile)
     }
 }
 
-/// Precomputed tracks: so many for each energy of a range that their mean is the profile.
+/// Precomputed tracks for a range of energies, [`TRACKS_PER_ENERGY`] of each, whose mean is the profile.
 #[derive(Clone, Debug)]
 pub struct TrackLibrary {
     first_node: usize,
@@ -156,22 +156,22 @@ impl TrackLibrary {
         Self { first_node, starts, collisions: by_node.concat() }
     }
 
-    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node (any `variant`); of the nearest node that the library has.
+    /// One of the [`TRACKS_PER_ENERGY`] tracks of a node, selected by any `variant`; of the nearest node in the library.
     ///
     /// # Panics
     ///
-    /// If the library was made for an empty range.
+    /// If the library was created for an empty range.
     #[must_use]
     pub fn track(&self, node: usize, variant: u32) -> &[Collision] {
-        let quantile = node.saturating_sub(self.first_node).min(self.starts.len() - 2);
-        let (start, end) = (self.starts[quantile], self.starts[quantile + 1]);
+        let index = node.saturating_sub(self.first_node).min(self.starts.len() - 2);
+        let (start, end) = (self.starts[index], self.starts[index + 1]);
         let count = (end - start) / TRACKS_PER_ENERGY as usize;
         let first = start + (variant % TRACKS_PER_ENERGY) as usize * count;
         &self.collisions[first..first + count]
     }
 }
 
-/// Index from the top, at least `above`, of the level at which the fraction `spent` of the energy is lost.
+/// Index from the top, at least `above`, of the level at which the fraction `energy_fraction` of the energy is lost.
 fn next_level_from_top(cumulative: &AltitudeProfile, above: usize, energy_fraction: f64) -> usize {
     let passed = cumulative[above..LEVELS - 1].iter().take_while(|sum| **sum <= energy_fraction);
     above + passed.count()
@@ -206,11 +206,11 @@ pub(super) struct TrackState {
 }
 
 impl TrackState {
-    /// Moves down to an altitude along the field deflected by `turn` (tangents): (2.24) read as a step along the unit
-    /// vector of L + omega.
-    pub(super) fn advance(&mut self, altitude_km: f64, turn: [f64; 2]) {
+    /// Moves down to an altitude along the field, deflected by the tangents `deflection`: (2.24) read as a step along the
+    /// unit vector of L + omega.
+    pub(super) fn advance(&mut self, altitude_km: f64, deflection: [f64; 2]) {
         let descent = self.altitude_km.map_or(0.0, |before| before - altitude_km).max(0.0);
-        self.transverse_km = std::array::from_fn(|i| self.transverse_km[i] + descent * turn[i]);
+        self.transverse_km = std::array::from_fn(|i| self.transverse_km[i] + descent * deflection[i]);
         self.altitude_km = Some(altitude_km);
     }
 

@@ -7,7 +7,7 @@
 use bansho_base::math;
 
 use super::{EV_PER_S_PER_MW, ION_PAIR_EV};
-use crate::physics::atmosphere::Air;
+use crate::physics::atmosphere::AirLevel;
 
 /// P_ij of table 1: C_i is the exponential of a cubic in the logarithm of the energy in keV.
 const COEFFICIENTS: [[f64; 4]; 8] = [
@@ -35,7 +35,7 @@ pub struct AirLayer {
 impl AirLayer {
     /// For this air.
     #[must_use]
-    pub fn new(air: &Air) -> Self {
+    pub fn new(air: &AirLevel) -> Self {
         Self {
             ln_column: 0.7 * math::ln(air.density * air.scale_height / COLUMN_SCALE),
             pairs_at_unit_dissipation: EV_PER_S_PER_MW / ION_PAIR_EV / air.scale_height,

@@ -7,9 +7,10 @@ use bansho_base::{
 
 use super::{
     COLLISION_EV, EV_PER_S_PER_MW, ION_PAIR_EV,
-    deposition::AltitudeProfile,
+    deposition::{AltitudeProfile, Deposition},
     electron_track::{Collision, TrackState, collision_count},
     energy_grid::{NODES, node_energy_ev},
+    spectrum::Spectrum,
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, level_altitude_km};
 
@@ -51,19 +52,19 @@ impl HardSphereAtmosphere {
     /// (2.22) is read as `1 - exp(-n pi r^2 |L|)`, which stays below 1 in dense air. The column density to the next
     /// collision is then exponentially distributed and is sampled directly, without steps.
     pub fn track(&self, energy_ev: f64, key: Key, particle: u64) -> impl Iterator<Item = Collision> {
-        let mut path = TrackState::default();
+        let mut state = TrackState::default();
         let (mut column, mut from_top) = (0.0, 0);
         (0..(energy_ev / COLLISION_EV).round().max(1.0) as u32).map_while(move |number| {
             let words = key.words(particle, number, COLLISION);
-            let turn = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
-            let slant = math::sqrt(1.0 + turn[0] * turn[0] + turn[1] * turn[1]);
+            let deflection = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
+            let slant = math::sqrt(1.0 + deflection[0] * deflection[0] + deflection[1] * deflection[1]);
             column -= math::ln_1p(-uniform_f64(words[0], words[1])) / (self.cross_section * slant);
             while from_top < LEVELS && self.columns[from_top] < column {
                 from_top += 1;
             }
             let altitude_km = self.altitude_km(from_top, column)?;
-            path.advance(altitude_km, turn);
-            Some(path.collision((altitude_km - level_altitude_km(0)).round() as usize))
+            state.advance(altitude_km, deflection);
+            Some(state.collision((altitude_km - level_altitude_km(0)).round() as usize))
         })
     }
 
@@ -94,6 +95,14 @@ impl HardSphereAtmosphere {
         let Some(above) = from_top.checked_sub(1) else { return Some(low_km) };
         let high = self.columns[above];
         Some(low_km + math::ln(low / column) / math::ln(low / high))
+    }
+}
+
+impl Deposition {
+    /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
+    #[must_use]
+    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+        Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
     }
 }
 

@@ -51,11 +51,12 @@ pub(crate) fn lateral_spread_km(model: TrackModel, deflection: f64, energy_ev: f
 struct SpreadByEnergy(Vec<f64>);
 
 impl SpreadByEnergy {
-    fn new(model: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
+    /// From the altitudes, in km, of the collisions of a track of a node, sampled with a key and a particle number.
+    fn new(track_altitudes_km: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
         let key = Key::new(0, "aurora wander");
         let of_node = |node: usize| {
             let tracks = u64::from(COLLISIONS_PER_ENERGY.div_ceil(collision_count(node)).max(MIN_TRACKS));
-            let sum = (0..tracks).map(|particle| variance_km2(&model(node, key, particle))).sum::<f64>();
+            let sum = (0..tracks).map(|particle| variance_km2(&track_altitudes_km(node, key, particle))).sum::<f64>();
             math::sqrt(sum / tracks as f64)
         };
         Self((0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect())
@@ -69,8 +70,8 @@ impl SpreadByEnergy {
     }
 }
 
-fn altitudes_km(model: impl Iterator<Item = Collision>) -> Vec<f64> {
-    model.map(|collision| f64::from(collision.altitude_km)).collect()
+fn altitudes_km(track: impl Iterator<Item = Collision>) -> Vec<f64> {
+    track.map(|collision| f64::from(collision.altitude_km)).collect()
 }
 
 /// Mean square distance from the field line, per direction, of collisions at these altitudes in km (highest first),

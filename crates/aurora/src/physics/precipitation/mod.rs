@@ -2,9 +2,8 @@
 //!
 //! [`fang2010`] has the altitude profiles by energy, [`energy_grid`] the energies of all tables, [`spectrum`] the
 //! energy spectra, [`deposition`] the ionization table, [`electron_track`] tracks of single collisions whose mean is
-//! the table. [`hard_sphere`] is the model of the thesis,
-//! [`quantile_matched`](crate::single_collisions::quantile_matched) a few of its tracks adjusted to have the mean of
-//! all.
+//! the table. [`hard_sphere`] is the model of the thesis, [`quantile_matched`] a few of its tracks adjusted to have the
+//! mean of all.
 
 pub mod deposition;
 pub mod electron_track;
@@ -12,6 +11,7 @@ pub mod energy_grid;
 pub mod fang2010;
 pub mod hard_sphere;
 pub(crate) mod lateral_spread;
+pub mod quantile_matched;
 pub mod spectrum;
 
 pub use deposition::Deposition;
@@ -20,9 +20,9 @@ pub use hard_sphere::HardSphereAtmosphere;
 pub use spectrum::Spectrum;
 
 bansho_base::choice! {
-    /// What stops the electrons and what shines where they are stopped.
+    /// Model of the energy loss of the electrons and of the light that they excite.
     pub enum TrackModel {
-        /// Air as it is measured: heights after Fang et al. (2010), colors and brightness as observed.
+        /// The measured atmosphere: altitudes after Fang et al. (2010), colors and brightness as observed.
         Fang2010 = "fang_2010",
         /// Hard spheres, as in the thesis (2.4): one radius for all energies, and green light only above 190 km.
         HardSphereAtmosphere = "hard_sphere",

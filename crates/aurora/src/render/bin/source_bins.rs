@@ -1,7 +1,7 @@
 //! Bins of precipitation by longitude and distance from the observer's own field line.
 //!
 //! Every source is a patch with the separable kernel `(1 - r^2)^2`, wider than a chart cell so that single sources are
-//! not visible. Sources are sorted into strips of columns: each strip is summed by one thread in a fixed order, so
+//! not visible. Sources are sorted into blocks of columns: each block is summed by one thread in a fixed order, so
 //! results do not depend on the number of threads.
 
 use std::{f64::consts::LN_2, ops::Range};
@@ -13,13 +13,10 @@ use bansho_base::math::{
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
-use crate::render::{
-    integrate::columns::ENTRY_PER_STEP,
-    project::{
-        chart::{Chart, ChartProjection, STRIP_COLUMNS},
-        field_lines::FieldLines,
-        visible_rows::VisibleRowTest,
-    },
+use crate::render::project::{
+    chart::{BLOCK_COLUMNS, Chart, ChartProjection},
+    field_lines::FieldLines,
+    visible_rows::VisibleRowTest,
 };
 
 /// Sources per task.
@@ -36,9 +33,12 @@ const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
 const MAX_DISTANCE_KM: f64 = 3000.0;
 /// Minimum kernel support in cells, so that the sum does not depend on the subcell position.
 const MIN_REACH_CELLS: f32 = 1.6;
+/// Maximum entry spacing of prefiltered emission tables, relative to the altitude step between bins. Steps as large as
+/// the emission layer need this spacing, else linear interpolation shows the pattern of the bins.
+pub(crate) const MAX_ENTRY_PER_STEP: f32 = 2.0;
 /// Maximum width, in near bins, over which prefiltered tables spread a bin's light: their filter spans two entries,
 /// each less than twice as wide as requested.
-const SMOOTHING_BINS: f32 = 4.0 * ENTRY_PER_STEP[1];
+const SMOOTHING_BINS: f32 = 4.0 * MAX_ENTRY_PER_STEP;
 /// Normalization: one over the integral of `(1 - r^2)^2` over (-1, 1).
 const NORM: f32 = 15.0 / 16.0;
 
@@ -73,32 +73,32 @@ pub(crate) const REACH: f32 = 2.645_751_3;
 /// node.
 pub(crate) type Bin = [f32; 4];
 
-/// The sources of a picture, sorted into strips of chart columns.
-pub(crate) struct SourceBins<'a> {
+/// The sources of a picture, sorted by the blocks of chart columns that they overlap.
+pub(crate) struct SortedSources<'a> {
     sources: &'a [FieldLineSource],
     /// Output of each sorting task, in the order of the sources.
-    chunks: Vec<SortedSources>,
+    chunks: Vec<SortedChunk>,
     bins: DistanceBins,
 }
 
-/// Part of the sources, sorted by strips.
-struct SortedSources {
-    /// Start index of each strip, and the total.
+/// The sources of one sorting task, sorted by blocks.
+struct SortedChunk {
+    /// Start index of each block, and the total.
     starts: Vec<u32>,
-    entries: Vec<StripEntry>,
+    entries: Vec<BlockEntry>,
 }
 
-/// A source that overlaps a strip.
+/// A source that overlaps a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct StripEntry {
+pub(crate) struct BlockEntry {
     /// Index of the source.
     pub(crate) source: u32,
-    /// First column of the strip within its support, and one past the last.
+    /// First column of the block within the source's support, and one past the last.
     columns: [u16; 2],
 }
 
-impl StripEntry {
-    /// Columns of the strip within its support.
+impl BlockEntry {
+    /// Columns of the block within the source's support.
     #[inline(always)]
     pub(crate) fn columns(&self) -> Range<usize> {
         self.columns[0] as usize..self.columns[1] as usize
@@ -181,15 +181,15 @@ impl DistanceBins {
     }
 }
 
-/// Bins of one strip, column by column.
+/// Bins of one block, column by column.
 #[derive(Default)]
-pub(crate) struct StripBins {
+pub(crate) struct BlockBins {
     bins: Vec<Bin>,
     /// First non-empty bin of each column, and one past the last.
-    filled: [[usize; 2]; STRIP_COLUMNS],
+    filled: [[usize; 2]; BLOCK_COLUMNS],
 }
 
-impl StripBins {
+impl BlockBins {
     /// The non-empty bins of a column: index of the first, and the bins.
     pub(crate) fn column(&self, column: usize, bins: &DistanceBins) -> (usize, &[Bin]) {
         let [first, end] = self.filled[column];
@@ -197,12 +197,13 @@ impl StripBins {
     }
 }
 
-impl<'a> SourceBins<'a> {
-    /// Sorts sources with at least this standard deviation in km into strips of chart columns. Sources outside the
-    /// visible rows are skipped.
+impl<'a> SortedSources<'a> {
+    /// Sorts sources with at least the standard deviation `spread_km` into blocks of `block_columns` chart columns.
+    /// Sources outside the visible rows are skipped.
     pub(crate) fn new(
         sources: &'a [FieldLineSource],
-        (chart, strip): (&Chart, usize),
+        chart: &Chart,
+        block_columns: usize,
         field: &FieldLines,
         spread_km: f64,
     ) -> Self {
@@ -211,8 +212,8 @@ impl<'a> SourceBins<'a> {
         let shown = VisibleRowTest::new(chart, field);
         let sorted = |(task, sources): (usize, &[FieldLineSource])| {
             let mut spans = vec![ColumnSpan::default(); sources.len()];
-            dispatch!(level, _simd => find_column_spans(sources, chart, &projection, (&shown, &bins), &mut spans));
-            SortedSources::new(&spans, task * TASK, chart, strip)
+            dispatch!(level, _simd => find_column_spans(sources, chart, &projection, &shown, &bins, &mut spans));
+            SortedChunk::new(&spans, task * TASK, chart, block_columns)
         };
         let chunks = sources.par_chunks(TASK).enumerate().map(sorted).collect();
         Self { sources, chunks, bins }
@@ -223,36 +224,38 @@ impl<'a> SourceBins<'a> {
         &self.bins
     }
 
-    /// Sources of a strip, in their original order, chunk by chunk.
-    pub(crate) fn entries(&self, strip: usize) -> impl Iterator<Item = &[StripEntry]> {
-        self.chunks.iter().map(move |part| &part.entries[part.starts[strip] as usize..part.starts[strip + 1] as usize])
+    /// Sources of a block, in their original order, chunk by chunk.
+    pub(crate) fn entries(&self, block: usize) -> impl Iterator<Item = &[BlockEntry]> {
+        self.chunks
+            .iter()
+            .map(move |chunk| &chunk.entries[chunk.starts[block] as usize..chunk.starts[block + 1] as usize])
     }
 
-    /// Number of sources of a strip.
-    pub(crate) fn count(&self, strip: usize) -> usize {
-        self.entries(strip).map(<[StripEntry]>::len).sum()
+    /// Number of sources of a block.
+    pub(crate) fn count(&self, block: usize) -> usize {
+        self.entries(block).map(<[BlockEntry]>::len).sum()
     }
 
     /// A source by its index.
     #[inline(always)]
-    pub(crate) fn source(&self, number: u32) -> &FieldLineSource {
-        &self.sources[number as usize]
+    pub(crate) fn source(&self, index: u32) -> &FieldLineSource {
+        &self.sources[index as usize]
     }
 
-    /// Accumulates the sources of a strip whose columns have these cosines and sines.
+    /// Accumulates the sources of a block whose columns have these cosines and sines.
     #[inline(always)]
     pub(crate) fn accumulate<S: Simd>(
         &self,
         simd: S,
-        strip: usize,
+        block: usize,
         chart: &Chart,
-        units: &[[f32; STRIP_COLUMNS]; 2],
-        sums: &mut StripBins,
+        units: &[[f32; BLOCK_COLUMNS]; 2],
+        sums: &mut BlockBins,
     ) {
         sums.bins.clear();
-        sums.bins.resize(STRIP_COLUMNS * self.bins.count, [0.0; 4]);
-        sums.filled = [[usize::MAX, 0]; STRIP_COLUMNS];
-        for entries in self.entries(strip) {
+        sums.bins.resize(BLOCK_COLUMNS * self.bins.count, [0.0; 4]);
+        sums.filled = [[usize::MAX, 0]; BLOCK_COLUMNS];
+        for entries in self.entries(block) {
             for entry in entries {
                 let source = self.source(entry.source);
                 let patch = PatchWeights::new(source, chart, units);
@@ -271,36 +274,37 @@ impl<'a> SourceBins<'a> {
     }
 }
 
-impl SortedSources {
-    /// Counting sort of sources, the first of which has index `first`, into strips of `width` columns.
+impl SortedChunk {
+    /// Counting sort of sources, the first of which has index `first`, into blocks of `width` columns.
     fn new(spans: &[ColumnSpan], first: usize, chart: &Chart, width: usize) -> Self {
-        let strips = chart.columns.div_ceil(width);
-        let mut starts = vec![0_u32; strips + 1];
+        let blocks = chart.columns.div_ceil(width);
+        let mut starts = vec![0_u32; blocks + 1];
         for span in spans {
-            for_each_strip(*span, chart, width, |strip, _| starts[strip + 1] += 1);
+            for_each_block(*span, chart, width, |block, _| starts[block + 1] += 1);
         }
-        for strip in 0..strips {
-            starts[strip + 1] += starts[strip];
+        for block in 0..blocks {
+            starts[block + 1] += starts[block];
         }
         let mut next = starts.clone();
-        let mut entries = vec![StripEntry::default(); starts[strips] as usize];
+        let mut entries = vec![BlockEntry::default(); starts[blocks] as usize];
         for (span, source) in spans.iter().zip(first..) {
-            for_each_strip(*span, chart, width, |strip, columns| {
-                entries[next[strip] as usize] = StripEntry { source: source as u32, columns };
-                next[strip] += 1;
+            for_each_block(*span, chart, width, |block, columns| {
+                entries[next[block] as usize] = BlockEntry { source: source as u32, columns };
+                next[block] += 1;
             });
         }
         Self { starts, entries }
     }
 }
 
-/// The columns that every source reaches.
+/// Finds the chart columns within the support of each source.
 #[inline(always)]
 fn find_column_spans(
     sources: &[FieldLineSource],
     chart: &Chart,
     projection: &ChartProjection,
-    (shown, bins): (&VisibleRowTest, &DistanceBins),
+    shown: &VisibleRowTest,
+    bins: &DistanceBins,
     spans: &mut [ColumnSpan],
 ) {
     for (source, span) in sources.iter().zip(spans) {
@@ -336,9 +340,9 @@ impl ColumnSpan {
     }
 }
 
-/// Calls `each` with every strip that a span overlaps, and its columns there.
+/// Calls `each` with every block that a span overlaps, and its columns there.
 #[inline]
-fn for_each_strip(span: ColumnSpan, chart: &Chart, width: usize, mut each: impl FnMut(usize, [u16; 2])) {
+fn for_each_block(span: ColumnSpan, chart: &Chart, width: usize, mut each: impl FnMut(usize, [u16; 2])) {
     let columns = chart.columns as i32;
     // A span across the seam of a full-circle chart also appears on the other side.
     let turns = if chart.wraps { &[0, columns, -columns][..] } else { &[0] };
@@ -346,30 +350,30 @@ fn for_each_strip(span: ColumnSpan, chart: &Chart, width: usize, mut each: impl 
         let mut first = (span.first + turn).max(0) as usize;
         let end = (span.first + turn + span.count).clamp(0, columns) as usize;
         while first < end {
-            let strip = first / width;
+            let block = first / width;
             let from = first % width;
             let to = width.min(from + end - first);
-            each(strip, [from as u16, to as u16]);
+            each(block, [from as u16, to as u16]);
             first += to - from;
         }
     }
 }
 
-/// Kernel weights of a source in the columns of a strip.
+/// Kernel weights of a source in the columns of a block.
 pub(crate) struct PatchWeights {
     /// Weight per km of width.
-    pub(crate) column_weights: [f32; STRIP_COLUMNS],
+    pub(crate) column_weights: [f32; BLOCK_COLUMNS],
     /// Distance along the meridian, km.
-    pub(super) distances_km: [f32; STRIP_COLUMNS],
+    pub(super) distances_km: [f32; BLOCK_COLUMNS],
 }
 
 impl PatchWeights {
     #[inline(always)]
-    pub(crate) fn new(source: &FieldLineSource, chart: &Chart, [cosines, sines]: &[[f32; STRIP_COLUMNS]; 2]) -> Self {
+    pub(crate) fn new(source: &FieldLineSource, chart: &Chart, [cosines, sines]: &[[f32; BLOCK_COLUMNS]; 2]) -> Self {
         let [x, y] = source.across;
         let per_reach = 1.0 / source.reach.max(MIN_REACH_CELLS * chart.column_step as f32 * source.distance());
-        let (mut side, mut along) = ([0.0; STRIP_COLUMNS], [0.0; STRIP_COLUMNS]);
-        for column in 0..STRIP_COLUMNS {
+        let (mut side, mut along) = ([0.0; BLOCK_COLUMNS], [0.0; BLOCK_COLUMNS]);
+        for column in 0..BLOCK_COLUMNS {
             let offset = y.fma(cosines[column], -(x * sines[column])) * per_reach;
             let shape = offset.fma(-offset, 1.0).max(0.0);
             side[column] = shape * shape * (NORM * per_reach);
@@ -381,8 +385,8 @@ impl PatchWeights {
     /// Bins within its support along each column.
     #[inline(always)]
     fn bins(&self, source: &FieldLineSource, bins: &DistanceBins) -> PatchBins {
-        let (mut middles, mut reaches) = ([0.0; STRIP_COLUMNS], [0.0; STRIP_COLUMNS]);
-        for column in 0..STRIP_COLUMNS {
+        let (mut middles, mut reaches) = ([0.0; BLOCK_COLUMNS], [0.0; BLOCK_COLUMNS]);
+        for column in 0..BLOCK_COLUMNS {
             let along = self.distances_km[column];
             middles[column] = bins.coordinate(along);
             let reach = source.reach / bins.bin_width(along);
@@ -392,15 +396,15 @@ impl PatchWeights {
     }
 }
 
-/// Center and half-width of a patch along each column of a strip, in bins.
+/// Center and half-width of a patch along each column of a block, in bins.
 struct PatchBins {
-    middles: [f32; STRIP_COLUMNS],
-    reaches: [f32; STRIP_COLUMNS],
+    middles: [f32; BLOCK_COLUMNS],
+    reaches: [f32; BLOCK_COLUMNS],
 }
 
 impl PatchBins {
     #[inline(always)]
-    fn add<S: Simd>(&self, column: usize, weights: FourLanes<S>, bins: &DistanceBins, sums: &mut StripBins) {
+    fn add<S: Simd>(&self, column: usize, weights: FourLanes<S>, bins: &DistanceBins, sums: &mut BlockBins) {
         let (middle, reach) = (self.middles[column], self.reaches[column]);
         let first = (middle - reach - 0.5).ceil().max(0.0) as usize;
         let end = ((middle + reach - 0.5).floor() + 1.0).clamp(0.0, bins.count as f32) as usize;

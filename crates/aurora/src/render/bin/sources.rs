@@ -27,10 +27,10 @@ use crate::{
 const TASK: usize = 4096;
 /// Standard deviation of a particle's patch relative to the particle spacing: single particles are not visible.
 const SPREAD_PER_SPACING: f64 = 1.2;
-/// Afterglow cells without particles are skipped below this fraction of a typical cell.
-const FAINTEST: f32 = 2e-4;
+/// Afterglow cells without particles are skipped below this fraction of a typical cell's power.
+const MIN_RELATIVE_POWER: f32 = 2e-4;
 /// The same with single collisions, whose noise masks more; the skipped light is a hundredth of the afterglow.
-const FAINTEST_WITH_COLLISIONS: f32 = 1e-2;
+const MIN_RELATIVE_POWER_WITH_COLLISIONS: f32 = 1e-2;
 /// Offset between the random-number counters of a particle at successive instants.
 const PER_INSTANT: u32 = 0x9e37_79b9;
 /// 1000 W, the power of one mW/m^2 on one km^2.
@@ -56,9 +56,9 @@ const RED: [EmitterWeights; RED_ALTITUDES] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 
 pub(crate) struct SourceBuilder<'a> {
     pub(crate) field: &'a FieldLines,
     pub(crate) reach: f32,
-    /// Weight of the power at each of several instants.
+    /// Factor of the power: one over the number of instants.
     pub(crate) weight: f32,
-    /// Index of the instant, so that a particle has other tracks at each.
+    /// Index of the instant: a particle has other random tracks at each.
     pub(crate) instant: u32,
 }
 
@@ -164,54 +164,54 @@ impl SourceBuilder<'_> {
 
 impl Sources {
     /// Sources while the shutter is open.
-    pub(crate) fn new(light: &EmissionInputs, field: &FieldLines, moments: &SampleTimes) -> Self {
-        let by_collisions = light.parameters.sampling == Sampling::SingleCollisions;
-        let faintest = if by_collisions { FAINTEST_WITH_COLLISIONS } else { FAINTEST };
-        let afterglow = light.afterglow;
-        let column = light.emission.column(light.energy_ev);
-        let spread = math::hypot(light.spread_km(), moments.smear_km);
+    pub(crate) fn new(inputs: &EmissionInputs, field: &FieldLines, times: &SampleTimes) -> Self {
+        let by_collisions = inputs.parameters.sampling == Sampling::SingleCollisions;
+        let min_power = if by_collisions { MIN_RELATIVE_POWER_WITH_COLLISIONS } else { MIN_RELATIVE_POWER };
+        let afterglow = inputs.afterglow;
+        let column = inputs.emission.column(inputs.energy_ev);
+        let spread = math::hypot(inputs.spread_km(), times.smear_km);
         let with = |emitter: Emitter, cell_km: f64| {
             let diffusion = column.spread_km[emitter.index()];
             math::sqrt(spread * spread + diffusion * diffusion + cell_km * cell_km / 6.0)
         };
-        let own =
+        let cell_spreads =
             [with(Emitter::OxygenGreen, afterglow.green.cell_km()), with(Emitter::OxygenRed, afterglow.red.cell_km())];
-        let blocks = [afterglow.green.block(own[0]), afterglow.red.block(own[1])];
+        let blocks = [afterglow.green.block(cell_spreads[0]), afterglow.red.block(cell_spreads[1])];
         let ((green_w, green), red) = rayon::join(
-            || afterglow.green.distribute_to_particles(light.particles, faintest, blocks[0]),
-            || afterglow.red.bright_blocks(FAINTEST, blocks[1]),
+            || afterglow.green.distribute_to_particles(inputs.particles, min_power, blocks[0]),
+            || afterglow.red.bright_blocks(MIN_RELATIVE_POWER, blocks[1]),
         );
         // Merged cells are drawn at their center: their spread replaces that of the single cells.
-        let of_block = |own: f64, cell_km: f64, block: usize| {
-            math::sqrt(own * own + ((block * block - 1) as f64) * cell_km * cell_km / 12.0)
+        let of_block = |cell_spread: f64, cell_km: f64, block: usize| {
+            math::sqrt(cell_spread * cell_spread + ((block * block - 1) as f64) * cell_km * cell_km / 12.0)
         };
-        let green_spread = of_block(own[0], afterglow.green.cell_km(), blocks[0]);
-        let red_spread = of_block(own[1], afterglow.red.cell_km(), blocks[1]);
-        let maker =
+        let green_spread = of_block(cell_spreads[0], afterglow.green.cell_km(), blocks[0]);
+        let red_spread = of_block(cell_spreads[1], afterglow.red.cell_km(), blocks[1]);
+        let builder =
             |spread: f64, weight, instant| SourceBuilder { field, reach: spread as f32 * REACH, weight, instant };
-        let mut sharp = maker(green_spread, 1.0, moments.first_index).cells(&green, GREEN);
-        let weight = 1.0 / moments.offsets_s.len().max(1) as f32;
-        for (offset_s, instant) in moments.offsets_s.iter().zip(moments.first_index..) {
-            sharp.extend(maker(spread, weight, instant).particles(light.particles, &green_w, *offset_s as f32));
+        let mut sharp = builder(green_spread, 1.0, times.first_index).cells(&green, GREEN);
+        let weight = 1.0 / times.offsets_s.len().max(1) as f32;
+        for (offset_s, instant) in times.offsets_s.iter().zip(times.first_index..) {
+            sharp.extend(builder(spread, weight, instant).particles(inputs.particles, &green_w, *offset_s as f32));
         }
-        let soft = maker(red_spread, 1.0, moments.first_index).cells(&red, RED);
+        let soft = builder(red_spread, 1.0, times.first_index).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }
 }
 
 impl Sources {
-    /// Adds others with their power scaled by a weight.
+    /// Appends other sources with their power scaled by a weight.
     pub(crate) fn add(&mut self, others: &Self, weight: f32) {
         let first = self.sharp.is_empty() && self.soft.is_empty();
-        for (own, others) in [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft)] {
+        for (sum, others) in [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft)] {
             let dimmed = |source: &FieldLineSource| FieldLineSource {
                 power: source.power.map(|power| weight * power),
                 ..*source
             };
-            own.extend(others.iter().map(dimmed));
+            sum.extend(others.iter().map(dimmed));
         }
-        for (own, other) in self.spread_km.iter_mut().zip(others.spread_km) {
-            *own = if first { other } else { own.min(other) };
+        for (spread, other) in self.spread_km.iter_mut().zip(others.spread_km) {
+            *spread = if first { other } else { spread.min(other) };
         }
     }
 }
@@ -226,7 +226,7 @@ pub(crate) struct SampleTimes {
     pub(crate) smear_km: f64,
 }
 
-/// Everything that sources are made from.
+/// Inputs from which sources are created.
 pub(crate) struct EmissionInputs<'a> {
     pub(crate) particles: &'a AuroraParticles,
     /// The green and the red map.
@@ -244,17 +244,17 @@ pub(crate) struct EmissionInputs<'a> {
 impl EmissionInputs<'_> {
     /// Standard deviation of a particle's light perpendicular to the field, km.
     pub(crate) fn spread_km(&self) -> f64 {
-        let own = match (self.parameters.blur_space, self.parameters.blur_radius_km) {
+        let blur_km = match (self.parameters.blur_space, self.parameters.blur_radius_km) {
             (Blur::Screen, _) => 0.0,
             (Blur::World, Auto::Set(spread)) => spread,
             (Blur::World, Auto::Auto) => SPREAD_PER_SPACING * self.spacing_km,
         };
-        math::hypot(own, self.lateral_spread_km).max(1e-3)
+        math::hypot(blur_km, self.lateral_spread_km).max(1e-3)
     }
 }
 
 /// The nearest node of the energy grid.
 pub(crate) fn nearest_node(energy_ev: f64) -> usize {
-    let least = |node: &usize| (math::ln(node_energy_ev(*node) / energy_ev.max(1.0))).abs();
-    (0..NODES).min_by(|a, b| least(a).total_cmp(&least(b))).unwrap_or(0)
+    let distance = |node: &usize| (math::ln(node_energy_ev(*node) / energy_ev.max(1.0))).abs();
+    (0..NODES).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
 }

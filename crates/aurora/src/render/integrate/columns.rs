@@ -20,9 +20,9 @@ use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_
 use crate::{
     physics::emission::PerEmitter,
     render::{
-        bin::source_bins::{Bin, DistanceBins, SourceBins, StripBins},
+        bin::source_bins::{Bin, BlockBins, DistanceBins, MAX_ENTRY_PER_STEP, SortedSources},
         project::{
-            chart::{Chart, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart},
             field_lines::{FieldLine, FieldLines, Meridian, altitude},
         },
     },
@@ -32,18 +32,16 @@ use crate::{
 const ROWS: usize = 16;
 /// Where light varies slowly with altitude, it is computed every fourth row and interpolated linearly.
 const KNOT_ROWS: usize = 4;
-/// It does so from this altitude on, where the knot spacing is at most this fraction of the distance from that
-/// altitude, km.
+/// Altitude above which light varies slowly, km, and maximum spacing of knots as a fraction of their height above it.
 const SLOW_KM: f32 = 110.0;
-const KNOTS_ABOVE: f32 = 0.1;
+const MAX_KNOT_FRACTION: f32 = 0.1;
 /// Altitude step between bins above which prefiltered tables are used, km: near the magnetic zenith a line of sight is
 /// nearly parallel to the field.
 const STEP_KM: f32 = 1.5;
 
-/// Entry spacing of prefiltered tables relative to the step: at least 1 / [`STEP_KM`]. Steps as large as the emission
-/// layer need 2, else linear interpolation shows the pattern of the bins; smaller steps need less because the profile
-/// is smooth, and the lower border stays sharp.
-pub(crate) const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, 2.0];
+/// Minimum and maximum entry spacing of prefiltered tables relative to the step. Small steps need less than the maximum
+/// because the profile is smooth, and the lower border stays sharp.
+const ENTRY_PER_STEP: [f32; 2] = [1.0 / STEP_KM, MAX_ENTRY_PER_STEP];
 /// Steps above which the entry spacing exceeds the step, km.
 const SMOOTH_KM: f32 = 12.0;
 
@@ -72,29 +70,35 @@ struct ProfilePass<'a> {
 
 impl ColumnBuffer {
     /// Integrates the binned sources.
-    pub(crate) fn new(chart: Chart, field: &FieldLines, profiles: &EmissionProfiles, source_bins: &SourceBins) -> Self {
+    pub(crate) fn new(
+        chart: Chart,
+        field: &FieldLines,
+        profiles: &EmissionProfiles,
+        sorted_sources: &SortedSources,
+    ) -> Self {
         let level = Level::new();
         let [cotangents, inverse_sines] = chart.row_tables(ROWS * KNOT_ROWS);
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
-        let distances: Vec<_> = (0..source_bins.bins().count).map(|bin| source_bins.bins().distance(bin)).collect();
-        let mut picture = Self::zeros(chart);
-        let (chart, strips) = picture.strips(STRIP_COLUMNS);
+        let distances: Vec<_> =
+            (0..sorted_sources.bins().count).map(|bin| sorted_sources.bins().distance(bin)).collect();
+        let mut buffer = Self::zeros(chart);
+        let (chart, blocks) = buffer.blocks(BLOCK_COLUMNS);
         let pass = ProfilePass {
             chart,
             field,
             profiles,
-            bins: source_bins.bins(),
+            bins: sorted_sources.bins(),
             distances: &distances,
             cotangents: &cotangents,
             knots: &knots,
             inverse_sines: &inverse_sines,
         };
-        let spares = ScratchPool::new(ProfileScratch::default);
-        strips.with_max_len(1).for_each(|strip| {
-            spares
-                .with(|workspace| dispatch!(level, simd => pass.integrate_strip(simd, strip, source_bins, workspace)));
+        let scratch_pool = ScratchPool::new(ProfileScratch::default);
+        blocks.with_max_len(1).for_each(|block| {
+            scratch_pool
+                .with(|scratch| dispatch!(level, simd => pass.integrate_block(simd, block, sorted_sources, scratch)));
         });
-        picture
+        buffer
     }
 
     /// A buffer without light.
@@ -116,11 +120,11 @@ impl ColumnBuffer {
         }
     }
 
-    /// Strips of columns, each for one thread.
-    pub(crate) fn strips(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = ColumnStrip<'_>>) {
+    /// The chart, and the buffer in blocks of that many columns, each for one thread.
+    pub(crate) fn blocks(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = ColumnBlock<'_>>) {
         let light = self.light.par_chunks_mut(columns * self.chart.rows);
-        let strips = light.zip(self.valid_rows.par_chunks_mut(columns)).enumerate();
-        (&self.chart, strips.map(|(number, (light, valid_rows))| ColumnStrip { number, light, valid_rows }))
+        let blocks = light.zip(self.valid_rows.par_chunks_mut(columns)).enumerate();
+        (&self.chart, blocks.map(|(number, (light, valid_rows))| ColumnBlock { number, light, valid_rows }))
     }
 
     /// Union of the valid rows of two columns.
@@ -131,15 +135,15 @@ impl ColumnBuffer {
     }
 }
 
-/// Adjacent columns of a buffer.
-pub(crate) struct ColumnStrip<'a> {
+/// A block of adjacent columns of a buffer.
+pub(crate) struct ColumnBlock<'a> {
     pub(crate) number: usize,
     pub(crate) light: &'a mut [PerEmitter<f32>],
     pub(crate) valid_rows: &'a mut [[u32; 2]],
 }
 
-impl ColumnStrip<'_> {
-    /// A column whose valid range includes these rows.
+impl ColumnBlock<'_> {
+    /// A column of `row_count` rows, with its valid range extended to include `rows`.
     ///
     /// New rows are cleared explicitly although the allocation is zeroed: a first read maps the shared zero page and
     /// the later write faults again with a TLB shootdown on all threads.
@@ -148,10 +152,10 @@ impl ColumnStrip<'_> {
         &mut self,
         column: usize,
         rows: &Range<usize>,
-        of: usize,
+        row_count: usize,
     ) -> &mut [PerEmitter<f32>] {
         let [first, end] = self.valid_rows[column].map(|row| row as usize);
-        let light = &mut self.light[column * of..][..of];
+        let light = &mut self.light[column * row_count..][..row_count];
         if first > end {
             light[rows.clone()].fill([0.0; 4]);
             self.valid_rows[column] = [rows.start as u32, rows.end as u32];
@@ -187,7 +191,7 @@ pub(crate) fn lerp_emitters<S: Simd>(
 struct KnotBuffer {
     light: Vec<[PerEmitter<f32>; 2]>,
     /// First group that may be non-zero, and one past the last.
-    valid_rows: [usize; 2],
+    valid_groups: [usize; 2],
 }
 
 impl KnotBuffer {
@@ -195,23 +199,23 @@ impl KnotBuffer {
     fn clear(&mut self, rows: usize) {
         self.light.clear();
         self.light.resize(rows.div_ceil(KNOT_ROWS), [[0.0; 4]; 2]);
-        self.valid_rows = [usize::MAX, 0];
+        self.valid_groups = [usize::MAX, 0];
     }
 
     /// Adds light at knots from index `first` on.
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, first: usize, knots: &[PerEmitter<f32>]) {
-        self.valid_rows = [self.valid_rows[0].min(first), self.valid_rows[1].max(first + knots.len() - 1)];
-        for (own, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
-            let own = own.as_flattened_mut();
-            (HalfLanes::from_slice(simd, ends.as_flattened()) + HalfLanes::from_slice(simd, own)).store_slice(own);
+        self.valid_groups = [self.valid_groups[0].min(first), self.valid_groups[1].max(first + knots.len() - 1)];
+        for (sum, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
+            let sum = sum.as_flattened_mut();
+            (HalfLanes::from_slice(simd, ends.as_flattened()) + HalfLanes::from_slice(simd, sum)).store_slice(sum);
         }
     }
 
     /// Interpolates it to the rows of the column.
     #[inline(always)]
     fn add_to<S: Simd>(&self, simd: S, light: &mut [PerEmitter<f32>]) {
-        for knot in self.valid_rows[0]..self.valid_rows[1] {
+        for knot in self.valid_groups[0]..self.valid_groups[1] {
             let [low, high] = &self.light[knot];
             let end = light.len().min((knot + 1) * KNOT_ROWS);
             for (row, light) in light[knot * KNOT_ROWS..end].iter_mut().enumerate() {
@@ -222,34 +226,34 @@ impl KnotBuffer {
     }
 }
 
-/// Buffers that a thread reuses from strip to strip.
+/// Buffers that a thread reuses from block to block.
 #[derive(Default)]
 struct ProfileScratch {
-    sums: StripBins,
+    sums: BlockBins,
     slow: KnotBuffer,
 }
 
 impl ProfilePass<'_> {
     #[inline(always)]
-    fn integrate_strip<S: Simd>(
+    fn integrate_block<S: Simd>(
         &self,
         simd: S,
-        mut strip: ColumnStrip,
-        source_bins: &SourceBins,
-        workspace: &mut ProfileScratch,
+        mut block: ColumnBlock,
+        sorted_sources: &SortedSources,
+        scratch: &mut ProfileScratch,
     ) {
-        let ProfileScratch { sums, slow } = workspace;
-        source_bins.accumulate(simd, strip.number, self.chart, &self.chart.strip_cos_sin(strip.number), sums);
-        for column in 0..STRIP_COLUMNS {
-            let meridian = self.field.meridian(self.chart.longitude_cos_sin(strip.number * STRIP_COLUMNS + column));
+        let ProfileScratch { sums, slow } = scratch;
+        sorted_sources.accumulate(simd, block.number, self.chart, &self.chart.block_cos_sin(block.number), sums);
+        for column in 0..BLOCK_COLUMNS {
+            let meridian = self.field.meridian(self.chart.longitude_cos_sin(block.number * BLOCK_COLUMNS + column));
             let (first, bins) = sums.column(column, self.bins);
             slow.clear(self.chart.rows);
             for (number, bin) in bins.iter().enumerate() {
-                self.accumulate_bin(simd, &meridian, (first + number, bin), (&mut strip, column), slow);
+                self.accumulate_bin(simd, &meridian, first + number, bin, &mut block, column, slow);
             }
-            let [first, end] = strip.valid_rows[column].map(|row| row as usize);
+            let [first, end] = block.valid_rows[column].map(|row| row as usize);
             let valid = first.min(end)..end;
-            let light = &mut strip.light[column * self.chart.rows..][..self.chart.rows];
+            let light = &mut block.light[column * self.chart.rows..][..self.chart.rows];
             // The last knots may extend past the valid rows.
             slow.add_to(simd, &mut light[..end]);
             for (light, inverse) in light[valid.clone()].iter_mut().zip(&self.inverse_sines[valid]) {
@@ -266,8 +270,10 @@ impl ProfilePass<'_> {
         &self,
         simd: S,
         meridian: &Meridian,
-        (number, bin): (usize, &Bin),
-        (strip, column): (&mut ColumnStrip, usize),
+        number: usize,
+        bin: &Bin,
+        block: &mut ColumnBlock,
+        column: usize,
         slow: &mut KnotBuffer,
     ) {
         let [green, red, prompt, by_node] = *bin;
@@ -292,7 +298,7 @@ impl ProfilePass<'_> {
         let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let (distance, width) = (distance as f32, width as f32);
         let bin_rows = BinRows { line: &line, profile: &profile, distance, width, near, weights };
-        let light = strip.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
+        let light = block.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
         let rest = if near { first } else { self.add_knot_rows(&bin_rows, first..end, slow) };
         self.add_dense_rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
         if near {
@@ -309,8 +315,12 @@ impl ProfilePass<'_> {
         let distance = bin_rows.distance;
         // Altitude difference between knots.
         let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32) * (SLOW_KM * SLOW_KM / distance + distance);
-        let end =
-            self.row_of_altitude(bin_rows.line, f64::from(distance), 0.0, SLOW_KM + knot_km * (1.0 / KNOTS_ABOVE));
+        let end = self.row_of_altitude(
+            bin_rows.line,
+            f64::from(distance),
+            0.0,
+            SLOW_KM + knot_km * (1.0 / MAX_KNOT_FRACTION),
+        );
         let end = (end.max(0.0) as usize).min(rows.end.next_multiple_of(KNOT_ROWS));
         let (mut knot, last) = (rows.start / KNOT_ROWS, end / KNOT_ROWS);
         if knot >= last {
@@ -376,24 +386,24 @@ impl<S: Simd> BinRows<'_, S> {
             self.add_rows(self.profile.table(0), &altitudes, light);
             return;
         }
-        let spacings = self.spacings(cotangents);
+        let mip_levels = self.mip_levels(cotangents);
         for i in 0..light.len() {
-            let altitude = altitudes[i].fma(approximations::exp2(-spacings[i]), 1.0);
-            self.add_row(self.profile.table(spacings[i] as usize), altitude, &mut light[i]);
+            let altitude = altitudes[i].fma(approximations::exp2(-mip_levels[i]), 1.0);
+            self.add_row(self.profile.table(mip_levels[i] as usize), altitude, &mut light[i]);
         }
     }
 
     /// Mip level per row: coarser where the altitude changes more from bin to bin.
     #[inline(always)]
-    fn spacings(&self, cotangents: &[f32; ROWS]) -> [f32; ROWS] {
-        const MOST: f32 = (MIP_LEVELS - 1) as f32;
-        let mut spacings = [0.0; ROWS];
+    fn mip_levels(&self, cotangents: &[f32; ROWS]) -> [f32; ROWS] {
+        const MAX_LEVEL: f32 = (MIP_LEVELS - 1) as f32;
+        let mut mip_levels = [0.0; ROWS];
         for i in 0..ROWS {
             let step = self.width * cotangents[i].abs();
             let entry = step * (step * (1.0 / SMOOTH_KM)).clamp(ENTRY_PER_STEP[0], ENTRY_PER_STEP[1]);
-            spacings[i] = approximations::log2(entry.max(1.0)).ceil().min(MOST);
+            mip_levels[i] = approximations::log2(entry.max(1.0)).ceil().min(MAX_LEVEL);
         }
-        spacings
+        mip_levels
     }
 
     /// Adds the light at altitudes above the lowest level, km.

@@ -24,15 +24,15 @@ const STARTS: [usize; MIP_LEVELS + 1] = starts();
 const CUTOFF_FRACTION: f64 = 3e-4;
 
 /// Entries of a mip level: one below the levels and zeros above, so that filtering conserves light.
-const fn entries(spacing: usize) -> usize {
-    ((LEVELS - 1) >> spacing) + 4
+const fn entries(mip_level: usize) -> usize {
+    ((LEVELS - 1) >> mip_level) + 4
 }
 
 const fn starts() -> [usize; MIP_LEVELS + 1] {
-    let (mut starts, mut spacing) = ([0; MIP_LEVELS + 1], 0);
-    while spacing < MIP_LEVELS {
-        starts[spacing + 1] = starts[spacing] + entries(spacing);
-        spacing += 1;
+    let (mut starts, mut mip_level) = ([0; MIP_LEVELS + 1], 0);
+    while mip_level < MIP_LEVELS {
+        starts[mip_level + 1] = starts[mip_level] + entries(mip_level);
+        mip_level += 1;
     }
     starts
 }
@@ -112,8 +112,8 @@ impl MipTables {
     /// The same for red light by altitude.
     fn from_red_altitudes(profile: &[PerEmitter<f64>]) -> Self {
         let top_km = top_km(profile, RED_ALTITUDES - 1);
-        let heights: [usize; RED_ALTITUDES] = std::array::from_fn(|height| height);
-        Self { values: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &heights) }
+        let altitudes: [usize; RED_ALTITUDES] = std::array::from_fn(|altitude| altitude);
+        Self { values: smoothed(profile), tops_km: [top_km; 2], bottom_km: bottom_km(profile, &altitudes) }
     }
 }
 
@@ -122,19 +122,19 @@ fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
     let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
     let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
-    for spacing in 0..MIP_LEVELS {
+    for mip_level in 0..MIP_LEVELS {
         let entry = |at: usize| table.get(at).copied().unwrap_or_default();
-        light.extend((0..entries(spacing)).map(|at| entry(at).map(|value| value as f32)));
+        light.extend((0..entries(mip_level)).map(|at| entry(at).map(|value| value as f32)));
         table = downsampled(&table);
     }
     light
 }
 
 impl<'a> EmissionProfile<'a> {
-    /// The table filtered to 2^`spacing` km. The second entry is at 80 km, the last is 0.
+    /// The table filtered to 2^`mip_level` km. The second entry is at 80 km, the last is 0.
     #[inline(always)]
-    pub(super) fn table(&self, spacing: usize) -> &'a [PerEmitter<f32>] {
-        &self.values[STARTS[spacing]..STARTS[spacing + 1]]
+    pub(super) fn table(&self, mip_level: usize) -> &'a [PerEmitter<f32>] {
+        &self.values[STARTS[mip_level]..STARTS[mip_level + 1]]
     }
 }
 
@@ -172,11 +172,11 @@ fn levels_within_cutoff(levels: impl Iterator<Item = usize>, profile: &[PerEmitt
     let light = |level: usize| profile[level][emitter];
     let whole: f64 = (0..LEVELS).map(light).sum();
     let mut sum = 0.0;
-    let hardly_any = |level: &usize| {
+    let within_cutoff = |level: &usize| {
         sum += light(*level);
         sum < CUTOFF_FRACTION * whole
     };
-    levels.take_while(hardly_any).count()
+    levels.take_while(within_cutoff).count()
 }
 
 /// Altitude of the second entry of all tables, km.
@@ -195,12 +195,12 @@ mod tests {
             let profile = profiles.at(node, true);
             let energy = table_energy_ev((node * TABLES_PER_NODE as f32) as usize);
             let expected = table.column(energy).kilorayleigh;
-            for spacing in 0..MIP_LEVELS {
-                let sum = profile.table(spacing).iter().fold([0.0; 4], |sum: [f64; 4], light| {
-                    std::array::from_fn(|i| sum[i] + f64::from(light[i]) * f64::from(1 << spacing))
+            for mip_level in 0..MIP_LEVELS {
+                let sum = profile.table(mip_level).iter().fold([0.0; 4], |sum: [f64; 4], light| {
+                    std::array::from_fn(|i| sum[i] + f64::from(light[i]) * f64::from(1 << mip_level))
                 });
                 for i in 0..4 {
-                    assert!((sum[i] / expected[i] - 1.0).abs() < 2e-3, "{node} {spacing} {i}: {sum:?} {expected:?}");
+                    assert!((sum[i] / expected[i] - 1.0).abs() < 2e-3, "{node} {mip_level} {i}: {sum:?} {expected:?}");
                 }
             }
         }

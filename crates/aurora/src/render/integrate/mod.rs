@@ -1,5 +1,4 @@
 //! Integration of the emission along lines of sight into chart columns.
 
-pub(crate) mod column_block;
 pub(crate) mod columns;
 pub(crate) mod emission_profile;

@@ -15,7 +15,7 @@ use crate::physics::atmosphere::{HIGHEST_KM, LOWEST_KM};
 const NODES: usize = 8;
 /// Terms of the polynomials of slope and brightness, which are smoother.
 const TERMS: usize = 5;
-/// Collisions of a level lie up to a kilometer from it.
+/// Maximum distance of collisions from their level.
 const MARGIN_KM: f64 = 1.0;
 /// The polynomials are in `1 / (altitude + PIVOT_KM)`, which approximates the perspective foreshortening of rays.
 const PIVOT_KM: f64 = 100.0;
@@ -60,15 +60,15 @@ impl<'a> ProjectedFieldLine<'a> {
     ) -> ProjectedPoints<COUNT> {
         const RADIUS: f32 = EARTH_RADIUS_KM as f32;
         const DIAMETER: f32 = 2.0 * RADIUS;
-        let ([constant, outward, own], projection) = (*self.meridian, *self.projection);
+        let ([constant, outward, along], projection) = (*self.meridian, *self.projection);
         let (mut per_upward, mut coordinates, mut far_squared) = ([0.0; COUNT], [0.0; COUNT], [0.0; COUNT]);
         for i in 0..COUNT {
             let (altitude, distance) = (altitudes[i], distances[i]);
             let squared = altitude.fma(DIAMETER + altitude, -distance.fma(2.0 * outward + distance, constant));
-            let squared = own.fma(own, squared);
+            let squared = along.fma(along, squared);
             let squared = if squared > 1.0 { squared } else { 1.0 };
             per_upward[i] = squared.simd_rsqrt();
-            coordinates[i] = squared * per_upward[i] - own;
+            coordinates[i] = squared * per_upward[i] - along;
             far_squared[i] = distance.fma(distance, coordinates[i] * coordinates[i]);
         }
         let mut projected = ProjectedPoints { rows: [0.0; COUNT], slopes: [0.0; COUNT], brightness: [0.0; COUNT] };
@@ -81,7 +81,7 @@ impl<'a> ProjectedFieldLine<'a> {
             let per_far = far_squared.simd_rsqrt();
             let slope = distance.fma((outward + distance) * per_upward[i], coordinates[i]) * (per_far * per_far);
             projected.slopes[i] = projection.rows(slope);
-            // A source's power is per area perpendicular to the field; a collision stands for all of it, so the cosine
+            // A source's power is per area perpendicular to the field; a collision represents all of it, so the cosine
             // to the vertical cancels.
             let slant = (RADIUS + altitudes[i]) * per_upward[i] * per_far;
             projected.brightness[i] = if distance > 0.0 && far_squared > 1.0 { slant } else { 0.0 };
@@ -108,7 +108,7 @@ pub(crate) fn altitudes_km(coordinates: &[f32; LANES]) -> [f32; LANES] {
     altitudes
 }
 
-/// Matrices from values at the nodes to polynomial coefficients.
+/// Matrices that convert values at the Chebyshev nodes to polynomial coefficients.
 #[derive(Clone, Debug)]
 pub(crate) struct RowPolynomialBasis {
     altitudes_km: [f32; NODES],
@@ -155,15 +155,15 @@ impl RowPolynomialBasis {
         RowPolynomials {
             ends: [rows[NODES - 1], rows[0]],
             steepest,
-            rows: sum(simd, &self.full, &rows),
-            slopes: sum(simd, &self.short, &slopes),
-            brightness: sum(simd, &self.short, &brightness),
+            rows: coefficients_from_values(simd, &self.full, &rows),
+            slopes: coefficients_from_values(simd, &self.short, &slopes),
+            brightness: coefficients_from_values(simd, &self.short, &brightness),
         }
     }
 }
 
 impl RowPolynomials {
-    /// Conservative test whether points within `reach` km of the line can lie on a chart of `rows` rows.
+    /// Conservative test whether points within `reach` km of the line can be on a chart of `rows` rows.
     #[inline(always)]
     pub(crate) fn may_be_visible(&self, reach: f32, rows: usize) -> bool {
         // One row of margin beyond the outermost nodes.
@@ -193,7 +193,7 @@ fn polynomial<S: Simd>(coordinates: Lanes<S>, coefficients: &[f32]) -> Lanes<S> 
 
 /// Coefficients from the values at the nodes.
 #[inline(always)]
-fn sum<S: Simd>(simd: S, basis: &[[f32; NODES]; NODES], values: &[f32; NODES]) -> [f32; NODES] {
+fn coefficients_from_values<S: Simd>(simd: S, basis: &[[f32; NODES]; NODES], values: &[f32; NODES]) -> [f32; NODES] {
     let mut sum = HalfLanes::splat(simd, 0.0);
     for node in 0..NODES {
         sum = HalfLanes::splat(simd, values[node]).fma(HalfLanes::from_slice(simd, &basis[node]), sum);
@@ -220,8 +220,8 @@ fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
         }
         // T(n + 1) = 2 x T(n) - T(n - 1), and T(1) = x.
         let scale = if term == 0 { 1.0 } else { 2.0 };
-        let times_place = |power: usize| if power == 0 { 0.0 } else { scale * polynomial[power - 1] };
-        let next = std::array::from_fn(|power| times_place(power) - last[power]);
+        let times_x = |power: usize| if power == 0 { 0.0 } else { scale * polynomial[power - 1] };
+        let next = std::array::from_fn(|power| times_x(power) - last[power]);
         (last, polynomial) = (polynomial, next);
     }
     powers.map(|power| power as f32)

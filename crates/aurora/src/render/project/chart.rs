@@ -10,8 +10,8 @@ use bansho_base::{
 
 use super::field_lines::FieldLines;
 
-/// Columns per strip; one thread works on a strip.
-pub(crate) const STRIP_COLUMNS: usize = 16;
+/// Columns per block. Blocks are the unit of work of a thread.
+pub(crate) const BLOCK_COLUMNS: usize = 16;
 /// Samples per side of the picture for the coverage.
 const SAMPLES_PER_SIDE: usize = 24;
 /// Maximum number of columns and of rows.
@@ -27,7 +27,7 @@ const MIN_SINE_ELEVATION: f64 = -0.35;
 pub(crate) struct Coverage {
     /// Center and half-width of the longitude range; full circle from pi on.
     longitude: [f64; 2],
-    /// Least and greatest colatitude.
+    /// Minimum and maximum colatitude.
     colatitude: [f64; 2],
     /// Angle of a pixel, or more where the chart would have too many cells.
     pub(crate) pixel: f64,
@@ -36,7 +36,7 @@ pub(crate) struct Coverage {
 /// A grid of directions; columns are meridians, rows parallels.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
-    /// Number of columns, a multiple of [`STRIP_COLUMNS`].
+    /// Number of columns, a multiple of [`BLOCK_COLUMNS`].
     pub(crate) columns: usize,
     /// Number of rows, at least 2.
     pub(crate) rows: usize,
@@ -58,41 +58,44 @@ impl Coverage {
         // Circular mean of the longitudes.
         let sum = directions.iter().fold([0.0; 2], |sum, [_, x, y]| [sum[0] + x, sum[1] + y]);
         let middle = math::atan2(sum[1], sum[0]);
-        let (mut reach, mut least, mut greatest) = (0.0_f64, PI, 0.0_f64);
+        let (mut reach, mut min_colatitude, mut max_colatitude) = (0.0_f64, PI, 0.0_f64);
         for [along, x, y] in &directions {
             let colatitude = math::atan2(math::hypot(*x, *y), *along);
             let wrapped = math::atan2(*y, *x) - middle;
             reach = reach.max((wrapped - TAU * (wrapped / TAU).round()).abs());
-            (least, greatest) = (least.min(colatitude), greatest.max(colatitude));
+            (min_colatitude, max_colatitude) = (min_colatitude.min(colatitude), max_colatitude.max(colatitude));
         }
         let camera = &view.camera;
         let pixel = 1.0 / camera.focal_pixels;
         let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES_PER_SIDE - 1) as f64 * pixel;
-        let around = least < margin || reach > 0.8 * PI;
-        let sine = math::sin(least.min(FRAC_PI_2)).max(1e-3);
+        let full_circle = min_colatitude < margin || reach > 0.8 * PI;
+        let sine = math::sin(min_colatitude.min(FRAC_PI_2)).max(1e-3);
         let mut coverage = Self {
-            longitude: [middle, if around { PI } else { (reach + margin / sine).min(PI) }],
-            colatitude: [if around { 0.0 } else { least - margin }.max(0.0), (greatest + margin).min(PI)],
+            longitude: [middle, if full_circle { PI } else { (reach + margin / sine).min(PI) }],
+            colatitude: [
+                if full_circle { 0.0 } else { min_colatitude - margin }.max(0.0),
+                (max_colatitude + margin).min(PI),
+            ],
             pixel,
         };
-        let most = MAX_CELLS_PER_PIXEL * camera.size[0] * camera.size[1];
-        coverage.pixel = pixel.max(math::sqrt(coverage.area() / most));
+        let max_cells = MAX_CELLS_PER_PIXEL * camera.size[0] * camera.size[1];
+        coverage.pixel = pixel.max(math::sqrt(coverage.area() / max_cells));
         coverage
     }
 
     /// Maximum sine of the colatitude.
-    fn widest(&self) -> f64 {
-        let [least, greatest] = self.colatitude;
-        if least < FRAC_PI_2 && greatest > FRAC_PI_2 {
+    fn max_sine(&self) -> f64 {
+        let [min_colatitude, max_colatitude] = self.colatitude;
+        if min_colatitude < FRAC_PI_2 && max_colatitude > FRAC_PI_2 {
             return 1.0;
         }
-        math::sin(least).max(math::sin(greatest)).max(1e-3)
+        math::sin(min_colatitude).max(math::sin(max_colatitude)).max(1e-3)
     }
 
-    /// Solid-angle bound, with columns as wide as the widest, square radians.
+    /// Upper bound on the solid angle: all rows are counted as wide as the widest, square radians.
     fn area(&self) -> f64 {
-        let [least, greatest] = self.colatitude;
-        2.0 * self.longitude[1] * self.widest() * (greatest - least)
+        let [min_colatitude, max_colatitude] = self.colatitude;
+        2.0 * self.longitude[1] * self.max_sine() * (max_colatitude - min_colatitude)
     }
 }
 
@@ -111,20 +114,20 @@ fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<It
 }
 
 impl Chart {
-    /// A chart over `coverage` with cells of at most `column` by `row` radians where they are widest.
+    /// A chart over `coverage` with cells of at most `column` by `row` radians where the columns are widest.
     pub(crate) fn new(coverage: &Coverage, column: f64, row: f64) -> Self {
-        let ([least, greatest], widest) = (coverage.colatitude, coverage.widest());
+        let ([min_colatitude, max_colatitude], max_sine) = (coverage.colatitude, coverage.max_sine());
         let [middle, reach] = coverage.longitude;
         let wraps = reach >= PI;
         let range = 2.0 * reach;
-        let columns = (range * widest / column).min(MAX_SIZE).ceil() as usize;
-        let columns = columns.max(1).next_multiple_of(STRIP_COLUMNS);
-        let column_step = if wraps { range / columns as f64 } else { (column / widest).max(range / columns as f64) };
+        let columns = (range * max_sine / column).min(MAX_SIZE).ceil() as usize;
+        let columns = columns.max(1).next_multiple_of(BLOCK_COLUMNS);
+        let column_step = if wraps { range / columns as f64 } else { (column / max_sine).max(range / columns as f64) };
         // Aligned to multiples of the step, so that the chart does not crawl as the camera turns.
         let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
-        let row = row.max((greatest - least) / MAX_SIZE);
-        let first_row = (least / row).floor();
-        let rows = ((greatest / row).ceil() - first_row).max(2.0) as usize;
+        let row = row.max((max_colatitude - min_colatitude) / MAX_SIZE);
+        let first_row = (min_colatitude / row).floor();
+        let rows = ((max_colatitude / row).ceil() - first_row).max(2.0) as usize;
         Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, wraps }
     }
 
@@ -144,21 +147,21 @@ impl Chart {
         [cos, sin]
     }
 
-    /// Cosines and sines of the longitudes of a strip's columns.
-    pub(crate) fn strip_cos_sin(&self, strip: usize) -> [[f32; STRIP_COLUMNS]; 2] {
-        let mut units = [[0.0; STRIP_COLUMNS]; 2];
-        for column in 0..STRIP_COLUMNS {
-            for (values, value) in units.iter_mut().zip(self.longitude_cos_sin(strip * STRIP_COLUMNS + column)) {
+    /// Cosines and sines of the longitudes of a block's columns.
+    pub(crate) fn block_cos_sin(&self, block: usize) -> [[f32; BLOCK_COLUMNS]; 2] {
+        let mut units = [[0.0; BLOCK_COLUMNS]; 2];
+        for column in 0..BLOCK_COLUMNS {
+            for (values, value) in units.iter_mut().zip(self.longitude_cos_sin(block * BLOCK_COLUMNS + column)) {
                 values[column] = value as f32;
             }
         }
         units
     }
 
-    /// Cotangents of the colatitude of every row and `more` rows beyond, and inverse sines of that of every row.
-    pub(crate) fn row_tables(&self, more: usize) -> [Vec<f32>; 2] {
+    /// Cotangents of the colatitudes of every row and of `padding` rows beyond, and inverse sines of those of every row.
+    pub(crate) fn row_tables(&self, padding: usize) -> [Vec<f32>; 2] {
         let trigonometry = |row| math::sin_cos(self.colatitude(row));
-        let cotangents = (0..self.rows + more).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
+        let cotangents = (0..self.rows + padding).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
         let inverses = (0..self.rows).map(trigonometry).map(|(sin, _)| (1.0 / sin.max(1e-9)) as f32);
         [cotangents.collect(), inverses.collect()]
     }
@@ -212,7 +215,7 @@ impl ChartProjection {
         wrapped.fma(self.per_column, self.half)
     }
 
-    /// How many rows an angle in radians is.
+    /// An angle in radians as a number of rows.
     #[inline(always)]
     pub(super) fn rows(&self, angle: f32) -> f32 {
         angle * self.per_row

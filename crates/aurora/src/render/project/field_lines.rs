@@ -99,7 +99,7 @@ impl FieldLines {
         [direction.dot(self.along), direction.dot(self.across[0]), direction.dot(self.across[1])]
     }
 
-    /// How high the observer stands above the ground, km.
+    /// Altitude of the observer above the ground, km.
     pub(crate) fn observer_altitude_km(&self) -> f64 {
         self.observer.length() - EARTH_RADIUS_KM
     }

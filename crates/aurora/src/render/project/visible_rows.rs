@@ -20,7 +20,7 @@ pub(crate) struct VisibleRowTest {
     squared: f32,
     along: f32,
     across: [f32; 2],
-    /// Length of the part across.
+    /// Length of the component across the field.
     lean: f32,
     /// Sine and cosine of the first and the last colatitude.
     first: [f32; 2],

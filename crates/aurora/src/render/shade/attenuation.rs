@@ -22,7 +22,7 @@ const BANDS_NM: f64 = 655.0;
 /// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
 #[derive(Clone, Debug)]
 pub(crate) struct EmitterColors {
-    /// Red, green, blue, and 1 for emitters whose brightness counts.
+    /// Red, green, blue, and 1 for emitters that contribute to the brightness, else 0.
     colors: Vec<PerEmitter<[f32; 4]>>,
 }
 
@@ -43,8 +43,8 @@ impl EmitterColors {
     /// Table coordinate of a sine of elevation, clamped at the horizon.
     #[inline(always)]
     pub(crate) fn table_coordinate(sine: f32) -> f32 {
-        let held = if sine > 0.0 { sine } else { 0.0 };
-        held.sqrt().fma(STEPS as f32, 0.5)
+        let clamped = if sine > 0.0 { sine } else { 0.0 };
+        clamped.sqrt().fma(STEPS as f32, 0.5)
     }
 
     /// Color of light by emitter in kR at a [`table_coordinate`](Self::table_coordinate); the fourth component is its

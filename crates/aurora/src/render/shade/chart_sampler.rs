@@ -13,13 +13,13 @@ use crate::{
 impl ColumnBuffer {
     /// A sampler of this buffer.
     pub(crate) fn sampler(&self) -> ChartSampler<'_> {
-        ChartSampler { meridians: self, projection: self.chart.projection() }
+        ChartSampler { buffer: self, projection: self.chart.projection() }
     }
 }
 
 /// A chart and its mapping from directions to cells.
 pub(crate) struct ChartSampler<'a> {
-    meridians: &'a ColumnBuffer,
+    buffer: &'a ColumnBuffer,
     projection: ChartProjection,
 }
 
@@ -33,7 +33,7 @@ impl ChartSampler<'_> {
         colatitude: &[f32; COUNT],
         light: &mut [PerEmitter<f32>; COUNT],
     ) {
-        let last = (self.meridians.chart.rows - 1) as f32;
+        let last = (self.buffer.chart.rows - 1) as f32;
         let (mut columns, mut rows) = ([0.0; COUNT], [0.0; COUNT]);
         for i in 0..COUNT {
             columns[i] = self.projection.column(longitude[i]) - 0.5;
@@ -54,13 +54,13 @@ impl ChartSampler<'_> {
 
     #[inline(always)]
     fn add_bilinear<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
-        let ColumnBuffer { chart, light: all, .. } = self.meridians;
+        let ColumnBuffer { chart, light: all, .. } = self.buffer;
         let left = column.floor();
         let across = column - left;
         let upper = (row as usize).min(chart.rows - 2);
         let fraction = row - upper as f32;
         let (left, right) = (chart.wrap_column(left as i32), chart.wrap_column(left as i32 + 1));
-        let [first, end] = self.meridians.valid_rows_of_either([left, right]);
+        let [first, end] = self.buffer.valid_rows_of_either([left, right]);
         if upper as u32 + 1 < first || upper as u32 >= end {
             return;
         }
@@ -74,7 +74,7 @@ impl ChartSampler<'_> {
 
     /// Conservative test whether a region between two longitudes, in radians, and two colatitudes is dark.
     pub(crate) fn is_dark(&self, longitudes: [f32; 2], colatitudes: [f32; 2]) -> bool {
-        let ColumnBuffer { chart, valid_rows, .. } = self.meridians;
+        let ColumnBuffer { chart, valid_rows, .. } = self.buffer;
         let [left, right] = longitudes.map(|longitude| self.projection.column(longitude) as i32);
         // Regions across the seam of a full-circle chart are not tested.
         if right < left || (right - left) as usize > chart.columns / 2 {

@@ -13,9 +13,9 @@ use super::attenuation::EmitterColors;
 use crate::{
     physics::emission::PerEmitter,
     render::{
-        integrate::columns::{ColumnBuffer, ColumnStrip, lerp_emitters},
+        integrate::columns::{ColumnBlock, ColumnBuffer, lerp_emitters},
         project::{
-            chart::{Chart, ChartProjection, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart, ChartProjection},
             field_lines::FieldLines,
         },
     },
@@ -42,7 +42,7 @@ impl ColumnBuffer {
     /// fourth component is the brightness in kR.
     pub(crate) fn composite(mut self, soft: &Self, field: &FieldLines, emitter_colors: &EmitterColors) -> Self {
         let level = Level::new();
-        let (chart, strips) = self.strips(STRIP_COLUMNS);
+        let (chart, blocks) = self.blocks(BLOCK_COLUMNS);
         let soft_projection = soft.chart.projection();
         let (mut cosines, mut sines, mut soft_rows) = (Vec::new(), Vec::new(), Vec::new());
         for row in 0..chart.rows + ROWS {
@@ -52,10 +52,10 @@ impl ColumnBuffer {
             sines.push(sine as f32);
             soft_rows.push(soft_projection.row(colatitude as f32) - 0.5);
         }
-        let coloring = ColorPass { chart, soft, soft_projection, emitter_colors, field, cosines, sines, soft_rows };
-        let spares = ScratchPool::new(Vec::new);
-        strips.with_max_len(1).for_each(|strip| {
-            spares.with(|column| dispatch!(level, simd => coloring.color_strip(simd, strip, column)));
+        let pass = ColorPass { chart, soft, soft_projection, emitter_colors, field, cosines, sines, soft_rows };
+        let scratch_pool = ScratchPool::new(Vec::new);
+        blocks.with_max_len(1).for_each(|block| {
+            scratch_pool.with(|column| dispatch!(level, simd => pass.color_block(simd, block, column)));
         });
         self
     }
@@ -63,12 +63,11 @@ impl ColumnBuffer {
 
 impl ColorPass<'_> {
     #[inline(always)]
-    fn color_strip<S: Simd>(&self, simd: S, strip: ColumnStrip, soft: &mut Vec<PerEmitter<f32>>) {
-        for column in 0..STRIP_COLUMNS {
-            let number = strip.number * STRIP_COLUMNS + column;
+    fn color_block<S: Simd>(&self, simd: S, block: ColumnBlock, soft: &mut Vec<PerEmitter<f32>>) {
+        for column in 0..BLOCK_COLUMNS {
+            let number = block.number * BLOCK_COLUMNS + column;
             let [soft_first, soft_end] = self.soft_column(simd, self.chart.longitude(number) as f32, soft);
-            let own = strip.valid_rows[column];
-            let [mut first, mut end] = own.map(|row| row as usize);
+            let [mut first, mut end] = block.valid_rows[column].map(|row| row as usize);
             if soft_first < soft_end {
                 let row = |soft_row: usize| self.row_of_soft(soft_row);
                 first = first.min(row(soft_first.saturating_sub(1)));
@@ -77,9 +76,9 @@ impl ColorPass<'_> {
             if first >= end {
                 continue;
             }
-            let light = &mut strip.light[column * self.chart.rows..][first..end];
+            let light = &mut block.light[column * self.chart.rows..][first..end];
             self.color(simd, number, first, light, soft);
-            strip.valid_rows[column] = [first as u32, end as u32];
+            block.valid_rows[column] = [first as u32, end as u32];
         }
     }
 
@@ -121,11 +120,11 @@ impl ColorPass<'_> {
     ) {
         let last = (soft.len() - 1) as f32;
         let [cosine, sine] = self.chart.longitude_cos_sin(number);
-        let [one, other] = self.field.across;
+        let [first_axis, second_axis] = self.field.across;
         let along = self.field.along.y as f32;
-        let outward = (one.y * cosine + other.y * sine) as f32;
-        for (block, light) in light.chunks_mut(ROWS).enumerate() {
-            let from = first + block * ROWS;
+        let outward = (first_axis.y * cosine + second_axis.y * sine) as f32;
+        for (batch, light) in light.chunks_mut(ROWS).enumerate() {
+            let from = first + batch * ROWS;
             let (cosines, sines) = (&self.cosines[from..][..ROWS], &self.sines[from..][..ROWS]);
             let mut steps = [0.0; ROWS];
             for i in 0..ROWS {
@@ -155,7 +154,7 @@ mod tests {
     use super::*;
     use crate::{
         physics::extinction::Extinction,
-        render::{prepared::PixelBatch, project::chart::Coverage},
+        render::project::{chart::Coverage, pixel_batch::PixelBatch},
     };
 
     /// Light that changes slowly over the sky, on a chart.

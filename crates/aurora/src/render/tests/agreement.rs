@@ -1,4 +1,4 @@
-//! Pictures of collisions have the picture of the mean track for their mean, each emitter by itself.
+//! The mean of pictures of single collisions is the picture of the mean profile, for each emitter.
 
 use super::*;
 use crate::{parameters::MAX_COLLISION_DEFLECTION, physics::precipitation::lateral_spread::lateral_spread_km};
@@ -12,10 +12,10 @@ fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
     })
 }
 
-/// Standard deviation of sources but for the wandering of their collisions, km.
+/// Standard deviation of sources without the lateral spread of their collisions, km.
 const OWN_SPREAD_KM: f64 = 1.5;
 
-/// How far the mean of 64 pictures of collisions is from the picture of the mean track, and that one.
+/// Difference of the mean of 64 pictures of collisions from the picture of the mean profile, and that picture.
 fn beside_profile(
     emission: &Emission,
     collisions: &CollisionRenderer,
@@ -27,12 +27,12 @@ fn beside_profile(
     let sources = sources(cells, PROMPT_AND_GREEN, spread_km, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
-    let sorted = |strip| SourceBins::new(&sources, (&chart(), strip), &field, spread_of(&sources));
-    let expected = ColumnBuffer::new(chart(), &field, &profiles, &sorted(STRIP_COLUMNS));
-    let source_bins = sorted(BLOCK_COLUMNS);
+    let sorted = |columns| SortedSources::new(&sources, &chart(), columns, &field, spread_of(&sources));
+    let expected = ColumnBuffer::new(chart(), &field, &profiles, &sorted(BLOCK_COLUMNS));
+    let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
-        let picture = collisions.draw(chart(), &field, &source_bins, step);
+        let picture = collisions.draw(chart(), &field, &sorted_sources, step);
         for (sum, light) in mean.iter_mut().zip(&picture.light) {
             *sum = std::array::from_fn(|i| light[i].mul_add(1.0 / 64.0, sum[i]));
         }
@@ -86,7 +86,7 @@ fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
     }
 }
 
-/// A sheet with the greatest energy factor that a scene may give, and the tracks that its aurora has for it.
+/// A sheet with the largest energy factor that a scene may have, and the tracks of its aurora.
 #[test]
 fn collisions_lose_no_light_on_hard_sheets() {
     const FACTOR: f64 = 20.0;

@@ -1,4 +1,4 @@
-//! What the drawing must get right: brightness, position, and the same for every way of drawing.
+//! Rendering: brightness, position, and agreement of all rendering methods.
 
 mod agreement;
 mod threads;
@@ -19,10 +19,7 @@ use bansho_base::{
     },
 };
 
-use super::{
-    BlurParameters, RenderingParameters, Sampling, TrackModel,
-    prepared::{ChartBuilder, PixelBatch},
-};
+use super::{BlurParameters, RenderingParameters, Sampling, TrackModel, prepared::ChartBuilder};
 use crate::{
     Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
@@ -33,18 +30,21 @@ use crate::{
     render::{
         aovs::{brightnesses, measured_lines},
         bin::{
-            source_bins::{FieldLineSource, REACH, SourceBins},
+            source_bins::{FieldLineSource, REACH, SortedSources},
             sources::{EmitterWeights, SourceBuilder, Sources, nearest_node},
         },
-        integrate::{column_block::BLOCK_COLUMNS, columns::ColumnBuffer, emission_profile::EmissionProfiles},
+        integrate::{columns::ColumnBuffer, emission_profile::EmissionProfiles},
         project::{
-            chart::{Chart, Coverage, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart, Coverage},
             field_lines::{EARTH_RADIUS_KM, FieldLines},
+            pixel_batch::PixelBatch,
+        },
+        single_collisions::{
+            blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS, collision_pass::CollisionRenderer,
         },
     },
     shapes::{ShapeParameters, SheetParameters},
     simulate::afterglow::AfterglowCell,
-    single_collisions::{blur::BlurredImage, collision_pass::CollisionRenderer},
 };
 
 const ENERGY_EV: f64 = 5000.0;
@@ -84,7 +84,7 @@ fn sources(
     SourceBuilder { field, reach: spread_km as f32 * REACH, weight: 1.0, instant: 0 }.cells(cells, [shares])
 }
 
-/// Least standard deviation of sources, km.
+/// Minimum standard deviation of sources, km.
 fn spread_of(sources: &[FieldLineSource]) -> f64 {
     f64::from(sources.iter().fold(f32::INFINITY, |least, source| least.min(source.reach)) / REACH)
 }
@@ -97,8 +97,8 @@ fn draw(
     step: f64,
 ) -> ColumnBuffer {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
-    let source_bins = SourceBins::new(sources, (&chart, STRIP_COLUMNS), field, spread_of(sources));
-    ColumnBuffer::new(chart, field, profiles, &source_bins)
+    let sorted_sources = SortedSources::new(sources, &chart, BLOCK_COLUMNS, field, spread_of(sources));
+    ColumnBuffer::new(chart, field, profiles, &sorted_sources)
 }
 
 /// Cells of one mW/m^2 over a wide square.
@@ -143,7 +143,7 @@ fn an_even_sheet_overhead_shows_its_column() {
             let column = emission.column(ENERGY_EV).kilorayleigh;
             for slant_deg in [0.0, 8.0, 30.0, 50.0] {
                 let (sin, cos) = math::sin_cos(f64::to_radians(slant_deg));
-                // Longer the way that is slanted, less so over a round Earth: van Rhijn for 120 or 250 km.
+                // Oblique lines of sight are longer, less so over a round Earth: van Rhijn for 120 or 250 km.
                 let altitude = if shares == RED { 250.0 } else { 120.0 };
                 let share = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + altitude) * sin;
                 let longer = 1.0 / math::sqrt(1.0 - share * share);
@@ -280,7 +280,7 @@ fn the_blur_of_the_thesis_is_as_wide_near_and_far() {
     }
 }
 
-/// A straight, even arc from west to east, so far to the north.
+/// A straight, uniform arc from west to east at a distance to the north.
 fn even_arc(north_km: f64, energy_ev: f32) -> Vec<AfterglowCell<1>> {
     let place = |index: i32| [(4.0 * f64::from(index)) as f32, -north_km as f32];
     let cell = |index: i32| AfterglowCell {
@@ -357,7 +357,7 @@ const THIN_SPREAD_KM: f64 = 0.35;
 /// Distance of its sources, km.
 const THIN_CELL_KM: f64 = 0.15;
 
-/// Positions across a thin sheet at which its sources lie, km.
+/// Positions of its sources across a thin sheet, km.
 fn across_thin() -> impl Iterator<Item = f64> {
     let count = (THIN_KM / THIN_CELL_KM) as i32;
     (-count..=count).map(|index| THIN_CELL_KM * f64::from(index))
@@ -377,7 +377,7 @@ fn thin_sheet() -> Vec<AfterglowCell<1>> {
         .collect()
 }
 
-/// What of an emitter is seen of it along a line of sight, kR: the integral over the way.
+/// Brightness of an emitter along a line of sight, kR: the integral over the path.
 fn thin_light(emission: &Emission, emitter: usize, [colatitude, longitude]: [f64; 2]) -> f64 {
     const STEP_KM: f64 = 0.25;
     let reach = THIN_SPREAD_KM * f64::from(REACH);

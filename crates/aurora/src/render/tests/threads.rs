@@ -1,4 +1,4 @@
-//! Pictures are the same however many threads draw them.
+//! Pictures do not depend on the number of threads.
 
 use super::*;
 
@@ -26,8 +26,9 @@ fn single_collisions_do_not_depend_on_the_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let chart = Chart::new(&Coverage::of_view(&view, &field), 0.25 * STEP, 0.25 * STEP);
-            let source_bins = SourceBins::new(&sources, (&chart, BLOCK_COLUMNS), &field, spread_of(&sources));
-            collisions.draw(chart, &field, &source_bins, 3).light
+            let sorted_sources =
+                SortedSources::new(&sources, &chart, COLLISION_BLOCK_COLUMNS, &field, spread_of(&sources));
+            collisions.draw(chart, &field, &sorted_sources, 3).light
         })
     };
     let one = with(1);

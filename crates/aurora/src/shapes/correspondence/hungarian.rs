@@ -11,35 +11,35 @@ pub(super) fn assign(count: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<us
     for row in 0..count {
         row_of[count] = row;
         let mut column = count;
-        let mut least = vec![f64::INFINITY; count];
-        let mut came_from = vec![count; count];
-        let mut seen = vec![false; count + 1];
+        let mut min_reduced = vec![f64::INFINITY; count];
+        let mut previous_column = vec![count; count];
+        let mut visited = vec![false; count + 1];
         while row_of[column] != FREE {
-            seen[column] = true;
-            let here = row_of[column];
+            visited[column] = true;
+            let current = row_of[column];
             let (mut step, mut next) = (f64::INFINITY, column);
-            for other in (0..count).filter(|&other| !seen[other]) {
-                let reduced = cost(here, other) - row_price[here] - column_price[other];
-                if reduced < least[other] {
-                    (least[other], came_from[other]) = (reduced, column);
+            for other in (0..count).filter(|&other| !visited[other]) {
+                let reduced = cost(current, other) - row_price[current] - column_price[other];
+                if reduced < min_reduced[other] {
+                    (min_reduced[other], previous_column[other]) = (reduced, column);
                 }
-                if least[other] < step {
-                    (step, next) = (least[other], other);
+                if min_reduced[other] < step {
+                    (step, next) = (min_reduced[other], other);
                 }
             }
             for other in 0..=count {
-                if seen[other] {
+                if visited[other] {
                     row_price[row_of[other]] += step;
                     column_price[other] -= step;
                 } else {
-                    least[other] -= step;
+                    min_reduced[other] -= step;
                 }
             }
             column = next;
         }
         while column != count {
-            row_of[column] = row_of[came_from[column]];
-            column = came_from[column];
+            row_of[column] = row_of[previous_column[column]];
+            column = previous_column[column];
         }
     }
     let mut columns = vec![0; count];

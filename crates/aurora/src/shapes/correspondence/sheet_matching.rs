@@ -37,8 +37,9 @@ pub(crate) struct MatchConstraint {
 }
 
 impl MatchConstraint {
-    fn allows(&self, of: SheetMatch) -> bool {
-        self.target.is_none_or(|target| target == of.target) && self.reversed.is_none_or(|turned| turned == of.reversed)
+    fn allows(&self, matched: SheetMatch) -> bool {
+        self.target.is_none_or(|target| target == matched.target)
+            && self.reversed.is_none_or(|turned| turned == matched.reversed)
     }
 }
 
@@ -70,24 +71,25 @@ pub(crate) fn match_sheets(
     // Larger than any possible total motion.
     let forbidden = 1.0 + best.iter().map(|(motion, _)| motion).sum::<f64>();
     let columns = assign(count, |source, target| {
-        let elsewhere = constraints[source].target.is_some_and(|own| own != target);
-        best[source * count + target].0 + if elsewhere { forbidden } else { 0.0 }
+        let is_forbidden = constraints[source].target.is_some_and(|required| required != target);
+        best[source * count + target].0 + if is_forbidden { forbidden } else { 0.0 }
     });
-    let matched = |(source, target): (usize, usize)| SheetMatch { target, reversed: best[source * count + target].1 };
-    let found = columns.into_iter().enumerate().map(matched).collect();
-    comparison.reduce_crossings(found).0
+    let sheet_match =
+        |(source, target): (usize, usize)| SheetMatch { target, reversed: best[source * count + target].1 };
+    let initial = columns.into_iter().enumerate().map(sheet_match).collect();
+    comparison.reduce_crossings(initial).0
 }
 
 impl Comparison<'_> {
-    fn target(&self, of: SheetMatch) -> impl Iterator<Item = DVec2> {
-        let points = &self.targets[of.target];
-        (0..SAMPLES).map(move |index| points[if of.reversed { SAMPLES - 1 - index } else { index }])
+    fn target(&self, matched: SheetMatch) -> impl Iterator<Item = DVec2> {
+        let points = &self.targets[matched.target];
+        (0..SAMPLES).map(move |index| points[if matched.reversed { SAMPLES - 1 - index } else { index }])
     }
 
     /// Mean squared displacement times the length of the sheet.
-    fn motion(&self, source: usize, of: SheetMatch) -> f64 {
-        let squares = self.sources[source].iter().zip(self.target(of)).map(|(from, to)| from.distance_squared(to));
-        let length = (self.lengths[0][source] + self.lengths[1][of.target]) / 2.0;
+    fn motion(&self, source: usize, matched: SheetMatch) -> f64 {
+        let squares = self.sources[source].iter().zip(self.target(matched)).map(|(from, to)| from.distance_squared(to));
+        let length = (self.lengths[0][source] + self.lengths[1][matched.target]) / 2.0;
         squares.sum::<f64>() / SAMPLES as f64 * length
     }
 
@@ -102,8 +104,8 @@ impl Comparison<'_> {
 
     /// Sheets interpolated at a fraction of the transition.
     fn interpolated(&self, matches: &[SheetMatch], fraction: f64) -> Vec<Vec<DVec2>> {
-        let sheet = |(source, of): (&Vec<DVec2>, &SheetMatch)| -> Vec<DVec2> {
-            source.iter().zip(self.target(*of)).map(|(from, to)| from.lerp(to, fraction)).collect()
+        let sheet = |(source, matched): (&Vec<DVec2>, &SheetMatch)| -> Vec<DVec2> {
+            source.iter().zip(self.target(*matched)).map(|(from, to)| from.lerp(to, fraction)).collect()
         };
         self.sources.iter().zip(matches).map(sheet).collect()
     }
@@ -125,17 +127,17 @@ impl Comparison<'_> {
     }
 
     fn all_motion(&self, matches: &[SheetMatch]) -> f64 {
-        matches.iter().enumerate().map(|(source, of)| self.motion(source, *of)).sum()
+        matches.iter().enumerate().map(|(source, matched)| self.motion(source, *matched)).sum()
     }
 
     /// Local search: reverses one or swaps two as long as the number of crossings, or at equal number the motion,
     /// decreases. Also returns the number of changes tried.
     fn reduce_crossings(&self, mut matches: Vec<SheetMatch>) -> (Vec<SheetMatch>, usize) {
         let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
-        let most = MAX_CROSSING_TESTS / matches.len().max(1);
+        let max_tries = MAX_CROSSING_TESTS / matches.len().max(1);
         let (mut cost, mut tries) = (self.cost(&matches), 0);
-        while cost.0 > 0 && tries < most {
-            let candidates = self.candidate_changes(&matches, (most / CANDIDATES_DIVISOR).min(most - tries));
+        while cost.0 > 0 && tries < max_tries {
+            let candidates = self.candidate_changes(&matches, (max_tries / CANDIDATES_DIVISOR).min(max_tries - tries));
             tries += candidates.len();
             let candidates = candidates.into_iter().map(|other| (self.cost(&other), other));
             let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
@@ -147,30 +149,33 @@ impl Comparison<'_> {
         (matches, tries)
     }
 
-    /// Up to `most` allowed changes that involve a crossing sheet, those with the least motion first. Changes of two
+    /// Up to `max_changes` allowed changes that involve a crossing sheet, those with the least motion first. Changes of two
     /// sheets without crossings cannot remove one.
-    fn candidate_changes(&self, matches: &[SheetMatch], most: usize) -> Vec<Vec<SheetMatch>> {
+    fn candidate_changes(&self, matches: &[SheetMatch], max_changes: usize) -> Vec<Vec<SheetMatch>> {
         let crossed = self.crossed(matches);
         let mut changes = Vec::new();
         for one in 0..matches.len() {
             let pairs = (0..=one).filter(|other| crossed.contains(&one) || crossed.contains(other));
             let allowed = pairs
                 .map(|other| self.change(matches, [one, other]))
-                .filter(|change| change.iter().all(|(source, of)| self.constraints[*source].allows(*of)));
+                .filter(|change| change.iter().all(|(source, matched)| self.constraints[*source].allows(*matched)));
             changes.extend(allowed);
         }
         let more = |change: &[(usize, SheetMatch); 2]| -> f64 {
             // A reversal is listed twice.
             let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
-            changed.iter().map(|(source, of)| self.motion(*source, *of) - self.motion(*source, matches[*source])).sum()
+            changed
+                .iter()
+                .map(|(source, matched)| self.motion(*source, *matched) - self.motion(*source, matches[*source]))
+                .sum()
         };
-        if changes.len() > most {
+        if changes.len() > max_changes {
             changes.sort_by(|a, b| more(a).total_cmp(&more(b)));
-            changes.truncate(most);
+            changes.truncate(max_changes);
         }
         let changed = |change: [(usize, SheetMatch); 2]| {
             let mut all = matches.to_vec();
-            change.into_iter().for_each(|(source, of)| all[source] = of);
+            change.into_iter().for_each(|(source, matched)| all[source] = matched);
             all
         };
         changes.into_iter().map(changed).collect()
@@ -179,8 +184,8 @@ impl Comparison<'_> {
     /// The new matches of two sheets that swap their targets, or of a sheet that is reversed.
     fn change(&self, matches: &[SheetMatch], [one, other]: [usize; 2]) -> [(usize, SheetMatch); 2] {
         if one == other {
-            let of = matches[one];
-            return [(one, SheetMatch { reversed: !of.reversed, ..of }); 2];
+            let matched = matches[one];
+            return [(one, SheetMatch { reversed: !matched.reversed, ..matched }); 2];
         }
         [(one, matches[other].target), (other, matches[one].target)]
             .map(|(source, target)| (source, SheetMatch { target, reversed: self.best_direction(source, target).1 }))
@@ -204,8 +209,8 @@ mod tests {
         targets: &[Polyline],
         constraints: &[MatchConstraint],
     ) -> Vec<(usize, bool)> {
-        let found = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), constraints);
-        found.into_iter().map(|of| (of.target, of.reversed)).collect()
+        let initial = match_sheets(sources, &targets.iter().collect::<Vec<_>>(), constraints);
+        initial.into_iter().map(|matched| (matched.target, matched.reversed)).collect()
     }
 
     #[test]
@@ -239,11 +244,11 @@ mod tests {
         let sources = [line([0.0, 0.0], [10.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
         let targets = [line([1.0, 10.0], [0.0, 0.0]), line([3.0, 4.0], [4.0, 3.0])];
         let constraints = [MatchConstraint::default(); 2];
-        let found = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &constraints);
+        let initial = match_sheets(&sources, &targets.iter().collect::<Vec<_>>(), &constraints);
         let comparison = comparison(&sources, &targets, &constraints);
         let through = [SheetMatch { target: 0, reversed: true }, SheetMatch { target: 1, reversed: false }];
         assert!(comparison.best_direction(0, 0).1 && comparison.crossings(&through) > 0);
-        assert_eq!(comparison.crossings(&found), 0);
+        assert_eq!(comparison.crossings(&initial), 0);
     }
 
     fn comparison<'a>(
@@ -273,8 +278,8 @@ mod tests {
         let through: Vec<SheetMatch> =
             (0..MANY + 2).map(|target| SheetMatch { target, reversed: target == 0 }).collect();
         assert!(comparison.crossings(&through) > 0);
-        let (found, tries) = comparison.reduce_crossings(through);
-        assert_eq!(comparison.crossings(&found), 0);
+        let (initial, tries) = comparison.reduce_crossings(through);
+        assert_eq!(comparison.crossings(&initial), 0);
         assert!(tries > 0 && tries <= MAX_CROSSING_TESTS / (MANY + 2) / CANDIDATES_DIVISOR, "{tries} tries");
     }
 }

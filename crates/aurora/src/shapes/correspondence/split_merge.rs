@@ -38,54 +38,70 @@ pub(crate) struct Transition {
     pub(crate) merges: Vec<CoincidentPoints>,
 }
 
-/// A cut of a sheet: the control point before it, and the fraction of the segment.
-type Cut = (usize, f64);
+/// A cut of a sheet.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    /// Index of the segment, from that control point to the next.
+    segment: usize,
+    /// Fraction of the segment.
+    fraction: f64,
+}
+
+/// An end of a sheet or of a strand.
+#[derive(Clone, Copy, Debug)]
+struct LineEnd {
+    /// Index of the sheet or strand.
+    line: usize,
+    /// 0 for the start, 1 for the end.
+    end: usize,
+}
 
 impl Transition {
     /// The transition to shape `index` from the previous shape, whose sheets are `sheets`.
     ///
     /// # Errors
     ///
-    /// A missing sheet or segment, a merge point that is not an end, two changes at one position, or a closed ring.
+    /// A missing sheet or segment, a merge point that is not an end, two splits or merges at one position, or a closed ring.
     pub(crate) fn new(
         parameters: &ShapeParameters,
         index: usize,
         sheets: &[Vec<usize>],
         tracks: &mut Vec<ControlPointTrack>,
     ) -> Result<Self, ShapeError> {
-        let mut change = Self::default();
+        let mut transition = Self::default();
         // First and last strand of each sheet.
-        let mut parts = Vec::new();
+        let mut outer_strands = Vec::new();
         let cuts = cuts(parameters, index, sheets, tracks)?;
         for (sheet, cuts) in sheets.iter().zip(cuts) {
-            let first = change.strands.len();
-            change.cut(sheet, &cuts, index - 1, tracks);
-            parts.push([first, change.strands.len() - 1]);
+            let first = transition.strands.len();
+            transition.cut(sheet, &cuts, index - 1, tracks);
+            outer_strands.push([first, transition.strands.len() - 1]);
         }
-        let mut chains = Chains::new(change.strands.len());
+        let mut chains = Chains::new(transition.strands.len());
         for (number, merge) in parameters.merge.iter().enumerate() {
             let error = |kind| ShapeError { key: format!("shapes.{index}.merge.{number}"), kind };
-            let ends = merged_ends(merge, sheets, tracks, index - 1).map_err(error)?;
-            let ends_of_strands = ends.map(|(sheet, end)| (parts[sheet][end], end));
-            for (index, (sheet, end)) in ends_of_strands.iter().zip(ends) {
-                if chains.links[index.0][index.1].is_some() {
-                    return Err(error(ShapeErrorKind::MergedTwice { sheet: sheet + 1, is_end: end == 1 }));
+            let sheet_ends = merged_ends(merge, sheets, tracks, index - 1).map_err(error)?;
+            let strand_ends = sheet_ends.map(|LineEnd { line, end }| LineEnd { line: outer_strands[line][end], end });
+            for (strand_end, sheet_end) in strand_ends.iter().zip(sheet_ends) {
+                if chains.links[strand_end.line][strand_end.end].is_some() {
+                    let kind = ShapeErrorKind::MergedTwice { sheet: sheet_end.line + 1, is_end: sheet_end.end == 1 };
+                    return Err(error(kind));
                 }
             }
-            if !chains.join(ends_of_strands) {
-                return Err(error(ShapeErrorKind::Ring { sheet: ends[0].0 + 1 }));
+            if !chains.join(strand_ends) {
+                return Err(error(ShapeErrorKind::Ring { sheet: sheet_ends[0].line + 1 }));
             }
-            change.add_merge_points(ends_of_strands, index - 1, tracks);
+            transition.add_merge_points(strand_ends, index - 1, tracks);
         }
-        change.chains = chains.collect();
-        Ok(change)
+        transition.chains = chains.collect();
+        Ok(transition)
     }
 
     /// Cuts a sheet into strands, with two new coincident points at each cut.
     fn cut(&mut self, sheet: &[usize], cuts: &[Cut], knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         let mut strand = Vec::new();
         let mut start = 0;
-        for &(segment, fraction) in cuts {
+        for &Cut { segment, fraction } in cuts {
             let old = [sheet[segment], sheet[segment + 1]];
             let new = [0, 1].map(|_| add_track(Parents { tracks: old, fraction }, knot, tracks));
             strand.extend_from_slice(&sheet[start..=segment]);
@@ -99,15 +115,10 @@ impl Transition {
     }
 
     /// Adds a new point at each of two merging ends.
-    fn add_merge_points(
-        &mut self,
-        ends_of_strands: [(usize, usize); 2],
-        knot: usize,
-        tracks: &mut Vec<ControlPointTrack>,
-    ) {
+    fn add_merge_points(&mut self, strand_ends: [LineEnd; 2], knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         let mut pair = CoincidentPoints { new: [0; 2], old: [0; 2] };
-        for (side, (strand, end)) in ends_of_strands.into_iter().enumerate() {
-            let strand = &mut self.strands[strand];
+        for (side, LineEnd { line, end }) in strand_ends.into_iter().enumerate() {
+            let strand = &mut self.strands[line];
             let index = if end == 0 { 0 } else { strand.len() };
             let old = strand[index.saturating_sub(end)];
             let new = add_track(Parents { tracks: [old; 2], fraction: 0.0 }, knot, tracks);
@@ -179,15 +190,16 @@ fn cuts(
         let sheet = sheet_index(split.sheet, sheets.len()).map_err(error)?;
         let positions: Vec<DVec2> = sheets[sheet].iter().map(|&track| tracks[track].knot(index - 1).position).collect();
         let cut = cut_of(split, sheet, &positions).map_err(error)?;
-        if cuts[sheet].iter().any(|other| other.0 == cut.0) {
-            return Err(error(ShapeErrorKind::SplitTwice { sheet: sheet + 1, segment: cut.0 + 1 }));
+        if cuts[sheet].iter().any(|other| other.segment == cut.segment) {
+            return Err(error(ShapeErrorKind::SplitTwice { sheet: sheet + 1, segment: cut.segment + 1 }));
         }
         cuts[sheet].push(cut);
     }
-    cuts.iter_mut().for_each(|cuts| cuts.sort_by_key(|cut| cut.0));
+    cuts.iter_mut().for_each(|cuts| cuts.sort_by_key(|cut| cut.segment));
     Ok(cuts)
 }
 
+/// The cut of a split sheet with these positions of its control points.
 fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<Cut, ShapeErrorKind> {
     let segments = positions.len() - 1;
     match (split.segment, split.length_fraction) {
@@ -195,25 +207,25 @@ fn cut_of(split: &SplitParameters, sheet: usize, positions: &[DVec2]) -> Result<
         (Some(segment), None) => {
             let index = usize::try_from(segment - 1).ok().filter(|&index| index < segments);
             let missing = ShapeErrorKind::NoSuchSegment { sheet: sheet + 1, segment, count: segments };
-            index.map(|index| (index, 0.5)).ok_or(missing)
+            index.map(|segment| Cut { segment, fraction: 0.5 }).ok_or(missing)
         }
         (None, at) => {
             let (at, fractions) = (at.unwrap_or(0.5), length_fractions(positions));
             let segment = fractions.partition_point(|&fraction| fraction <= at).clamp(1, segments) - 1;
             let length = fractions[segment + 1] - fractions[segment];
             let fraction = if length > 0.0 { (at - fractions[segment]) / length } else { 0.5 };
-            Ok((segment, fraction.clamp(0.0, 1.0)))
+            Ok(Cut { segment, fraction: fraction.clamp(0.0, 1.0) })
         }
     }
 }
 
-/// The two ends named by a merge: sheet, and 0 for its start or 1 for its end.
+/// The two ends of sheets that a merge joins.
 fn merged_ends(
     merge: &MergeParameters,
     sheets: &[Vec<usize>],
     tracks: &[ControlPointTrack],
     knot: usize,
-) -> Result<[(usize, usize); 2], ShapeErrorKind> {
+) -> Result<[LineEnd; 2], ShapeErrorKind> {
     let [first, second] = merge.sheets;
     let pair = [sheet_index(first, sheets.len())?, sheet_index(second, sheets.len())?];
     if pair[0] == pair[1] {
@@ -221,19 +233,15 @@ fn merged_ends(
     }
     let Auto::Set(at) = merge.ends else { return Ok(nearest_ends(pair, sheets, tracks, knot)) };
     let end = |side: usize| match at[side] {
-        0.0 => Ok((pair[side], 0)),
-        1.0 => Ok((pair[side], 1)),
-        at => Err(ShapeErrorKind::NotAnEnd { sheet: pair[side] + 1, at }),
+        0.0 => Ok(LineEnd { line: pair[side], end: 0 }),
+        1.0 => Ok(LineEnd { line: pair[side], end: 1 }),
+        length_fraction => Err(ShapeErrorKind::NotAnEnd { sheet: pair[side] + 1, length_fraction }),
     };
     Ok([end(0)?, end(1)?])
 }
 
-fn nearest_ends(
-    pair: [usize; 2],
-    sheets: &[Vec<usize>],
-    tracks: &[ControlPointTrack],
-    knot: usize,
-) -> [(usize, usize); 2] {
+/// The ends of two sheets that are nearest to each other.
+fn nearest_ends(pair: [usize; 2], sheets: &[Vec<usize>], tracks: &[ControlPointTrack], knot: usize) -> [LineEnd; 2] {
     let at = |side: usize, end: usize| {
         let sheet = &sheets[pair[side]];
         tracks[sheet[end * (sheet.len() - 1)]].knot(knot).position
@@ -241,13 +249,13 @@ fn nearest_ends(
     let distance = |ends: &[usize; 2]| at(0, ends[0]).distance_squared(at(1, ends[1]));
     let all = [[1, 0], [0, 1], [0, 0], [1, 1]];
     let ends = all.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or([1, 0]);
-    [(pair[0], ends[0]), (pair[1], ends[1])]
+    [0, 1].map(|side| LineEnd { line: pair[side], end: ends[side] })
 }
 
 /// Strands joined at their ends.
 struct Chains {
-    /// The strand and end that each end of each strand is joined to.
-    links: Vec<[Option<(usize, usize)>; 2]>,
+    /// The end that each end of each strand is joined to.
+    links: Vec<[Option<LineEnd>; 2]>,
     /// Chain id of each strand (union by relabeling).
     chain: Vec<usize>,
 }
@@ -258,13 +266,13 @@ impl Chains {
     }
 
     /// Joins two ends; `false` if that would close a ring.
-    fn join(&mut self, [a, b]: [(usize, usize); 2]) -> bool {
-        let [one, other] = [self.chain[a.0], self.chain[b.0]];
+    fn join(&mut self, [a, b]: [LineEnd; 2]) -> bool {
+        let [one, other] = [self.chain[a.line], self.chain[b.line]];
         if one == other {
             return false;
         }
-        self.links[a.0][a.1] = Some(b);
-        self.links[b.0][b.1] = Some(a);
+        self.links[a.line][a.end] = Some(b);
+        self.links[b.line][b.end] = Some(a);
         self.chain.iter_mut().filter(|chain| **chain == other).for_each(|chain| *chain = one);
         true
     }
@@ -279,16 +287,16 @@ impl Chains {
             }
             let mut chain = vec![ChainLink { strand, reversed: false }];
             for end in [0, 1] {
-                let mut at = self.links[strand][end];
-                while let Some((next, entered)) = at {
-                    // Walking toward the start, a strand entered at its end runs with the chain.
-                    let link = ChainLink { strand: next, reversed: entered == end };
+                let mut next = self.links[strand][end];
+                while let Some(entered) = next {
+                    // Toward the start, a strand entered at its end has the direction of the chain.
+                    let link = ChainLink { strand: entered.line, reversed: entered.end == end };
                     if end == 0 {
                         chain.insert(0, link);
                     } else {
                         chain.push(link);
                     }
-                    at = self.links[next][1 - entered];
+                    next = self.links[entered.line][1 - entered.end];
                 }
             }
             chain.iter().for_each(|link| seen[link.strand] = true);
@@ -312,9 +320,12 @@ mod tests {
         (sheets, (0..4 * count).map(track).collect())
     }
 
-    fn change(parameters: &ShapeParameters, sheets: usize) -> Result<(Transition, Vec<ControlPointTrack>), ShapeError> {
+    fn transition(
+        parameters: &ShapeParameters,
+        sheets: usize,
+    ) -> Result<(Transition, Vec<ControlPointTrack>), ShapeError> {
         let (sheets, mut tracks) = setting(sheets);
-        Transition::new(parameters, 1, &sheets, &mut tracks).map(|change| (change, tracks))
+        Transition::new(parameters, 1, &sheets, &mut tracks).map(|transition| (transition, tracks))
     }
 
     fn split(sheet: i64, segment: Option<i64>, at: Option<f64>) -> ShapeParameters {
@@ -331,71 +342,71 @@ mod tests {
 
     #[test]
     fn a_split_segment_lets_go_and_takes_two_points_in_its_middle() {
-        let (change, tracks) = change(&split(1, Some(2), None), 1).unwrap();
-        assert_eq!(change.strands, [vec![0, 1, 4], vec![5, 2, 3]]);
-        assert_eq!(change.chains.len(), 2);
-        assert_eq!((change.splits[0].new, change.splits[0].old), ([4, 5], [1, 2]));
+        let (transition, tracks) = transition(&split(1, Some(2), None), 1).unwrap();
+        assert_eq!(transition.strands, [vec![0, 1, 4], vec![5, 2, 3]]);
+        assert_eq!(transition.chains.len(), 2);
+        assert_eq!((transition.splits[0].new, transition.splits[0].old), ([4, 5], [1, 2]));
         assert!([4, 5].iter().all(|&new| tracks[new].knot(0).position == DVec2::new(1.5, 0.0)));
     }
 
     #[test]
     fn a_split_at_a_share_opens_exactly_there() {
-        let (_, tracks) = change(&split(1, None, Some(0.25)), 1).unwrap();
+        let (_, tracks) = transition(&split(1, None, Some(0.25)), 1).unwrap();
         assert_eq!(tracks[4].knot(0).position, DVec2::new(0.75, 0.0));
-        let (middle, tracks) = change(&split(1, None, None), 1).unwrap();
+        let (middle, tracks) = transition(&split(1, None, None), 1).unwrap();
         assert_eq!(tracks[4].knot(0).position, DVec2::new(1.5, 0.0));
         assert_eq!(middle.strands.len(), 2);
         for at in [0.0, 1.0] {
-            let (change, _) = change(&split(1, None, Some(at)), 1).unwrap();
-            assert!(change.strands.iter().all(|strand| strand.len() >= 2));
+            let (transition, _) = transition(&split(1, None, Some(at)), 1).unwrap();
+            assert!(transition.strands.iter().all(|strand| strand.len() >= 2));
         }
     }
 
     #[test]
     fn merged_ends_take_a_point_each() {
-        let (change, tracks) = change(&merge(&[([1, 2], Auto::Set([1.0, 1.0]))]), 2).unwrap();
-        assert_eq!(change.strands, [vec![0, 1, 2, 3, 8], vec![4, 5, 6, 7, 9]]);
+        let (transition, tracks) = transition(&merge(&[([1, 2], Auto::Set([1.0, 1.0]))]), 2).unwrap();
+        assert_eq!(transition.strands, [vec![0, 1, 2, 3, 8], vec![4, 5, 6, 7, 9]]);
         let links = [ChainLink { strand: 0, reversed: false }, ChainLink { strand: 1, reversed: true }];
-        assert_eq!(change.chains, [links]);
-        assert_eq!(change.tracks_along(links[1]), [9, 7, 6, 5, 4]);
+        assert_eq!(transition.chains, [links]);
+        assert_eq!(transition.tracks_along(links[1]), [9, 7, 6, 5, 4]);
         assert_eq!(tracks[9].knot(0).position, DVec2::new(3.0, 10.0));
     }
 
     #[test]
     fn three_sheets_become_one_whichever_is_named_first() {
         let start_to_end = Auto::Set([0.0, 1.0]);
-        let (change, _) = change(&merge(&[([1, 2], start_to_end), ([2, 3], start_to_end)]), 3).unwrap();
-        let order: Vec<(usize, bool)> = change.chains[0].iter().map(|link| (link.strand, link.reversed)).collect();
+        let (transition, _) = transition(&merge(&[([1, 2], start_to_end), ([2, 3], start_to_end)]), 3).unwrap();
+        let order: Vec<(usize, bool)> = transition.chains[0].iter().map(|link| (link.strand, link.reversed)).collect();
         assert_eq!(order, [(2, false), (1, false), (0, false)]);
-        assert_eq!(change.strands[1].len(), 6);
+        assert_eq!(transition.strands[1].len(), 6);
     }
 
     #[test]
     fn the_nearest_ends_merge_unless_told() {
-        let (change, _) = change(&merge(&[([1, 2], Auto::Auto)]), 2).unwrap();
-        let ends: Vec<usize> = change.merges[0].old.to_vec();
+        let (transition, _) = transition(&merge(&[([1, 2], Auto::Auto)]), 2).unwrap();
+        let ends: Vec<usize> = transition.merges[0].old.to_vec();
         assert!(ends == [3, 7] || ends == [0, 4], "{ends:?}");
     }
 
     #[test]
     fn refining_halves_the_longest_segments() {
-        let (mut change, mut tracks) = change(&split(1, Some(2), None), 1).unwrap();
-        change.refine(4, 0, &mut tracks);
-        assert!(change.strands.iter().all(|strand| strand.len() == 4));
-        let xs: Vec<f64> = change.strands[0].iter().map(|&track| tracks[track].knot(0).position.x).collect();
+        let (mut transition, mut tracks) = transition(&split(1, Some(2), None), 1).unwrap();
+        transition.refine(4, 0, &mut tracks);
+        assert!(transition.strands.iter().all(|strand| strand.len() == 4));
+        let xs: Vec<f64> = transition.strands[0].iter().map(|&track| tracks[track].knot(0).position.x).collect();
         assert_eq!(xs, [0.0, 0.5, 1.0, 1.5]);
     }
 
     #[test]
     fn faults_name_sheet_and_segment() {
-        let kind = |parameters: &ShapeParameters| change(parameters, 2).unwrap_err();
+        let kind = |parameters: &ShapeParameters| transition(parameters, 2).unwrap_err();
         for (parameters, expected) in [
-            (split(3, None, None), "shapes.1.split.0: there is no sheet 3 in the shape before; allowed: 1 to 2"),
+            (split(3, None, None), "shapes.1.split.0: there is no sheet 3 in the previous shape; allowed: 1 to 2"),
             (split(2, Some(4), None), "shapes.1.split.0: sheet 2 has no segment 4; allowed: 1 to 3"),
-            (split(2, Some(1), Some(0.5)), "says both `segment` and `length_fraction`"),
+            (split(2, Some(1), Some(0.5)), "has both `segment` and `length_fraction`"),
             (merge(&[([1, 5], Auto::Auto)]), "shapes.1.merge.0: there is no sheet 5"),
             (merge(&[([1, 2], Auto::Set([1.0, 0.4]))]), "the point at 0.4 of sheet 2 is not an end"),
-            (merge(&[([2, 2], Auto::Set([0.0, 1.0]))]), "would close sheet 2 to a ring"),
+            (merge(&[([2, 2], Auto::Set([0.0, 1.0]))]), "would close sheet 2 into a ring"),
             (
                 merge(&[([1, 2], Auto::Set([1.0, 0.0])), ([1, 2], Auto::Set([0.0, 1.0]))]),
                 "shapes.1.merge.1: this merge would close",

@@ -11,9 +11,19 @@ const MAX_POINTS: usize = 1024;
 const SLOTS_PER_POINT: usize = 8;
 /// Minimum and maximum number of slots between successive control points.
 const STEP_RANGE: [usize; 2] = [3, 20];
+
+/// A point with a given position on the target line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Anchor {
+    /// Index of the point.
+    pub(super) point: usize,
+    /// Fraction of the target's length at which it must arrive.
+    pub(super) fraction: f64,
+}
+
 /// Target length fractions for `points`, from `range[0]` for the first to `range[1]` for the last. Minimizes the sum of
-/// (distance / length)^2 and `evenness` (spacing - 1)^2 by dynamic programming with 8 slots per point. Unmoved parts
-/// stay where they are; the spacing stays within 3/8 to 5/2 of the uniform one.
+/// (distance / length)^2 and `evenness` (spacing - 1)^2 by dynamic programming with 8 slots per point. Sections
+/// that do not move keep their positions. The spacing is 3/8 to 5/2 of the uniform one.
 pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
     let slots = last * SLOTS_PER_POINT;
@@ -23,11 +33,11 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
     if last < 2 || scale == 0.0 {
         return (0..=last).map(|index| fraction(index * SLOTS_PER_POINT)).collect();
     }
-    let nearness = |point: usize, slot: usize| points[point].distance_squared(line[slot]) / (scale * scale);
+    let distance_cost = |point: usize, slot: usize| points[point].distance_squared(line[slot]) / (scale * scale);
     let step_costs: Vec<f64> = (0..=STEP_RANGE[1])
         .map(|step| {
-            let stretch = step as f64 / SLOTS_PER_POINT as f64 - 1.0;
-            evenness * stretch * stretch
+            let deviation = step as f64 / SLOTS_PER_POINT as f64 - 1.0;
+            evenness * deviation * deviation
         })
         .collect();
     let (mut costs, mut next) = (vec![f64::INFINITY; slots + 1], vec![f64::INFINITY; slots + 1]);
@@ -54,7 +64,7 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
         let row = &mut steps[point * (slots + 1)..][..=slots];
         for slot in low..=high {
             row[slot] = best[slot] as u8;
-            next[slot] += nearness(point, slot);
+            next[slot] += distance_cost(point, slot);
         }
         std::mem::swap(&mut costs, &mut next);
     }
@@ -76,27 +86,28 @@ fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: 
         return warp(points, target, range, evenness);
     }
     let chosen: Vec<usize> = (0..MAX_POINTS).map(|index| index * last / (MAX_POINTS - 1)).collect();
-    let few: Vec<DVec2> = chosen.iter().map(|&point| points[point]).collect();
-    let found = warp(&few, target, range, evenness);
+    let thinned: Vec<DVec2> = chosen.iter().map(|&point| points[point]).collect();
+    let found = warp(&thinned, target, range, evenness);
     let mut all = vec![found[0]];
-    for (ends, shares_at) in chosen.windows(2).zip(found.windows(2)) {
+    for (ends, end_fractions) in chosen.windows(2).zip(found.windows(2)) {
         let between = length_fractions(&points[ends[0]..=ends[1]]);
-        all.extend(between[1..].iter().map(|&fraction| lerp(shares_at[0], shares_at[1], fraction)));
+        all.extend(between[1..].iter().map(|&fraction| lerp(end_fractions[0], end_fractions[1], fraction)));
     }
     all
 }
 
-/// [`warp`] with `anchors`: pairs of point index and fraction at which it must arrive, both ascending along the points.
+/// [`warp`] with anchors, in the order of the points.
 pub(crate) fn warp_through(
     points: &[DVec2],
     target: &Polyline,
     range: [f64; 2],
-    anchors: &[(usize, f64)],
+    anchors: &[Anchor],
     evenness: f64,
 ) -> Vec<f64> {
     let mut fractions = vec![range[0]];
     let mut start = 0;
-    for (end, fraction) in anchors.iter().copied().chain([(points.len() - 1, range[1])]) {
+    let end = Anchor { point: points.len() - 1, fraction: range[1] };
+    for Anchor { point: end, fraction } in anchors.iter().copied().chain([end]) {
         let sub_range = [fractions[start], fraction];
         fractions.extend(&warp_thinned(&points[start..=end], target, sub_range, evenness)[1..]);
         start = end;
@@ -139,7 +150,8 @@ mod tests {
     fn anchored_points_arrive_where_they_are_told_and_the_others_between_them() {
         let points = straight(0.0, 100.0, 11);
         let target = Polyline::new(points.clone()).unwrap();
-        let fractions = warp_through(&points, &target, [0.0, 1.0], &[(3, 0.5), (8, 0.75)], 0.01);
+        let anchors = [Anchor { point: 3, fraction: 0.5 }, Anchor { point: 8, fraction: 0.75 }];
+        let fractions = warp_through(&points, &target, [0.0, 1.0], &anchors, 0.01);
         assert_eq!(
             (fractions.len(), fractions[0], fractions[3], fractions[8], fractions[10]),
             (11, 0.0, 0.5, 0.75, 1.0)
@@ -157,7 +169,7 @@ mod tests {
         assert!(whole.iter().enumerate().all(|(i, fraction)| (fraction - i as f64 / 99_999.0).abs() < 2e-4));
         // Those between go along: nothing is passed by.
         points.iter_mut().for_each(|point| point.x *= (point.x / 310.0) * (point.x / 310.0));
-        let uneven = warp_through(&points, &target, [0.25, 0.75], &[(40_000, 0.5)], 0.01);
+        let uneven = warp_through(&points, &target, [0.25, 0.75], &[Anchor { point: 40_000, fraction: 0.5 }], 0.01);
         assert_eq!((uneven.len(), uneven[0], uneven[40_000], uneven[99_999]), (100_000, 0.25, 0.5, 0.75));
         assert!(uneven.windows(2).all(|pair| pair[1] >= pair[0]));
     }

@@ -13,11 +13,12 @@ pub(crate) struct CellGrid {
 }
 
 impl CellGrid {
-    /// Cells of side `cell` over the rectangle from `low` to `high`, made larger if there would be more than `most` on a side.
-    pub(crate) fn new(low: DVec2, high: DVec2, cell: f64, most: usize) -> Self {
+    /// Cells of side `cell` over the rectangle from `low` to `high`, or larger ones if there would be more than `max_cells` along
+    /// a side.
+    pub(crate) fn new(low: DVec2, high: DVec2, cell: f64, max_cells: usize) -> Self {
         let extent = (high - low).max_element();
-        let cell = cell.max(extent / most as f64).max(f64::MIN_POSITIVE);
-        let size = ((high - low) / cell).to_array().map(|cells| (cells.floor() as usize + 1).min(most + 1));
+        let cell = cell.max(extent / max_cells as f64).max(f64::MIN_POSITIVE);
+        let size = ((high - low) / cell).to_array().map(|cells| (cells.floor() as usize + 1).min(max_cells + 1));
         Self { low, cell, size }
     }
 
@@ -27,7 +28,7 @@ impl CellGrid {
 
     /// The cell of `point`, clamped to the grid.
     pub(super) fn cell_of(&self, point: DVec2) -> usize {
-        self.line(1, point.y) * self.size[0] + self.line(0, point.x)
+        self.index_along(1, point.y) * self.size[0] + self.index_along(0, point.x)
     }
 
     /// Center of a cell.
@@ -41,13 +42,13 @@ impl CellGrid {
         self.cell
     }
 
-    /// From the middle of a cell to its corners.
+    /// Distance from the center of a cell to its corners.
     pub(super) fn half_diagonal(&self) -> f64 {
         self.cell * std::f64::consts::FRAC_1_SQRT_2
     }
 
-    /// Column (`axis` 0) or row (1) of a coordinate.
-    fn line(&self, axis: usize, coordinate: f64) -> usize {
+    /// Column (`axis` 0) or row (1) at a coordinate.
+    fn index_along(&self, axis: usize, coordinate: f64) -> usize {
         // Casts saturate, so points outside and NaN map to a border cell.
         (((coordinate - self.low[axis]) / self.cell) as usize).min(self.size[axis] - 1)
     }
@@ -66,15 +67,15 @@ impl CellGrid {
             let fraction = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
             top.x + (bottom.x - top.x) * fraction
         };
-        for row in self.line(1, top.y - margin)..=self.line(1, bottom.y + margin) {
+        for row in self.index_along(1, top.y - margin)..=self.index_along(1, bottom.y + margin) {
             let slab = self.low.y + row as f64 * self.cell;
             let ends = if bottom.y > top.y {
                 [x_at(slab - margin), x_at(slab + self.cell + margin)]
             } else {
                 [top.x, bottom.x]
             };
-            let left = self.line(0, ends[0].min(ends[1]) - margin);
-            let right = self.line(0, ends[0].max(ends[1]) + margin);
+            let left = self.index_along(0, ends[0].min(ends[1]) - margin);
+            let right = self.index_along(0, ends[0].max(ends[1]) + margin);
             visit(row * self.size[0] + left..row * self.size[0] + right + 1);
         }
     }

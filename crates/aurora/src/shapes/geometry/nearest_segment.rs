@@ -110,27 +110,28 @@ struct CellRun {
 /// segment by at most the cell's diagonal. Distances are computed per run of cells.
 fn nearest_candidates(grid: &CellGrid, segments: &[SegmentGeometry], reach: f64) -> (Vec<u32>, Vec<SegmentGeometry>) {
     let (mut runs, mut squares) = (Vec::new(), Vec::new());
-    let mut least = vec![f32::INFINITY; grid.count()];
+    let mut min_squares = vec![f32::INFINITY; grid.count()];
     for (number, segment) in segments.iter().enumerate() {
         grid.for_each_run(segment.start, segment.start + segment.direction, reach, |cells| {
             let (cell, first) = (cells.start, squares.len());
             runs.push(CellRun { segment: number as u32, cell: cell as u32, first: first as u32 });
             squares.resize(first + cells.len(), 0.0);
             segment.fill_squares(grid.center(cell), grid.side(), &mut squares[first..]);
-            for (least, square) in least[cells].iter_mut().zip(&squares[first..]) {
-                *least = if *square < *least { *square } else { *least };
+            for (min_square, square) in min_squares[cells].iter_mut().zip(&squares[first..]) {
+                *min_square = if *square < *min_square { *square } else { *min_square };
             }
         });
     }
     // Margin for rounding.
     let slack = (2.0 * 1.001 * grid.half_diagonal()) as f32;
-    let most: Vec<f32> = least.iter().map(|least| (least.sqrt() + slack) * (least.sqrt() + slack)).collect();
+    let max_squares: Vec<f32> =
+        min_squares.iter().map(|square| (square.sqrt() + slack) * (square.sqrt() + slack)).collect();
     let ends = runs.iter().skip(1).map(|run| run.first as usize).chain([squares.len()]);
     let for_each_kept = |visit: &mut dyn FnMut(usize, u32)| {
         for (run, end) in runs.iter().zip(ends.clone()) {
             let distances = &squares[run.first as usize..end];
             for (cell, square) in (run.cell as usize..).zip(distances) {
-                if *square <= most[cell] {
+                if *square <= max_squares[cell] {
                     visit(cell, run.segment);
                 }
             }
@@ -157,14 +158,14 @@ impl SegmentGeometry {
         Self { number, start, direction: end - start, inverse_square }
     }
 
-    /// Squared distances of `squares.len()` points in a row, `apart` from each other, starting at `first`.
-    fn fill_squares(&self, first: DVec2, apart: f64, squares: &mut [f32]) {
+    /// Squared distances of `squares.len()` points in a row, `spacing` apart, starting at `first`.
+    fn fill_squares(&self, first: DVec2, spacing: f64, squares: &mut [f32]) {
         let from_start = first - self.start;
         let ([x, y], [u, v]) =
             ([from_start.x as f32, from_start.y as f32], [self.direction.x as f32, self.direction.y as f32]);
-        let (apart, per_square) = (apart as f32, self.inverse_square.min(f64::from(f32::MAX)) as f32);
+        let (spacing, per_square) = (spacing as f32, self.inverse_square.min(f64::from(f32::MAX)) as f32);
         for (index, square) in squares.iter_mut().enumerate() {
-            let x = x + apart * index as f32;
+            let x = x + spacing * index as f32;
             let fraction = ((x * u + y * v) * per_square).clamp(0.0, 1.0);
             let (beside, below) = (x - fraction * u, y - fraction * v);
             *square = beside * beside + below * below;
@@ -219,8 +220,8 @@ mod tests {
         for probe in 0..5_000 {
             let point = random(1000 + probe) * 1.2;
             let all = segments.iter().map(|segment| segment.distance_squared(point));
-            let least = all.fold(f64::INFINITY, f64::min).sqrt();
-            let expected = (least <= 7.0).then_some(least);
+            let min_squares = all.fold(f64::INFINITY, f64::min).sqrt();
+            let expected = (min_squares <= 7.0).then_some(min_squares);
             within += usize::from(expected.is_some());
             assert_eq!(near.distance(point), expected);
         }

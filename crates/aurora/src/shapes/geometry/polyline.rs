@@ -90,7 +90,7 @@ pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> 
 /// segment (Yuksel, Schaefer & Keyser 2011), and its number of segments per point. Longer strokes are returned
 /// unchanged.
 pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
-    const PIECES: usize = 8;
+    const SEGMENTS: usize = 8;
     let count = points.len();
     if !(3..SKETCH_POINTS).contains(&count) {
         return (points, 1);
@@ -103,10 +103,10 @@ pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
         let previous = if index == 0 { before } else { points[index - 1] };
         let next = points.get(index + 2).copied().unwrap_or(after);
         let four = [previous, points[index], points[index + 1], next];
-        line.extend((1..PIECES).map(|piece| centripetal(four, piece as f64 / PIECES as f64)));
+        line.extend((1..SEGMENTS).map(|segment| centripetal(four, segment as f64 / SEGMENTS as f64)));
         line.push(points[index + 1]);
     }
-    (line, PIECES)
+    (line, SEGMENTS)
 }
 
 /// The segment between the two inner points (Barry & Goldman 1988).

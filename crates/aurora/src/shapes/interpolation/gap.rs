@@ -35,18 +35,27 @@ pub(crate) struct GapFlux {
 /// Light across a narrow gap between two ends of sheets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bridge {
-    /// Index of the two sheets, and whether it is the end of each (or its start).
-    pub ends: [(usize, bool); 2],
-    /// Factors of the aurora's flux and energy there.
+    /// The two ends.
+    pub ends: [SheetEnd; 2],
+    /// Factor of the aurora's flux.
     pub flux: f64,
-    /// See `flux`.
+    /// Factor of the aurora's energy.
     pub energy: f64,
 }
 
+/// The start or the end of a sheet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SheetEnd {
+    /// Index of the sheet.
+    pub sheet: usize,
+    /// Whether it is the end, else the start.
+    pub is_end: bool,
+}
+
 impl GapFlux {
-    /// A gap of `width` km with the maximum `widest`, at a fraction of the time from closed to widest.
-    pub(crate) fn new(width: f64, widest: f64, fraction: f64) -> Self {
-        let limit = BRIDGED_KM.min(0.5 * widest);
+    /// A gap of width `width`, km, and maximum width `max_width`, at a fraction of the time from closed to maximum width.
+    pub(crate) fn new(width: f64, max_width: f64, fraction: f64) -> Self {
+        let limit = BRIDGED_KM.min(0.5 * max_width);
         let closed = if limit > 0.0 { 1.0 - smoothstep(0.0, limit, width) } else { 1.0 };
         // At maximum width the sheets are as drawn.
         let free = 1.0 - smoothstep(1.0 - DARKENING, 1.0, fraction);
@@ -54,13 +63,13 @@ impl GapFlux {
     }
 }
 
-/// Fades the flux of a sheet toward its start or end, down to that fraction.
-pub(crate) fn fade_toward_gap(sheet: &mut Sheet, at_end: bool, fraction: f64) {
+/// Fades the flux of a sheet toward its end, or else its start, down to a fraction.
+pub(crate) fn fade_toward_gap(sheet: &mut Sheet, is_end: bool, fraction: f64) {
     let lengths = cumulative_lengths(&sheet.points);
     let whole = lengths.last().copied().unwrap_or(0.0);
     let fade_km = FADE_KM.min(MAX_FADE_FRACTION * whole);
     for (flux, length) in sheet.flux.iter_mut().zip(&lengths) {
-        let from_end = if at_end { whole - length } else { *length };
+        let from_end = if is_end { whole - length } else { *length };
         let risen = if fade_km > 0.0 { smoothstep(0.0, fade_km, from_end) } else { 1.0 };
         *flux *= 1.0 - (1.0 - fraction) * (1.0 - risen);
     }

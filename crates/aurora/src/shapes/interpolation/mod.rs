@@ -1,5 +1,4 @@
 //! In-between shapes: splines in time through the key shapes.
 
-pub(crate) mod control_points;
 pub(crate) mod gap;
 pub(crate) mod spline_track;

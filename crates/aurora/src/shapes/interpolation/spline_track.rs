@@ -10,7 +10,7 @@ pub(crate) struct ShapeTiming {
 }
 
 impl ShapeTiming {
-    /// Time from leaving shape `index` to reaching the next, s.
+    /// Duration of the transition from shape `index` to the next, s.
     fn span(&self, index: usize) -> f64 {
         self.arrivals[index + 1] - self.departures[index]
     }
@@ -92,10 +92,10 @@ impl ControlPointTrack {
 /// exists for one transition only. With `closed`, points that return to their start have one velocity there.
 pub(crate) fn find_velocities(tracks: &mut [ControlPointTrack], timing: &ShapeTiming, closed: bool) {
     for index in 0..tracks.len() {
-        let (known, rest) = tracks.split_at_mut(index);
-        let Some(track) = rest.first_mut() else { return };
+        let (done, remaining) = tracks.split_at_mut(index);
+        let Some(track) = remaining.first_mut() else { return };
         let parent_velocities =
-            track.parents.map(|parents| [0, 1].map(|later| parents.velocity(track.first_shape + later, known)));
+            track.parents.map(|parents| [0, 1].map(|later| parents.velocity(track.first_shape + later, done)));
         track.velocities = velocities(track, timing, parent_velocities, closed);
     }
 }
@@ -118,7 +118,7 @@ fn velocities(
     closed: bool,
 ) -> Vec<DVec2> {
     let count = track.knots.len();
-    let round = closed.then(|| closing_velocity(track, timing)).flatten();
+    let closing_velocity = closed.then(|| closing_velocity(track, timing)).flatten();
     let end = |knot_index: usize| {
         if timing.is_held(track.first_shape + knot_index) {
             return SplineEnd::Velocity(DVec2::ZERO);
@@ -126,7 +126,7 @@ fn velocities(
         match (knot_index, parent_velocities) {
             (0, Some([velocity, _])) => SplineEnd::Velocity(velocity),
             (1, Some([_, velocity])) if count == 2 => SplineEnd::Velocity(velocity),
-            _ => round.map_or(SplineEnd::Natural, SplineEnd::Velocity),
+            _ => closing_velocity.map_or(SplineEnd::Natural, SplineEnd::Velocity),
         }
     };
     let mut velocities = vec![DVec2::ZERO; count];
@@ -160,25 +160,27 @@ fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<D
         ends = [SplineEnd::Velocity(DVec2::ZERO); 2];
     }
     let slope = |knot_index: usize| (positions[knot_index + 1] - positions[knot_index]) / spans[knot_index];
-    // Row i: low v(i-1) + middle v(i) + high v(i+1) = right.
+    // Row i: lower v(i-1) + diagonal v(i) + upper v(i+1) = right.
     let row = |i: usize| match i {
-        0 => end_row(ends[0], slope(0)),
-        _ if i == last => {
-            let (high, middle, low, right) = end_row(ends[1], slope(last - 1));
-            (low, middle, high, right)
-        }
+        0 => TridiagonalRow::of_end(ends[0], slope(0)),
+        _ if i == last => TridiagonalRow::of_end(ends[1], slope(last - 1)).mirrored(),
         _ => {
             let [before, after] = [1.0 / spans[i - 1], 1.0 / spans[i]];
-            (before, 2.0 * (before + after), after, 3.0 * (slope(i - 1) * before + slope(i) * after))
+            TridiagonalRow {
+                lower: before,
+                diagonal: 2.0 * (before + after),
+                upper: after,
+                right: 3.0 * (slope(i - 1) * before + slope(i) * after),
+            }
         }
     };
     let (mut ratios, mut values): (Vec<f64>, Vec<DVec2>) = (Vec::new(), Vec::new());
     for i in 0..=last {
-        let (low, middle, high, right) = row(i);
+        let TridiagonalRow { lower, diagonal, upper, right } = row(i);
         let (ratio, value) = if i == 0 { (0.0, DVec2::ZERO) } else { (ratios[i - 1], values[i - 1]) };
-        let pivot = middle - low * ratio;
-        ratios.push(high / pivot);
-        values.push((right - value * low) / pivot);
+        let pivot = diagonal - lower * ratio;
+        ratios.push(upper / pivot);
+        values.push((right - value * lower) / pivot);
     }
     for i in (0..last).rev() {
         let next = values[i + 1];
@@ -187,11 +189,27 @@ fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<D
     values
 }
 
-/// Boundary row of the system: lower, diagonal and upper coefficient, right-hand side.
-fn end_row(end: SplineEnd, slope: DVec2) -> (f64, f64, f64, DVec2) {
-    match end {
-        SplineEnd::Natural => (0.0, 2.0, 1.0, 3.0 * slope),
-        SplineEnd::Velocity(velocity) => (0.0, 1.0, 0.0, velocity),
+/// A row of a tridiagonal system.
+struct TridiagonalRow {
+    lower: f64,
+    diagonal: f64,
+    upper: f64,
+    /// Right-hand side.
+    right: DVec2,
+}
+
+impl TridiagonalRow {
+    /// The first row, for a boundary condition and the slope of the first segment.
+    fn of_end(end: SplineEnd, slope: DVec2) -> Self {
+        match end {
+            SplineEnd::Natural => Self { lower: 0.0, diagonal: 2.0, upper: 1.0, right: 3.0 * slope },
+            SplineEnd::Velocity(velocity) => Self { lower: 0.0, diagonal: 1.0, upper: 0.0, right: velocity },
+        }
+    }
+
+    /// The corresponding last row.
+    fn mirrored(self) -> Self {
+        Self { lower: self.upper, upper: self.lower, ..self }
     }
 }
 

@@ -138,8 +138,8 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
         return meeting == Meeting::Touching && orient2d(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
     }
     let [c_side, d_side, a_side, b_side] = [orient2d(a, b, c), orient2d(a, b, d), orient2d(c, d, a), orient2d(c, d, b)];
-    let apart = |x: f64, y: f64| (x < 0.0 && y > 0.0) || (x > 0.0 && y < 0.0);
-    if apart(c_side, d_side) && apart(a_side, b_side) {
+    let have_opposite_signs = |x: f64, y: f64| (x < 0.0 && y > 0.0) || (x > 0.0 && y < 0.0);
+    if have_opposite_signs(c_side, d_side) && have_opposite_signs(a_side, b_side) {
         return true;
     }
     meeting == Meeting::Touching
@@ -148,47 +148,48 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
             .any(|(side, from, to, point)| side == 0.0 && (point - from).dot(point - to) <= 0.0)
 }
 
-/// The test is skipped with more sheets.
+/// Maximum number of sheets for which [`passes`] is tested.
 const MAX_SHEETS: usize = 40;
 /// Tested points of a sheet, in quarters of its points.
 const TESTED_QUARTERS: [usize; 3] = [1, 2, 3];
-/// Maximum distance relative to the motion.
+/// Maximum distance between the sheets, relative to their motion.
 const MAX_RELATIVE_DISTANCE: f64 = 1.5;
 
 /// Whether a sheet of `before` is on the other side of another sheet in `after`; both shapes have the same control
 /// points.
 pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
     let count = before.sheets.len();
-    let alike = |(a, b): (&Sheet, &Sheet)| a.points.len() == b.points.len();
-    if count > MAX_SHEETS || count != after.sheets.len() || !before.sheets.iter().zip(&after.sheets).all(alike) {
+    let same_points = |(a, b): (&Sheet, &Sheet)| a.points.len() == b.points.len();
+    if count > MAX_SHEETS || count != after.sheets.len() || !before.sheets.iter().zip(&after.sheets).all(same_points) {
         return false;
     }
     let pairs =
-        || (0..count).flat_map(|own| (0..count).filter(move |other| *other != own).map(move |other| (own, other)));
-    pairs().any(|(own, other)| {
-        let [own, other] = [own, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
-        let moved = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        || (0..count).flat_map(|one| (0..count).filter(move |other| *other != one).map(move |other| (one, other)));
+    pairs().any(|(one, other)| {
+        let [one, other] = [one, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
+        let max_motion = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
         TESTED_QUARTERS.iter().any(|quarters| {
-            let point = own.map(|points| points[quarters * (points.len() - 1) / 4]);
-            let sides = [0, 1].map(|moment| signed_distance(point[moment], other[moment]));
+            let point = one.map(|points| points[quarters * (points.len() - 1) / 4]);
+            let sides = [0, 1].map(|time| signed_distance(point[time], other[time]));
             let [Some(was), Some(is)] = sides else { return false };
-            was * is < 0.0 && was.abs() + is.abs() < MAX_RELATIVE_DISTANCE * (moved + point[0].distance(point[1]))
+            was * is < 0.0 && was.abs() + is.abs() < MAX_RELATIVE_DISTANCE * (max_motion + point[0].distance(point[1]))
         })
     })
 }
 
 /// Signed distance of a point from a polyline; `None` beyond its ends.
 fn signed_distance(point: DVec2, line: &[DVec2]) -> Option<f64> {
-    let (mut least, mut nearest) = (f64::INFINITY, None);
+    let (mut min_distance, mut nearest) = (f64::INFINITY, None);
     let last = line.len().saturating_sub(2);
     for (index, pair) in line.windows(2).enumerate() {
         let direction = pair[1] - pair[0];
         let unclamped = (point - pair[0]).dot(direction) / direction.length_squared().max(f64::MIN_POSITIVE);
         let clamped = unclamped.clamp(0.0, 1.0);
         let distance = point.distance(pair[0] + direction * clamped);
-        if distance < least {
+        if distance < min_distance {
             let beyond = (index == 0 && unclamped < 0.0) || (index == last && unclamped > 1.0);
-            (least, nearest) = (distance, (!beyond).then(|| distance.copysign(direction.perp_dot(point - pair[0]))));
+            (min_distance, nearest) =
+                (distance, (!beyond).then(|| distance.copysign(direction.perp_dot(point - pair[0]))));
         }
     }
     nearest

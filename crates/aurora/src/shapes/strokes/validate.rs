@@ -90,7 +90,7 @@ pub(crate) fn drawn_sheets(
     for (entry, parameters) in entries.iter().enumerate() {
         draw_entry(parameters, entry, context, assets, &mut sheets)?;
         if sheets.len() > MAX_SHEETS {
-            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), most: MAX_SHEETS };
+            let kind = ShapeErrorKind::TooManySheets { found: sheets.len(), max: MAX_SHEETS };
             return Err(context.error(".sheets", kind));
         }
     }
@@ -129,8 +129,8 @@ fn draw_entry(
     for copy in 0..parameters.copies {
         let offset = (copy as f64 - (parameters.copies - 1) as f64 / 2.0) * parameters.spacing_km;
         for stroke in &strokes {
-            let placed = stroke.iter().map(|&point| placed(point, offset, parameters)).collect();
-            let sheet = sheet(placed, parameters, entry, factors.clone()).map_err(|found| {
+            let points = stroke.iter().map(|&point| transformed(point, offset, parameters)).collect();
+            let sheet = sheet(points, parameters, entry, factors.clone()).map_err(|found| {
                 let key = if parameters.points.is_some() { ".points" } else { "" };
                 error_for(key, ShapeErrorKind::TooFewPoints { sheet: sheets.len() + 1, found })
             })?;
@@ -173,7 +173,7 @@ fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
 }
 
 /// Applies scale, mirror, rotation and translation, in this order; a copy is offset to the south before the rotation.
-fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
+fn transformed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
     let mut point = point * parameters.scale;
     if parameters.mirror {
         point.y = -point.y;
@@ -185,8 +185,8 @@ fn placed(point: DVec2, offset: f64, parameters: &SheetParameters) -> DVec2 {
 /// The strokes of a drawing, scaled to the drawn square.
 fn strokes(file: &str, id: Option<&str>, extent_km: f64, assets: &dyn Assets) -> Result<Vec<Vec<DVec2>>, AssetError> {
     let drawing = assets.drawing(file)?;
-    let wanted = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
-    let strokes: Vec<Vec<DVec2>> = wanted.map(|stroke| fitted(&stroke.points, &drawing, extent_km)).collect();
+    let selected = drawing.strokes.iter().filter(|stroke| id.is_none() || stroke.id.as_deref() == id);
+    let strokes: Vec<Vec<DVec2>> = selected.map(|stroke| fitted(&stroke.points, &drawing, extent_km)).collect();
     if strokes.is_empty() {
         let problem =
             id.map_or(AssetProblem::NoStrokes { instead: Vec::new() }, |id| AssetProblem::NoStroke(id.to_owned()));
@@ -206,12 +206,12 @@ fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), Shap
     let half = context.extent_km / 2.0;
     let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
-        let given = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
-        let Some(at) = given.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
+        let recorded_outside = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
+        let Some(at) = recorded_outside.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
         let point = sheet.line.points()[at];
         let number = sheet.origin(at) + 1;
         let (x, z, sheet_number) = (point.x, point.y, index + 1);
-        let kind = if given.is_some() {
+        let kind = if recorded_outside.is_some() {
             ShapeErrorKind::Outside { sheet: sheet_number, point: number, x, z, half }
         } else {
             ShapeErrorKind::BendsOutside { sheet: sheet_number, point: number, x, z, half }

@@ -85,7 +85,7 @@ impl<const ALTITUDES: usize> Tile<ALTITUDES> {
 /// Power on square cells, stored in sparse tiles, once per altitude of the red line with its own lifetime.
 ///
 /// Each cell relaxes toward the power of the particles in it, `dP/dt = (P_particles - P) / lifetime`: a steady sheet
-/// shows its own power, and one that has gone fades. Diffusion of the excited atoms is applied later as a blur
+/// shows its own power, and the light of one that has moved on fades. Diffusion of the excited atoms is applied later as a blur
 /// ([`ColumnEmission::spread_km`](crate::physics::emission::table::ColumnEmission)). The lifetime is that of the local
 /// mean energy, per tile of eight by eight cells: soft electrons emit at high altitudes, where it is long.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,10 +117,10 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         self.tiles.iter().flat_map(|tile| (0..TILE_CELLS).filter_map(|cell| self.cell(tile, cell)))
     }
 
-    /// All cells brighter than `faintest` times a typical cell, merged into blocks of `block` by `block`.
-    pub(crate) fn bright_blocks(&self, faintest: f32, block: usize) -> Vec<AfterglowCell<ALTITUDES>> {
-        let faintest = faintest * self.typical_w();
-        self.blocks(block, |tile, cell| self.tiles[tile].powers[cell].iter().any(|power| *power > faintest))
+    /// All cells with more than `min_relative_power` times the power of a typical cell, merged into blocks of `block` by `block`.
+    pub(crate) fn bright_blocks(&self, min_relative_power: f32, block: usize) -> Vec<AfterglowCell<ALTITUDES>> {
+        let min_power = min_relative_power * self.typical_w();
+        self.blocks(block, |tile, cell| self.tiles[tile].powers[cell].iter().any(|power| *power > min_power))
     }
 
     /// Block side in cells that is still smooth after a blur with this standard deviation, km.
@@ -128,14 +128,14 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         [8, 4, 2].into_iter().find(|block| *block as f64 * self.cell_km <= BLOCK_PER_SPREAD * spread_km).unwrap_or(1)
     }
 
-    /// Merges the `wanted` cells (tile, cell) into blocks of `block` by `block`, a divisor of [`TILE_SIDE`].
-    fn blocks(&self, block: usize, wanted: impl Fn(usize, usize) -> bool + Sync) -> Vec<AfterglowCell<ALTITUDES>> {
+    /// Merges the `selected(tile, cell)` cells into blocks of `block` by `block`, a divisor of [`TILE_SIDE`].
+    fn blocks(&self, block: usize, selected: impl Fn(usize, usize) -> bool + Sync) -> Vec<AfterglowCell<ALTITUDES>> {
         let of_tiles = |(task, tiles): (usize, &[Tile<ALTITUDES>])| {
             let mut blocks = Vec::new();
             for (tile, number) in tiles.iter().zip(task * TILES_PER_TASK..) {
                 // Output index of each block.
                 let mut numbers = [usize::MAX; TILE_CELLS];
-                for cell in (0..TILE_CELLS).filter(|cell| wanted(number, *cell)) {
+                for cell in (0..TILE_CELLS).filter(|cell| selected(number, *cell)) {
                     let Some(mut lit) = self.cell(tile, cell) else { continue };
                     let [column, row] = self.column_and_row(tile, cell).map(|position| position / block * block);
                     lit.cell_index = self.number_of([column, row]);
@@ -173,7 +173,8 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         };
         // Fixed chunks, so that the sum does not depend on the number of threads.
         let partial_sums: Vec<[f64; 2]> = self.tiles.par_chunks(TILES_PER_TASK).map(of_tiles).collect();
-        let [sum, squares] = partial_sums.iter().fold([0.0; 2], |sums, part| [sums[0] + part[0], sums[1] + part[1]]);
+        let [sum, squares] =
+            partial_sums.iter().fold([0.0; 2], |total, chunk| [total[0] + chunk[0], total[1] + chunk[1]]);
         (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
     }
 
@@ -236,7 +237,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
     pub(super) fn step(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>) {
         let dark_w = (DARK_MW_PER_M2 * W_PER_KM2 * self.cell_km * self.cell_km) as f32;
         let mut gain = self.fade(decay, dark_w);
-        self.feed(particles, decay, &mut gain);
+        self.add_particles(particles, decay, &mut gain);
     }
 
     /// Applies the decay and frees dark tiles; returns the gain of the particles' power for each remaining tile.
@@ -271,7 +272,12 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
 
     /// Adds the particles' power times the gain of their tile, sequentially, so that sums do not depend on threads. A
     /// new tile takes the gain of its first particle.
-    fn feed(&mut self, particles: &AuroraParticles, decay: &DecayFactors<ALTITUDES>, gain: &mut Vec<[f32; ALTITUDES]>) {
+    fn add_particles(
+        &mut self,
+        particles: &AuroraParticles,
+        decay: &DecayFactors<ALTITUDES>,
+        gain: &mut Vec<[f32; ALTITUDES]>,
+    ) {
         let [xs, zs] = &particles.positions;
         let positions = xs.par_iter().zip(zs).with_min_len(TASK).map(|(x, z)| self.locate([*x, *z]));
         let positions: Vec<(u32, u32)> = positions.map(|(position, cell)| (position as u32, cell as u32)).collect();
@@ -281,22 +287,22 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
             if number == gain.len() {
                 gain.push(decay.of(*energy).map(|kept| 1.0 - kept));
             }
-            let (tile, fractions) = (&mut self.tiles[number], gain[number]);
+            let (tile, gains) = (&mut self.tiles[number], gain[number]);
             let (powers, weighted) = (&mut tile.powers[cell], &mut tile.weighted[cell]);
             // No `mul_add`: outside of vectorized loops it is a library call on targets without FMA.
             for i in 0..ALTITUDES {
-                powers[i] += power * fractions[i];
-                weighted[i] += power * energy * fractions[i];
+                powers[i] += power * gains[i];
+                weighted[i] += power * energy * gains[i];
             }
         }
     }
 
     /// Tile position and cell within the tile, for a position in km.
     #[inline(always)]
-    fn locate(&self, place_km: [f32; 2]) -> (usize, usize) {
+    fn locate(&self, position_km: [f32; 2]) -> (usize, usize) {
         let last = (self.side * TILE_SIDE) as f64 - 1.0;
         let per_km = 1.0 / self.cell_km;
-        let [x, z] = place_km;
+        let [x, z] = position_km;
         let column = ((f64::from(x) + self.half_km) * per_km).clamp(0.0, last) as usize;
         let row = ((f64::from(z) + self.half_km) * per_km).clamp(0.0, last) as usize;
         (row / TILE_SIDE * self.side + column / TILE_SIDE, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
@@ -313,11 +319,11 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
 }
 
 impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
-    /// Sum of both at their centroid, with the index of the first.
+    /// Sum of two cells at their centroid, with the index of the first.
     fn merged_with(self, other: Self) -> Self {
         let whole = [self, other].map(|cell| cell.powers_w.iter().sum::<f32>());
         let fraction = whole[1] / (whole[0] + whole[1]);
-        let mean = |own: f32, other: f32| own + fraction * (other - own);
+        let mean = |first: f32, second: f32| first + fraction * (second - first);
         Self {
             cell_index: self.cell_index,
             position_km: [0, 1].map(|axis| mean(self.position_km[axis], other.position_km[axis])),
@@ -329,12 +335,12 @@ impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
 
 impl AfterglowMap<1> {
     /// Distributes each cell's power to the particles in it in proportion to their power. Returns the power per
-    /// particle, W, and the cells without particles, merged into blocks of `block` by `block`; cells below `faintest`
-    /// times a typical cell are skipped.
+    /// particle, W, and the cells without particles, merged into blocks of `block` by `block`; cells below
+    /// `min_relative_power` times the power of a typical cell are skipped.
     pub(crate) fn distribute_to_particles(
         &self,
         particles: &AuroraParticles,
-        faintest: f32,
+        min_relative_power: f32,
         block: usize,
     ) -> (Vec<f32>, Vec<AfterglowCell<1>>) {
         let cells = self.cells_of(particles);
@@ -344,16 +350,16 @@ impl AfterglowMap<1> {
                 *sum += power;
             }
         }
-        let own = |(cell, power): (&u32, &f32)| {
+        let power_of = |(cell, power): (&u32, &f32)| {
             let cell = *cell as usize;
             let sum = sums.get(cell).copied().unwrap_or_default();
             if sum > 0.0 { self.tiles[cell / TILE_CELLS].powers[cell % TILE_CELLS][0] * (power / sum) } else { 0.0 }
         };
-        let fractions = cells.par_iter().zip(&particles.powers_w).map(own).collect();
-        let faintest = faintest * self.typical_w();
-        let left = |tile: usize, cell: usize| sums[tile * TILE_CELLS + cell] <= 0.0;
-        let lit = |tile: usize, cell: usize| left(tile, cell) && self.tiles[tile].powers[cell][0] > faintest;
-        (fractions, self.blocks(block, lit))
+        let powers = cells.par_iter().zip(&particles.powers_w).map(power_of).collect();
+        let min_power = min_relative_power * self.typical_w();
+        let is_empty = |tile: usize, cell: usize| sums[tile * TILE_CELLS + cell] <= 0.0;
+        let lit = |tile: usize, cell: usize| is_empty(tile, cell) && self.tiles[tile].powers[cell][0] > min_power;
+        (powers, self.blocks(block, lit))
     }
 }
 

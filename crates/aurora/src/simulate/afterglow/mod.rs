@@ -1,7 +1,7 @@
 //! Afterglow of the green and the red line, on maps of the plane at 100 km altitude.
 //!
 //! Blue and violet light is prompt. O(1S) has a lifetime of 0.8 s and O(1D) of up to two minutes, shorter at low
-//! altitudes because of quenching. So green light slightly lags behind a moving sheet and red light stays behind.
+//! altitudes because of quenching. So green light lags slightly behind a moving sheet, and red light stays behind.
 
 mod map;
 

@@ -19,7 +19,7 @@ const TASK_COLUMNS: usize = 64;
 ///
 /// The sine transform along x decouples the equation into one tridiagonal system along z per wave number (Thomas
 /// algorithm). The solution equals converged relaxation (2.6) to rounding. The transform is fast if columns + 1 has
-/// small prime factors: 255 columns are good; 256, where 257 is prime, take twice as long. The number of rows is
+/// small prime factors: 255 columns are fast; 256 columns take twice as long, because 257 is prime. The number of rows is
 /// arbitrary.
 #[derive(Clone)]
 pub struct PoissonSolver {
@@ -68,7 +68,7 @@ impl PoissonSolver {
     ///
     /// If the grid has another size than the solver.
     pub fn solve(&self, grid: &mut Grid2) {
-        assert_eq!(grid.size(), self.size, "a solver is made for one size");
+        assert_eq!(grid.size(), self.size, "a solver is built for one size");
         if grid.values().is_empty() {
             return;
         }
@@ -136,7 +136,7 @@ fn eliminate_block(rows: &mut [&mut [f64]], factors: &[&[f64]], scale: f64) {
 ///
 /// If potential and source differ in size.
 pub fn gauss_seidel_sweep(potential: &mut Grid2, source: &Grid2, screening: f64) -> f64 {
-    assert_eq!(potential.size(), source.size(), "one source a cell");
+    assert_eq!(potential.size(), source.size(), "one source per cell");
     let [columns, rows] = potential.size();
     let area = potential.spacing() * potential.spacing();
     let scale = 1.0 / area.mul_add(screening, 4.0);
@@ -162,19 +162,19 @@ pub fn gauss_seidel_sweep(potential: &mut Grid2, source: &Grid2, screening: f64)
 /// If potential and source differ in size.
 #[must_use]
 pub fn relative_residual(potential: &Grid2, source: &Grid2, screening: f64) -> f64 {
-    assert_eq!(potential.size(), source.size(), "one source a cell");
+    assert_eq!(potential.size(), source.size(), "one source per cell");
     let columns = potential.size()[0];
     let inverse = 1.0 / (potential.spacing() * potential.spacing());
-    let (mut left, mut whole) = (0.0, 0.0);
+    let (mut residual, mut norm) = (0.0, 0.0);
     for (index, source) in source.values().iter().enumerate() {
         let (i, j) = ((index % columns) as isize, (index / columns) as isize);
         let around =
             (potential.at(i - 1, j) + potential.at(i + 1, j)) + (potential.at(i, j - 1) + potential.at(i, j + 1));
         let error = inverse * (around - 4.0 * potential.at(i, j)) - screening * potential.at(i, j) - source;
-        left += error * error;
-        whole += source * source;
+        residual += error * error;
+        norm += source * source;
     }
-    if left == 0.0 { 0.0 } else { (left / whole).sqrt() }
+    if residual == 0.0 { 0.0 } else { (residual / norm).sqrt() }
 }
 
 #[cfg(test)]

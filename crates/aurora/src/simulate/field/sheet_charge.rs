@@ -23,7 +23,7 @@ const MAX_TILT: f64 = 0.9;
 /// Charge per scattered particle as a function of the position along the sheets, linear between nodes; 1 on a long,
 /// straight, isolated sheet.
 ///
-/// With uniform charge the potential would be half as deep at the ends of sheets and deeper where they wind up or lie
+/// With uniform charge the potential would be half as deep at the ends of sheets and deeper where they wind up or are
 /// close together, and particles would collect there. Here the potential is constant along all sheets, as on
 /// conductors. Next to a bend or another sheet the charge is also tilted across the sheet until both edges have the
 /// same potential; otherwise particles would rest beside the drawn line.
@@ -56,8 +56,8 @@ pub(super) struct ChargeTarget {
 }
 
 impl SheetCharge {
-    /// Uniform charge, with nodes about `spacing` km apart, or more where there are few particles.
-    pub(crate) fn even(refined: &RefinedShape, spacing: f64, particles: f64) -> Self {
+    /// Uniform charge, with nodes about `spacing` km apart, or more if there are few particles.
+    pub(crate) fn uniform(refined: &RefinedShape, spacing: f64, particles: f64) -> Self {
         let lengths = refined.sheet_lengths();
         let spacing = spacing.max(lengths.iter().sum::<f64>() / (NODES_PER_PARTICLE * particles));
         let mut starts = vec![0];
@@ -69,7 +69,7 @@ impl SheetCharge {
         Self { nodes: vec![1.0; count], tilts: vec![0.0; count], starts }
     }
 
-    /// How many nodes there are.
+    /// Number of nodes.
     #[cfg(test)]
     pub(crate) fn count(&self) -> usize {
         self.nodes.len()
@@ -94,8 +94,8 @@ impl SheetCharge {
     }
 
     /// Adjusts charge and tilt toward the target potential and equal potentials at both edges.
-    pub(super) fn adjust_toward(&mut self, refined: &RefinedShape, potential: &Grid2, wanted: ChargeTarget) {
-        let ChargeTarget { density, half_thickness, .. } = wanted;
+    pub(super) fn adjust_toward(&mut self, refined: &RefinedShape, potential: &Grid2, target: ChargeTarget) {
+        let ChargeTarget { density, half_thickness, .. } = target;
         let starts = &self.starts;
         let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
             let sheet = starts.partition_point(|start| *start <= index) - 1;
@@ -103,7 +103,7 @@ impl SheetCharge {
             let fraction = (index - starts[sheet]) as f64 / last;
             let position = refined.position(sheet, fraction);
             let found = potential.sample(position.to_array());
-            let change = if found < 0.0 { wanted.potential / found } else { CHANGE[1] };
+            let change = if found < 0.0 { target.potential / found } else { CHANGE[1] };
             *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
             let chord = refined.position(sheet, fraction + 0.5 / last) - refined.position(sheet, fraction - 0.5 / last);
             let across = chord.perp().normalize_or_zero() * half_thickness;
@@ -126,13 +126,14 @@ pub(crate) struct ScatteredParticle {
     pub(crate) position: DVec2,
     /// Index of the nearest sheet.
     pub(crate) sheet: u32,
-    /// Fraction of that sheet's length before it.
+    /// Position along that sheet as a fraction of its length.
     pub(crate) arc_fraction: f32,
     /// Lateral position, -1 to 1 within L_thr.
     pub(super) side: f32,
 }
 
-/// Scatters particles uniformly within `half_thickness` km of the shape; set number `renewal` of `count` trials.
+/// Scatters particles uniformly within `half_thickness` km of the shape, in `count` trials. Each `update_index` has other
+/// random numbers.
 ///
 /// Sampled along the segments, so the cost depends on the number of particles only. A position counts for its nearest
 /// segment, so overlaps are not counted twice.
@@ -141,22 +142,22 @@ pub(crate) fn scatter(
     half_thickness: f64,
     count: usize,
     key: Key,
-    renewal: u32,
+    update_index: u32,
 ) -> Vec<ScatteredParticle> {
     let segments = refined.segments();
     let particle = |index: usize| {
-        let [u, v, ..] = key.words(index as u64, renewal, SCATTER).map(|word| f64::from(uniform(word)));
+        let [u, v, ..] = key.words(index as u64, update_index, SCATTER).map(|word| f64::from(uniform(word)));
         let sample = segments.sample((index as f64 + u) / count as f64)?;
         let side = 2.0 * v - 1.0;
         let position = sample.point + sample.tangent.perp() * (half_thickness * side);
-        let own = [sample.segment.sheet, sample.segment.segment];
+        let segment = [sample.segment.sheet, sample.segment.segment];
         let scattered = ScatteredParticle {
             position,
-            sheet: own[0] as u32,
+            sheet: segment[0] as u32,
             arc_fraction: sample.fraction as f32,
             side: side as f32,
         };
-        (refined.nearest_segment(position) == Some(own)).then_some(scattered)
+        (refined.nearest_segment(position) == Some(segment)).then_some(scattered)
     };
     (0..count).into_par_iter().with_min_len(1024).filter_map(particle).collect()
 }

@@ -22,16 +22,16 @@ use crate::{
     AuroraParameters, FieldCharge, FieldSolver, shapes::FRAME_S, simulate::sheets::refined_shape::RefinedShape,
 };
 
-/// Default screening length l, cells: particles are attracted from a few cells, those farther away can be removed.
+/// Default screening length l, cells: particles within a few cells are attracted, those farther away can be removed.
 const REACH_CELLS: f64 = 3.0;
 /// Iterations of the conductor charge.
 const ADJUSTMENTS: usize = 4;
 /// Minimum particles per task.
 const TASK: usize = 4096;
-/// Field at the edge of a sheet at a pull of 1, cells per frame^2.
+/// Field at the edge of a sheet at an attraction of 1, cells per frame^2.
 const EDGE_FIELD: f64 = 0.25;
 
-/// Everything that does not depend on the shape.
+/// Builds the field of a shape; holds all data that do not depend on the shape.
 #[derive(Clone, Debug)]
 pub(crate) struct FieldBuilder {
     parameters: AuroraParameters,
@@ -140,8 +140,9 @@ impl FieldBuilder {
         // In the middle of a long, straight, isolated sheet.
         let reach = self.reach_km();
         let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
-        let wanted = ChargeTarget { potential, density, half_thickness };
-        let mut charge = SheetCharge::even(refined, self.parameters.cell_km(), self.parameters.particles.count as f64);
+        let target = ChargeTarget { potential, density, half_thickness };
+        let mut charge =
+            SheetCharge::uniform(refined, self.parameters.cell_km(), self.parameters.particles.count as f64);
         let coordinates: Vec<(usize, SheetCoordinate)> = scattered
             .par_iter()
             .with_min_len(TASK)
@@ -159,7 +160,7 @@ impl FieldBuilder {
         let is_conductor = self.parameters.field.charge == FieldCharge::Conductor;
         let adjustments = if density > 0.0 && is_conductor { ADJUSTMENTS } else { 0 };
         for _ in 0..adjustments {
-            charge.adjust_toward(refined, &self.solve_directly(source(&charge)), wanted);
+            charge.adjust_toward(refined, &self.solve_directly(source(&charge)), target);
         }
         source(&charge)
     }
@@ -178,9 +179,9 @@ impl FieldBuilder {
     /// Eq. (2.6), until the maximum number of sweeps or the tolerance.
     fn solve_by_relaxation(&self, source: &Grid2) -> Grid2 {
         let mut potential = self.grid();
-        let least = self.parameters.field.tolerance * self.edge_field() * self.reach_km();
+        let tolerance = self.parameters.field.tolerance * self.edge_field() * self.reach_km();
         let sweeps = self.parameters.field.sweeps;
-        (0..sweeps).take_while(|_| gauss_seidel_sweep(&mut potential, source, self.screening) > least).count();
+        (0..sweeps).take_while(|_| gauss_seidel_sweep(&mut potential, source, self.screening) > tolerance).count();
         potential
     }
 
@@ -219,7 +220,7 @@ impl FieldBuilder {
     }
 }
 
-/// Typical count of a cell that lies entirely within a sheet: the mean over particles of their cell's count.
+/// Typical count of a cell that is entirely within a sheet: the mean over particles of their cell's count.
 pub(crate) fn full_cell_count(counts: &Grid2) -> f64 {
     let sum: f64 = counts.values().iter().sum();
     let squares: f64 = counts.values().iter().map(|count| count * count).sum();
@@ -235,8 +236,8 @@ impl ElectricField {
         for axis in 0..2 {
             let position = coordinates[axis].fma(self.per_km, 0.5 - self.corner[axis]);
             let clamped = if position > 0.0 { position } else { 0.0 };
-            let most = self.size[axis] + 0.999;
-            let clamped = if clamped < most { clamped } else { most };
+            let max = self.size[axis] + 0.999;
+            let clamped = if clamped < max { clamped } else { max };
             cells[axis] = clamped as usize;
             fractions[axis] = clamped - cells[axis] as f32;
         }

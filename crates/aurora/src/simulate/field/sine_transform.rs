@@ -8,9 +8,9 @@ use rustfft::{Fft, FftPlanner, num_complex::Complex};
 
 /// `F_k = sum_j f_j sin(pi j k / (n + 1))`, j and k from 1 to n; applied twice it is `(n + 1) / 2`.
 ///
-/// A row becomes one of n + 1 values of which an ordinary transform yields both parities (Press et al. 2007, 12.4.1), and two rows
-/// are the real and the imaginary part of one transform. `rustfft` chooses its code by the instructions of the machine; where there
-/// are AVX and FMA it is always the same.
+/// A row of n values is folded into n + 1 values whose Fourier transform yields the even and the odd wave numbers (Press et al. 2007,
+/// section 12.4.1). Two rows are transformed at once, as real and imaginary part. `rustfft` selects its code by the instruction set; on
+/// machines with AVX and FMA it is always the same.
 pub(super) struct SineTransform {
     fourier: Arc<dyn Fft<f64>>,
     /// `sin(pi j / (n + 1))`, j from 0 to n.
@@ -19,7 +19,7 @@ pub(super) struct SineTransform {
 }
 
 /// Scratch buffers of a thread.
-pub(super) struct Scratch {
+pub(super) struct TransformScratch {
     spectrum: Vec<Complex<f64>>,
     inner: Vec<Complex<f64>>,
 }
@@ -32,15 +32,15 @@ impl SineTransform {
         Self { fourier: FftPlanner::new().plan_fft_forward(whole), sines, level: Level::new() }
     }
 
-    pub(super) fn scratch(&self) -> Scratch {
-        Scratch {
+    pub(super) fn scratch(&self) -> TransformScratch {
+        TransformScratch {
             spectrum: vec![Complex::default(); self.sines.len()],
             inner: vec![Complex::default(); self.fourier.get_inplace_scratch_len()],
         }
     }
 
     /// Transforms one or two rows, one after the other in `rows`.
-    pub(super) fn apply(&self, rows: &mut [f64], scratch: &mut Scratch) {
+    pub(super) fn apply(&self, rows: &mut [f64], scratch: &mut TransformScratch) {
         let (first, second) = rows.split_at_mut(self.sines.len() - 1);
         let spectrum = &mut scratch.spectrum;
         dispatch!(self.level, _simd => self.fold(first, second, spectrum));
@@ -55,8 +55,8 @@ impl SineTransform {
         });
     }
 
-    /// `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2`, whose cosine sums are `F_(2k+1) - F_(2k-1)` and whose sine sums are
-    /// `F_2k`; of the first row as the real part, of the second, if there is one, as the imaginary part.
+    /// Folds rows: `sin(pi j / N) (f_j + f_(N-j)) + (f_j - f_(N-j)) / 2` with N = n + 1, whose cosine sums are `F_(2k+1) - F_(2k-1)`
+    /// and whose sine sums are `F_2k`. The first row is the real part, the second, if there is one, the imaginary part.
     #[inline(always)]
     fn fold(&self, first: &[f64], second: &[f64], spectrum: &mut [Complex<f64>]) {
         spectrum.fill(Complex::default());
@@ -80,7 +80,7 @@ fn unfold(row: &mut [f64], sums: impl Fn(usize, usize) -> [f64; 2]) {
     let Some(first) = row.first_mut() else { return };
     let mut odd = 0.5 * sums(0, 0)[0];
     *first = odd;
-    // Two by two: F_2k, F_(2k+1); the last stands alone if their number is even.
+    // In pairs F_2k, F_(2k+1); the last pair is incomplete if the number of values is even.
     for (k, values) in row[1..].chunks_mut(2).enumerate().map(|(k, values)| (k + 1, values)) {
         let [cosine, sine] = sums(k, whole - k);
         odd += cosine;

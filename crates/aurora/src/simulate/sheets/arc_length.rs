@@ -151,13 +151,13 @@ impl<'a> PreviousArcMap<'a> {
     }
 
     fn slot(&self, track: usize) -> Option<[usize; 2]> {
-        let index = self.slots.binary_search_by_key(&track, |(own, _)| *own).ok()?;
+        let index = self.slots.binary_search_by_key(&track, |(id, _)| *id).ok()?;
         Some(self.slots[index].1)
     }
 
-    /// Coordinates and directions of a sheet with these control points; `begin` km at the start of a sheet without
-    /// predecessor.
-    fn transfer_sheet(&self, tracks: &[usize], points: &[DVec2], begin: f64) -> (Vec<f64>, Vec<bool>) {
+    /// Coordinates and directions of a sheet with these control points; a sheet without predecessor starts at the coordinate
+    /// `start`, km.
+    fn transfer_sheet(&self, tracks: &[usize], points: &[DVec2], start: f64) -> (Vec<f64>, Vec<bool>) {
         let known: Vec<Option<[usize; 2]>> = tracks.iter().map(|&track| self.slot(track)).collect();
         let (reversed, cumulative_lengths) = (self.reversed(&known, points), cumulative_lengths(points));
         let mut coordinates: Vec<f64> = Vec::with_capacity(points.len());
@@ -173,8 +173,8 @@ impl<'a> PreviousArcMap<'a> {
                         after += 1;
                     }
                     let between = before.filter(|_| after < known.len()).map(|before| [before, after]);
-                    let within =
-                        between.and_then(|ends| self.within(ends, &known, &reversed, (&cumulative_lengths, index)));
+                    let within = between
+                        .and_then(|ends| self.between_known(ends, &known, &reversed, &cumulative_lengths, index));
                     within.or_else(|| Some(self.nearest(points[index])?.0.coordinate))
                 }
             };
@@ -184,7 +184,7 @@ impl<'a> PreviousArcMap<'a> {
                     coordinates[last] - (cumulative_lengths[index] - cumulative_lengths[last])
                 }
                 Some(last) => coordinates[last] + (cumulative_lengths[index] - cumulative_lengths[last]),
-                None => begin,
+                None => start,
             };
             coordinates.push(found.unwrap_or(beyond));
         }
@@ -216,16 +216,18 @@ impl<'a> PreviousArcMap<'a> {
     fn reversed_by_position(&self, points: &[DVec2]) -> bool {
         let middle = points.len() / 2;
         let displacement = points[middle] - points[middle.saturating_sub(1)];
-        self.nearest(points[middle]).is_some_and(|(mark, heading)| displacement.dot(heading) * mark.direction < 0.0)
+        self.nearest(points[middle])
+            .is_some_and(|(position, heading)| displacement.dot(heading) * position.direction < 0.0)
     }
 
     /// Coordinate of a new control point between two existing ones that are still joined, by arc length.
-    fn within(
+    fn between_known(
         &self,
         ends: [usize; 2],
         known: &[Option<[usize; 2]>],
         reversed: &[bool],
-        (cumulative_lengths, index): (&[f64], usize),
+        cumulative_lengths: &[f64],
+        index: usize,
     ) -> Option<f64> {
         let [[sheet, first], [other, second]] = [known[ends[0]]?, known[ends[1]]?];
         let [from, to] = [self.map.coordinates[sheet][first], self.map.coordinates[other][second]];
@@ -255,7 +257,7 @@ fn joined(step: f64, length: f64) -> bool {
     step.abs() <= MAX_STRETCH * long && step.abs() >= length / MAX_STRETCH - SHORT_KM
 }
 
-/// End of the run from point `start`: points that belong together, with a monotonic coordinate.
+/// End of the run from point `start`: points of one sheet with a monotonic coordinate.
 fn run_end(coordinates: &[f64], cumulative_lengths: &[f64], reversed: &[bool], start: usize) -> usize {
     let mut sign = 0.0;
     for index in start + 1..coordinates.len() {
@@ -280,7 +282,7 @@ fn relax_run(coordinates: &mut [f64], cumulative_lengths: &[f64], reversed: bool
     let forward = if first == last { !reversed } else { first < last };
     for (coordinate, length) in coordinates.iter_mut().zip(cumulative_lengths) {
         let displacement = length - middle_length;
-        let wanted = middle + if forward { displacement } else { -displacement };
-        *coordinate += fraction * (wanted - *coordinate);
+        let target = middle + if forward { displacement } else { -displacement };
+        *coordinate += fraction * (target - *coordinate);
     }
 }

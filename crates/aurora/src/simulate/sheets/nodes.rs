@@ -16,18 +16,18 @@ pub(crate) struct NodeLayout {
 }
 
 impl NodeLayout {
-    /// Divides sheets of these lengths into about `all` intervals, each sheet into at least and at most `bounds`.
-    pub(crate) fn new(lengths: &[f64], all: f64, bounds: [f64; 2]) -> Self {
+    /// Divides sheets of these lengths into about `count` intervals, with the minimum and maximum `bounds` per sheet.
+    pub(crate) fn new(lengths: &[f64], count: f64, bounds: [f64; 2]) -> Self {
         let whole = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let mut starts = vec![0];
         for length in lengths {
-            let intervals = (all * length / whole).round().clamp(bounds[0], bounds[1]) as usize;
+            let intervals = (count * length / whole).round().clamp(bounds[0], bounds[1]) as usize;
             starts.push(starts[starts.len() - 1] + intervals + 1);
         }
         Self { starts }
     }
 
-    /// How many nodes a sheet has.
+    /// Number of nodes of a sheet.
     pub(crate) fn count(&self, sheet: usize) -> usize {
         self.starts[sheet + 1] - self.starts[sheet]
     }
@@ -41,7 +41,7 @@ pub(crate) struct NodeValues<'a> {
 }
 
 impl<'a> NodeValues<'a> {
-    /// All of them 0.
+    /// Zero at all nodes.
     pub(crate) fn new(layout: &'a NodeLayout) -> Self {
         Self { layout, values: vec![0.0; layout.starts[layout.starts.len() - 1]] }
     }
@@ -81,29 +81,29 @@ impl<'a> NodeValues<'a> {
         self.values[node] + t * (self.values[node + 1] - self.values[node])
     }
 
-    /// Both together.
+    /// Sum of both.
     pub(crate) fn plus(mut self, other: &Self) -> Self {
         self.values.iter_mut().zip(&other.values).for_each(|(sum, value)| *sum += value);
         self
     }
 
-    /// All values together.
+    /// Sum of all values.
     pub(crate) fn sum(&self) -> f64 {
         self.values.iter().sum()
     }
 
-    /// Power per unit of weight at each node, so that the total is distributed but nowhere more than
-    /// `max_concentration` times the mean. Power of nodes with nearly no weight cannot be distributed completely there.
+    /// Power per unit of weight at each node, at most about `max_concentration` times the mean, such that the total power is
+    /// distributed. Nodes with nearly no weight cannot take all of their power, which goes to the others.
     pub(crate) fn distributed_by(mut self, weights: &Self, max_concentration: f64) -> Self {
         let (whole, weight) = (self.sum(), weights.sum());
-        let most = if weight > 0.0 { max_concentration * whole / weight } else { 0.0 };
-        let mut given = 0.0;
+        let max_factor = if weight > 0.0 { max_concentration * whole / weight } else { 0.0 };
+        let mut distributed = 0.0;
         for (power, weight) in self.values.iter_mut().zip(&weights.values) {
-            *power = (*power / weight.max(f64::MIN_POSITIVE)).min(most);
-            given += *power * weight;
+            *power = (*power / weight.max(f64::MIN_POSITIVE)).min(max_factor);
+            distributed += *power * weight;
         }
-        let rest = if given > 0.0 { whole / given } else { 0.0 };
-        self.values.iter_mut().for_each(|factor| *factor *= rest);
+        let correction = if distributed > 0.0 { whole / distributed } else { 0.0 };
+        self.values.iter_mut().for_each(|factor| *factor *= correction);
         self
     }
 

@@ -12,7 +12,7 @@ use fearless_simd::{Level, dispatch};
 use super::nodes::split;
 use crate::{AuroraParameters, PulsationParameters, RayParameters};
 
-/// Fractal noise of the rays: groups, rays, and fine structure.
+/// Fractal noise of the rays: its octaves are groups of rays, rays, and fine structure.
 const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
 /// Table nodes per cell of the finest octave: linear interpolation is then accurate to a hundredth.
 const NODES_PER_CELL: f64 = 12.0;
@@ -35,7 +35,7 @@ pub(crate) struct RayPattern {
     patches: Noise<2>,
     /// Standard deviation of the noise, for normalization.
     deviation: f32,
-    most_nodes: f64,
+    max_nodes: f64,
 }
 
 /// Noise of the rays on both sides, of black rays and of patches.
@@ -80,7 +80,7 @@ impl RayPattern {
             black: noise(c, Fractal::SINGLE),
             patches: noise(d, Fractal::SINGLE),
             deviation: ((VARIANCE[0] * squares).sqrt() / sum) as f32,
-            most_nodes: NODES_PER_PARTICLE * parameters.particles.count as f64,
+            max_nodes: NODES_PER_PARTICLE * parameters.particles.count as f64,
         }
     }
 
@@ -93,7 +93,7 @@ impl RayPattern {
         time: f64,
     ) -> RayTable {
         let level = Level::new();
-        let node = self.node_km().max(lengths.iter().sum::<f64>() / self.most_nodes);
+        let node = self.node_km().max(lengths.iter().sum::<f64>() / self.max_nodes);
         let sheet = |(sheet, length): (usize, &f64)| {
             let last = (length / node).max(1.0).ceil();
             let coordinates = arc_coordinates(sheet, last as usize);
@@ -118,7 +118,7 @@ impl RayPattern {
         rays.min(others) / NODES_PER_CELL
     }
 
-    /// The pattern at sixteen positions at a time.
+    /// The pattern at sixteen positions.
     pub(crate) fn at(&self, level: Level, coordinates: &PatternInputs, time: f64) -> PatternSample {
         dispatch!(level, _simd => self.combined(coordinates, time))
     }
@@ -145,13 +145,13 @@ impl RayPattern {
         let (shift, age) = (rays.shear_km_per_s * time, time / rays.lifetime_s);
         // Groups of rays are four rays long. Black rays drift against the rays of one side.
         let [group, black, patch] = [4.0 * rays.spacing_km, rays.black_ray_spacing_km, self.pulsation.patch_length_km];
-        let wanted = [
+        let channels = [
             (rays.contrast.max(rays.energy_variation), &self.noise[0], shift, group, age),
             (rays.contrast.max(rays.energy_variation), &self.noise[1], -shift, group, age),
             (rays.black_ray_depth, &self.black, -shift, black, age),
             (self.pulsation.modulation_depth, &self.patches, 0.0, patch, 0.0),
         ];
-        wanted.map(|(strength, noise, shift, scale, age)| {
+        channels.map(|(strength, noise, shift, scale, age)| {
             if strength > 0.0 {
                 values(level, noise, coordinates.map(|coordinate| (coordinate - shift) / scale), age)
             } else {

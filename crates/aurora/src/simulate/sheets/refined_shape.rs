@@ -8,7 +8,7 @@ use bansho_base::{
 use super::arc_length::{ArcLengthMap, ArcPosition};
 use crate::{
     AuroraParameters, FoldParameters,
-    shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetSampler, cumulative_lengths},
+    shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetEnd, SheetSampler, cumulative_lengths},
 };
 
 /// Segments per fold, unless there would be too many.
@@ -31,7 +31,7 @@ pub(crate) struct FoldModel {
     parameters: FoldParameters,
     noise: Noise<2>,
     piece_km: f64,
-    most_pieces: f64,
+    max_pieces: f64,
     half_km: f64,
 }
 
@@ -45,8 +45,8 @@ impl FoldModel {
             if parameters.amplitude_km > 0.0 { parameters.wavelength_km / PIECES_PER_FOLD } else { f64::INFINITY };
         // Detail finer than a fraction of the thickness is not visible.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
-        let most_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(MIN_MAX_SEGMENTS, MAX_SEGMENTS);
-        Self { noise, piece_km, most_pieces, half_km: aurora.extent_km / 2.0, parameters }
+        let max_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(MIN_MAX_SEGMENTS, MAX_SEGMENTS);
+        Self { noise, piece_km, max_pieces, half_km: aurora.extent_km / 2.0, parameters }
     }
 
     /// Lateral displacement of the sheet at a coordinate and a time, km.
@@ -84,6 +84,17 @@ struct SegmentAttributes {
     sheet: u32,
 }
 
+/// A piece of a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SheetPiece {
+    pub(crate) sheet: usize,
+    /// Fraction of the sheet's length at its middle.
+    pub(crate) fraction: f64,
+    /// Factor of the aurora's flux at its middle.
+    pub(crate) flux: f64,
+    pub(crate) length_km: f64,
+}
+
 /// The point of a sheet that is nearest to a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SheetProjection {
@@ -98,28 +109,29 @@ pub(crate) struct SheetProjection {
 impl RefinedShape {
     /// Refines `shape` and the bridges over its gaps at a time, for queries within `reach` km.
     pub(crate) fn new(
-        (shape, bridges): (&Shape, &[Bridge]),
-        along: &ArcLengthMap,
+        shape: &Shape,
+        bridges: &[Bridge],
+        arc_map: &ArcLengthMap,
         folds: &FoldModel,
         time: f64,
         reach: f64,
     ) -> Self {
         // Each control segment has a whole number of segments, at most one more than would fit.
         let segments: usize = shape.sheets.iter().map(|sheet| sheet.points.len().saturating_sub(1)).sum();
-        let piece = folds.piece_km.max(shape.length() / (folds.most_pieces - segments as f64).max(1.0));
+        let piece = folds.piece_km.max(shape.length() / (folds.max_pieces - segments as f64).max(1.0));
         let (mut fine, mut arc_positions) = (Shape::default(), Vec::new());
         for (index, sheet) in shape.sheets.iter().enumerate() {
-            let (mut refined, own) = refine(sheet, piece, |point, t| along.interpolate(index, point, t));
+            let (mut refined, positions) = refine(sheet, piece, |point, t| arc_map.interpolate(index, point, t));
             if folds.parameters.amplitude_km > 0.0 {
-                fold(&mut refined, &own, folds, time);
+                fold(&mut refined, &positions, folds, time);
             }
             fine.sheets.push(refined);
-            arc_positions.push(own);
+            arc_positions.push(positions);
         }
         for bridge in bridges {
-            let (refined, own) = bridge_sheet(bridge, &fine, &arc_positions, piece);
+            let (refined, positions) = bridge_sheet(bridge, &fine, &arc_positions, piece);
             fine.sheets.push(refined);
-            arc_positions.push(own);
+            arc_positions.push(positions);
         }
         let (mut fractions, mut starts) = (Vec::new(), Vec::new());
         for (index, sheet) in fine.sheets.iter().enumerate() {
@@ -136,7 +148,7 @@ impl RefinedShape {
         Self { shape: fine, arc_coordinates, fractions, starts, attributes, near }
     }
 
-    /// Its segments, to be sampled.
+    /// A sampler of its segments.
     pub(crate) fn segments(&self) -> SheetSampler<'_> {
         SheetSampler::new(&self.shape)
     }
@@ -179,56 +191,56 @@ impl RefinedShape {
         (after - 1, fraction_between([fractions[after - 1], fractions[after]], fraction))
     }
 
-    /// All segments, subdivided to at most the fraction `most` of their sheet's length: sheet, fraction of the length
-    /// at its middle, flux factor, length in km.
-    pub(crate) fn pieces(&self, most: impl Fn(usize) -> f64) -> impl Iterator<Item = (usize, f64, f64, f64)> {
+    /// All segments, subdivided into pieces of at most a fraction of their sheet's length, `max_fraction(sheet)`.
+    pub(crate) fn pieces(&self, max_fraction: impl Fn(usize) -> f64) -> impl Iterator<Item = SheetPiece> {
         self.starts.iter().flat_map(move |start| {
-            let [number, index] = start.map(|t| t as usize);
+            let [number, index] = start.map(|index| index as usize);
             let (sheet, fractions) = (&self.shape.sheets[number], &self.fractions[number]);
             let length = sheet.points[index].distance(sheet.points[index + 1]);
-            let count = ((fractions[index + 1] - fractions[index]) / most(number)).ceil().max(1.0);
+            let count = ((fractions[index + 1] - fractions[index]) / max_fraction(number)).ceil().max(1.0);
             (0..count as usize).map(move |t| {
                 let middle = (t as f64 + 0.5) / count;
                 let at = |values: &[f64]| lerp(values[index], values[index + 1], middle);
-                (number, at(fractions), at(&sheet.flux), length / count)
+                SheetPiece { sheet: number, fraction: at(fractions), flux: at(&sheet.flux), length_km: length / count }
             })
         })
     }
 
-    /// Distance to the shape, km; none beyond the reach.
+    /// Distance to the shape, km; `None` beyond the reach.
     pub(crate) fn distance(&self, point: DVec2) -> Option<f64> {
         self.near.distance(point)
     }
 
-    /// Sheet and number of the segment nearest to `point`; none beyond the reach.
+    /// Indices of sheet and segment nearest to `point`; `None` beyond the reach.
     pub(crate) fn nearest_segment(&self, point: DVec2) -> Option<[usize; 2]> {
         self.near.nearest(point).map(|(segment, _)| self.starts[segment].map(|number| number as usize))
     }
 
-    /// `point`, moved toward the shape if it is farther than `most` km from it; unchanged beyond the reach.
-    pub(crate) fn clamp_distance(&self, point: DVec2, most: f64) -> DVec2 {
-        let Some(nearest) = self.near.nearest_point(point).filter(|nearest| nearest.distance_squared > most * most)
+    /// `point`, moved toward the shape if it is farther than `max_distance` km from it; unchanged beyond the reach.
+    pub(crate) fn clamp_distance(&self, point: DVec2, max_distance: f64) -> DVec2 {
+        let Some(nearest) =
+            self.near.nearest_point(point).filter(|nearest| nearest.distance_squared > max_distance * max_distance)
         else {
             return point;
         };
         let [sheet, index] = self.starts[nearest.segment].map(|number| number as usize);
         let points = &self.shape.sheets[sheet].points;
-        let coordinates = points[index].lerp(points[index + 1], nearest.fraction);
-        coordinates + (point - coordinates) * (most / math::sqrt(nearest.distance_squared))
+        let on_sheet = points[index].lerp(points[index + 1], nearest.fraction);
+        on_sheet + (point - on_sheet) * (max_distance / math::sqrt(nearest.distance_squared))
     }
 
-    /// The position nearest to `point`; none beyond the reach.
+    /// The point of a sheet nearest to `point`; `None` beyond the reach.
     #[inline]
     pub(crate) fn project(&self, point: DVec2) -> Option<SheetProjection> {
         let nearest = self.near.nearest_point(point)?;
-        let t = &self.attributes[nearest.segment];
-        let at = |[start, more]: [f64; 2]| start + nearest.fraction * more;
+        let attributes = &self.attributes[nearest.segment];
+        let at = |[start, change]: [f64; 2]| start + nearest.fraction * change;
         Some(SheetProjection {
-            sheet: t.sheet,
-            fraction: at(t.fraction),
-            flux: at(t.flux),
-            energy: at(t.energy),
-            side: nearest.cross * t.per_length,
+            sheet: attributes.sheet,
+            fraction: at(attributes.fraction),
+            flux: at(attributes.flux),
+            energy: at(attributes.energy),
+            side: nearest.cross * attributes.per_length,
         })
     }
 }
@@ -241,20 +253,20 @@ impl SegmentAttributes {
         [sheet, index]: [u32; 2],
     ) -> Self {
         let (number, index) = (sheet as usize, index as usize);
-        let on = &shape.sheets[number];
+        let sheet_points = &shape.sheets[number];
         let along = |values: &[f64]| [values[index], values[index + 1] - values[index]];
-        let length = on.points[index].distance(on.points[index + 1]);
+        let length = sheet_points.points[index].distance(sheet_points.points[index + 1]);
         Self {
             fraction: along(&fractions[number]),
-            flux: along(&on.flux),
-            energy: along(&on.energy),
+            flux: along(&sheet_points.flux),
+            energy: along(&sheet_points.energy),
             per_length: if length > 0.0 { arc_positions[number][index].direction / length } else { 0.0 },
             sheet,
         }
     }
 }
 
-/// How far a fraction of the length is from the one to the other.
+/// Interpolation fraction of a fraction of the length between those of two points, clamped to 0 to 1.
 fn fraction_between([before, end]: [f64; 2], fraction: f64) -> f64 {
     ((fraction - before) / (end - before).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
@@ -301,21 +313,22 @@ fn bridge_sheet(
     arc_positions: &[Vec<ArcPosition>],
     piece_km: f64,
 ) -> (Sheet, Vec<ArcPosition>) {
-    let point = |(sheet, at_end): (usize, bool)| if at_end { fine.sheets[sheet].points.len() - 1 } else { 0 };
-    let [from, to] = bridge.ends.map(|end| fine.sheets[end.0].points[point(end)]);
-    let begin = arc_positions[bridge.ends[0].0][point(bridge.ends[0])];
-    let direction = if bridge.ends[0].1 { begin.direction } else { -begin.direction };
+    let point = |end: SheetEnd| if end.is_end { fine.sheets[end.sheet].points.len() - 1 } else { 0 };
+    let [from, to] = bridge.ends.map(|end| fine.sheets[end.sheet].points[point(end)]);
+    let first_end = bridge.ends[0];
+    let start = arc_positions[first_end.sheet][point(first_end)];
+    let direction = if first_end.is_end { start.direction } else { -start.direction };
     let length = from.distance(to);
     let pieces = (length / piece_km).ceil().max(1.0) as usize;
-    let (mut sheet, mut own) = (Sheet::default(), Vec::new());
+    let (mut sheet, mut arc_positions) = (Sheet::default(), Vec::new());
     for number in 0..=pieces {
         let t = number as f64 / pieces as f64;
         sheet.points.push(from.lerp(to, t));
         sheet.flux.push(bridge.flux);
         sheet.energy.push(bridge.energy);
-        own.push(ArcPosition { coordinate: begin.coordinate + direction * t * length, direction });
+        arc_positions.push(ArcPosition { coordinate: start.coordinate + direction * t * length, direction });
     }
-    (sheet, own)
+    (sheet, arc_positions)
 }
 
 /// Swaps neighboring points closer than `near_km` that are in the wrong order, as occurs where a fold forms. Otherwise
@@ -358,10 +371,10 @@ fn without_backward_component(heading: DVec2, displacement: DVec2) -> DVec2 {
 
 /// Cubic Hermite interpolation.
 fn hermite([a, b]: [DVec2; 2], [at_a, at_b]: [DVec2; 2], t: f64) -> DVec2 {
-    let (distance_squared, rest) = (t * t, 1.0 - t);
-    let rest_square = rest * rest;
-    a * (rest_square * (1.0 + 2.0 * t)) + b * (distance_squared * (3.0 - 2.0 * t)) + at_a * (t * rest_square)
-        - at_b * (distance_squared * rest)
+    let (t_squared, rest) = (t * t, 1.0 - t);
+    let rest_squared = rest * rest;
+    a * (rest_squared * (1.0 + 2.0 * t)) + b * (t_squared * (3.0 - 2.0 * t)) + at_a * (t * rest_squared)
+        - at_b * (t_squared * rest)
 }
 
 /// Displaces every point laterally, and along the sheet so that crests lean over, relative to the coordinate's

@@ -1,4 +1,4 @@
-//! Rays and folds go on as they were where a shape is reached, whatever the order and direction in which its sheets were drawn.
+//! Rays and folds are continuous when a shape is reached, whatever the order and direction in which its sheets were drawn.
 
 use bansho_base::{
     math::{approximations, random::Key},
@@ -32,7 +32,7 @@ fn reached(sheets: Vec<SheetParameters>) -> ShapeParameters {
     ShapeParameters { sheets, ..ShapeParameters::default() }
 }
 
-/// What is seen of the sheets at a moment.
+/// The sheets and their rays at one time.
 struct Seen {
     refined: RefinedShape,
     /// The logarithm of the rays' brightness at positions beside the sheets, some on their left and some on their right.
@@ -49,7 +49,7 @@ impl Seen {
     ) -> Self {
         let folds = FoldModel::new(parameters, KEY);
         let (shape, bridges) = (sequence.at(time), sequence.bridges(time));
-        let refined = RefinedShape::new((&shape, &bridges), along, &folds, time, 40.0);
+        let refined = RefinedShape::new(&shape, &bridges, along, &folds, time, 40.0);
         let rays = RayPattern::new(parameters, KEY);
         let table = rays.table(&refined.sheet_lengths(), |sheet, last| refined.arc_coordinates(sheet, last), time);
         let bright = |position: &DVec2| {
@@ -65,7 +65,7 @@ impl Seen {
         Self { refined, rays }
     }
 
-    /// Farthest that a point of one is from the other, km, both ways.
+    /// Maximum distance of a point of one from the other, km, in both directions.
     fn apart(&self, other: &Self) -> f64 {
         let one_way = |from: &RefinedShape, to: &RefinedShape| {
             let points = from.shape.sheets.iter().flat_map(|sheet| &sheet.points);
@@ -75,16 +75,16 @@ impl Seen {
     }
 }
 
-/// How control points are known again.
+/// How control points are identified between shapes.
 #[derive(Clone, Copy, PartialEq)]
 enum Known {
-    /// As the sequence says.
+    /// By the ids of the sequence.
     ByNumber,
-    /// By their positions in the list of sheets, as if these never changed.
+    /// By their positions in the list of sheets, as if it never changed.
     ByPosition,
 }
 
-/// The most that folds move, km, and that rays change at fixed positions, from just before `arrivals` to just after them.
+/// Maximum motion of folds, km, and maximum change of rays at fixed positions, from just before `arrivals` to just after them.
 fn jumps(
     parameters: &AuroraParameters,
     sequence: &Sequence,
@@ -150,7 +150,7 @@ fn nothing_jumps_where_sheets_were_drawn_in_another_order_and_direction() {
     assert!(folds > 1.0 && rays > 0.3, "{folds} {rays}");
 }
 
-/// Two sheets that were drawn toward each other grow together: one of them is passed the other way from then on.
+/// Two sheets that were drawn toward each other merge: one of them is then listed in the opposite direction.
 #[test]
 fn nothing_jumps_where_a_sheet_joins_one_of_the_other_direction() {
     let mut merge = reached(vec![row(220.0, -220.0, 5.0)]);
@@ -172,7 +172,7 @@ fn nothing_jumps_where_a_sheet_joins_one_of_the_other_direction() {
     assert!(folds < 0.2, "folds jump by {folds} km");
 }
 
-/// A sheet that turns round by thirds has turned end to end when the loop begins again.
+/// A sheet that rotates by thirds is reversed when the loop begins again.
 #[test]
 fn nothing_jumps_where_a_loop_begins_again() {
     let turned = |rotation_deg: f64| SheetParameters { rotation_deg, ..row(-200.0, 200.0, 0.0) };

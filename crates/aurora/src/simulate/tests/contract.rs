@@ -1,4 +1,4 @@
-//! What every phenomenon promises: the same bytes whatever the threads, snapshots, nothing but numbers.
+//! Requirements of every phenomenon: independence of the number of threads, snapshots, finite numbers.
 
 use bansho_base::{
     math::random::{Key, Purpose, uniform},
@@ -29,7 +29,7 @@ fn a_snapshot_goes_on_as_if_nothing_had_happened() {
     let parameters = AuroraParameters { preroll_s: 0.0, shapes: becoming(Form::Fold), ..AuroraParameters::default() };
     let parameters = AuroraParameters { particles: small().particles, ..parameters };
     let mut first = simulation(parameters.clone());
-    // Between two renewals, so that the field is that of an earlier moment.
+    // Between two updates of the target, so that the field is that of an earlier time.
     (0..9).for_each(|_| first.step());
     let bytes = first.snapshot();
     let mut second = simulation(parameters);
@@ -67,7 +67,7 @@ fn a_snapshot_holds_numbers_only() {
     simulation.step();
     let bytes = simulation.snapshot();
     let count = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
-    // Behind version, steps, next number, support, time and renewals: the two courses of the coordinate, each with coordinates, ways and
+    // After version, steps, next id, support, time and target updates: the two arc-length maps, each with coordinates, directions and
     // positions of every sheet.
     let (mut at, mut starts) = (40, Vec::new());
     for _ in 0..2 {
@@ -102,7 +102,7 @@ fn a_snapshot_holds_numbers_only() {
     assert_eq!(simulation.restore(&bytes), Ok(()));
 }
 
-/// Random valid parameters at a bearable cost.
+/// Random valid parameters with limited computing time.
 fn random(trial: u64) -> Result<AuroraSimulation, ShapeError> {
     let key = Key::new(trial, "random aurora");
     let mut count = 0;

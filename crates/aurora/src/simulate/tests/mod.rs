@@ -1,4 +1,4 @@
-//! What the aurora's particles must show.
+//! Behavior of the aurora's particles.
 
 mod arrivals;
 mod contract;
@@ -13,7 +13,7 @@ use crate::{
     shapes::{Form, MergeParameters, Sequence, Shape, ShapeParameters, SheetParameters, SplitParameters},
 };
 
-/// Few particles on a coarse grid, and no folds beside those that are drawn.
+/// Few particles on a coarse grid, without folds.
 fn small() -> AuroraParameters {
     AuroraParameters {
         field: FieldParameters { cells: 127, ..FieldParameters::default() },
@@ -37,7 +37,7 @@ fn shape(sheets: Vec<SheetParameters>) -> ShapeParameters {
     ShapeParameters { sheets, hold_s: 3.0, ..ShapeParameters::default() }
 }
 
-/// A form whose flux is even.
+/// A form with uniform flux.
 fn form(form: Form) -> SheetParameters {
     SheetParameters { form: Some(form), end_taper: 0.0, ..SheetParameters::default() }
 }
@@ -70,7 +70,7 @@ fn merging() -> Vec<ShapeParameters> {
     vec![shape(halves()), ShapeParameters { merge, ..shape(vec![form(Form::Arc)]) }]
 }
 
-/// Particles that are not on their way out.
+/// Particles that are not fading out.
 fn live(simulation: &AuroraSimulation) -> Vec<(DVec2, f64)> {
     let particles = simulation.particles();
     let live = (0..particles.len()).filter(|index| !particles.dying[*index]);

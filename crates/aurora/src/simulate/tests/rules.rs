@@ -1,4 +1,4 @@
-//! The rules one by one, on numbers worked by hand.
+//! The equations one by one, compared with results computed by hand.
 
 use bansho_base::math::random::Key;
 
@@ -30,7 +30,7 @@ fn sheet(points: &[[f64; 2]]) -> Sheet {
 
 fn refined(parameters: &AuroraParameters, sheets: &[&[[f64; 2]]], reach: f64) -> RefinedShape {
     let shape = Shape { sheets: sheets.iter().map(|points| sheet(points)).collect() };
-    RefinedShape::new((&shape, &[]), &ArcLengthMap::alone(&shape), &FoldModel::new(parameters, KEY), 0.0, reach)
+    RefinedShape::new(&shape, &[], &ArcLengthMap::alone(&shape), &FoldModel::new(parameters, KEY), 0.0, reach)
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn the_coordinate_runs_evenly_along_points_that_lie_unevenly() {
 
 #[test]
 fn points_that_have_changed_places_make_no_loop() {
-    // The middle of an S as it is born: two of its points have not turned round yet.
+    // The middle of an S as it forms: two of its points are still in the wrong order.
     let middle =
         [[30.0, -1.5], [20.0, -1.0], [10.0, 0.0], [-0.3, 0.7], [0.3, 0.9], [-10.0, 1.5], [-20.0, 2.0], [-30.0, 3.0]];
     let length = refined(&small(), &[&middle], 20.0).sheet_lengths()[0];
@@ -177,7 +177,7 @@ fn kinetic_and_potential_energy_do_not_grow() {
     }
 }
 
-/// A straight sheet on a grid of cells of 10 km, with as many particles as are asked for in the cell at (0, 0)...(10, 10).
+/// A straight sheet on a grid of cells of 10 km, with `count` particles in the cell at (0, 0)...(10, 10).
 fn relocated(
     count: usize,
     position: impl Fn(f64, f64) -> DVec2,
@@ -198,7 +198,7 @@ fn relocated(
         particles.push(id, position(u, v), [2.0, -1.0], 1.0);
     }
     let mut next = count as u64;
-    Relocation::new(&parameters, KEY).relocate(&mut particles, (&field, &refined, &scattered), 0, &mut next);
+    Relocation::new(&parameters, KEY).relocate(&mut particles, &field, &refined, &scattered, 0, &mut next);
     (particles, next)
 }
 
@@ -224,7 +224,7 @@ fn table_3_3_to_the_letter() {
     let here = born.iter().filter(|p| (0.0..10.0).contains(&p.x) && (0.0..10.0).contains(&p.y)).count();
     assert_eq!((here, born.len(), next), (3, 3 + 390, 47 + 393));
     assert!(particles.fades[47..].iter().all(|fade| *fade == 0.0));
-    // Those that are born have the mean velocity of the cells around; far away there is nobody.
+    // New particles have the mean velocity of the surrounding cells; there are none far away.
     let east = |index: usize| particles.velocities[0][index];
     assert!((47..particles.len()).all(|i| east(i)
         == if particles.position(i).x.abs() < 10.0 || (10.0..20.0).contains(&particles.position(i).x) {
@@ -252,14 +252,14 @@ fn the_coordinate_stays_with_the_sheet_when_it_splits() {
     let numbers = [vec![0, 1, 4], vec![5, 2, 3]];
     let mut split = along.transfer(&parts, &ControlPointIds::alone(&numbers));
     assert_eq!(split.coordinates, [[0.0, 10.0, 14.0], [16.0, 20.0, 30.0]]);
-    // The second part runs away and shrinks to half; its coordinate comes with it and then follows its length.
+    // The second half moves away and shrinks to half its length; its coordinate moves with it and then follows its length.
     let far = Shape { sheets: vec![parts.sheets[0].clone(), sheet(&[[90.0, 9.0], [92.0, 9.0], [97.0, 9.0]])] };
     split = split.transfer(&far, &ControlPointIds::alone(&numbers));
     assert_eq!(split.coordinates[1], [16.0, 20.0, 30.0]);
     (0..1000).for_each(|_| split.relax(0.1));
     let length = split.coordinates[1][2] - split.coordinates[1][0];
     assert!((length - 7.0).abs() < 1e-6 && (split.coordinates[1].iter().sum::<f64>() - 66.0).abs() < 1e-6);
-    // Joined again, the break stays where it was, and neither part is squeezed into it.
+    // When joined again, the discontinuity keeps its position, and neither half is compressed into it.
     let joined = Shape { sheets: vec![sheet(&[[0.0, 0.0], [10.0, 0.0], [90.0, 9.0], [97.0, 9.0]])] };
     let mut again = split.transfer(&joined, &ControlPointIds::alone(&[vec![0, 1, 5, 3]]));
     (0..100).for_each(|_| again.relax(0.1));
@@ -310,10 +310,10 @@ fn when_electrons_stop_each_map_fades_with_its_own_lifetime() {
         };
         let before = go_to(&mut simulation, 0.0);
         assert!((before[1] / before[0] - 1.0).abs() < 0.1, "both are fed alike: {before:?}");
-        // By then particles have let go of their power.
+        // By then the particles have lost their power.
         let [early, late] = [2.0, 3.0].map(|time| go_to(&mut simulation, time));
         assert!(simulation.particles().power_w() < 1e-6 * before[0]);
-        // Red light high up.
+        // Red light at high altitudes.
         let lifetimes =
             [simulation.emission().column(5000.0).lifetime[0], simulation.emission().red_lifetimes(5000.0)[2]];
         // 0.75 s and 134 s where nothing quenches.
@@ -325,7 +325,7 @@ fn when_electrons_stop_each_map_fades_with_its_own_lifetime() {
     }
 }
 
-/// Eq. (2.2) to the letter: the charge of a cell is its count.
+/// Eq. (2.2) literally: the charge of a cell is its count.
 #[test]
 fn an_even_charge_is_the_count() {
     let of = |charge: FieldCharge| {

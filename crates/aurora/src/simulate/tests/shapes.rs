@@ -1,15 +1,15 @@
-//! Particles go where the shapes are.
+//! Particles follow the shapes.
 
 use super::*;
 use crate::{RepulsionKernel, shapes::NearestSegmentGrid, simulate::field::sheet_charge::SheetCharge};
 
-/// Seconds after a shape is reached from which on particles are where they shall be, how often that is looked at, and for how long.
+/// Time after the arrival of a shape from which on particles must be on it, s, interval of the checks, and their duration.
 const SETTLED_S: f64 = 1.5;
 const MOMENT_STEPS: u64 = 15;
 const WATCHED_S: f64 = 3.5;
 
-/// What particles must do at one moment: how many lie within L_thr of the target, how many in the gaps, and what the least stretch holds of
-/// its fraction of the power and of the particles.
+/// Distribution of the particles at one time: fractions within L_thr of the target and in gaps, and the minimum over intervals of their power
+/// and count relative to the expected values.
 struct Moment {
     within: f64,
     in_gaps: f64,
@@ -46,7 +46,7 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
     ] {
         let mut parameters = AuroraParameters { shapes, ..small() };
         parameters.field.cells = cells;
-        // Rays brighten and darken stretches on purpose.
+        // Rays brighten and darken intervals intentionally.
         parameters.rays.contrast = 0.0;
         let sequence = sequence(&parameters);
         let mut simulation = simulation(parameters);
@@ -70,7 +70,7 @@ fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
     }
 }
 
-/// A sheet through these points, taken to as they are.
+/// A sheet through these points, unchanged.
 fn through(points: Vec<[f64; 2]>) -> SheetParameters {
     SheetParameters { points: Some(points), smooth: false, end_taper: 0.0, ..SheetParameters::default() }
 }
@@ -116,7 +116,7 @@ fn least_stretch(simulation: &AuroraSimulation) -> f64 {
     intervals.fold(f64::INFINITY, f64::min)
 }
 
-/// With the particles, cells and folds of a scene that says nothing of them, on arrival and ever after.
+/// With default particles, cells and folds, from the arrival on.
 #[test]
 fn every_stretch_holds_its_share_from_the_arrival_on() {
     for (name, sheet) in
@@ -197,7 +197,7 @@ fn nothing_jumps_from_frame_to_frame_through_split_merge_and_relocation() {
     }
 }
 
-/// Median distance from a particle of a straight sheet to its nearest neighbor, beside that of as many strewn at random.
+/// Median distance from a particle of a straight sheet to its nearest neighbor, relative to that of uniformly random particles.
 fn parting(kernel: RepulsionKernel) -> f64 {
     let mut parameters = AuroraParameters { shapes: vec![shape(vec![line([-200.0, 0.0], [200.0, 0.0])])], ..small() };
     parameters.particles.kernel = kernel;
@@ -223,7 +223,7 @@ fn parting(kernel: RepulsionKernel) -> f64 {
     distances[distances.len() / 2] / random
 }
 
-/// What the kernels differ in: not in rays as they are drawn, but in how close to each other particles come.
+/// The kernels differ in the minimum distance of particles, not in rays as they are drawn.
 #[test]
 fn poly6_with_spiky_parts_particles_that_the_spline_lets_be() {
     let [spline, parted] = [RepulsionKernel::CubicSpline, RepulsionKernel::Poly6Spiky].map(parting);
@@ -275,7 +275,7 @@ fn rays_have_more_contrast_with_the_spline_while_particles_are_few() {
     assert!((many[0] / many[1] - 1.0).abs() < 0.07, "{many:?}: then the book is wrong");
 }
 
-/// How many pieces, and nodes of charge, the sheets of a course are followed by; a benchmark tells what a step of them costs.
+/// Numbers of segment pieces and of charge nodes; a benchmark measures the cost of a step.
 #[test]
 fn what_is_found_along_the_sheets_is_bounded_by_the_particles_not_by_the_drawn_shapes() {
     let of = |rows: i32, particles: i64| {
@@ -289,7 +289,7 @@ fn what_is_found_along_the_sheets_is_bounded_by_the_particles_not_by_the_drawn_s
         let refined = simulation(parameters).refined_shape();
         let lengths = refined.sheet_lengths().iter().sum::<f64>();
         let spacing = AuroraParameters::default().cell_km();
-        let charge = SheetCharge::even(&refined, spacing, particles as f64).count();
+        let charge = SheetCharge::uniform(&refined, spacing, particles as f64).count();
         (lengths, refined.pieces(|_| 1.0).count(), charge)
     };
     let (short, pieces, charge) = of(1, 120_000);

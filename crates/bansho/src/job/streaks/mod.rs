@@ -19,7 +19,7 @@ use bansho_rain::{
     billboards::texture::StreakCube,
     drops::{
         size_distribution::{DropSizeDistribution, SizeBin},
-        terminal_velocity::{Air, TerminalVelocity, VelocityLaw, fixed_point_velocity},
+        terminal_velocity::{FallAir, TerminalVelocity, VelocityLaw, fixed_point_velocity},
     },
     lighting::drop_phase_function::DropPhaseFunction,
 };
@@ -112,7 +112,7 @@ impl Streaks {
     /// The first thing that makes no sense or stands in the way.
     pub fn prepare(&self) -> Result<PreparedStreaks, JobError> {
         fault::check(self)?;
-        let air = Air::default();
+        let air = FallAir::default();
         if self.law == VelocityLaw::RigidSphere {
             // Where the drops of a bin have diameters of their own, its ends stand for them.
             let bins = SizeBin::around(&self.diameters);

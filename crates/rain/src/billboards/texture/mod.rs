@@ -26,7 +26,7 @@ pub struct StreakCube {
     pub edge: f64,
     /// Pixels on a side of the texture.
     pub size: usize,
-    /// How long the shutter is open, s.
+    /// Duration of the exposure, s.
     pub exposure: f64,
     /// Terminal velocity of the drops.
     pub terminal_velocity: TerminalVelocity,

@@ -13,7 +13,7 @@ fn sum(image: &Image<1>) -> f64 {
     image.pixels().iter().map(|&[opacity]| f64::from(opacity)).sum()
 }
 
-/// What a texture hides in all, m^2.
+/// Total blocked area of a texture, m^2.
 fn hidden(cube: &StreakCube, drops: &[FallingDrop]) -> f64 {
     sum(&cube.draw(drops)) * cube.pixel() * cube.pixel()
 }

@@ -2,7 +2,7 @@ use bansho_base::math::random::{Key, Purpose};
 
 use super::*;
 use crate::{
-    drops::terminal_velocity::{Air, VelocityLaw},
+    drops::terminal_velocity::{FallAir, VelocityLaw},
     tests::reference::{fields, near, rows},
 };
 
@@ -38,7 +38,7 @@ fn rain_rates_water_and_shares_are_those_of_the_reference() {
             _ => continue,
         };
         let (sizes, fall) =
-            (DropSizeDistribution::marshall_palmer(rate), TerminalVelocity { law, air: Air::default() });
+            (DropSizeDistribution::marshall_palmer(rate), TerminalVelocity { law, air: FallAir::default() });
         assert!(near(sizes.count(DropSizeDistribution::ALL), drops, 1e-4) && near(sizes.liquid_water(), water, 1e-4));
         assert!(near(sizes.rain_rate(&fall, DropSizeDistribution::ALL), whole, 2e-3), "{line}");
         assert!(near(sizes.rain_rate(&fall, [0.0, 6.0]), to_six, 2e-3), "{line}");

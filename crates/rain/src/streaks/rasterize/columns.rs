@@ -4,12 +4,9 @@ use bansho_base::math::MulAdd;
 
 use super::{
     StreakSegment,
-    tile::{TileBuffer, TileRows},
+    tile::{TILE_COLUMNS, TILE_ROWS, TileBuffer, TileRows},
 };
-use crate::{
-    lanes::{fast_max, fast_min},
-    streaks::bin::{TILE_COLUMNS, TILE_ROWS},
-};
+use crate::lanes::{fast_max, fast_min};
 
 /// Cumulative distribution of a disc's area: the fraction left of `t`, for a disc from -1 to 1. The integral of `2
 /// sqrt(1 - t^2) / pi`, which is the streak's profile. A series whose last term is chosen so that it ends at 1; the
@@ -34,14 +31,14 @@ trait ColumnCoverage {
 }
 
 impl StreakSegment {
-    /// Composites it under the contents of a tile; `measure` gets column and row within the tile and the opacity of
+    /// Composites the streak under the contents of a tile; `measure` gets column and row within the tile and the opacity of
     /// each pixel.
     #[inline(always)]
     pub(crate) fn draw(&self, buffer: &mut TileBuffer, measure: &mut impl FnMut([usize; 2], f32)) {
         // All coordinates are relative to the streak's center.
         let [left, top] = [0, 1].map(|axis| buffer.origin()[axis] as i32 as f32 - self.center[axis]);
         let touched_columns = self.touched_columns(left, top);
-        // Nothing of it lies left of its first column, unless the tile begins there.
+        // The streak does not extend to the left of its first column, unless the tile begins there.
         let clip_left = if touched_columns.start > 0 { None } else { Some(left) };
         match (self.is_wide(), self.steep) {
             (false, true) => {
@@ -67,7 +64,7 @@ impl StreakSegment {
         }
     }
 
-    /// Columns of a tile that it may touch.
+    /// Columns of a tile that the streak may touch.
     #[inline(always)]
     fn touched_columns(&self, left: f32, top: f32) -> std::ops::Range<usize> {
         let (reach, bottom) = (self.reach(), top + TILE_ROWS as f32);
@@ -130,22 +127,22 @@ struct SteepStreak {
 impl SteepStreak {
     #[inline(always)]
     fn new(segment: &StreakSegment, clip_left: Option<f32>, top: f32) -> Self {
-        let mut down = Self {
+        let mut streak = Self {
             coverage: [0.0; TILE_ROWS],
             center: [0.0; TILE_ROWS],
             scale: 1.0 / segment.half_width,
             cdf_left: [0.0; TILE_ROWS],
         };
         for row in 0..TILE_ROWS {
-            (down.coverage[row], down.center[row]) =
+            (streak.coverage[row], streak.center[row]) =
                 segment.line_crossing(top + ROW_OFFSETS[row], top + NEXT_ROW_OFFSETS[row]);
         }
         if let Some(left) = clip_left {
             for row in 0..TILE_ROWS {
-                down.cdf_left[row] = disc_cdf((left - down.center[row]) * down.scale);
+                streak.cdf_left[row] = disc_cdf((left - streak.center[row]) * streak.scale);
             }
         }
-        down
+        streak
     }
 }
 
@@ -212,7 +209,7 @@ impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
     }
 }
 
-/// Least half chord, pixels: avoids a division by zero.
+/// Minimum half chord, pixels: avoids a division by zero.
 const MIN_HALF_CHORD: f32 = 0.1;
 
 /// Cumulative distribution of a chord's coverage along its path: of the overlap of `+-chord` about `along` with the
@@ -228,9 +225,9 @@ fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
 /// Integral of `clamp(s, -chord, chord)` from 0 to `s`.
 #[inline(always)]
 fn clamp_integral(s: f32, chord: f32) -> f32 {
-    let size = s.abs();
-    let limit = fast_min(chord, size);
-    limit * (size - 0.5 * limit)
+    let magnitude = s.abs();
+    let limit = fast_min(chord, magnitude);
+    limit * (magnitude - 0.5 * limit)
 }
 
 /// Clamps rounding errors.

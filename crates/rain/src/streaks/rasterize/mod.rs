@@ -49,7 +49,7 @@ pub(crate) struct ScreenPath {
 
 /// Half width from which on a streak is treated as wide, pixels. The ends of thin ones are sharp.
 const MIN_WIDE_HALF_WIDTH: f32 = 1.25;
-/// Least half length of a wide one, pixels.
+/// Minimum half length of a wide streak, pixels.
 const MIN_HALF_LENGTH: f32 = 0.1;
 
 impl StreakSegment {
@@ -106,7 +106,7 @@ impl StreakSegment {
         (if square > 0.0 { square.sqrt() } else { 0.0 }) / (self.slope * self.slope + 1.0)
     }
 
-    /// How far it extends along its major axis from the center, pixels.
+    /// Half of its extent along the major axis, pixels.
     #[inline(always)]
     fn reach(&self) -> f32 {
         if self.is_wide() {
@@ -131,8 +131,9 @@ mod tests {
     use bansho_base::{image::Rect, phenomenon::strip::Strip};
     use fearless_simd::{Level, dispatch};
 
+    use super::tile::TILE_ROWS;
     use super::{tile::TileBuffer, *};
-    use crate::streaks::{bin::TILE_ROWS, coverage::Streak};
+    use crate::streaks::coverage::Streak;
 
     /// What a drop hides that does not overlap itself.
     fn disc(radius: f32) -> f32 {

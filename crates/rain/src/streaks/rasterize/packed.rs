@@ -27,7 +27,7 @@ const UM_PER_MM: f32 = 1000.0;
 
 /// Rounds to bfloat16: the upper half of an `f32`.
 #[inline(always)]
-fn bits(value: f32) -> u16 {
+fn f32_to_bf16(value: f32) -> u16 {
     ((value.to_bits() + (1 << 15)) >> 16) as u16
 }
 
@@ -37,13 +37,13 @@ fn bf16_to_f32(bits: u16) -> f32 {
     f32::from_bits(u32::from(bits) << 16)
 }
 
-/// The nearest bfloat16, as kept for half widths.
+/// The nearest bfloat16, the format of half widths.
 #[inline(always)]
 pub(super) fn round_to_bf16(value: f32) -> f32 {
-    bf16_to_f32(bits(value))
+    bf16_to_f32(f32_to_bf16(value))
 }
 
-/// The nearest slope that is kept, for slopes of -1 to 1.
+/// The nearest representable slope, for slopes of -1 to 1.
 #[inline(always)]
 pub(super) fn quantize_slope(value: f32) -> f32 {
     approximations::rounded(value * SLOPE_SCALE) * (1.0 / SLOPE_SCALE)
@@ -60,7 +60,7 @@ impl PackedStreak {
     pub(crate) fn new(segment: &StreakSegment) -> Self {
         let mut light = [0; 3];
         for c in 0..3 {
-            light[c] = bits(segment.shading.light[c]);
+            light[c] = f32_to_bf16(segment.shading.light[c]);
         }
         Self {
             center: segment.center,
@@ -68,7 +68,7 @@ impl PackedStreak {
             line_coverage: segment.line_coverage,
             depth: segment.shading.depth,
             slope: round_to_u16(segment.slope * SLOPE_SCALE) as i16,
-            half_width: bits(segment.half_width),
+            half_width: f32_to_bf16(segment.half_width),
             light,
             diameter_and_steep: round_to_u16(segment.diameter_mm * UM_PER_MM) & !STEEP_BIT
                 | if segment.steep { STEEP_BIT } else { 0 },

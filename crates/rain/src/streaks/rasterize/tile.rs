@@ -3,7 +3,10 @@
 use bansho_base::{image::Rect, math::MulAdd, phenomenon::strip::GrayPlanes};
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use crate::streaks::bin::{TILE_COLUMNS, TILE_ROWS};
+/// Rows of a tile: one SIMD vector.
+pub(crate) const TILE_ROWS: usize = 8;
+/// Columns of a tile: its pixels and their depths fit into the L1 cache.
+pub(crate) const TILE_COLUMNS: usize = 128;
 
 /// One `f32` for each of the eight pixels of a column.
 pub(crate) type TileRows = [f32; TILE_ROWS];

@@ -5,21 +5,19 @@
 use bansho_base::math::{self, MulAdd, approximations, simd::FourLanes};
 use fearless_simd::Simd;
 
-use super::columns::ColumnStrip;
-use crate::{
-    render::{
-        bin::source_bins::{FieldLineSource, SourceBins, StripEntry},
-        project::{
-            altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials},
-            chart::{Chart, ChartProjection, STRIP_COLUMNS},
-            field_lines::FieldLines,
-        },
+use super::rasterize::{QUAD_ROWS, RowQuad, TrackRasterizer};
+use crate::render::{
+    bin::source_bins::{BlockEntry, FieldLineSource, SortedSources},
+    integrate::columns::ColumnBlock,
+    project::{
+        altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials},
+        chart::{BLOCK_COLUMNS, Chart, ChartProjection},
+        field_lines::FieldLines,
     },
-    single_collisions::rasterize::{QUAD_ROWS, RowQuad, TrackRasterizer},
 };
 
-/// Columns per block: the wider, the fewer sources are projected more than once.
-pub(crate) const BLOCK_COLUMNS: usize = 4 * STRIP_COLUMNS;
+/// Columns per block of single collisions: the wider, the fewer sources are projected more than once.
+pub(crate) const COLLISION_BLOCK_COLUMNS: usize = 4 * BLOCK_COLUMNS;
 
 /// Distance intervals per octave, in each of which field lines differ by a shift of their rows only, to within a
 /// hundredth.
@@ -35,36 +33,36 @@ pub(crate) struct CachedProjection {
     column: u32,
     /// Distance of that line, km.
     pub(crate) distance: f32,
-    pub(crate) descent: RowPolynomials,
+    pub(crate) polynomials: RowPolynomials,
 }
 
-/// Buffers that a thread reuses from block to block.
-pub(crate) struct ColumnBlock {
+/// The accumulation buffer of a block, which a thread reuses from block to block.
+pub(crate) struct CollisionBlock {
     /// Groups of four rows, column by column; only those within `valid` are initialized.
     light: Vec<RowQuad>,
-    valid: [[usize; 2]; BLOCK_COLUMNS],
+    valid: [[usize; 2]; COLLISION_BLOCK_COLUMNS],
     /// Groups of four rows per column.
     stride: usize,
     /// Sources of the block, sorted by their first column.
-    entries: Vec<StripEntry>,
-    /// Cosines and sines of the columns' longitudes, padded by one strip.
-    units: [[f32; BLOCK_COLUMNS + STRIP_COLUMNS]; 2],
-    meridians: [[f32; 3]; BLOCK_COLUMNS],
+    entries: Vec<BlockEntry>,
+    /// Cosines and sines of the columns' longitudes, padded by [`BLOCK_COLUMNS`].
+    units: [[f32; COLLISION_BLOCK_COLUMNS + BLOCK_COLUMNS]; 2],
+    meridians: [[f32; 3]; COLLISION_BLOCK_COLUMNS],
     /// Direct-mapped cache of projections by distance interval and column parity.
     cache: Vec<CachedProjection>,
 }
 
-impl ColumnBlock {
+impl CollisionBlock {
     pub(crate) fn new(chart: &Chart) -> Self {
         // Odd, to avoid cache-set aliasing between the same row of neighboring columns.
         let stride = chart.rows.div_ceil(QUAD_ROWS) | 1;
         Self {
-            light: vec![RowQuad::DARK; stride * BLOCK_COLUMNS],
-            valid: [[usize::MAX, 0]; BLOCK_COLUMNS],
+            light: vec![RowQuad::DARK; stride * COLLISION_BLOCK_COLUMNS],
+            valid: [[usize::MAX, 0]; COLLISION_BLOCK_COLUMNS],
             stride,
             entries: Vec::new(),
-            units: [[0.0; BLOCK_COLUMNS + STRIP_COLUMNS]; 2],
-            meridians: [[0.0; 3]; BLOCK_COLUMNS],
+            units: [[0.0; COLLISION_BLOCK_COLUMNS + BLOCK_COLUMNS]; 2],
+            meridians: [[0.0; 3]; COLLISION_BLOCK_COLUMNS],
             cache: (0..2 * RANGES).map(|slot| CachedProjection::none(slot / 2)).collect(),
         }
     }
@@ -74,36 +72,36 @@ impl ColumnBlock {
         &mut self,
         index: usize,
         chart: &Chart,
-        source_bins: &SourceBins,
+        sorted_sources: &SortedSources,
         field: &FieldLines,
-    ) -> Vec<StripEntry> {
-        self.valid = [[usize::MAX, 0]; BLOCK_COLUMNS];
+    ) -> Vec<BlockEntry> {
+        self.valid = [[usize::MAX, 0]; COLLISION_BLOCK_COLUMNS];
         for cached in &mut self.cache {
             cached.column = NONE;
         }
-        for column in 0..BLOCK_COLUMNS {
-            let unit = chart.longitude_cos_sin(index * BLOCK_COLUMNS + column);
+        for column in 0..COLLISION_BLOCK_COLUMNS {
+            let unit = chart.longitude_cos_sin(index * COLLISION_BLOCK_COLUMNS + column);
             self.meridians[column] = field.meridian(unit).coefficients_f32();
             for (values, value) in self.units.iter_mut().zip(unit) {
                 values[column] = value as f32;
             }
         }
-        self.sort(index, source_bins);
+        self.sort(index, sorted_sources);
         std::mem::take(&mut self.entries)
     }
 
     /// Counting sort by first column, for cache locality of the writes.
-    fn sort(&mut self, index: usize, source_bins: &SourceBins) {
-        let mut starts = [0; BLOCK_COLUMNS + 1];
-        for entry in source_bins.entries(index).flatten() {
+    fn sort(&mut self, index: usize, sorted_sources: &SortedSources) {
+        let mut starts = [0; COLLISION_BLOCK_COLUMNS + 1];
+        for entry in sorted_sources.entries(index).flatten() {
             starts[entry.columns().start + 1] += 1;
         }
-        for column in 0..BLOCK_COLUMNS {
+        for column in 0..COLLISION_BLOCK_COLUMNS {
             starts[column + 1] += starts[column];
         }
         self.entries.clear();
-        self.entries.resize(starts[BLOCK_COLUMNS], StripEntry::default());
-        for entry in source_bins.entries(index).flatten() {
+        self.entries.resize(starts[COLLISION_BLOCK_COLUMNS], BlockEntry::default());
+        for entry in sorted_sources.entries(index).flatten() {
             let next = &mut starts[entry.columns().start];
             self.entries[*next] = *entry;
             *next += 1;
@@ -111,16 +109,16 @@ impl ColumnBlock {
     }
 
     /// Returns the entry list for reuse.
-    pub(crate) fn recycle(&mut self, entries: Vec<StripEntry>) {
+    pub(crate) fn recycle(&mut self, entries: Vec<BlockEntry>) {
         self.entries = entries;
     }
 
     /// Cosines and sines from a column on.
     #[inline(always)]
-    pub(crate) fn units(&self, column: usize) -> [[f32; STRIP_COLUMNS]; 2] {
-        let mut units = [[0.0; STRIP_COLUMNS]; 2];
+    pub(crate) fn units(&self, column: usize) -> [[f32; BLOCK_COLUMNS]; 2] {
+        let mut units = [[0.0; BLOCK_COLUMNS]; 2];
         for (units, all) in units.iter_mut().zip(&self.units) {
-            units.copy_from_slice(&all[column..column + STRIP_COLUMNS]);
+            units.copy_from_slice(&all[column..column + BLOCK_COLUMNS]);
         }
         units
     }
@@ -139,13 +137,14 @@ impl ColumnBlock {
         simd: S,
         column: usize,
         distance: f32,
-        (descents, projection): (&RowPolynomialBasis, &ChartProjection),
+        basis: &RowPolynomialBasis,
+        projection: &ChartProjection,
     ) -> &CachedProjection {
         let range = ((approximations::log2(distance) * RANGES_PER_OCTAVE).max(0.0) as usize).min(RANGES - 1);
         let cached = &mut self.cache[2 * range + column % 2];
         if cached.column != column as u32 {
             let line = ProjectedFieldLine::new(&self.meridians[column], cached.distance, projection);
-            (cached.column, cached.descent) = (column as u32, descents.fit(simd, &line));
+            (cached.column, cached.polynomials) = (column as u32, basis.fit(simd, &line));
         }
         cached
     }
@@ -162,19 +161,19 @@ impl ColumnBlock {
     }
 
     /// Writes the block to the picture.
-    pub(crate) fn write(&self, strip: ColumnStrip, rows: usize) {
-        let columns = strip.light.chunks_mut(rows).zip(strip.valid_rows);
-        for ((own, valid), (light, rows_lit)) in self.light.chunks(self.stride).zip(&self.valid).zip(columns) {
+    pub(crate) fn write(&self, block: ColumnBlock, rows: usize) {
+        let columns = block.light.chunks_mut(rows).zip(block.valid_rows);
+        for ((quads, valid), (light, valid_rows)) in self.light.chunks(self.stride).zip(&self.valid).zip(columns) {
             let [first, end] = *valid;
             if first >= end {
                 continue;
             }
             let last = rows.min(end * QUAD_ROWS);
-            for (quad, light) in own[first..end].iter().zip(light[first * QUAD_ROWS..last].chunks_mut(QUAD_ROWS)) {
+            for (quad, light) in quads[first..end].iter().zip(light[first * QUAD_ROWS..last].chunks_mut(QUAD_ROWS)) {
                 let light = light.as_flattened_mut();
                 light.copy_from_slice(&quad.0[..light.len()]);
             }
-            *rows_lit = [(first * QUAD_ROWS) as u32, last as u32];
+            *valid_rows = [(first * QUAD_ROWS) as u32, last as u32];
         }
     }
 }
@@ -182,7 +181,7 @@ impl ColumnBlock {
 impl CachedProjection {
     fn none(range: usize) -> Self {
         let distance = math::exp2((range as f64 + 0.5) / f64::from(RANGES_PER_OCTAVE)) as f32;
-        Self { column: NONE, distance, descent: RowPolynomials::default() }
+        Self { column: NONE, distance, polynomials: RowPolynomials::default() }
     }
 }
 

@@ -84,13 +84,14 @@ impl TrackRasterizer {
         self.active_count = 0;
     }
 
-    /// Adds the light of the first `count` points.
+    /// Adds the light of the first `count` points, by their rows of the photon table.
     #[inline(always)]
     pub(super) fn add<S: Simd>(
         &mut self,
         simd: S,
         points: &SplatBatch,
-        (lights, count): (&[u16; SPLAT_LANES], usize),
+        photon_rows: &[u16; SPLAT_LANES],
+        count: usize,
         photons: &[PerEmitter<f32>],
     ) {
         let light = self.light[self.start..].as_chunks_mut().0;
@@ -99,13 +100,13 @@ impl TrackRasterizer {
         let mut sums = RowPairSums { light: &mut light[..pairs], touched: &mut self.touched[..pairs], photons };
         if count < SPLAT_LANES {
             for lane in 0..count {
-                sums.add(simd, points, lane, lights[lane]);
+                sums.add(simd, points, lane, photon_rows[lane]);
             }
             return;
         }
         for first in (0..SPLAT_LANES).step_by(UNROLLED) {
             for lane in first..first + UNROLLED {
-                sums.add(simd, points, lane, lights[lane]);
+                sums.add(simd, points, lane, photon_rows[lane]);
             }
         }
     }
@@ -129,9 +130,9 @@ impl TrackRasterizer {
             let even = &mut even[2 * from..][..2 * SPLAT_LANES];
             let odd = &mut odd[2 * from..][..2 * SPLAT_LANES + 1];
             // The second and third odd pair of a quad are at the next byte.
-            let [own, odd_own, odd_next] =
+            let [touched_even, touched_odd, touched_next_odd] =
                 [&*even, &odd[..2 * SPLAT_LANES], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
-            let touched: u16x16<S> = (own | odd_own | odd_next).bitcast();
+            let touched: u16x16<S> = (touched_even | touched_odd | touched_next_odd).bitcast();
             none.store_slice(even);
             none.store_slice(&mut odd[..2 * SPLAT_LANES]);
             let quads = quads + from as u16;
@@ -159,15 +160,15 @@ impl TrackRasterizer {
         }
     }
 
-    /// Adds it with weights to a column.
+    /// Adds the track with weights to a column.
     #[inline(always)]
     pub(crate) fn add_to<S: Simd>(&self, column: &mut [RowQuad], weights: FourLanes<S>) {
         let two = weights.combine(weights);
         let four = two.combine(two);
         for (quad, merged) in self.active_quads().iter().zip(&self.merged) {
             let Some(light) = column.get_mut(*quad as usize) else { continue };
-            let [own, all] = [&merged.0, &light.0].map(|light| Lanes::from_slice(four.simd, light));
-            own.fma(four, all).store_slice(&mut light.0);
+            let [track, sum] = [&merged.0, &light.0].map(|light| Lanes::from_slice(four.simd, light));
+            track.fma(four, sum).store_slice(&mut light.0);
         }
     }
 }
@@ -181,9 +182,9 @@ struct RowPairSums<'a> {
 
 impl RowPairSums<'_> {
     #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, points: &SplatBatch, lane: usize, light: u16) {
+    fn add<S: Simd>(&mut self, simd: S, points: &SplatBatch, lane: usize, photon_row: u16) {
         let pair = points.pairs[lane] as usize;
-        let photons = self.photons.get(light as usize);
+        let photons = self.photons.get(photon_row as usize);
         let (Some(photons), Some(both), Some(touched)) =
             (photons, self.light.get_mut(pair), self.touched.get_mut(pair))
         else {
@@ -200,7 +201,7 @@ impl RowPairSums<'_> {
 /// Collisions per batch.
 pub(super) const SPLAT_LANES: usize = LANES;
 
-/// Row pairs of collisions and the weights of both rows. Collisions outside have weight 0 and a distinct pair each
+/// Row pairs of collisions and the weights of both rows. Collisions outside have weight 0, each with another pair
 /// below the chart, to avoid dependent sums.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -213,21 +214,21 @@ pub(super) struct SplatBatch {
 
 /// Minimum and maximum row per lane.
 pub(super) struct RowRange<S: Simd> {
-    least: Lanes<S>,
-    greatest: Lanes<S>,
+    min: Lanes<S>,
+    max: Lanes<S>,
 }
 
 impl<S: Simd> RowRange<S> {
     #[inline(always)]
     pub(super) fn new(simd: S) -> Self {
-        Self { least: Lanes::splat(simd, f32::INFINITY), greatest: Lanes::splat(simd, -1.0) }
+        Self { min: Lanes::splat(simd, f32::INFINITY), max: Lanes::splat(simd, -1.0) }
     }
 
     /// First row that may have light, and one past the last.
     #[inline(always)]
     pub(super) fn range(&self) -> [usize; 2] {
-        let (least, greatest) = (self.least.reduce_min(), self.greatest.reduce_max());
-        if greatest < least { [0; 2] } else { [least as usize, greatest as usize + 2] }
+        let (min, max) = (self.min.reduce_min(), self.max.reduce_max());
+        if max < min { [0; 2] } else { [min as usize, max as usize + 2] }
     }
 }
 
@@ -245,9 +246,9 @@ impl SplatBatch {
     ) {
         let (zero, end, outside) = (rows.broadcast(0.0), rows.broadcast(last), ramp(rows.simd, last + 1.0, 2.0));
         let whole = rows.floor();
-        let (least, greatest) = (rows.broadcast(f32::INFINITY), rows.broadcast(-1.0));
-        row_range.least = row_range.least.simd_min(inside(rows, end, [whole, least]));
-        row_range.greatest = row_range.greatest.simd_max(inside(rows, end, [whole, greatest]));
+        let (no_min, no_max) = (rows.broadcast(f32::INFINITY), rows.broadcast(-1.0));
+        row_range.min = row_range.min.simd_min(inside(rows, end, [whole, no_min]));
+        row_range.max = row_range.max.simd_max(inside(rows, end, [whole, no_max]));
         let row = round_to_u32(inside(rows, end, [whole, outside]));
         (((row + 1) >> 1) + (row & 1) * odd_pairs).store_slice(&mut self.pairs);
         let weights = inside(rows, end, [brightness, zero]);
@@ -273,49 +274,51 @@ mod tests {
 
     const ROWS: usize = 150;
 
-    type Batch<'a> =
-        (&'a [f32; SPLAT_LANES], &'a [f32; SPLAT_LANES], (&'a [u16; SPLAT_LANES], usize), &'a [PerEmitter<f32>]);
+    struct Batch<'a> {
+        rows: &'a [f32; SPLAT_LANES],
+        brightness: &'a [f32; SPLAT_LANES],
+        photon_rows: &'a [u16; SPLAT_LANES],
+        count: usize,
+        photons: &'a [PerEmitter<f32>],
+    }
 
-    /// A column with the light of points at rows, so bright, twice.
+    /// A column with the light of a batch of points, times two.
     #[inline(always)]
-    fn column_of<S: Simd>(
-        simd: S,
-        rasterizer: &mut TrackRasterizer,
-        (rows, shown, lights, photons): Batch,
-    ) -> Vec<RowQuad> {
-        let (mut points, mut lit) = (SplatBatch::NONE, RowRange::new(simd));
-        let (rows, shown) = (Lanes::from_slice(simd, rows), Lanes::from_slice(simd, shown));
-        points.project([rows, shown], (ROWS - 1) as f32, rasterizer.odd_pairs(), &mut lit);
+    fn column_of<S: Simd>(simd: S, rasterizer: &mut TrackRasterizer, batch: &Batch) -> Vec<RowQuad> {
+        let (mut points, mut row_range) = (SplatBatch::NONE, RowRange::new(simd));
+        let (rows, brightness) = (Lanes::from_slice(simd, batch.rows), Lanes::from_slice(simd, batch.brightness));
+        points.project([rows, brightness], (ROWS - 1) as f32, rasterizer.odd_pairs(), &mut row_range);
         rasterizer.reset();
-        rasterizer.add(simd, &points, lights, photons);
-        rasterizer.finish(simd, &lit);
+        rasterizer.add(simd, &points, batch.photon_rows, batch.count, batch.photons);
+        rasterizer.finish(simd, &row_range);
         let mut column = vec![RowQuad::DARK; ROWS.div_ceil(QUAD_ROWS)];
         rasterizer.add_to(&mut column, FourLanes::splat(simd, 2.0));
         column
     }
 
-    /// Rows and brightness of some points, some outside: the same light as one sum after the other, and none left for the next fall.
+    /// Points inside and outside of the chart: the sums equal scalar ones, and no light is left for the next track.
     #[test]
     fn points_light_the_two_rows_that_they_lie_between() {
         let photons = [[1.0, 2.0, 3.0, 4.0], [0.5, 0.0, 0.25, 8.0]];
         let mut rasterizer = TrackRasterizer::new(ROWS);
-        for fall in 0..20_u16 {
-            let spread = 1.0 + 9.0 * f32::from(fall % 5);
-            let row = |lane: usize| 3.0 + 2.37 * f32::from(fall) + spread * (lane * 7 % SPLAT_LANES) as f32 - 8.0;
+        for track in 0..20_u16 {
+            let spread = 1.0 + 9.0 * f32::from(track % 5);
+            let row = |lane: usize| 3.0 + 2.37 * f32::from(track) + spread * (lane * 7 % SPLAT_LANES) as f32 - 8.0;
             let rows: [f32; SPLAT_LANES] = std::array::from_fn(row);
-            let shown: [f32; SPLAT_LANES] = std::array::from_fn(|lane| 0.5 + lane as f32);
-            let lights: [u16; SPLAT_LANES] = std::array::from_fn(|lane| (lane % 2) as u16);
-            let count = SPLAT_LANES - (fall % 4) as usize;
-            let points = (&rows, &shown, (&lights, count), &photons[..]);
-            let column = dispatch!(Level::new(), simd => column_of(simd, &mut rasterizer, points));
-            let plainest = bansho_base::dispatch_baseline!(simd => column_of(simd, &mut rasterizer, points));
+            let brightness: [f32; SPLAT_LANES] = std::array::from_fn(|lane| 0.5 + lane as f32);
+            let photon_rows: [u16; SPLAT_LANES] = std::array::from_fn(|lane| (lane % 2) as u16);
+            let count = SPLAT_LANES - (track % 4) as usize;
+            let batch =
+                Batch { rows: &rows, brightness: &brightness, photon_rows: &photon_rows, count, photons: &photons };
+            let column = dispatch!(Level::new(), simd => column_of(simd, &mut rasterizer, &batch));
+            let plainest = bansho_base::dispatch_baseline!(simd => column_of(simd, &mut rasterizer, &batch));
             assert!(column.iter().zip(&plainest).all(|(wide, plain)| wide.0 == plain.0), "the same on all machines");
             let mut expected = [[0.0_f32; 4]; ROWS + 1];
             for lane in 0..count {
                 let (row, lower) = (rows[lane].floor(), rows[lane] - rows[lane].floor());
                 if (0.0..(ROWS - 1) as f32).contains(&rows[lane]) {
                     for (emitter, photons) in photons[lane % 2].iter().enumerate() {
-                        let light = 2.0 * photons * shown[lane];
+                        let light = 2.0 * photons * brightness[lane];
                         expected[row as usize][emitter] += light * (1.0 - lower);
                         expected[row as usize + 1][emitter] += light * lower;
                     }
@@ -323,7 +326,7 @@ mod tests {
             }
             let found = column.iter().flat_map(|quad| quad.0);
             for (number, (found, expected)) in found.zip(expected.as_flattened()).enumerate() {
-                let what = || format!("fall {fall}, row {}, emitter {}", number / 4, number % 4);
+                let what = || format!("track {track}, row {}, emitter {}", number / 4, number % 4);
                 assert!((found - expected).abs() <= 1e-4 * expected.abs(), "{}: {found} for {expected}", what());
             }
         }

@@ -16,7 +16,7 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    quantile_matched::QuantileMatchedTracks,
+    collision_block::{COLLISION_BLOCK_COLUMNS, CollisionBlock},
     rasterize::{RowRange, SPLAT_LANES, SplatBatch, TrackRasterizer},
     track_table::{CollisionBatch, TrackTable},
 };
@@ -30,18 +30,16 @@ use crate::{
             energy_grid::{NODES, node_energy_ev},
             hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
             lateral_spread::lateral_spread_km,
+            quantile_matched::QuantileMatchedTracks,
         },
     },
     render::{
         RenderingParameters, TrackModel,
-        bin::source_bins::{FieldLineSource, PatchWeights, REACH, SourceBins},
-        integrate::{
-            column_block::{BLOCK_COLUMNS, ColumnBlock},
-            columns::{ColumnBuffer, ColumnStrip},
-        },
+        bin::source_bins::{FieldLineSource, PatchWeights, REACH, SortedSources},
+        integrate::columns::{ColumnBlock, ColumnBuffer},
         project::{
             altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials, altitudes_km},
-            chart::{Chart, ChartProjection, STRIP_COLUMNS},
+            chart::{BLOCK_COLUMNS, Chart, ChartProjection},
             field_lines::FieldLines,
         },
     },
@@ -67,7 +65,7 @@ pub(crate) struct CollisionRenderer {
     deposition: Deposition,
     /// Counted photons per ion pair, by level.
     photons: Vec<PerEmitter<f32>>,
-    descents: RowPolynomialBasis,
+    basis: RowPolynomialBasis,
     /// Brightness of ion pairs per collision of a node's track, kR per mW/m^2.
     pairs: Vec<f32>,
     /// Squared support due to the deflections of a node's tracks, km^2.
@@ -77,8 +75,8 @@ pub(crate) struct CollisionRenderer {
 }
 
 impl CollisionRenderer {
-    /// Tracks for all energies up to that of a node.
-    pub(crate) fn new(emission: &Emission, drawing: &RenderingParameters, highest: usize, key: Key) -> Self {
+    /// The tables for all energies up to that of the node `highest`.
+    pub(crate) fn new(emission: &Emission, rendering: &RenderingParameters, highest: usize, key: Key) -> Self {
         let deviation = |index: usize| {
             // The sum of three uniforms approximates that density; scaled to its variance, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
@@ -88,9 +86,9 @@ impl CollisionRenderer {
         let highest = highest.min(NODES - 1);
         let levels = emission.photons_per_ion_pair().iter().copied();
         let photons = levels.chain([[0.0; 4]]);
-        let (deposition, deflection) = (emission.deposition(), drawing.collision_deflection);
+        let (deposition, deflection) = (emission.deposition(), rendering.collision_deflection);
         let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
-        let tracks = match drawing.energy_deposition {
+        let tracks = match rendering.energy_deposition {
             TrackModel::Fang2010 => fang_tracks(&TrackSampler::new(deposition, deflection), highest, key),
             TrackModel::HardSphereAtmosphere => {
                 let tracks = hard_sphere_tracks(deposition, deflection, highest, key);
@@ -100,28 +98,34 @@ impl CollisionRenderer {
                 })
             }
         };
-        let wander =
-            |node| REACH * lateral_spread_km(drawing.energy_deposition, deflection, node_energy_ev(node)) as f32;
+        let support_km =
+            |node| REACH * lateral_spread_km(rendering.energy_deposition, deflection, node_energy_ev(node)) as f32;
         Self {
             key,
             tracks,
             deposition: emission.deposition().clone(),
             photons: photons.map(|photons| photons.map(|value| value as f32)).collect(),
-            descents: RowPolynomialBasis::new(),
+            basis: RowPolynomialBasis::new(),
             pairs,
-            spread_squared: (0..NODES).map(|node| wander(node) * wander(node)).collect(),
+            spread_squared: (0..NODES).map(|node| support_km(node) * support_km(node)).collect(),
             deviations: (0..DEVIATIONS).map(deviations).collect(),
         }
     }
 
-    /// Renders sources that are sorted by [`BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
-    pub(crate) fn draw(&self, chart: Chart, field: &FieldLines, source_bins: &SourceBins, step: u32) -> ColumnBuffer {
+    /// Renders sources that are sorted by [`COLLISION_BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
+    pub(crate) fn draw(
+        &self,
+        chart: Chart,
+        field: &FieldLines,
+        sorted_sources: &SortedSources,
+        step: u32,
+    ) -> ColumnBuffer {
         let level = Level::new();
-        let mut picture = ColumnBuffer::zeros(chart);
-        let (chart, blocks) = picture.strips(BLOCK_COLUMNS);
-        let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), source_bins, step };
+        let mut buffer = ColumnBuffer::zeros(chart);
+        let (chart, blocks) = buffer.blocks(COLLISION_BLOCK_COLUMNS);
+        let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), sorted_sources, step };
         // Largest block first (LPT scheduling), for load balance.
-        let mut blocks: Vec<_> = blocks.map(|block| (source_bins.count(block.number), block)).collect();
+        let mut blocks: Vec<_> = blocks.map(|block| (sorted_sources.count(block.number), block)).collect();
         blocks.sort_by_key(|(count, _)| *count);
         let blocks = Mutex::new(blocks);
         let next = || blocks.lock().unwrap_or_else(PoisonError::into_inner).pop();
@@ -132,7 +136,7 @@ impl CollisionRenderer {
                 dispatch!(level, simd => pass.draw_block(simd, block, field, scratch));
             }
         });
-        picture
+        buffer
     }
 
     /// The track of a source.
@@ -140,9 +144,9 @@ impl CollisionRenderer {
     fn track(&self, source: FieldLineSource, step: u32) -> SourceTrack<'_> {
         let [a, b, c, d] = self.key.words(u64::from(source.random_key), step, SOURCE);
         let below = (source.energy_node as usize).min(NODES - 2);
-        let about = below + usize::from(uniform(a) < source.energy_node - below as f32);
+        let central_node = below + usize::from(uniform(a) < source.energy_node - below as f32);
         // Energies above the tables use the highest node: its collision count and weight belong together.
-        let node = self.deposition.sample_node_around(about, uniform_f64(b, d)).min(self.tracks.highest_node());
+        let node = self.deposition.sample_node_around(central_node, uniform_f64(b, d)).min(self.tracks.highest_node());
         let batches = self.tracks.track(node, c);
         SourceTrack {
             source,
@@ -168,8 +172,8 @@ fn hard_sphere_tracks(
     key: Key,
 ) -> Vec<QuantileMatchedTracks> {
     let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, deflection);
-    let heights = TrackSampler::new(deposition, 0.0);
-    (0..=highest).into_par_iter().map(|node| QuantileMatchedTracks::new(&spheres, &heights, node, key)).collect()
+    let sampler = TrackSampler::new(deposition, 0.0);
+    (0..=highest).into_par_iter().map(|node| QuantileMatchedTracks::new(&spheres, &sampler, node, key)).collect()
 }
 
 /// A collision and its photon row, its level.
@@ -191,7 +195,7 @@ struct SourceTrack<'a> {
 
 /// Buffers that a thread reuses.
 struct CollisionScratch {
-    block: ColumnBlock,
+    block: CollisionBlock,
     rasterizer: TrackRasterizer,
     points: [SplatBatch; PIPELINED_BATCHES],
 }
@@ -199,7 +203,7 @@ struct CollisionScratch {
 impl CollisionScratch {
     fn new(chart: &Chart) -> Self {
         Self {
-            block: ColumnBlock::new(chart),
+            block: CollisionBlock::new(chart),
             rasterizer: TrackRasterizer::new(chart.rows),
             points: [SplatBatch::NONE; PIPELINED_BATCHES],
         }
@@ -217,8 +221,8 @@ impl LineProjection<'_> {
     #[inline(always)]
     fn points<S: Simd>(&self, batch: &CollisionBatch, offsets: Lanes<S>) -> [Lanes<S>; 2] {
         match self {
-            Self::Polynomial(descent) => {
-                descent.points(Lanes::from_slice(offsets.simd, &batch.altitude_coordinates), offsets)
+            Self::Polynomial(polynomials) => {
+                polynomials.points(Lanes::from_slice(offsets.simd, &batch.altitude_coordinates), offsets)
             }
             Self::Exact(line) => line.points(&altitudes_km(&batch.altitude_coordinates), offsets),
         }
@@ -230,20 +234,20 @@ struct CollisionPass<'a> {
     collisions: &'a CollisionRenderer,
     chart: &'a Chart,
     projection: ChartProjection,
-    source_bins: &'a SourceBins<'a>,
+    sorted_sources: &'a SortedSources<'a>,
     step: u32,
 }
 
 impl CollisionPass<'_> {
     /// Rasterizes a block: each source once for all its columns.
     #[inline(always)]
-    fn draw_block<S: Simd>(&self, simd: S, strip: ColumnStrip, field: &FieldLines, scratch: &mut CollisionScratch) {
-        let entries = scratch.block.begin(strip.number, self.chart, self.source_bins, field);
+    fn draw_block<S: Simd>(&self, simd: S, block: ColumnBlock, field: &FieldLines, scratch: &mut CollisionScratch) {
+        let entries = scratch.block.begin(block.number, self.chart, self.sorted_sources, field);
         let (mut sources, mut tracks) = (Vec::with_capacity(LOOKAHEAD_SOURCES), Vec::with_capacity(LOOKAHEAD_SOURCES));
         for entries in entries.chunks(LOOKAHEAD_SOURCES) {
             sources.clear();
             for entry in entries {
-                sources.push(*self.source_bins.source(entry.source));
+                sources.push(*self.sorted_sources.source(entry.source));
             }
             tracks.clear();
             for source in &sources {
@@ -253,7 +257,7 @@ impl CollisionPass<'_> {
                 self.splat_source(simd, entry.columns(), track, scratch);
             }
         }
-        scratch.block.write(strip, self.chart.rows);
+        scratch.block.write(block, self.chart.rows);
         scratch.block.recycle(entries);
     }
 
@@ -274,9 +278,9 @@ impl CollisionPass<'_> {
         if shared {
             self.rasterize_at_column(simd, track, (columns.start + columns.end) / 2, scratch);
         }
-        for from in columns.clone().step_by(STRIP_COLUMNS) {
+        for from in columns.clone().step_by(BLOCK_COLUMNS) {
             let patch = PatchWeights::new(source, self.chart, &scratch.block.units(from));
-            for column in from..columns.end.min(from + STRIP_COLUMNS) {
+            for column in from..columns.end.min(from + BLOCK_COLUMNS) {
                 let weight = patch.column_weights[column - from];
                 if weight <= 0.0 {
                     continue;
@@ -302,15 +306,16 @@ impl CollisionPass<'_> {
         rasterizer.reset();
         let (meridian, distance) = block.meridian_and_distance(column, &track.source);
         let line = ProjectedFieldLine::new(meridian, distance, &self.projection);
-        let reach = track.source.reach.max(self.source_bins.bins().min_reach(distance));
+        let reach = track.source.reach.max(self.sorted_sources.bins().min_reach(distance));
         if distance < EXACT_REACHES * reach {
-            self.add(simd, track, (reach, 0.0), &LineProjection::Exact(line), (rasterizer, points));
+            self.add(simd, track, reach, 0.0, &LineProjection::Exact(line), rasterizer, points);
             return;
         }
-        let cached = block.cached_projection(simd, column, distance, (&self.collisions.descents, &self.projection));
-        let (descent, distance_offset) = (&cached.descent, distance - cached.distance);
-        if descent.may_be_visible(reach + distance_offset.abs(), self.chart.rows) {
-            self.add(simd, track, (reach, distance_offset), &LineProjection::Polynomial(descent), (rasterizer, points));
+        let cached = block.cached_projection(simd, column, distance, &self.collisions.basis, &self.projection);
+        let (polynomials, distance_offset) = (&cached.polynomials, distance - cached.distance);
+        if polynomials.may_be_visible(reach + distance_offset.abs(), self.chart.rows) {
+            let line = LineProjection::Polynomial(polynomials);
+            self.add(simd, track, reach, distance_offset, &line, rasterizer, points);
         }
     }
 
@@ -321,9 +326,11 @@ impl CollisionPass<'_> {
         &self,
         simd: S,
         track: &SourceTrack,
-        (reach, distance_offset): (f32, f32),
+        reach: f32,
+        distance_offset: f32,
         line: &LineProjection,
-        (rasterizer, points): (&mut TrackRasterizer, &mut [SplatBatch; PIPELINED_BATCHES]),
+        rasterizer: &mut TrackRasterizer,
+        points: &mut [SplatBatch; PIPELINED_BATCHES],
     ) {
         let last = (self.chart.rows - 1) as f32;
         // The kernel's support includes the spread by deflections, which the collisions have already.
@@ -339,7 +346,7 @@ impl CollisionPass<'_> {
                 points.project(line.points(batch, offsets), last, rasterizer.odd_pairs(), &mut row_range);
             }
             for (batch, points) in batches.iter().zip(&*points) {
-                rasterizer.add(simd, points, (&batch.photon_rows, batch.count as usize), &self.collisions.photons);
+                rasterizer.add(simd, points, &batch.photon_rows, batch.count as usize, &self.collisions.photons);
             }
         }
         rasterizer.finish(simd, &row_range);

@@ -16,8 +16,10 @@ use crate::{
     parameters::BlurParameters,
     physics::emission::{EMITTERS, Emitter, PerEmitter},
     render::{
-        prepared::{PIXEL_BATCH, PixelBatch},
-        project::field_lines::FieldLines,
+        project::{
+            field_lines::FieldLines,
+            pixel_batch::{PIXEL_BATCH, PixelBatch},
+        },
         shade::chart_sampler::ChartSampler,
     },
 };
@@ -41,17 +43,18 @@ struct BlurKernel(Vec<PerEmitter<f32>>);
 impl BlurKernel {
     fn new(radii: &BlurParameters) -> Self {
         let sigmas = EMITTERS.map(|emitter| radii.pixels(emitter));
-        let most = sigmas.into_iter().fold(0.0, f64::max);
-        let count = (KERNEL_SIGMAS * most).ceil() as usize + 1;
+        let max_sigma = sigmas.into_iter().fold(0.0, f64::max);
+        let count = (KERNEL_SIGMAS * max_sigma).ceil() as usize + 1;
         let by_emitter = sigmas.map(|sigma| {
-            let left = math::sqrt((sigma * sigma - CHART_SIGMA * CHART_SIGMA).max(1e-4));
-            let gaussian = |distance: usize| math::exp(-0.5 * math::pow(distance as f64 / left, 2.0));
+            let remaining = math::sqrt((sigma * sigma - CHART_SIGMA * CHART_SIGMA).max(1e-4));
+            let gaussian = |distance: usize| math::exp(-0.5 * math::pow(distance as f64 / remaining, 2.0));
             let whole = 2.0 * (0..count).map(gaussian).sum::<f64>() - 1.0;
             (0..count).map(|distance| (gaussian(distance) / whole) as f32).collect::<Vec<_>>()
         });
         Self((0..count).map(|distance| std::array::from_fn(|emitter| by_emitter[emitter][distance])).collect())
     }
 
+    /// Half-width of the support, pixels.
     fn reach(&self) -> usize {
         self.0.len() - 1
     }
@@ -80,7 +83,7 @@ impl BlurredImage {
         let mut rows = vec![[0.0; 4]; width * height];
         rows.par_chunks_mut(width).enumerate().for_each_init(Vec::new, |sharp: &mut Vec<PerEmitter<f32>>, (y, row)| {
             dispatch!(level, simd => {
-                look_up(simd, &camera, field, samplers, y, width, sharp);
+                sample_row(simd, &camera, field, samplers, y, width, sharp);
                 for (x, light) in row.iter_mut().enumerate().take(width - margin).skip(margin) {
                     *light = kernel.sum(simd, sharp, x, 1);
                 }
@@ -111,7 +114,7 @@ impl BlurredImage {
 
 /// Brightness by emitter of a picture row, sampled from the charts.
 #[inline(always)]
-fn look_up<S: Simd>(
+fn sample_row<S: Simd>(
     simd: S,
     camera: &Camera,
     field: &FieldLines,

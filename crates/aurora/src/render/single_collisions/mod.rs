@@ -2,7 +2,7 @@
 //! blur (2.28) by `rendering.blur_space = "screen"`.
 
 pub(crate) mod blur;
+pub(crate) mod collision_block;
 pub(crate) mod collision_pass;
-pub mod quantile_matched;
 pub(crate) mod rasterize;
 pub(crate) mod track_table;

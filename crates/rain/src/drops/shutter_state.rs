@@ -1,4 +1,4 @@
-//! The state of the rain for one exposure: how many drops of each diameter there are, where they are and how they move.
+//! The state of the rain during one exposure: number, positions and motion of the drops of each diameter.
 
 use bansho_base::{
     math::{
@@ -44,7 +44,7 @@ pub(crate) struct DropClassState {
     pub(crate) max_density: f64,
     /// Fraction of these that exist now, 0 to 1.
     pub(crate) fraction: f64,
-    /// Positions of its cells.
+    /// The lattice of its cells.
     pub(crate) lattice: Lattice,
 }
 
@@ -60,7 +60,7 @@ impl DropClassState {
     }
 }
 
-/// A sphere of air.
+/// A sphere.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sphere {
     pub(crate) center: DVec3,
@@ -68,9 +68,17 @@ pub(crate) struct Sphere {
     pub(crate) radius: f64,
 }
 
+/// A cell of a lattice that may be visible.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VisibleCell {
+    /// Distance of its center from the camera, m.
+    pub(crate) distance: f64,
+    pub(crate) cell: Cell,
+}
+
 /// The rain while the shutter is open.
 #[derive(Clone, Debug)]
-pub(crate) struct ExposureState {
+pub(crate) struct ShutterState {
     pub(crate) key: Key,
     pub(crate) cameras: ShutterCameras,
     pub(crate) classes: Vec<DropClassState>,
@@ -83,11 +91,11 @@ pub(crate) struct ExposureState {
     /// Horizontal mean wind, scaled by the response of the drops, m/s.
     wind: DVec3,
     gusts: Option<GustField>,
-    /// Solids that shelter what is beneath them.
+    /// Solids that shelter the air below them from rain.
     occluders: Vec<Occluder>,
 }
 
-impl ExposureState {
+impl ShutterState {
     pub(crate) fn new(rain: &Rain, view: &View, surroundings: &Surroundings) -> Self {
         let parameters = &rain.parameters;
         let cameras = ShutterCameras::new(view);
@@ -126,7 +134,7 @@ impl ExposureState {
     /// The drops of a cell of a class.
     pub(crate) fn cell_state(&self, class: &DropClassState, cell: Cell) -> CellState {
         let eye = self.cameras.middle().position;
-        let corner = |step: [f64; 3]| class.lattice.world(cell, DVec3::from(step));
+        let corner = |step: [f64; 3]| class.lattice.point_in_world(cell, DVec3::from(step));
         let origin = corner([0.0; 3]);
         let [base, right, up, back] = [
             origin - eye,
@@ -147,7 +155,7 @@ impl ExposureState {
     /// Position of a point of a cell (given as fractions of its edges) at the middle of the exposure, and its velocity,
     /// m/s.
     pub(crate) fn drop_state(&self, class: &DropClassState, cell: Cell, within: DVec3) -> (DVec3, DVec3) {
-        let steady = class.lattice.world(cell, within);
+        let steady = class.lattice.point_in_world(cell, within);
         let velocity = self.wind - DVec3::Y * class.speed;
         match &self.gusts {
             None => (steady, velocity),
@@ -158,14 +166,13 @@ impl ExposureState {
         }
     }
 
-    /// Cells of a class of which any drop may be visible within a sphere, with the distances of their centers from the
-    /// camera. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
+    /// Cells of a class with drops that may be visible within a sphere. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
     pub(crate) fn visible_cells(
         &self,
         class: &DropClassState,
         Sphere { center, radius }: Sphere,
         half_width: f64,
-    ) -> Vec<(f64, Cell)> {
+    ) -> Vec<VisibleCell> {
         let eye = self.cameras.middle().position;
         let margin = self.gusts.as_ref().map_or(0.0, |_| GUST_MARGIN);
         let half = class.lattice.half_extents(half_width) + margin;
@@ -187,7 +194,7 @@ impl ExposureState {
                     let wind_travel =
                         0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.cameras.exposure_time;
                     if nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel) {
-                        cells.push(((point - eye).length(), cell));
+                        cells.push(VisibleCell { distance: (point - eye).length(), cell });
                     }
                 }
             }
@@ -195,7 +202,7 @@ impl ExposureState {
         cells
     }
 
-    /// Whether any solid may shelter anything.
+    /// Whether any solid may block rain.
     pub(crate) fn has_occluders(&self) -> bool {
         !self.occluders.is_empty()
     }
@@ -206,7 +213,7 @@ impl ExposureState {
     }
 }
 
-/// A half space is ground: nothing is beneath it.
+/// Whether a solid is a half space, which is ground and shelters nothing.
 fn is_ground(solid: &Occluder) -> bool {
     matches!(solid, Occluder::HalfSpace { .. })
 }
@@ -222,7 +229,7 @@ pub(crate) fn ground_height(occluders: &[Occluder]) -> Option<f64> {
 
 /// Steps of sphere tracing after which a grazing ray counts as a miss.
 const MAX_TRACE_STEPS: usize = 64;
-/// Greatest height of a sheltering solid, m.
+/// Maximum height of a sheltering solid, m.
 const MAX_OCCLUDER_HEIGHT: f64 = 200.0;
 
 /// Sphere tracing from `point` toward `up`: whether the ray meets the solid.

@@ -3,10 +3,6 @@
 use bansho_base::{host::assets::Assets, math::DVec2};
 
 use super::{
-    gap::Gap,
-    spline_track::{ControlPointTrack, Knot},
-};
-use crate::shapes::{
     Correspondence, MorphingParameters, ShapeError, ShapeErrorKind, ShapeParameters,
     correspondence::{
         links::LinkConstraints,
@@ -15,13 +11,17 @@ use crate::shapes::{
         time_warping::warp_through,
     },
     geometry::polyline::{Polyline, length_fractions},
+    interpolation::{
+        gap::Gap,
+        spline_track::{ControlPointTrack, Knot},
+    },
     strokes::validate::{DrawnSheet, ShapeContext, drawn_sheets},
 };
 
 /// Control points closer than this coincide, km.
 const SAME_KM: f64 = 1e-3;
 
-/// Maximum number of control points of all shapes: about 200 MB.
+/// Maximum number of control points of all shapes, which take about 200 MB.
 const MAX_POINTS: usize = 4_000_000;
 
 /// Control-point tracks, and the tracks of each sheet.
@@ -61,19 +61,20 @@ pub(crate) fn drawn_shapes(
 ///
 /// A shape with the wrong number of sheets; too many control points.
 pub(crate) fn track_control_points(
-    (shapes, drawn): (&[ShapeParameters], &[Vec<DrawnSheet>]),
-    motion: &MorphingParameters,
+    shapes: &[ShapeParameters],
+    drawn: &[Vec<DrawnSheet>],
+    morphing: &MorphingParameters,
     extent_km: f64,
     evenness: f64,
 ) -> Result<TrackedControlPoints, ShapeError> {
     let mut count = 0;
     for (index, sheets) in drawn.iter().enumerate() {
-        count += sheets.len() * motion.point_count();
+        count += sheets.len() * morphing.point_count();
         check_count(count, index)?;
     }
-    let in_order = motion.correspondence == Correspondence::DrawingOrder;
+    let in_order = morphing.correspondence == Correspondence::DrawingOrder;
     let mut tracked = TrackedControlPoints::default();
-    tracked.begin(&drawn[0], motion);
+    tracked.begin(&drawn[0], morphing);
     let mut count = tracked.point_count(0);
     tracked.is_closed = drawn.len() > 1 && same(&drawn[0], &drawn[drawn.len() - 1], extent_km);
     if let Some(last) = shapes.last().filter(|_| in_order) {
@@ -81,8 +82,8 @@ pub(crate) fn track_control_points(
         tracked.is_closed &= last.split.is_empty() && last.merge.is_empty();
     }
     for (index, parameters) in shapes.iter().enumerate().skip(1) {
-        let mut change = Transition::new(parameters, index, &tracked.shapes[index - 1], &mut tracked.tracks)?;
-        let expected = if in_order { tracked.shapes[index - 1].len() } else { change.chains.len() };
+        let mut transition = Transition::new(parameters, index, &tracked.shapes[index - 1], &mut tracked.tracks)?;
+        let expected = if in_order { tracked.shapes[index - 1].len() } else { transition.chains.len() };
         if drawn[index].len() != expected {
             let kind = ShapeErrorKind::Unmatched { found: drawn[index].len(), expected };
             return Err(ShapeError { key: format!("shapes.{index}.sheets"), kind });
@@ -91,16 +92,16 @@ pub(crate) fn track_control_points(
             return Err(ShapeError { key: format!("shapes.{index}.link"), kind: ShapeErrorKind::LinkInOrder });
         }
         if in_order {
-            tracked.advance_in_order(&change, &drawn[index], motion);
+            tracked.advance_in_order(&transition, &drawn[index], morphing);
         } else {
-            change.refine(motion.point_count(), index - 1, &mut tracked.tracks);
+            transition.refine(morphing.point_count(), index - 1, &mut tracked.tracks);
             let before = &tracked.shapes[index - 1];
-            let constraints = LinkConstraints::new(&parameters.link, index, before, &change, &tracked.tracks)?;
+            let constraints = LinkConstraints::new(&parameters.link, index, before, &transition, &tracked.tracks)?;
             let closes = tracked.is_closed && index == shapes.len() - 1;
-            tracked.advance_by_nearness(&change, &drawn[index], &constraints, closes, evenness);
+            tracked.advance_by_nearness(&transition, &drawn[index], &constraints, closes, evenness);
         }
-        tracked.gaps.push(change.gaps());
-        tracked.strands.push(change.strands);
+        tracked.gaps.push(transition.gaps());
+        tracked.strands.push(transition.strands);
         // Merged sheets keep all their points.
         count += tracked.point_count(index);
         check_count(count, index)?;
@@ -113,7 +114,7 @@ pub(crate) fn track_control_points(
 
 /// Checks the number of control points up to shape `index`.
 fn check_count(found: usize, index: usize) -> Result<(), ShapeError> {
-    let kind = ShapeErrorKind::TooManyPoints { found, most: MAX_POINTS };
+    let kind = ShapeErrorKind::TooManyPoints { found, max: MAX_POINTS };
     let error = || ShapeError { key: format!("shapes.{index}.sheets"), kind };
     if found > MAX_POINTS { Err(error()) } else { Ok(()) }
 }
@@ -121,14 +122,14 @@ fn check_count(found: usize, index: usize) -> Result<(), ShapeError> {
 /// The target of a chain of strands.
 struct ChainTarget<'a> {
     drawn: &'a DrawnSheet,
-    of: SheetMatch,
-    /// Tracks of that sheet in the first shape, if the sequence closes there point by point.
+    matched: SheetMatch,
+    /// Tracks of that sheet in the first shape, if this is the last shape of a closed sequence.
     first_shape: Option<Vec<usize>>,
     evenness: f64,
     constraints: &'a LinkConstraints,
 }
 
-/// Whether two drawn shapes are equal in position, flux and energy.
+/// Whether two drawn shapes have equal positions, flux and energy.
 fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
     const SAMPLES: usize = 64;
     let near = |a: &DVec2, b: &DVec2| a.distance(*b) < 1e-6 * extent_km;
@@ -140,8 +141,8 @@ fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
 }
 
 /// Control points of a sheet with flux and energy factors.
-fn control_knots(sheet: &DrawnSheet, count: usize, motion: &MorphingParameters) -> Vec<Knot> {
-    let points = sheet.control_points(count, motion.control_point_spacing);
+fn control_knots(sheet: &DrawnSheet, count: usize, morphing: &MorphingParameters) -> Vec<Knot> {
+    let points = sheet.control_points(count, morphing.control_point_spacing);
     let fractions = length_fractions(&points);
     let knot = |(position, fraction): (DVec2, f64)| Knot { position, factors: sheet.factors.at(fraction) };
     points.into_iter().zip(fractions).map(knot).collect()
@@ -160,8 +161,8 @@ impl TrackedControlPoints {
         let sheets = self.shapes[0].iter().zip(&self.shapes[last]).filter(same_count);
         let pairs = sheets.flat_map(|(firsts, lasts)| lasts.iter().zip(firsts).map(|(&last, &first)| [last, first]));
         let meets = |pair: &[usize; 2]| {
-            let [there, here] = [self.tracks[pair[0]].knot(last), self.tracks[pair[1]].knot(0)];
-            there.position.distance(here.position) < SAME_KM
+            let [last_knot, first_knot] = [self.tracks[pair[0]].knot(last), self.tracks[pair[1]].knot(0)];
+            last_knot.position.distance(first_knot.position) < SAME_KM
         };
         let mut pairs: Vec<[usize; 2]> = pairs.filter(meets).collect();
         pairs.sort_unstable();
@@ -169,55 +170,55 @@ impl TrackedControlPoints {
     }
 
     /// Adds the first shape.
-    fn begin(&mut self, drawn: &[DrawnSheet], motion: &MorphingParameters) {
+    fn begin(&mut self, drawn: &[DrawnSheet], morphing: &MorphingParameters) {
         let mut sheets = Vec::new();
         for sheet in drawn {
             let first = self.tracks.len();
-            let knots = control_knots(sheet, motion.point_count(), motion);
+            let knots = control_knots(sheet, morphing.point_count(), morphing);
             self.tracks.extend(knots.into_iter().map(|knot| ControlPointTrack::new(0, None, knot)));
             sheets.push((first..self.tracks.len()).collect());
         }
         self.shapes.push(sheets);
     }
 
-    /// Correspondence by drawing order, as in the thesis. Where a sheet splits, the segment between its parts shrinks;
-    /// where two ends merge, a segment grows between them.
-    fn advance_in_order(&mut self, change: &Transition, drawn: &[DrawnSheet], motion: &MorphingParameters) {
+    /// Correspondence by drawing order, as in the thesis. Where a sheet splits, the segment between its strands is removed;
+    /// where two ends merge, a segment is inserted between them.
+    fn advance_in_order(&mut self, transition: &Transition, drawn: &[DrawnSheet], morphing: &MorphingParameters) {
         let sheets = self.shapes[self.shapes.len() - 1].clone();
         let next = self.shapes.len();
         for (sheet, drawn) in sheets.iter().zip(drawn) {
-            for (&track, knot) in sheet.iter().zip(control_knots(drawn, sheet.len(), motion)) {
+            for (&track, knot) in sheet.iter().zip(control_knots(drawn, sheet.len(), morphing)) {
                 self.tracks[track].knots.push(knot);
             }
         }
-        for pair in &change.splits {
+        for pair in &transition.splits {
             for (&new, &old) in pair.new.iter().zip(&pair.old) {
                 let knot = self.tracks[old].knot(next);
                 self.tracks[new].knots.push(knot);
             }
         }
-        for pair in &change.merges {
+        for pair in &transition.merges {
             let [first, second] = pair.old.map(|old| self.tracks[old].knot(next));
             pair.new.iter().for_each(|&new| self.tracks[new].knots.push(first.lerp(second, 0.5)));
         }
         // Coincident points are dropped: both of a split, one of a merge.
-        let dropped: Vec<usize> = change
+        let dropped: Vec<usize> = transition
             .splits
             .iter()
             .flat_map(|pair| pair.new)
-            .chain(change.merges.iter().map(|pair| pair.new[1]))
+            .chain(transition.merges.iter().map(|pair| pair.new[1]))
             .collect();
         let sheet = |chain: &Vec<ChainLink>| -> Vec<usize> {
-            let tracks = chain.iter().flat_map(|&link| change.tracks_along(link));
+            let tracks = chain.iter().flat_map(|&link| transition.tracks_along(link));
             tracks.filter(|track| !dropped.contains(track)).collect()
         };
-        self.shapes.push(change.chains.iter().map(sheet).collect());
+        self.shapes.push(transition.chains.iter().map(sheet).collect());
     }
 
     /// Automatic correspondence: chains by sheet matching, points by time warping.
     fn advance_by_nearness(
         &mut self,
-        change: &Transition,
+        transition: &Transition,
         drawn: &[DrawnSheet],
         constraints: &LinkConstraints,
         closes: bool,
@@ -226,51 +227,51 @@ impl TrackedControlPoints {
         let knot = self.shapes.len() - 1;
         let position = |track: &usize| self.tracks[*track].knot(knot).position;
         let line = |chain: &Vec<ChainLink>| -> Vec<DVec2> {
-            chain.iter().flat_map(|&link| change.tracks_along(link)).map(|track| position(&track)).collect()
+            chain.iter().flat_map(|&link| transition.tracks_along(link)).map(|track| position(&track)).collect()
         };
         // A strand has at least two points, so the polyline exists.
-        let sources: Vec<Polyline> = change.chains.iter().filter_map(|chain| Polyline::new(line(chain))).collect();
+        let sources: Vec<Polyline> = transition.chains.iter().filter_map(|chain| Polyline::new(line(chain))).collect();
         let targets: Vec<&Polyline> = drawn.iter().map(|sheet| &sheet.line).collect();
         let matches = match_sheets(&sources, &targets, &constraints.chain_constraints);
         let mut sheets = vec![Vec::new(); drawn.len()];
-        for (chain, of) in change.chains.iter().zip(matches) {
-            let first_shape = closes.then(|| self.shapes[0][of.target].clone());
-            let target = ChainTarget { drawn: &drawn[of.target], of, first_shape, evenness, constraints };
-            let mut sheet = self.advance_chain(change, chain, &target);
-            if of.reversed {
+        for (chain, matched) in transition.chains.iter().zip(matches) {
+            let first_shape = closes.then(|| self.shapes[0][matched.target].clone());
+            let target = ChainTarget { drawn: &drawn[matched.target], matched, first_shape, evenness, constraints };
+            let mut sheet = self.advance_chain(transition, chain, &target);
+            if matched.reversed {
                 sheet.reverse();
             }
-            sheets[of.target] = sheet;
+            sheets[matched.target] = sheet;
         }
         self.shapes.push(sheets);
     }
 
     /// Moves the strands of a chain to their ranges of a sheet; returns the sheet's tracks along the chain.
-    fn advance_chain(&mut self, change: &Transition, chain: &[ChainLink], target: &ChainTarget) -> Vec<usize> {
-        let ChainTarget { drawn, of, first_shape, evenness, constraints } = target;
+    fn advance_chain(&mut self, transition: &Transition, chain: &[ChainLink], target: &ChainTarget) -> Vec<usize> {
+        let ChainTarget { drawn, matched, first_shape, evenness, constraints } = target;
         let knot = self.shapes.len() - 1;
-        let strands: Vec<Vec<usize>> = chain.iter().map(|&link| change.tracks_along(link)).collect();
+        let strands: Vec<Vec<usize>> = chain.iter().map(|&link| transition.tracks_along(link)).collect();
         let points: Vec<Vec<DVec2>> = strands
             .iter()
             .map(|strand| strand.iter().map(|&track| self.tracks[track].knot(knot).position).collect())
             .collect();
         let mut sheet: Vec<usize> = Vec::new();
         for ((strand, points), range) in strands.iter().zip(&points).zip(strand_ranges(&points)) {
-            let range = if of.reversed { range.map(|fraction| 1.0 - fraction) } else { range };
-            let linked = constraints.linked_points(strand, range);
+            let range = if matched.reversed { range.map(|fraction| 1.0 - fraction) } else { range };
+            let anchors = constraints.anchors(strand, range);
             let repeated = first_shape.as_ref().filter(|first| chain.len() == 1 && first.len() == strand.len());
-            let repeated = repeated.filter(|_| linked.is_empty());
+            let repeated = repeated.filter(|_| anchors.is_empty());
             let knots: Vec<Knot> = match repeated {
                 Some(first) => first.iter().map(|&track| self.tracks[track].knot(0)).collect(),
                 None => {
                     let knot =
                         |fraction: f64| Knot { position: drawn.line.at(fraction), factors: drawn.factors.at(fraction) };
-                    warp_through(points, &drawn.line, range, &linked, *evenness).into_iter().map(knot).collect()
+                    warp_through(points, &drawn.line, range, &anchors, *evenness).into_iter().map(knot).collect()
                 }
             };
-            let turned = repeated.is_some() && of.reversed;
+            let is_backward = repeated.is_some() && matched.reversed;
             for (index, &track) in strand.iter().enumerate() {
-                let index = if turned { knots.len() - 1 - index } else { index };
+                let index = if is_backward { knots.len() - 1 - index } else { index };
                 self.tracks[track].knots.push(knots[index]);
             }
             // Where two strands merge, one of the two coincident points is kept.
@@ -280,7 +281,8 @@ impl TrackedControlPoints {
     }
 }
 
-/// Length range of a sheet for each strand of a chain: in proportion to its length plus half of the adjacent gaps.
+/// Range of a sheet's length for each strand of a chain, in proportion to the strand's length plus half of the adjacent
+/// gaps.
 fn strand_ranges(strands: &[Vec<DVec2>]) -> Vec<[f64; 2]> {
     let length = |points: &[DVec2]| points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
     let gap = |index: usize| match (

@@ -2,7 +2,7 @@
 
 use bansho_base::math::random::Key;
 
-use crate::physics::precipitation::{
+use super::{
     electron_track::{Collision, TRACKS_PER_ENERGY, TrackSampler, collision_count},
     energy_grid::node_energy_ev,
     hard_sphere::HardSphereAtmosphere,
@@ -17,19 +17,19 @@ use crate::physics::precipitation::{
 pub struct QuantileMatchedTracks {
     /// [`TRACKS_PER_ENERGY`] of them, each from its highest collision down.
     tracks: Vec<Vec<Collision>>,
-    /// Energy per collision relative to the energy over [`collision_count`]: more than 1 where some collisions lie
-    /// below the levels.
+    /// Energy per collision relative to the energy over [`collision_count`]: more than 1 if some collisions are below the
+    /// levels.
     pub energy_weight: f32,
 }
 
 impl QuantileMatchedTracks {
-    /// Tracks of a node of the energy grid, matched to the mean profile of `heights`.
+    /// Tracks of a node of the energy grid, matched to the mean profile of `sampler`.
     ///
     /// # Panics
     ///
     /// If the node is not in the grid.
     #[must_use]
-    pub fn new(spheres: &HardSphereAtmosphere, heights: &TrackSampler, node: usize, key: Key) -> Self {
+    pub fn new(spheres: &HardSphereAtmosphere, sampler: &TrackSampler, node: usize, key: Key) -> Self {
         let track =
             |variant| spheres.track(node_energy_ev(node), key, (node as u64) << 32 | u64::from(variant)).collect();
         let mut tracks: Vec<Vec<Collision>> = (0..TRACKS_PER_ENERGY).map(track).collect();
@@ -37,14 +37,14 @@ impl QuantileMatchedTracks {
         let mut order: Vec<&mut Collision> = tracks.iter_mut().flatten().collect();
         order.sort_by(|a, b| b.altitude_km.total_cmp(&a.altitude_km));
         let count = order.len();
-        for (collision, even) in order.into_iter().zip(heights.quantile_collisions(node, count)) {
-            (collision.level, collision.altitude_km) = (even.level, even.altitude_km);
+        for (collision, quantile) in order.into_iter().zip(sampler.quantile_collisions(node, count)) {
+            (collision.level, collision.altitude_km) = (quantile.level, quantile.altitude_km);
         }
         let energy_weight = f64::from(TRACKS_PER_ENERGY * collision_count(node)) / count.max(1) as f64;
         Self { tracks, energy_weight: energy_weight as f32 }
     }
 
-    /// One of them (any `variant`).
+    /// One of the tracks, selected by any `variant`.
     #[must_use]
     pub fn track(&self, variant: u32) -> &[Collision] {
         &self.tracks[(variant % TRACKS_PER_ENERGY) as usize]

@@ -1,4 +1,4 @@
-//! Serialization of the state: a version, then little-endian numbers and length-prefixed arrays.
+//! The state of the simulation, and its serialization: a version, then little-endian numbers and length-prefixed arrays.
 
 use bansho_base::{math::DVec2, phenomenon::SnapshotError};
 
@@ -6,13 +6,30 @@ use super::{
     AuroraParticles,
     afterglow::{Afterglow, AfterglowMap},
     particles::FLOAT_ARRAYS,
-    simulation::SimulationState,
 };
 use crate::simulate::sheets::arc_length::ArcLengthMap;
 
 const VERSION: u32 = 3;
 /// Counts below this are exact in f64.
 const MAX_EXACT_COUNT: u64 = 1 << 53;
+
+/// State that a step changes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SimulationState {
+    pub(super) steps: u64,
+    pub(super) next_id: u64,
+    /// Support radius h of the repulsion, km.
+    pub(super) support_km: f64,
+    /// Arc-length map of the current sheets.
+    pub(super) arc_map: ArcLengthMap,
+    /// Arc-length map of the target shape, and its time, s.
+    pub(super) target_arc_map: ArcLengthMap,
+    pub(super) target_time: f64,
+    /// Number of updates of the target.
+    pub(super) target_updates: u32,
+    pub(super) particles: AuroraParticles,
+    pub(super) afterglow: Afterglow,
+}
 
 /// Numbers in a snapshot.
 trait SnapshotValue: Copy {
@@ -62,64 +79,71 @@ impl SnapshotReader<'_> {
     }
 }
 
-pub(super) fn write(state: &SimulationState) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    VERSION.put(&mut bytes);
-    state.steps.put(&mut bytes);
-    state.next_id.put(&mut bytes);
-    state.support_km.put(&mut bytes);
-    state.target_time.put(&mut bytes);
-    state.renewals.put(&mut bytes);
-    write_arc_map(&mut bytes, &state.arc_map);
-    write_arc_map(&mut bytes, &state.target_arc_map);
-    write_particles(&mut bytes, &state.particles);
-    for (tile_positions, values) in [state.afterglow.green.to_arrays(), state.afterglow.red.to_arrays()] {
-        put_list(&mut bytes, &tile_positions);
-        put_list(&mut bytes, &values);
+impl SimulationState {
+    /// The bytes of the state.
+    pub(super) fn serialize(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        VERSION.put(&mut bytes);
+        self.steps.put(&mut bytes);
+        self.next_id.put(&mut bytes);
+        self.support_km.put(&mut bytes);
+        self.target_time.put(&mut bytes);
+        self.target_updates.put(&mut bytes);
+        write_arc_map(&mut bytes, &self.arc_map);
+        write_arc_map(&mut bytes, &self.target_arc_map);
+        write_particles(&mut bytes, &self.particles);
+        for (tile_positions, values) in [self.afterglow.green.to_arrays(), self.afterglow.red.to_arrays()] {
+            put_list(&mut bytes, &tile_positions);
+            put_list(&mut bytes, &values);
+        }
+        bytes
     }
-    bytes
-}
 
-/// Deserializes a state whose afterglow has the same layout as `layout`.
-pub(super) fn read(bytes: &[u8], layout: &SimulationState) -> Result<SimulationState, SnapshotError> {
-    let mut reader = SnapshotReader(bytes);
-    let found = reader.item::<u32>()?;
-    if found != VERSION {
-        return Err(SnapshotError::Version { found, known: VERSION });
+    /// The state of bytes from [`Self::serialize`]. Its afterglow has the same layout as that of `layout`.
+    ///
+    /// # Errors
+    ///
+    /// Bytes of another version, truncated or trailing bytes, or values that no simulation reaches.
+    pub(super) fn deserialize(bytes: &[u8], layout: &Self) -> Result<Self, SnapshotError> {
+        let mut reader = SnapshotReader(bytes);
+        let found = reader.item::<u32>()?;
+        if found != VERSION {
+            return Err(SnapshotError::Version { found, known: VERSION });
+        }
+        let state = Self {
+            steps: reader.item()?,
+            next_id: reader.item()?,
+            support_km: reader.item()?,
+            target_time: reader.item()?,
+            target_updates: reader.item()?,
+            arc_map: read_arc_map(&mut reader)?,
+            target_arc_map: read_arc_map(&mut reader)?,
+            particles: read_particles(&mut reader)?,
+            afterglow: Afterglow {
+                green: read_map(&mut reader, &layout.afterglow.green)?,
+                red: read_map(&mut reader, &layout.afterglow.red)?,
+            },
+        };
+        if reader.0.is_empty() && state.is_valid() { Ok(state) } else { Err(SnapshotError::Damaged) }
     }
-    let state = SimulationState {
-        steps: reader.item()?,
-        next_id: reader.item()?,
-        support_km: reader.item()?,
-        target_time: reader.item()?,
-        renewals: reader.item()?,
-        arc_map: read_arc_map(&mut reader)?,
-        target_arc_map: read_arc_map(&mut reader)?,
-        particles: read_particles(&mut reader)?,
-        afterglow: Afterglow {
-            green: read_map(&mut reader, &layout.afterglow.green)?,
-            red: read_map(&mut reader, &layout.afterglow.red)?,
-        },
-    };
-    if reader.0.is_empty() && is_possible(&state) { Ok(state) } else { Err(SnapshotError::Damaged) }
-}
 
-/// Validates a state: finite numbers and counts within range.
-fn is_possible(state: &SimulationState) -> bool {
-    let is_finite = |arc_map: &ArcLengthMap| {
-        arc_map.coordinates.iter().flatten().all(|coordinate| coordinate.is_finite())
-            && arc_map.points.iter().flatten().all(|point| point.is_finite())
-    };
-    let arrays = state.particles.float_arrays();
-    [state.steps, state.next_id].iter().all(|count| *count < MAX_EXACT_COUNT)
-        && u64::from(state.renewals) <= state.steps
-        && state.renewals < u32::MAX
-        && state.support_km.is_finite()
-        && state.support_km > 0.0
-        && state.target_time.is_finite()
-        && is_finite(&state.arc_map)
-        && is_finite(&state.target_arc_map)
-        && arrays.iter().all(|values| values.iter().all(|value| value.is_finite()))
+    /// Whether numbers are finite and counts within range.
+    fn is_valid(&self) -> bool {
+        let is_finite = |arc_map: &ArcLengthMap| {
+            arc_map.coordinates.iter().flatten().all(|coordinate| coordinate.is_finite())
+                && arc_map.points.iter().flatten().all(|point| point.is_finite())
+        };
+        let arrays = self.particles.float_arrays();
+        [self.steps, self.next_id].iter().all(|count| *count < MAX_EXACT_COUNT)
+            && u64::from(self.target_updates) <= self.steps
+            && self.target_updates < u32::MAX
+            && self.support_km.is_finite()
+            && self.support_km > 0.0
+            && self.target_time.is_finite()
+            && is_finite(&self.arc_map)
+            && is_finite(&self.target_arc_map)
+            && arrays.iter().all(|values| values.iter().all(|value| value.is_finite()))
+    }
 }
 
 fn write_arc_map(bytes: &mut Vec<u8>, arc_map: &ArcLengthMap) {
