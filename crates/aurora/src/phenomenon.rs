@@ -5,9 +5,10 @@ use std::sync::Arc;
 use bansho_base::{
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
     },

@@ -350,13 +350,13 @@ fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
 #[test]
 fn a_models_fault_stays_what_it_is() {
     use bansho_base::parameters::ProblemKind;
-    use bansho_fire::particles::ParticleFaultKind;
+    use bansho_fire::particles::ParticleErrorKind;
     let text = "bansho = 2\n[[flame_particles]]\nparticles = 900000000\n";
     let kinds = bansho::KINDS;
     let error = compiled("new.toml", text, kinds, MemoryAssets::default()).err().unwrap();
     let ProblemKind::Model(fault) = &error.problems[0].kind else { panic!("{error}") };
-    let kind = fault.downcast::<ParticleFaultKind>();
-    assert!(matches!(kind, Some(ParticleFaultKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
+    let kind = fault.downcast::<ParticleErrorKind>();
+    assert!(matches!(kind, Some(ParticleErrorKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
 }
 
 #[test]

@@ -27,7 +27,7 @@ use bansho_base::{
 use bansho_fire::particles::{
     Particles,
     render::{
-        FadeOut, Gas, PreparedGas, RenderingParameters, ScratchPool, line_gradient, line_integral, soot_absorption,
+        BufferPool, FadeOut, Gas, PreparedGas, RenderingParameters, line_gradient, line_integral, soot_absorption,
     },
 };
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -50,7 +50,7 @@ fn view() -> View {
     View::new(camera, Shutter { open: TIME, close: TIME + 1.0 / 60.0 }, TIME + 1.0 / 30.0, SIZE, 0)
 }
 
-fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
+fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles,
         time: TIME,
@@ -60,7 +60,7 @@ fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
         size: DVec2::ONE,
         key: Key::new(1, "plume"),
         fade_out: FadeOut::NEVER,
-        scratch,
+        buffers,
     }
 }
 
@@ -68,14 +68,14 @@ fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
 struct Subject {
     particles: Particles,
     view: View,
-    scratch: ScratchPool,
+    buffers: BufferPool,
 }
 
 /// Prepares the gas and hands it to `each`.
 fn prepared(subject: &Subject, look: &RenderingParameters, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
-    let gas = gas(&subject.particles, &subject.scratch);
+    let gas = gas(&subject.particles, &subject.buffers);
     if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
         each(&prepared);
     }
@@ -118,7 +118,7 @@ fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(
 fn gas_720p(criterion: &mut Criterion) {
     let pool = pinned_pool(2);
     let subject =
-        Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), scratch: ScratchPool::default() };
+        Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), buffers: BufferPool::default() };
     let Subject { particles, view, .. } = &subject;
     let look = RenderingParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{Emitter, Light, OtherPhenomena, Publication, Surroundings},
     },

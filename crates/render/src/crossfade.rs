@@ -1,9 +1,10 @@
 //! Seamless loops of what is stepped: the end of one run dissolves into the beginning of the next.
 
 use bansho_base::{
+    frame::Figure,
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, Rect},
     phenomenon::{
         Deflection, Prepared, Run, SnapshotError, Stepped, Stepping,
         strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},

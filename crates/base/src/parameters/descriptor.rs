@@ -1,6 +1,6 @@
 //! Descriptors of parameters: sufficient to parse, document and edit a parameter and to generate random valid values.
 
-use super::Value;
+use super::{Table, Value};
 use crate::host::plural::count_range;
 
 /// One parameter.
@@ -36,6 +36,31 @@ pub struct TableDescriptor {
     pub doc: String,
     /// Its parameters, in the order in which they are documented.
     pub parameters: Vec<Descriptor>,
+}
+
+impl TableDescriptor {
+    /// Paths of all assets that `table`, which this describes, refers to at any depth, in the order of the descriptors.
+    pub fn asset_paths(&self, table: &Table) -> Vec<String> {
+        let mut paths = Vec::new();
+        for parameter in &self.parameters {
+            if let Some(node) = table.get(parameter.key) {
+                collect_asset_paths(&node.value, &parameter.kind, &mut paths);
+            }
+        }
+        paths
+    }
+}
+
+fn collect_asset_paths(value: &Value, kind: &Kind, paths: &mut Vec<String>) {
+    match (kind, value) {
+        (Kind::Asset, Value::Text(path)) => paths.push(path.clone()),
+        (Kind::Optional(inner) | Kind::Auto(inner), value) => collect_asset_paths(value, inner, paths),
+        (Kind::List { item, .. }, Value::List(items)) => {
+            items.iter().for_each(|node| collect_asset_paths(&node.value, item, paths));
+        }
+        (Kind::Table(descriptor), Value::Table(table)) => paths.extend(descriptor().asset_paths(table)),
+        _ => {}
+    }
 }
 
 /// One of the allowed names of a choice.
@@ -146,5 +171,36 @@ impl Kind {
             }
             Self::Table(_) => "a table".into(),
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(unreachable_pub, reason = "tables are public")]
+mod tests {
+    use crate::parameters::{AssetPath, Parameters};
+
+    crate::parameters! {
+        /// A thing with a file.
+        pub struct Part {
+            /// Its file.
+            file: Option<AssetPath> = None;
+        }
+    }
+
+    crate::parameters! {
+        /// Things with files.
+        pub struct Whole {
+            /// Text that is no asset.
+            title: String = "a.png".into();
+            /// Parts.
+            parts: Vec<Part> = Vec::new();
+        }
+    }
+
+    #[test]
+    fn files_are_found_in_tables_in_lists() {
+        let part = |file: Option<&str>| Part { file: file.map(|path| AssetPath(path.into())) };
+        let whole = Whole { parts: vec![part(Some("b.glb")), part(None), part(Some("c.glb"))], ..Whole::default() };
+        assert_eq!(Whole::table().asset_paths(&whole.to_table()), ["b.glb", "c.glb"]);
     }
 }

@@ -150,6 +150,22 @@ pub enum ProblemKind {
     Asset(#[from] AssetError),
 }
 
+/// An error that is only detected when a phenomenon, an obstacle or a plate is built from its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildError {
+    /// Key of the invalid parameter, with sub-tables separated by dots.
+    pub key: String,
+    /// What is wrong.
+    pub kind: ProblemKind,
+}
+
+impl BuildError {
+    /// An error of a model at the parameter `key`.
+    pub fn new(key: impl Into<String>, error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self { key: key.into(), kind: ModelError::new(error).into() }
+    }
+}
+
 /// The list items on a path, counted from 1: ` (shape 2, sheet 1)`. The first table of its kind needs no number.
 fn items(path: &str) -> String {
     let segments: Vec<&str> = path.split('.').collect();

@@ -1,10 +1,10 @@
 //! Kinds of phenomena: how each is read from its table in a scene, and built.
 
-use std::{error::Error, sync::Arc};
+use std::sync::Arc;
 
 use crate::{
     host::assets::Assets,
-    parameters::{ModelError, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
+    parameters::{BuildError, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
 };
 
 use super::Phenomenon;
@@ -20,22 +20,6 @@ pub struct BuildContext<'a> {
     pub loop_s: Option<f64>,
     /// Loader of assets.
     pub assets: &'a dyn Assets,
-}
-
-/// An error that is only detected when a phenomenon is built.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BuildError {
-    /// Key of the invalid parameter, with sub-tables separated by dots.
-    pub key: String,
-    /// What is wrong.
-    pub kind: ProblemKind,
-}
-
-impl BuildError {
-    /// An error of the phenomenon's model, at the parameter `key`.
-    pub fn new(key: impl Into<String>, fault: impl Error + Send + Sync + 'static) -> Self {
-        Self { key: key.into(), kind: ModelError::new(fault).into() }
-    }
 }
 
 /// The checked parameters of a phenomenon.
@@ -130,7 +114,7 @@ impl<P: Describe> CheckedParameters for Described<P> {
     }
 
     fn assets(&self) -> Vec<String> {
-        crate::parameters::assets(&self.0.to_table(), P::table())
+        P::table().asset_paths(&self.0.to_table())
     }
 
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {

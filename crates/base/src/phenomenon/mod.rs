@@ -8,9 +8,10 @@ pub mod surroundings;
 use std::{fmt, sync::Arc};
 
 use crate::{
+    frame::Figure,
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, Rect},
 };
 use strip::{AovDescriptor, DepthInterval, Shutter, Strip, View};
 use surroundings::{OtherPhenomena, Publication, Surroundings};

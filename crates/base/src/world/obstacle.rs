@@ -8,8 +8,7 @@ use super::occluder::Occluder;
 use crate::{
     geometry::{distance_field::DistanceField, transform::Transform},
     host::{assets::Assets, constructions},
-    parameters::{AssetPath, ProblemKind, Range},
-    phenomenon::kind::BuildError,
+    parameters::{AssetPath, BuildError, ProblemKind, Range},
 };
 
 crate::choice! {

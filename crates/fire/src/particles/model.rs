@@ -7,9 +7,9 @@ use bansho_base::{
 };
 
 use super::{
-    fault::{ParticleFault, ParticleFaultKind},
+    error::{ParticleError, ParticleErrorKind},
     parameters::FlameParticlesParameters,
-    render::{FadeOut, Gas, ScratchPool},
+    render::{BufferPool, FadeOut, Gas},
 };
 use crate::particles::simulate::{Simulation, burner::Burner, derived::DerivedConstants, particles::Particles};
 
@@ -25,7 +25,7 @@ pub struct FlameParticles {
     /// Temperature of the air at the last step, K.
     pub(super) air_temperature_k: f64,
     /// Scratch memory of the renderer.
-    pub(super) scratch: ScratchPool,
+    pub(super) buffers: BufferPool,
 }
 
 impl FlameParticles {
@@ -39,7 +39,7 @@ impl FlameParticles {
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
-    ) -> Result<Self, ParticleFault> {
+    ) -> Result<Self, ParticleError> {
         if let Some(seconds) = loop_s {
             close_loop(&mut parameters, seconds)?;
         }
@@ -53,7 +53,7 @@ impl FlameParticles {
             time: -steps * parameters.step_s,
             air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
             simulation: Simulation::new(&parameters, constants, key),
-            scratch: ScratchPool::default(),
+            buffers: BufferPool::default(),
             parameters,
         })
     }
@@ -79,7 +79,7 @@ impl FlameParticles {
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
             fade_out: self.fade_out(),
-            scratch: &self.scratch,
+            buffers: &self.buffers,
         }
     }
 
@@ -99,9 +99,9 @@ impl FlameParticles {
 }
 
 /// Makes animated values repeat with the loop.
-pub(super) fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
+pub(super) fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleError> {
     match parameters.close_loop(seconds) {
-        Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
+        Some(key) => Err(ParticleError { key, kind: ParticleErrorKind::LoopJumps { seconds } }),
         None => Ok(()),
     }
 }

@@ -7,16 +7,17 @@ use bansho_base::{
     geometry::point_cloud::{PointCloud, Quantity},
     host::observer::{Cancelled, Observer},
     math::{self, DVec3},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
     },
 };
 
 use super::{
-    fault::ParticleFaultKind,
+    error::ParticleErrorKind,
     model::FlameParticles,
     parameters::{FlameParticlesParameters, TemperatureLaw},
     render::{self, PreparedGas, SpriteStyle},
@@ -53,7 +54,7 @@ impl Describe for FlameParticlesParameters {
         match FlameParticles::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
             Ok(flame) => Ok(Arc::new(flame)),
             Err(fault) => Err(match fault.kind {
-                ParticleFaultKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
+                ParticleErrorKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
                 other => BuildError::new(fault.key, other),
             }),
         }

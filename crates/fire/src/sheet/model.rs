@@ -3,19 +3,17 @@
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
+    camera::{Camera, upright_quad::right_facing},
     host::{constructions, once::get_or_compute},
-    parameters::parameter_error::{ParameterError, ParameterErrorKind},
+    math::{self, DVec2, DVec3, random::Key},
+    parameters::{ParameterError, ParameterErrorKind},
 };
 
 use super::{
-    FlameSheetParameters, Instance, TextureKind,
     animate::{clock::Clock, warp::FlameWaves},
-    render::{
-        color_ramp::ColorRamp,
-        curve_tables::{ShapeTables, instance_key},
-        flame_instance::{FlameInstance, TextureSource},
-    },
-    texture::{FractalLayers, PaperLayer},
+    parameters::{Facing, FlameSheetParameters, Instance, TextureKind},
+    tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
+    texture::{FractalLayers, PaperLayer, TextureSource},
 };
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
@@ -83,6 +81,54 @@ pub(super) struct Tables {
     pub(super) ramp: Box<ColorRamp>,
 }
 
+/// One flame among the instances of a sheet.
+#[derive(Clone, Debug)]
+pub(crate) struct FlameInstance {
+    pub(crate) placement: Instance,
+    pub(crate) key: Key,
+    pub(crate) waves: FlameWaves,
+    pub(crate) texture_source: TextureSource,
+}
+
+impl FlameSheet {
+    /// Center of a flame's base at `t`, m.
+    pub(crate) fn base(&self, flame: &FlameInstance, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.placement.position)
+    }
+
+    /// A flame's own time, with its phase.
+    pub(crate) fn flame_time(&self, flame: &FlameInstance, t: f64) -> f64 {
+        t + self.parameters.phase_s + flame.placement.phase_s
+    }
+
+    /// Width and height of a flame's sheet, m.
+    pub(crate) fn sheet_size(&self, flame: &FlameInstance) -> DVec2 {
+        DVec2::new(self.parameters.width, self.parameters.height) * flame.placement.scale
+    }
+
+    /// Mean speed of the rising gas, m/s.
+    pub(crate) fn rise_speed(&self, flame: &FlameInstance, t: f64) -> f64 {
+        // The texture passes over a height in 1/s seconds, whatever the acceleration.
+        self.clock.speed(t) * self.sheet_size(flame).y
+    }
+
+    /// Horizontal direction across a flame's sheet.
+    pub(crate) fn right(&self, flame: &FlameInstance, camera: &Camera, base: DVec3) -> DVec3 {
+        match self.parameters.facing {
+            Facing::Camera => right_facing(camera, base),
+            Facing::Fixed => {
+                let (sin, cos) = math::sin_cos((self.parameters.yaw_deg + flame.placement.yaw_deg).to_radians());
+                DVec3::new(cos, 0.0, -sin)
+            }
+        }
+    }
+
+    /// Luminance of the brightest color at `t`, cd/m^2.
+    pub(crate) fn luminance_at(&self, t: f64) -> f64 {
+        self.parameters.color.luminance.at(self.clock.time(t))
+    }
+}
+
 pub(super) fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
@@ -106,4 +152,9 @@ pub(super) fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
     const USUAL: f64 = 0.65;
     let aspect = parameters.width / parameters.height / USUAL;
     [parameters.texture.tongue_width / aspect.clamp(0.05, 20.0), parameters.texture.tongue_length]
+}
+
+/// Key of the random numbers of one instance.
+fn instance_key(seed: u64, name: &str, variation: i64, index: usize) -> Key {
+    Key::new(seed, &format!("{name}/{variation}/{index}"))
 }

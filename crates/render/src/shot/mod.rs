@@ -6,12 +6,13 @@ pub(crate) mod stepping;
 use std::sync::Arc;
 
 use bansho_base::{
+    frame::{Channel, FigureSet, Frame},
     geometry::point_cloud::PointCloud,
     host::observer::{self, Cancelled, Observer, Stage, StageGuard},
-    image::{Channel, FigureSet, Frame, Rect},
+    image::Rect,
+    parameters::BuildError,
     phenomenon::{
         LevelMirror, Prepared, SnapshotError,
-        kind::BuildError,
         strip::View,
         surroundings::{Publication, Surroundings},
     },

@@ -9,8 +9,8 @@ use super::gas::Gas;
 use crate::particles::{
     parameters::RenderingParameters,
     render::{
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer, spline},
+        project::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer},
         splat::{
             MIN_RADIUS_CELLS, SplatSettings, Sprite,
             grid::{Grid, weighted_sum},
@@ -119,10 +119,10 @@ impl<'a> MotionField<'a> {
                 window: view.window,
             },
             &sprites,
-            gas.scratch,
+            gas.buffers,
         );
         let grid = grid.sums()?;
-        Some(Self { weights: spline::weights(&grid.cells), grid, min_max })
+        Some(Self { weights: grid.cells.spline_weights(), grid, min_max })
     }
 
     /// Motion of the gas at a pixel until the next frame, pixels to the right and down.

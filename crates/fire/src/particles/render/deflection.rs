@@ -15,8 +15,8 @@ use crate::particles::{
     parameters::RenderingParameters,
     render::{
         depth_layers::is_visible,
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{PATH, PLANES, spline},
+        project::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{PATH, PLANES},
         splat::{
             MIN_RADIUS_CELLS, SplatSettings, Sprite,
             grid::{Grid, weighted_sum},
@@ -101,7 +101,7 @@ impl HeatHaze {
             window: view.window,
         };
         let rest =
-            splat(&settings, &project_particles(gas, view, &RefractionSprites { gas, look, whole_gas }), gas.scratch)
+            splat(&settings, &project_particles(gas, view, &RefractionSprites { gas, look, whole_gas }), gas.buffers)
                 .sums();
         let paths: Vec<OpticalPathField> = [(splatted, PATH, PLANES), (rest.as_ref(), 0, 1)]
             .into_iter()
@@ -160,8 +160,8 @@ impl<'a> OpticalPathField<'a> {
     fn new(grid: &Grid<'a>, plane: usize, planes: usize) -> Self {
         Self {
             sums: grid.one_plane(plane, planes),
-            weights: spline::weights(&grid.cells),
-            slopes: spline::slopes(&grid.cells),
+            weights: grid.cells.spline_weights(),
+            slopes: grid.cells.spline_slopes(),
         }
     }
 

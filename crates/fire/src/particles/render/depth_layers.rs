@@ -13,7 +13,10 @@ use rayon::prelude::*;
 
 use crate::particles::{
     parameters::{RenderingParameters, SpriteStyle},
-    render::{gas::Gas, prepared::PARTICLES_PER_TASK, resolve::detail::DetailScale},
+    render::{
+        gas::{Gas, PARTICLES_PER_TASK},
+        resolve::detail::DetailScale,
+    },
 };
 
 /// Layers of equal thickness, at multiples of it, so that they stay in place while the gas moves.

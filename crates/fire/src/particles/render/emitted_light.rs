@@ -10,7 +10,7 @@ use bansho_base::{
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
+use super::gas::{Gas, PARTICLES_PER_TASK};
 use crate::particles::parameters::RenderingParameters;
 
 /// Slabs of height over which emission is accumulated.

@@ -5,7 +5,10 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, parameters::RenderingParameters, render::splat::scratch_pool::ScratchPool};
+use crate::particles::{Particles, parameters::RenderingParameters, render::buffer_pool::BufferPool};
+
+/// Particles per task of the thread pool.
+pub(crate) const PARTICLES_PER_TASK: usize = 2048;
 
 /// The gas of one flame at one time, with what rendering needs of its surroundings.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +30,7 @@ pub struct Gas<'a> {
     /// How particles fade out before they are removed.
     pub fade_out: FadeOut,
     /// Scratch memory that is kept from frame to frame.
-    pub scratch: &'a ScratchPool,
+    pub buffers: &'a BufferPool,
 }
 
 /// Fading of particles before they are removed, so that none vanishes abruptly.

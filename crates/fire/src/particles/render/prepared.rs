@@ -26,14 +26,14 @@ use super::{
 use crate::{
     chemiluminescence_color,
     particles::{
-        paper_squares::Squares,
         parameters::{RenderingParameters, SpriteStyle},
         render::{
             depth_layers::{GasStatistics, is_visible},
-            project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+            paper_squares::Squares,
+            project::{ProjectedParticle, SpriteKind, project_particles},
             resolve::{
                 BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES,
-                TAU, detail::Detail, spline, strain::Strain, upsample::RowInterpolator,
+                TAU, detail::Detail, strain::Strain, upsample::RowInterpolator,
             },
             splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, grid::Grid, kernel::Profile, splat},
         },
@@ -53,9 +53,6 @@ pub struct PreparedGas<'a> {
     /// Computed where it is requested as an AOV or bends the light from behind.
     haze: OnceLock<Option<HeatHaze>>,
 }
-
-/// Particles per task of the thread pool.
-pub(crate) const PARTICLES_PER_TASK: usize = 2048;
 
 /// How the particles are drawn.
 enum DrawMode<'a> {
@@ -191,7 +188,7 @@ fn splat_gas<'a>(
             window: view.window,
         },
         &sprites,
-        gas.scratch,
+        gas.buffers,
     ) {
         SplatResult::Sums(grid) => grid,
         SplatResult::OutsideWindow => return DrawMode::OutsideWindow,
@@ -206,8 +203,8 @@ fn splat_gas<'a>(
     let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.center(layer), surroundings));
     DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
-        weights: spline::weights(&grid.cells),
-        across: RowInterpolator::new(&grid, view.size[0], &spline::weights(&grid.cells)),
+        weights: grid.cells.spline_weights(),
+        across: RowInterpolator::new(&grid, view.size[0], &grid.cells.spline_weights()),
         grid,
         detail,
         scattered: scattered.collect(),

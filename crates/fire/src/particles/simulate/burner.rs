@@ -17,7 +17,7 @@ use bansho_base::{
 };
 
 use crate::particles::{
-    fault::ParticleFaultKind,
+    error::ParticleErrorKind,
     parameters::{BurnerParameters, BurnerShape, FlameParticlesParameters},
 };
 
@@ -72,7 +72,7 @@ impl Burner {
         parameters: &BurnerParameters,
         flame: &FlameParticlesParameters,
         assets: &dyn Assets,
-    ) -> Result<Self, ParticleFaultKind> {
+    ) -> Result<Self, ParticleErrorKind> {
         let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
         let placement = Transform::new([0.0; 3], parameters.rotation_deg, scale);
         let (area, size) = area(parameters, assets)?;
@@ -206,7 +206,7 @@ fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DV
     [-half, half]
 }
 
-fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSurface, Size), ParticleFaultKind> {
+fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSurface, Size), ParticleErrorKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
     let disc_area = 0.25 * std::f64::consts::PI * diameter * diameter;
     let size = |diameter, area_m2, bounding_radius| Size { diameter, area_m2, bounding_radius, mesh: None };
@@ -219,7 +219,7 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSur
             (BurnerSurface::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
         }
         BurnerShape::Mesh => {
-            let file = parameters.file.as_ref().ok_or(ParticleFaultKind::NoFile)?;
+            let file = parameters.file.as_ref().ok_or(ParticleErrorKind::NoFile)?;
             let mesh = assets.mesh(&file.0)?;
             let [min, max] = mesh.bounds();
             let sides = (max - min) * scale;
@@ -342,6 +342,6 @@ mod tests {
         assert!(spawn_points(&point).all(|spawn_point| spawn_point.position.length() <= 0.05));
         let missing = BurnerParameters { shape: BurnerShape::Mesh, ..Default::default() };
         let fault = Burner::new(&missing, &FlameParticlesParameters::default(), &MemoryAssets::default());
-        assert_eq!(fault.unwrap_err(), ParticleFaultKind::NoFile);
+        assert_eq!(fault.unwrap_err(), ParticleErrorKind::NoFile);
     }
 }

@@ -14,8 +14,9 @@ use crate::particles::{
     simulate::{
         fluid::{NeighborSums, Neighborhood},
         forces::external_forces::{BurnerForces, ExternalForces},
-        particle_lanes::{BatchUpdate, RowBatch, SharedColumns, add_scaled, for_each_burner_batch, length},
+        particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
         particles::Particles,
+        vectors::{add_scaled, length},
     },
 };
 

@@ -9,7 +9,7 @@ use bansho_base::{
 
 use super::burner::Burner;
 use crate::particles::{
-    fault::{ParticleFault, ParticleFaultKind},
+    error::{ParticleError, ParticleErrorKind},
     parameters::{BurnerParameters, FlameParticlesParameters},
 };
 
@@ -66,7 +66,7 @@ impl DerivedConstants {
         parameters: &FlameParticlesParameters,
         loop_s: Option<f64>,
         assets: &dyn Assets,
-    ) -> Result<Self, ParticleFault> {
+    ) -> Result<Self, ParticleError> {
         check_particle_count(parameters.particles, 0)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
@@ -115,12 +115,12 @@ fn support_radius(
     parameters: &FlameParticlesParameters,
     volume: f64,
     domain: &[DVec3; 2],
-) -> Result<f64, ParticleFault> {
+) -> Result<f64, ParticleError> {
     let (radius, side) = (parameters.fluid.support_radius * math::cbrt(volume), (domain[1] - domain[0]).min_element());
     if radius <= side {
         return Ok(radius);
     }
-    Err(ParticleFault { key: "particles".into(), kind: ParticleFaultKind::SupportBeyondDomain { radius, side } })
+    Err(ParticleError { key: "particles".into(), kind: ParticleErrorKind::SupportBeyondDomain { radius, side } })
 }
 
 /// Preroll before the shot, s; by default twice the longest residence time.
@@ -140,7 +140,7 @@ fn have_memory(count: i64) -> bool {
 ///
 /// # Errors
 /// Too many particles, or not enough memory; the error says how many are allowed.
-pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault> {
+pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleError> {
     let taken = (MAX_PARTICLES - others).max(0);
     if count <= taken && have_memory(count + others) {
         return Ok(());
@@ -149,26 +149,26 @@ pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault
         memory::largest_fitting_count(taken.min(count), |max_particles| have_memory(max_particles + others));
     let max_particles = if count > taken && have_memory(taken + others) { taken } else { max_particles };
     let gib = (count as f64 + others as f64) * MEMORY_PER_PARTICLE / f64::from(1 << 30);
-    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most: max_particles };
-    Err(ParticleFault { key: "particles".into(), kind })
+    let kind = ParticleErrorKind::TooManyParticles { count, others, gib, most: max_particles };
+    Err(ParticleError { key: "particles".into(), kind })
 }
 
-fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleFault> {
+fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleError> {
     let single = [BurnerParameters::default()];
     let listed = if parameters.burners.is_empty() { &single[..] } else { &parameters.burners };
     let make = |(index, burner): (usize, &BurnerParameters)| {
         Burner::new(burner, parameters, assets)
-            .map_err(|kind| ParticleFault { key: format!("burners.{index}.file"), kind })
+            .map_err(|kind| ParticleError { key: format!("burners.{index}.file"), kind })
     };
     listed.iter().enumerate().map(make).collect()
 }
 
 /// The domain: as given, or with a margin of three flame heights around the burners.
-fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleFault> {
+fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleError> {
     if let (Auto::Set(min), Auto::Set(max)) = (parameters.domain_min, parameters.domain_max)
         && DVec3::from(min).cmpge(DVec3::from(max)).any()
     {
-        return Err(ParticleFault { key: "domain_max".into(), kind: ParticleFaultKind::EmptyDomain { min, max } });
+        return Err(ParticleError { key: "domain_max".into(), kind: ParticleErrorKind::EmptyDomain { min, max } });
     }
     for (index, burner) in burners.iter().enumerate() {
         let corners = burner.parameters.position.bounds().map(DVec3::from);
@@ -178,7 +178,7 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
                 |(corner, kind)| {
                     // A parameter that the user did not write is not named as the faulty one.
                     let moved = burner.parameters.position != Animated::from([0.0; 3]);
-                    ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
+                    ParticleError { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
                 },
             )?;
         }
@@ -198,10 +198,10 @@ fn stands_within(
     parameters: &FlameParticlesParameters,
     position: DVec3,
     slack: f64,
-) -> Result<(), (&'static str, ParticleFaultKind)> {
+) -> Result<(), (&'static str, ParticleErrorKind)> {
     let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
     let beyond =
-        |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { position: position.into(), corner, limit }));
+        |corner, limit| Err((corner, ParticleErrorKind::OutsideDomain { position: position.into(), corner, limit }));
     match (domain_min, domain_max) {
         (Auto::Set(min), _) if (position + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
         (_, Auto::Set(max)) if (position - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
@@ -216,7 +216,7 @@ mod tests {
     use super::*;
     use crate::particles::parameters::BurnerShape;
 
-    fn constants(parameters: &FlameParticlesParameters) -> Result<DerivedConstants, ParticleFault> {
+    fn constants(parameters: &FlameParticlesParameters) -> Result<DerivedConstants, ParticleError> {
         DerivedConstants::new(parameters, None, &MemoryAssets::default())
     }
 
@@ -238,7 +238,7 @@ mod tests {
     }
 
     /// A flame on a triangle of 0.5 m^2, offset by `far` from the mesh's origin, in a domain of 2 m in each direction.
-    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<DerivedConstants, ParticleFault> {
+    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<DerivedConstants, ParticleError> {
         let corners = vec![[far, 0.0, 0.0], [far, 0.0, 1.0], [far + 1.0, 0.0, 0.0]];
         let mut assets = MemoryAssets::default();
         assets.insert_mesh("far.gltf", Mesh::new(corners, vec![[0, 1, 2]]).unwrap());
@@ -260,7 +260,7 @@ mod tests {
             let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
             assert_eq!(fault.key, key);
             assert!(
-                matches!(fault.kind, ParticleFaultKind::OutsideDomain { position, .. } if position[0].abs() >= 50.0)
+                matches!(fault.kind, ParticleErrorKind::OutsideDomain { position, .. } if position[0].abs() >= 50.0)
             );
         }
     }
@@ -289,7 +289,7 @@ mod tests {
         let narrow = vec![BurnerParameters { diameter: 0.015, ..Default::default() }];
         let [domain_min, domain_max] = thin;
         let wide = FlameParticlesParameters { particles: 5, burners: narrow, domain_min, domain_max, ..default() };
-        assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
+        assert!(matches!(fault(wide).kind, ParticleErrorKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
         let expected = "particles: 900000000 particles would take 562 GiB; allowed: up to ";
         let max_particles: Option<i64> =

@@ -17,7 +17,7 @@ use crate::particles::{
     parameters::WindForce,
     simulate::{
         forces::external_forces::{BurnerForces, ExternalForces},
-        particle_lanes::{add_scaled, clamp_length, length, subtract},
+        vectors::{add_scaled, clamp_length, length, subtract},
     },
 };
 

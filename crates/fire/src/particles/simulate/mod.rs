@@ -39,6 +39,7 @@ pub(crate) mod particle_lanes;
 pub mod particles;
 pub(crate) mod snapshot;
 pub(crate) mod spawning;
+pub(crate) mod vectors;
 
 /// The simulation: particles, and all that moves them.
 #[derive(Clone, Debug)]

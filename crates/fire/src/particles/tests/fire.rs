@@ -138,8 +138,8 @@ fn gas_stands_on_its_burner_after_a_step_of_any_length() {
 
 /// Light that gas of a kind sends, and that times its height.
 fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
-    let scratch = ScratchPool::default();
-    let gas = gas(simulation, &scratch);
+    let buffers = BufferPool::default();
+    let gas = gas(simulation, &buffers);
     let mut sums = [0.0; 2];
     for index in 0..gas.particles.len() {
         let light = of(&gas, index) * gas.volume(index);

@@ -13,7 +13,10 @@ use fearless_simd::Simd;
 use super::{clock::Clock, fluctuation::Fluctuation};
 use crate::sheet::{
     parameters::{FlameSheetParameters, ShapeParameters},
-    render::curve_tables::{CurvePair, SEGMENTS, ShapeTables, lookup_index},
+    tables::{
+        curve_pair::{CurvePair, SEGMENTS, lookup_index},
+        shape_tables::ShapeTables,
+    },
 };
 
 /// The fluctuations of one flame: its edges P (15), the sway of its center line and the flicker of its height.

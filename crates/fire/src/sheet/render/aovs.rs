@@ -9,7 +9,10 @@ use bansho_base::{
 use fearless_simd::Simd;
 
 use super::shade::{SheetContent, TimeSample, shade_sample};
-use crate::sheet::{FlameSheet, render::flame_instance::FlameInstance};
+use crate::sheet::{
+    equations,
+    model::{FlameInstance, FlameSheet},
+};
 
 /// What a flame sheet can write beside its light, in the order of a strip's planes.
 pub(crate) const AOVS: &[AovDescriptor] = &[
@@ -125,7 +128,7 @@ impl FlameSheet {
     /// dy/dt of the gas at (x, y), sheet heights per second: s / (dw/dy).
     fn gas_speed(&self, flame: &FlameInstance, x: f64, y: f64, t: f64) -> f64 {
         const STEP: f32 = 0.01;
-        let distance = crate::sheet::equations::axis_distance(x as f32);
+        let distance = equations::axis_distance(x as f32);
         let y = (y as f32).clamp(0.02, 0.98);
         let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);

@@ -13,10 +13,14 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use super::shade::{ShadedBatch, SheetContent, TimeSample, coordinates, shade_coordinates, shade_sample};
-use crate::sheet::render::{
+use super::shade::{
+    ShadedBatch, SheetContent, TimeSample,
+    flame::{coordinates, shade_coordinates},
+    shade_sample,
+};
+use crate::sheet::tables::{
     color_ramp::ColorRamp,
-    curve_tables::{FlameCoordinates, ShapeTables},
+    shape_tables::{FlameCoordinates, ShapeTables},
 };
 
 /// What is drawn of one sheet.

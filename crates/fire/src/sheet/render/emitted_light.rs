@@ -14,12 +14,11 @@ use fearless_simd::{Level, Simd, prelude::*};
 
 use super::{
     projection::SheetCoordinates,
-    shade::{SheetState, shade},
+    shade::{SheetState, flame::shade},
 };
 use crate::sheet::{
-    FlameSheet,
     animate::warp::{WarpState, WindLean},
-    render::flame_instance::FlameInstance,
+    model::{FlameInstance, FlameSheet},
 };
 
 /// Rows of the grid; it is sixteen wide.

@@ -16,12 +16,12 @@ use super::{
     aovs::{AovContext, write_aov_rows},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
+    time_samples::pixels_per_meter,
 };
 use crate::{
     sheet::{
-        FlameSheet,
+        model::{FlameInstance, FlameSheet},
         parameters::Stage,
-        render::flame_instance::{FlameInstance, pixels_per_meter},
     },
     sparks::{SparkEmitter, Streak},
 };

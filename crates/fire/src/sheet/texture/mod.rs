@@ -5,9 +5,13 @@ mod paper;
 
 use std::sync::{Arc, OnceLock};
 
-use bansho_base::math::simd::{Lanes, Real, gather, wrap_split};
+use bansho_base::math::{
+    self,
+    simd::{Lanes, Real, gather, wrap_split},
+};
 use fearless_simd::{Level, Simd, dispatch};
-pub(crate) use fractal::{FRACTAL, FractalLayers};
+use fractal::FRACTAL;
+pub(crate) use fractal::FractalLayers;
 pub(crate) use paper::PaperLayer;
 pub use paper::{PaperTexture, paper_texture};
 
@@ -169,6 +173,71 @@ impl Texture {
             Self::Mixed(table, [mip_level, fine]) => {
                 fractal::mix_equalized(mip_level.sample(table, u, w), fine.sample(table, u, w))
             }
+        }
+    }
+}
+
+/// Source of a flame's texture.
+#[derive(Clone, Debug)]
+pub(crate) enum TextureSource {
+    /// The layers of this flame on the common noise table.
+    Fractal(FractalLayers),
+    /// The paper's table, common to all instances.
+    Paper(Arc<PaperLayer>),
+}
+
+impl TextureSource {
+    /// Texels of the table per sheet height.
+    fn texels_up(&self) -> f64 {
+        match self {
+            Self::Fractal(layers) => layers.texels_up(),
+            Self::Paper(layer) => layer.texels_up(),
+        }
+    }
+}
+
+impl TextureSource {
+    /// T0 after `scroll` sheet heights, at full resolution.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
+            Self::Paper(layer) => layer.at(scroll),
+        }
+    }
+
+    /// The same with its table filtered (as a mip level) for a sheet `height_pixels` tall.
+    pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredTexture {
+        let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
+        match self {
+            Self::Fractal(layers) if level > 0.0 => {
+                FilteredTexture::Fractal(*layers, Arc::new(FRACTAL.filtered(level)))
+            }
+            Self::Fractal(layers) => FilteredTexture::Fractal(*layers, FRACTAL.clone()),
+            Self::Paper(layer) if level > 0.0 => FilteredTexture::Paper(Arc::new(layer.filtered(level))),
+            Self::Paper(layer) => FilteredTexture::Paper(layer.clone()),
+        }
+    }
+}
+
+/// A flame's texture, filtered for one frame.
+pub(crate) enum FilteredTexture {
+    /// Layers and their filtered table.
+    Fractal(FractalLayers, Arc<TextureTable>),
+    /// The paper's texture.
+    Paper(Arc<PaperLayer>),
+}
+
+impl FilteredTexture {
+    /// Fractal layers filtered for a sheet `height_pixels` tall.
+    pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
+        TextureSource::Fractal(layers).filtered(height_pixels)
+    }
+
+    /// T0 after `scroll` sheet heights.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers, table) => layers.at(table, scroll),
+            Self::Paper(layer) => layer.at(scroll),
         }
     }
 }

@@ -7,16 +7,19 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::sprite::{Ellipse, MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
+use super::{MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
 use crate::particles::render::{
     gas::Gas,
-    splat::kernel::{LINE_PEAK, VARIANCE},
+    splat::{
+        Ellipse,
+        kernel::{LINE_PEAK, VARIANCE},
+    },
 };
 
 type Batch = [f32; LANES];
 
 /// A perspective camera at this frame and the next.
-pub(crate) struct PerspectiveProjector {
+pub(super) struct PerspectiveProjector {
     now: PinholeCamera,
     next: PinholeCamera,
     /// Exposure time as a fraction of the frame interval.
@@ -34,7 +37,7 @@ struct ProjectedBatch {
 
 impl PerspectiveProjector {
     /// `None` where the lens is not rectilinear.
-    pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
+    pub(super) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
         let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
         (view.camera.lens == Lens::Perspective).then(|| Self {
             now: pinhole(&view.camera, view.shutter.middle()),
@@ -46,7 +49,7 @@ impl PerspectiveProjector {
 
     /// Records the particles of `range` that are included and visible.
     #[inline(always)]
-    pub(crate) fn project<K: SpriteKind>(
+    pub(super) fn project<K: SpriteKind>(
         &self,
         gas: &Gas,
         range: std::ops::Range<usize>,

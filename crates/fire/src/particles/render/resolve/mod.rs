@@ -18,7 +18,6 @@ use crate::particles::render::{
 };
 
 pub(crate) mod detail;
-pub(crate) mod spline;
 pub(crate) mod strain;
 pub(crate) mod upsample;
 

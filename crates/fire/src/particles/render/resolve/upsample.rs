@@ -71,20 +71,20 @@ impl RowInterpolator {
 mod tests {
     use bansho_base::image::Rect;
 
-    use super::{super::spline, *};
-    use crate::particles::render::splat::{grid::Raster, scratch_pool::ScratchPool};
+    use super::*;
+    use crate::particles::render::{buffer_pool::BufferPool, splat::grid::Raster};
 
     #[test]
     fn sixteen_pixels_are_what_each_of_them_is() {
         const DEPTH: usize = 3;
-        let scratch = ScratchPool::default();
+        let buffers = BufferPool::default();
         for (size, width) in [(1, 64), (2, 50), (3, 47), (4, 64), (6, 130), (8, 17), (32, 99)] {
             let cells = Raster::around(Rect { x: 5, y: 0, width: width - 9, height: 4 }, size, false);
-            let mut grid = Grid::new(cells, DEPTH, &scratch);
+            let mut grid = Grid::new(cells, DEPTH, &buffers);
             for (index, value) in grid.values_mut().iter_mut().enumerate() {
                 *value = (index * index % 17) as f32;
             }
-            let weights = spline::weights(&grid.cells);
+            let weights = grid.cells.spline_weights();
             let (across, columns, row) =
                 (RowInterpolator::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
             for x in (0..width).step_by(LANES) {

@@ -4,10 +4,8 @@ use bansho_base::image::Rect;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use crate::particles::render::{
-    resolve::spline,
-    splat::scratch_pool::{PooledVec, ScratchPool},
-};
+use super::spline;
+use crate::particles::render::buffer_pool::{BufferPool, PooledVec};
 
 /// Cells around the covered area that are read: two by interpolation, one by differences, two by the prefilter.
 const MARGIN: i32 = 5;
@@ -83,6 +81,16 @@ impl Raster {
         let half = if size.is_multiple_of(2) { 0.5 } else { 0.0 };
         (0..size).map(move |phase| (phase as f32 + half) / size as f32)
     }
+
+    /// Weights of the four surrounding cells for values, for each pixel phase.
+    pub(crate) fn spline_weights(&self) -> Vec<[f32; 4]> {
+        self.phases().map(spline::value).collect()
+    }
+
+    /// Weights of the four surrounding cells for slopes per pixel, for each pixel phase.
+    pub(crate) fn spline_slopes(&self) -> Vec<[f32; 4]> {
+        self.phases().map(|t| spline::slope(t).map(|weight| weight / self.size as f32)).collect()
+    }
 }
 
 /// Values over cells. The values of a cell are contiguous, so that one SIMD vector accumulates a whole sprite value.
@@ -98,11 +106,11 @@ pub(crate) struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     /// A grid with uninitialized (arbitrary) values: the caller fills all rows.
-    pub(crate) fn new(cells: Raster, depth: usize, scratch: &'a ScratchPool) -> Self {
+    pub(crate) fn new(cells: Raster, depth: usize, buffers: &'a BufferPool) -> Self {
         /// Cache line, bytes.
         const LINE: usize = 64;
         let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
-        let mut values = scratch.take(count);
+        let mut values = buffers.take(count);
         if values.len() < count {
             // Zero pages from the operating system, not touched before they are used.
             *values = vec![0.0; values.capacity()];
@@ -112,8 +120,8 @@ impl<'a> Grid<'a> {
     }
 
     /// The pool that its memory came from.
-    pub(crate) fn scratch(&self) -> &'a ScratchPool {
-        self.values.scratch()
+    pub(crate) fn pool(&self) -> &'a BufferPool {
+        self.values.pool()
     }
 
     /// All values.
@@ -155,13 +163,35 @@ impl<'a> Grid<'a> {
 
     /// One value per cell: the sum over layers of plane `plane` of `planes`.
     pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
-        let mut one = Self::new(self.cells, 1, self.scratch());
+        let mut one = Self::new(self.cells, 1, self.pool());
         one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
             for (sum, cell) in out.iter_mut().zip(self.row(row as i32).chunks_exact(self.depth)) {
                 *sum = cell[plane..].iter().step_by(planes).sum();
             }
         });
         one
+    }
+
+    /// The grid of B-spline coefficients: prefiltered along columns and rows, so that the spline interpolates these values.
+    pub(crate) fn prefiltered(&self) -> Self {
+        let (length, depth) = (self.row_length(), self.depth);
+        let (mut prefiltered, level) = (Self::new(self.cells, depth, self.pool()), Level::new());
+        prefiltered.values_mut().par_chunks_mut(length).enumerate().for_each_init(
+            || vec![0.0; length],
+            |column_filtered, (row, out)| {
+                let rows = [-2, -1, 0, 1, 2].map(|by| self.row(row as i32 + by));
+                // The margin, which lacks two cells on one side, is empty.
+                let (margin, inner) = out.split_at_mut(2 * depth);
+                let (inner, other_margin) = inner.split_at_mut(length - 4 * depth);
+                margin.fill(0.0);
+                other_margin.fill(0.0);
+                dispatch!(level, _simd => {
+                    spline::prefilter(column_filtered, rows);
+                    spline::prefilter(inner, [0, 1, 2, 3, 4].map(|by| &column_filtered[by * depth..]));
+                });
+            },
+        );
+        prefiltered
     }
 
     /// Adds prefiltered cells twice as large, interpolated.
@@ -211,5 +241,45 @@ pub(crate) fn weighted_sum(out: &mut [f32], rows: [&[f32]; 4], weights: &[f32; 4
     for i in 0..count {
         let sum = weights[0].mul_add(a[i], weights[1] * b[i]);
         out[i] = weights[3].mul_add(d[i], weights[2].mul_add(c[i], sum));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math;
+
+    use super::*;
+
+    /// Greatest relative error of values and slopes of a sine of `length` cells, over pixels of every phase.
+    fn worst(length: f64) -> [f64; 2] {
+        let cells = Raster::around(Rect { x: 0, y: 0, width: 128, height: 8 }, 4, false);
+        let buffers = BufferPool::default();
+        let mut grid = Grid::new(cells, 1, &buffers);
+        let turn = std::f64::consts::TAU / length;
+        for (index, value) in grid.values_mut().iter_mut().enumerate() {
+            *value = math::sin(turn * (index % cells.columns) as f64) as f32;
+        }
+        let prefiltered = grid.prefiltered();
+        let (weights, slopes, row) = (cells.spline_weights(), cells.spline_slopes(), prefiltered.row(4));
+        let mut worst = [0.0_f64; 2];
+        for x in 16..112 {
+            let (cell, phase) = cells.cell_before(0, x);
+            let first = grid.first_of_four(cell);
+            let sum = |weights: &[f32; 4]| f64::from((0..4).map(|k| weights[k] * row[first + k]).sum::<f32>());
+            let (sin, cos) = math::sin_cos(
+                turn * (f64::from(cells.cell_coordinates([x as f32 + 0.5, 0.0])[0]) - f64::from(cells.first[0])),
+            );
+            worst[0] = worst[0].max((sum(&weights[phase]) - sin).abs());
+            worst[1] = worst[1].max((4.0 / turn * sum(&slopes[phase]) - cos).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn waves_are_followed_closely_and_the_closer_the_longer_they_are() {
+        let ([value, slope], [short_value, short_slope]) = (worst(12.0), worst(6.0));
+        assert!(short_value < 8e-3 && short_slope < 2e-2, "{short_value} {short_slope}");
+        // Cubic splines: values are accurate to fourth order, slopes to third.
+        assert!(value < short_value / 13.0 && slope < short_slope / 7.0, "{value} {slope}");
     }
 }

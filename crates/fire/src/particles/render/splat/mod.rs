@@ -11,20 +11,18 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use crate::particles::render::{
-    project::sprite::Ellipse,
-    resolve::spline,
+    buffer_pool::{BufferPool, PooledVec},
     splat::{
         grid::{Grid, Raster},
         kernel::Profile,
         rasterize::{COLUMNS, ROWS, RasterizedSprite},
-        scratch_pool::{PooledVec, ScratchPool},
     },
 };
 
 pub(crate) mod grid;
 pub(crate) mod kernel;
 pub(crate) mod rasterize;
-pub(crate) mod scratch_pool;
+pub(crate) mod spline;
 
 /// Least radius of a sprite in cells, at which splines are accurate to a few percent of a single sprite's peak.
 pub(crate) const MIN_RADIUS_CELLS: f32 = 2.75;
@@ -32,6 +30,21 @@ pub(crate) const MIN_RADIUS_CELLS: f32 = 2.75;
 const ROWS_PER_TASK: usize = 32;
 /// Coarsest grid: cells of 4096 pixels, twelve octaves.
 const MAX_LEVEL: usize = 24;
+
+/// An ellipse in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 at its edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ellipse {
+    /// Center, pixels from the picture's top left corner.
+    pub(crate) center: [f32; 2],
+    /// a, b and c, 1/pixel^2.
+    pub(crate) shape: [f32; 3],
+    /// Half extents of its bounding box, pixels.
+    pub(crate) reach: [f32; 2],
+    /// Semi-minor axis, pixels.
+    pub(crate) radius: f32,
+    /// Line integral through the center, for a particle of 1 m^3 with an absorption coefficient of 1/m.
+    pub(crate) peak: f32,
+}
 
 /// One sprite: `P` values, weighted by its profile, for layer `layer` and, with the weight `next_layer_weight`, the next.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +92,7 @@ impl<'a> SplatResult<'a> {
 pub(crate) fn splat<'a, const P: usize>(
     settings: &SplatSettings,
     tasks: &[PooledVec<Sprite<P>>],
-    scratch: &'a ScratchPool,
+    buffers: &'a BufferPool,
 ) -> SplatResult<'a> {
     let statistics = SpriteStatistics::new(settings, tasks);
     let Some(rect) = statistics.covered(settings.picture) else { return SplatResult::Empty };
@@ -99,13 +112,13 @@ pub(crate) fn splat<'a, const P: usize>(
         if !any && fineness != finest && coarser.is_none() {
             continue;
         }
-        let mut grid = Grid::new(cells(fineness), settings.layers * P, scratch);
+        let mut grid = Grid::new(cells(fineness), settings.layers * P, buffers);
         let is_on_this_grid = |radius: f32| settings.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
         add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(fineness), &mut grid);
         if let Some(coarser) = coarser {
             grid.add_coarser(&coarser);
         }
-        coarser = Some(spline::sharpened(&grid));
+        coarser = Some(grid.prefiltered());
     }
     coarser.map_or(SplatResult::Empty, SplatResult::Sums)
 }
@@ -278,7 +291,7 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         cells: &Raster,
         is_on_this_grid: impl Fn(f32) -> bool,
     ) -> Self {
-        let mut sprites = task.scratch().take(task.len());
+        let mut sprites = task.pool().take(task.len());
         sprites.clear();
         for sprite in task.iter() {
             if is_on_this_grid(sprite.ellipse.radius) {

@@ -75,7 +75,7 @@ fn glowing_cloud(count: u64) -> Particles {
     }))
 }
 
-fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
+fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles,
         time: 1.0,
@@ -85,7 +85,7 @@ fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
         size: DVec2::ONE,
         key: Key::new(1, "flame"),
         fade_out: FadeOut::NEVER,
-        scratch,
+        buffers,
     }
 }
 
@@ -102,8 +102,8 @@ fn prepared<T>(
 ) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
-    let scratch = ScratchPool::default();
-    each(&PreparedGas::new(gas(particles, &scratch), look, view, &surroundings, &Unobserved).unwrap())
+    let buffers = BufferPool::default();
+    each(&PreparedGas::new(gas(particles, &buffers), look, view, &surroundings, &Unobserved).unwrap())
 }
 
 /// The whole picture drawn as one strip, with AOVs where wanted and a plate at `plate` m.
@@ -254,7 +254,7 @@ fn lights_carry_the_light_of_the_picture() {
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&thin, &smooth(), &view, 0, None);
     let seen: f64 = strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>() / (scale * scale);
-    let lights = point_lights_of_gas(&gas(&thin, &ScratchPool::default()), &RenderingParameters::default(), 1.0);
+    let lights = point_lights_of_gas(&gas(&thin, &BufferPool::default()), &RenderingParameters::default(), 1.0);
     assert_eq!(lights.len(), 3);
     let sum: f64 = lights.iter().map(|light| f64::from(light.intensity[0])).sum();
     assert!((sum / seen - 1.0).abs() < 0.02, "{sum} {seen}");
@@ -433,13 +433,13 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
 
 /// Light and opacity in the middle of a ball of gas among lights of so much illuminance.
 fn lit_ball(ball: Particle, look: &RenderingParameters, illuminance: f32) -> ([f64; 3], f64) {
-    let (view, scratch, wind, air) =
-        (view(camera()), ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
+    let (view, buffers, wind, air) =
+        (view(camera()), BufferPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
     let others = Publication { lights: vec![sun], ..Publication::default() };
     let surroundings = Surroundings { air: &air, others, ..Surroundings::from_wind(&wind) };
     let particles = cloud([ball]);
-    let prepared = PreparedGas::new(gas(&particles, &scratch), look, &view, &surroundings, &Unobserved).unwrap();
+    let prepared = PreparedGas::new(gas(&particles, &buffers), look, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
     strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
     prepared.draw(&DepthInterval::ALL, &mut strip);
@@ -484,5 +484,5 @@ fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
 
 /// Luminance per meter of a particle's gas in blue light.
 fn gas_blue(ball: Particle) -> f64 {
-    gas(&cloud([ball]), &ScratchPool::default()).blue_luminance(0, &smooth())
+    gas(&cloud([ball]), &BufferPool::default()).blue_luminance(0, &smooth())
 }

@@ -23,8 +23,8 @@ use crate::particles::{
     parameters::{FlameParticlesParameters, WindForce},
     simulate::{
         derived::DerivedConstants,
-        particle_lanes::{add_scaled, length, subtract},
         particles::Particles,
+        vectors::{add_scaled, length, subtract},
     },
 };
 

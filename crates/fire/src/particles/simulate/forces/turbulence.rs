@@ -16,6 +16,8 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*, u32x16};
 
+use crate::particles::simulate::vectors::lerp4;
+
 /// Grid points along each side of the tile.
 const SIDE: usize = 32;
 /// Eddies along each side of the tile.
@@ -132,16 +134,6 @@ impl<S: Simd> Row<'_, S> {
         let start = ((z << SIDE.ilog2()) + y) << SIDE.ilog2();
         lerp4(&gather(simd, self.tile, start + self.x[0]), &gather(simd, self.tile, start + self.x[1]), self.across)
     }
-}
-
-/// Linear interpolation of four components.
-#[inline(always)]
-pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], weight: R) -> [R; 4] {
-    let mut lerp4 = *one;
-    for c in 0..4 {
-        lerp4[c] = weight.fma(other[c] - one[c], one[c]);
-    }
-    lerp4
 }
 
 /// Trilinear interpolation of the tile at one position in grid points.

@@ -15,7 +15,7 @@ use fearless_simd::Simd;
 use super::entrainment_axis::PlumeAxis;
 use crate::particles::{
     parameters::FlameParticlesParameters,
-    simulate::{burner::Burner, particle_lanes::dot},
+    simulate::{burner::Burner, vectors::dot},
 };
 
 /// Most rings that a burner sheds side by side.

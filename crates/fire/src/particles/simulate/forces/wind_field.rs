@@ -9,7 +9,7 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use crate::particles::simulate::forces::turbulence::lerp4;
+use crate::particles::simulate::vectors::lerp4;
 
 /// Grid points along each side of the box around the gas.
 const POINTS: usize = 4;

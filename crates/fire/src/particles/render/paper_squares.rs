@@ -11,7 +11,7 @@ use crate::particles::{
     parameters::RenderingParameters,
     render::{
         gas::Gas,
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        project::{ProjectedParticle, SpriteKind, project_particles},
     },
 };
 

@@ -1,132 +1,20 @@
-//! Tables of the user's curves, and the mapping of eqs. (9) to (18) and threshold (4) evaluated with them.
-//!
-//! A table holds two curves side by side, so that one load fetches both.
+//! The mapping from sheet coordinates to flame coordinates, eqs. (9) to (18), and the threshold, eq. (4), with tables of the user's curves.
 
 use bansho_base::{
     math::{
         self,
         curve::Curve,
-        random::Key,
-        simd::{LANES, Lanes, Real, any_positive, gather, wrap_split},
+        simd::{LANES, Lanes, Real, any_positive},
     },
-    parameters::parameter_error::{ParameterError, ParameterErrorKind},
+    parameters::{ParameterError, ParameterErrorKind},
 };
-use fearless_simd::{Simd, prelude::*, u32x16};
+use fearless_simd::{Simd, prelude::*};
 
+use super::curve_pair::{CurvePair, SEGMENTS, lookup_index};
 use crate::sheet::{
     equations,
     parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
 };
-
-/// Linear segments of a table.
-pub(crate) const SEGMENTS: usize = 512;
-/// The greatest float below 1, so that the last segment includes the end.
-const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
-
-/// Two functions on [0, 1], piecewise linear: for each segment value and increment of the first, then of the second.
-#[derive(Clone, Debug)]
-pub(crate) struct CurvePair {
-    segments: Box<[[f32; 4]; SEGMENTS]>,
-}
-
-/// Segment indices and the fractions within them.
-pub(crate) struct TableIndex<S: Simd> {
-    segment: u32x16<S>,
-    fraction: Lanes<S>,
-}
-
-/// Segment indices of sixteen arguments, clamped to [0, 1].
-#[inline(always)]
-pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
-    let scaled = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
-    let (segment, fraction) = wrap_split(scaled, SEGMENTS as u32 - 1);
-    TableIndex { segment, fraction }
-}
-
-/// Table indices of sixteen arguments that are often all equal, such as the heights of a horizontal row of pixels: then one lookup
-/// suffices.
-pub(crate) enum TableLookup<S: Simd> {
-    /// All arguments are equal.
-    Uniform(f32, Lanes<S>),
-    /// Each lane has its own argument.
-    PerLane(TableIndex<S>),
-}
-
-/// The table indices of sixteen arguments, and whether they are all equal.
-#[inline(always)]
-pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
-    /// Spread that counts as equal: a twentieth of a segment.
-    const UNIFORM_TOLERANCE: f32 = 0.05 / SEGMENTS as f32;
-    let first = x.broadcast(x[0]);
-    if any_positive((x - first).simd_abs() - x.broadcast(UNIFORM_TOLERANCE)) {
-        TableLookup::PerLane(table_index(x))
-    } else {
-        TableLookup::Uniform(x[0], first)
-    }
-}
-
-impl CurvePair {
-    /// The table of the values at `SEGMENTS + 1` equidistant arguments.
-    pub(crate) fn new(mut values: impl FnMut(f64) -> [f64; 2]) -> Self {
-        Self::from_samples(|i| {
-            let [first, second] = values(i as f64 / SEGMENTS as f64);
-            [first as f32, second as f32]
-        })
-    }
-
-    /// The table of samples by index, 0 to `SEGMENTS`.
-    #[inline(always)]
-    pub(crate) fn from_samples(mut sample: impl FnMut(usize) -> [f32; 2]) -> Self {
-        let mut segments = Box::new([[0.0; 4]; SEGMENTS]);
-        let mut low = sample(0);
-        for (i, segment) in segments.iter_mut().enumerate() {
-            let high = sample(i + 1);
-            *segment = [low[0], high[0] - low[0], low[1], high[1] - low[1]];
-            low = high;
-        }
-        Self { segments }
-    }
-
-    /// Both functions at table indices.
-    #[inline(always)]
-    pub(crate) fn fetch<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
-        let [first, first_delta, second, second_delta] = gather(at.fraction.simd, &self.segments, at.segment);
-        [first_delta.fma(at.fraction, first), second_delta.fma(at.fraction, second)]
-    }
-
-    /// Both functions at sixteen arguments.
-    #[inline(always)]
-    pub(crate) fn sample<S: Simd>(&self, x: Lanes<S>) -> [Lanes<S>; 2] {
-        self.fetch(&table_index(x))
-    }
-
-    /// Both functions at arguments that are often all equal.
-    #[inline(always)]
-    pub(crate) fn lookup<S: Simd>(&self, at: &TableLookup<S>) -> [Lanes<S>; 2] {
-        match at {
-            TableLookup::Uniform(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
-            TableLookup::PerLane(located) => self.fetch_per_lane(located),
-        }
-    }
-
-    /// [`fetch`](Self::fetch), out of line.
-    fn fetch_per_lane<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
-        at.fraction.simd.vectorize(
-            #[inline(always)]
-            || self.fetch(at),
-        )
-    }
-
-    /// Both functions at one argument.
-    #[inline(always)]
-    pub(crate) fn at(&self, x: f32) -> [f32; 2] {
-        let scaled = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
-        let segment = scaled as i32;
-        let fraction = scaled - segment as f32;
-        let [first, first_delta, second, second_delta] = self.segments[segment as usize & (SEGMENTS - 1)];
-        [first_delta.mul_add(fraction, first), second_delta.mul_add(fraction, second)]
-    }
-}
 
 /// Bins of height for which the horizontal extent of the flame is known.
 const REACH_BINS: usize = 128;
@@ -183,7 +71,7 @@ fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterError> {
 
 /// Both curves at the samples of a table.
 fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
-    let count = super::curve_tables::SEGMENTS + 1;
+    let count = SEGMENTS + 1;
     let rows = [first, second].map(|curve| curve.sample_table(count, 0.0, 1.0));
     rows[0].iter().zip(&rows[1]).map(|(a, b)| [*a, *b]).collect()
 }
@@ -435,35 +323,4 @@ fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
     }
     let cooled_fraction = color.cooling * w;
     [math::exp(-RED * cooled_fraction), math::exp((RED - GREEN) * cooled_fraction)]
-}
-
-/// Key of the random numbers of one instance.
-pub(crate) fn instance_key(seed: u64, name: &str, variation: i64, index: usize) -> Key {
-    Key::new(seed, &format!("{name}/{variation}/{index}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use bansho_base::math::simd::ramp;
-    use fearless_simd::SimdBase;
-
-    use super::*;
-
-    #[test]
-    fn a_table_holds_its_ends_and_is_straight_between_samples() {
-        let table = CurvePair::new(|x| [x, 1.0 - x * x]);
-        assert_eq!((table.at(0.0), table.at(-3.0)), ([0.0, 1.0], [0.0, 1.0]));
-        let end = table.at(7.0);
-        assert!((end[0] - 1.0).abs() < 1e-6 && end[1].abs() < 1e-5);
-        for i in 0..1000 {
-            let x = i as f32 / 999.0;
-            let [line, parabola] = table.at(x);
-            assert!((line - x).abs() < 1e-6 && (parabola - (1.0 - x * x)).abs() < 2e-6);
-            let batch =
-                bansho_base::dispatch_baseline!(simd => table.sample(Lanes::splat(simd, x)).map(|values| values[7]));
-            assert!((batch[0] - line).abs() < 1e-6 && (batch[1] - parabola).abs() < 1e-6);
-            let lookup = bansho_base::dispatch_baseline!(simd => table.lookup(&lookup_index(ramp(simd, x, 1e-5))).map(|values| values[11]));
-            assert!((lookup[0] - line).abs() < 2e-4 && (lookup[1] - parabola).abs() < 4e-4, "{lookup:?}");
-        }
-    }
 }

@@ -5,16 +5,16 @@ use bansho_base::host::assets::AssetError;
 /// A combination of parameters from which no particle flame can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: {kind}")]
-pub struct ParticleFault {
+pub struct ParticleError {
     /// Key of the parameter, with list indices and sub-tables separated by dots, as in `burners.0.file`.
     pub key: String,
     /// What is wrong.
-    pub kind: ParticleFaultKind,
+    pub kind: ParticleErrorKind,
 }
 
 /// Errors of parameters that are each within their own bounds.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ParticleFaultKind {
+pub enum ParticleErrorKind {
     /// A burner whose center, or a mesh of which any vertex, lies outside the domain.
     #[error("the burner stands at {position:?} m, beyond `{corner}` {limit:?} m")]
     OutsideDomain {

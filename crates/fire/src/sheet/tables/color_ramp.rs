@@ -6,7 +6,7 @@ use bansho_base::{
         self,
         simd::{Lanes, Real, gather, round_to_u32},
     },
-    parameters::parameter_error::ParameterError,
+    parameters::ParameterError,
 };
 use fearless_simd::Simd;
 
@@ -14,7 +14,7 @@ use crate::{
     chemiluminescence_color,
     sheet::{
         parameters::{ColorParameters, Coloring, Stage, TextureParameters},
-        render::curve_tables::{CurvePair, from_origin},
+        tables::{curve_pair::CurvePair, shape_tables::from_origin},
     },
 };
 

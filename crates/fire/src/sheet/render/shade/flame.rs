@@ -1,67 +1,17 @@
-//! Shading of sixteen pixels: from sheet coordinates to light and opacity.
+//! Shading of the flame and of its flat texture square.
 
-use bansho_base::{
-    camera::upright_quad::UprightQuad,
-    math::simd::{Lanes, Real, any_positive},
-};
+use bansho_base::math::simd::{Lanes, Real, any_positive};
 use fearless_simd::Simd;
 
-use super::{
-    projection::{PixelToSheet, SheetCoordinates},
-    smoke::{SmokeState, shade_smoke},
-};
+use super::{ShadedBatch, SheetState};
 use crate::sheet::{
-    animate::warp::WarpState,
     equations,
-    render::{
+    render::projection::SheetCoordinates,
+    tables::{
         color_ramp::ColorRamp,
-        curve_tables::{FlameCoordinates, ShapeTables},
+        shape_tables::{FlameCoordinates, ShapeTables},
     },
-    texture::Texture,
 };
-
-/// The state of a sheet at one time.
-pub(crate) struct SheetState {
-    /// Edges, center line and scroll.
-    pub(crate) warp: WarpState,
-    /// T0.
-    pub(crate) texture: Texture,
-    /// Size of a pixel in x' and in y.
-    pub(crate) pixel: [f32; 2],
-}
-
-impl SheetState {
-    /// Texels per unit of u and of w, of the finer layer; a texture that is filtered for small pixels has as many texels as pixels.
-    #[inline(always)]
-    pub(crate) fn texels(&self) -> [f32; 2] {
-        let [across, up] = self.texture.texels();
-        let kept = (1.0 / (self.pixel[1] * up)).min(1.0);
-        [across * kept, up * kept]
-    }
-}
-
-/// A sheet at one time of the exposure, as one camera sees it.
-pub(crate) struct TimeSample {
-    /// Mapping from pixels to the sheet.
-    pub(crate) pixel_to_sheet: PixelToSheet,
-    /// The sheet's quad in the world.
-    pub(crate) quad: UprightQuad,
-    /// Its state at that time.
-    pub(crate) state: SheetState,
-    /// For smoke, its properties.
-    pub(crate) smoke: Option<SmokeState>,
-    /// Luminance of the brightest color divided by the number of time samples, cd/m^2.
-    pub(crate) luminance: f32,
-}
-
-/// Shaded pixels of the flame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ShadedBatch<S: Simd> {
-    /// T1, eq. (5).
-    pub(crate) t1: Lanes<S>,
-    /// Red, green, blue of luminance up to 1, and opacity.
-    pub(crate) light: [Lanes<S>; 4],
-}
 
 /// Light at flame coordinates; `None` where there is none.
 #[inline(always)]
@@ -128,28 +78,6 @@ pub(crate) fn shade<S: Simd>(
     )
 }
 
-/// Light of a batch of pixels of a time sample, whatever its content.
-pub(crate) fn shade_sample<S: Simd>(
-    shape: &ShapeTables,
-    ramp: &ColorRamp,
-    sample: &TimeSample,
-    content: SheetContent,
-    batch: &SheetCoordinates<S>,
-) -> Option<ShadedBatch<S>> {
-    let state = &sample.state;
-    match (&sample.smoke, content) {
-        (None, SheetContent::Flame | SheetContent::Smoke) => shade(shape, ramp, state, batch),
-        (None, SheetContent::FlatTexture | SheetContent::FlatThresholded) => batch.x.simd.vectorize(
-            #[inline(always)]
-            || shade_flat(shape, ramp, state, batch, content == SheetContent::FlatThresholded),
-        ),
-        (Some(smoke), _) => batch.x.simd.vectorize(
-            #[inline(always)]
-            || shade_smoke(state, smoke, batch),
-        ),
-    }
-}
-
 /// Height w up to which the base burns blue.
 const BLUE_TOP: f32 = 0.45;
 
@@ -173,7 +101,7 @@ fn add_base_blue<S: Simd>(
 
 /// The flat texture square of the paper's pictures 1 to 4.
 #[inline(always)]
-fn shade_flat<S: Simd>(
+pub(super) fn shade_flat<S: Simd>(
     shape: &ShapeTables,
     ramp: &ColorRamp,
     state: &SheetState,
@@ -193,17 +121,4 @@ fn shade_flat<S: Simd>(
         *plane *= strength;
     }
     Some(ShadedBatch { t1, light })
-}
-
-/// What a sheet shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum SheetContent {
-    /// The mapped flame.
-    Flame,
-    /// The texture square before the threshold.
-    FlatTexture,
-    /// The texture square after the threshold.
-    FlatThresholded,
-    /// Smoke.
-    Smoke,
 }
