@@ -134,7 +134,7 @@ fn faults_of_a_particle_flame_are_located() {
         ("combustion = { flame_temperature_k = 1e6 }\n", "1000000 is out of range"),
         (
             "burners = [{}, { position = [0, 99, 0] }]\ndomain_max = [5, 5, 5]\n",
-            "test.toml:3:29: flame_particles.0.burners.1.position (burner 2): the burner stands at",
+            "test.toml:3:29: flame_particles.0.burners.1.position (burner 2): the burner is at",
         ),
         ("burners = [{ shape = \"mesh\" }]\n", "burners.0.file (burner 1): a burner of shape \"mesh\" needs a `file`"),
         (
@@ -368,7 +368,7 @@ fn flames_together_may_not_have_more_particles_than_fit() {
         compiled("new.toml", &text, kinds, MemoryAssets::default()).err().map(|error| error.to_string())
     };
     let error = check([flame(12_000_000, true), flame(9_000_000, true), flame(8_000_000, true)]).unwrap();
-    let expected = "9000000 particles beside 12000000 of other flames would take 13 GiB; allowed: up to ";
+    let expected = "9000000 particles in addition to 12000000 of other flames would take 13 GiB; allowed: up to ";
     assert!(error.contains("new.toml:6") && error.contains(expected), "{error}");
     // One that is off takes nothing.
     let error = check([flame(900_000, true), flame(20_000_000, false), flame(500_000, true)]).unwrap_or_default();

@@ -1,8 +1,8 @@
 //! Particle flame: burning gas as particles that move by smoothed-particle hydrodynamics and radiate as black bodies.
 //!
 //! # Model
-//! Particles carry mass, velocity, temperature, fuel and soot. Pressure, buoyancy, wind, entrainment, vortex rings and turbulence move them;
-//! they heat, burn, form soot and cool. Each is drawn as the exact line integral of its kernel, so that sums of sprites are the line
+//! Particles carry mass, velocity, temperature, fuel and soot. Pressure, buoyancy, wind, entrainment, vortex rings and turbulence move them.
+//! They burn, heat up, form soot and cool. Each is drawn as the exact line integral of its kernel, so that sums of sprites are the line
 //! integrals of the gas: optical depth, emission, and the optical path that bends light from behind (heat haze). SI units throughout;
 //! temperatures in K, luminance in cd/m^2.
 //!
@@ -43,7 +43,7 @@
 //! (4) and (5) are a property of kernels that integrate to 1.
 //!
 //! # Data flow
-//! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper leaves open; `error` are their errors.
+//! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper does not state; `error` are their errors.
 //! 2. A step (`simulate::Simulation::step`) runs sub-steps. In each, `simulate::fluid` sorts particles and computes density and pressure
 //!    force, `simulate::integrate` advances them (with `simulate::collision`), and `simulate::spawning` adds new ones.
 //! 3. Once per step `simulate::combustion` smooths velocity and temperature, burns fuel, forms soot and cools;

@@ -1,9 +1,9 @@
 //! Flame sheet: a small, near flame (candle, torch, hearth, campfire) as a scrolling texture on an upright rectangle.
 //!
 //! # Model
-//! A monochrome texture scrolls upward behind a rectangle. A threshold that rises with height cuts it; then it is sharpened and colored. The
-//! coordinates of the rectangle are warped so that the gas accelerates and its edges flutter. Nothing is simulated: any frame is a function
-//! of time alone. Lengths are in meters, speeds of the texture in sheet heights per second, luminance in cd/m^2.
+//! A monochrome texture scrolls upward on a rectangle. A threshold that increases with height is subtracted from it; the rest is sharpened and colored. The
+//! coordinates of the rectangle are warped so that the gas accelerates and its edges flutter. Nothing is simulated: every frame is a closed-form
+//! function of time. Lengths are in meters, speeds of the texture in sheet heights per second, luminance in cd/m^2.
 //!
 //! # References
 //! - T. Ohshima and S. Itahashi, "Easy representation of flame by using 2-dimensional texture" (in Japanese). Equation numbers are theirs.
@@ -15,7 +15,7 @@
 //! | (1) | `(p, q) = (u, w - s (t - t0))`: the texture scrolls upward | `animate::clock::Clock::scroll` |
 //! | (2) | `T0 = T(u, w - s (t - t0))`, in [0, 1]: value of the texture | `texture::Texture::sample` |
 //! | (4) | `L = 1 - (1 - V(w)) (1 - H(u))`: threshold | [`equations::threshold`] |
-//! | (5) | `T1 = max(0, T0 - L)`: cut at the threshold | [`equations::above_threshold`] |
+//! | (5) | `T1 = max(0, T0 - L)`: excess over the threshold | [`equations::above_threshold`] |
 //! | (6) | `T2 = C(T1)`: sharpen | `tables::color_ramp::ColorRamp::new` |
 //! | (7) | `(r, g, b) = (R, G, B)(T2)`: color | `tables::color_ramp::unscaled_color` |
 //! | (9) | `w_p = (1 - k) sqrt(y) + k y`: rise | [`equations::rise`] |
@@ -30,7 +30,7 @@
 //! | (18) | `u = (1 - u') / 2`: left of the axis | [`equations::texture_u`] |
 //! | (20) | sum of products of cosines: the texture of the paper | [`paper_texture`], [`PaperTexture`] |
 //!
-//! (3) are bounds that follow from (1). (8) and (19) do not exist in the paper.
+//! (3) states bounds that follow from (1). The paper has no (8) and no (19).
 //!
 //! # Data flow
 //! 1. `parameters` holds the scene's values; [`FlameSheet::new`] checks them and makes one `FlameInstance` per entry of `instances`.

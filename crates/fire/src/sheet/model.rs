@@ -1,4 +1,4 @@
-//! A flame sheet: what is built once from its parameters.
+//! A flame sheet: built once from its parameters, immutable.
 
 use std::sync::{Arc, OnceLock};
 
@@ -22,7 +22,7 @@ pub struct FlameSheet {
     pub(super) name: String,
     pub(super) parameters: FlameSheetParameters,
     pub(super) clock: Clock,
-    /// Made when it is first seen: there may be thousands of sheets, each of which is made to be checked.
+    /// Computed when the sheet is first drawn: a scene may contain thousands of sheets, and each is constructed to check its parameters.
     pub(super) tables: OnceLock<Tables>,
     pub(super) flames: Vec<FlameInstance>,
 }
@@ -31,7 +31,7 @@ impl FlameSheet {
     /// The flame sheet `name` of a scene; in a seamless loop it repeats every `loop_s` seconds.
     ///
     /// # Errors
-    /// Parameters that do not go together; each alone is within its bounds.
+    /// The parameters contradict each other, although each is within its bounds.
     pub fn new(
         parameters: FlameSheetParameters,
         name: &str,
@@ -56,32 +56,32 @@ impl FlameSheet {
 
     pub(super) fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
-        let make = || Tables {
+        let compute = || Tables {
             shape: Box::new(ShapeTables::new(shape, texture, color)),
             ramp: Box::new(ColorRamp::new(texture, color, *stage)),
         };
-        get_or_compute(&self.tables, make)
+        get_or_compute(&self.tables, compute)
     }
 
-    /// What of the chain does not change with time.
+    /// The mapping to flame coordinates and the threshold: tables that do not change with time.
     pub(crate) fn shape(&self) -> &ShapeTables {
         &self.tables().shape
     }
 
-    /// From gas to light.
+    /// The table from T1 to light.
     pub(crate) fn ramp(&self) -> &ColorRamp {
         &self.tables().ramp
     }
 }
 
-/// What a sheet is drawn with, and depends on its parameters alone.
+/// Tables that depend on the parameters alone.
 #[derive(Clone, Debug)]
 pub(super) struct Tables {
     pub(super) shape: Box<ShapeTables>,
     pub(super) ramp: Box<ColorRamp>,
 }
 
-/// One flame among the instances of a sheet.
+/// One instance of a flame: its placement, fluctuations and texture.
 #[derive(Clone, Debug)]
 pub(crate) struct FlameInstance {
     pub(crate) placement: Instance,
@@ -129,7 +129,8 @@ impl FlameSheet {
     }
 }
 
-pub(super) fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
+/// The flames at all placements.
+fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
@@ -146,11 +147,12 @@ pub(super) fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, c
     placements.into_iter().enumerate().map(flame).collect()
 }
 
-/// Size of the fractal's tongues in sheet widths and heights, beside the usual: they keep their form on a sheet of any aspect.
-pub(super) fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
-    /// Width over height of the sheet for which the usual size is meant.
-    const USUAL: f64 = 0.65;
-    let aspect = parameters.width / parameters.height / USUAL;
+/// Width and length of the fractal's tongues relative to the default, in sheet widths and heights: their shape in meters does not depend on the aspect ratio
+/// of the sheet.
+fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
+    /// Width over height of the sheet to which the parameters `tongue_width` and `tongue_length` refer.
+    const REFERENCE_ASPECT: f64 = 0.65;
+    let aspect = parameters.width / parameters.height / REFERENCE_ASPECT;
     [parameters.texture.tongue_width / aspect.clamp(0.05, 20.0), parameters.texture.tongue_length]
 }
 

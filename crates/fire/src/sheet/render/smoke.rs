@@ -24,17 +24,17 @@ use crate::sheet::{
 };
 
 impl FlameSheet {
-    /// Texture layers and fluctuations of a flame's smoke; `None` where it makes none.
+    /// Texture layers and fluctuations of a flame's smoke; `None` if it has none.
     pub(crate) fn smoke_layers(&self, flame: &FlameInstance) -> Option<(FractalLayers, FlameWaves)> {
         let smoke = &self.parameters.smoke;
-        let still_shape = ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
+        let shape = ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
         (smoke.optical_depth > 0.0).then(|| {
             let layers = FractalLayers::new([1.0, 0.35], smoke.speed, flame.key, &self.clock);
-            (layers, FlameWaves::new(&still_shape, flame.key, &self.clock))
+            (layers, FlameWaves::new(&shape, flame.key, &self.clock))
         })
     }
 
-    /// A flame's smoke over the exposure, and the pixels it may touch.
+    /// A flame's smoke at the middle of the exposure, and the bounding rectangle of its pixels.
     pub(crate) fn smoke_sample(
         &self,
         flame: &FlameInstance,
@@ -73,7 +73,7 @@ impl FlameSheet {
         Some((TimeSample { pixel_to_sheet, state, quad, luminance: 1.0, smoke: Some(smoke_state) }, rect))
     }
 
-    /// Radiance scattered at each height: isotropic single scattering of the fire below and of all other lights.
+    /// Radiance scattered at each height: isotropic single scattering of the light of the flame below and of all other lights.
     fn smoke_light(
         &self,
         flame: &FlameInstance,
@@ -86,18 +86,19 @@ impl FlameSheet {
         let fire: [f32; 3] = std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum());
         let size = self.sheet_size(flame);
         let flame_center = self.base(flame, t) + DVec3::Y * (0.3 * size.y);
-        let near = 0.16 * size.length_squared();
-        let scatter = smoke.albedo / (4.0 * std::f64::consts::PI);
+        // The light of the flame is extended: within about its size the illuminance no longer increases.
+        let extent_squared = 0.16 * size.length_squared();
+        let phase_albedo = smoke.albedo / (4.0 * std::f64::consts::PI);
         let tint = color::acescg_from_srgb(smoke.color.map(|value| value as f32));
         std::array::from_fn(|i| {
             let point = quad.point(0.5, i as f64 / (LIGHT_SAMPLES - 1) as f64);
-            let falloff = smoke.fire_light / ((point - flame_center).length_squared() + near);
+            let falloff = smoke.fire_light / ((point - flame_center).length_squared() + extent_squared);
             let mut light = fire.map(|value| value * falloff as f32);
             for other in &surroundings.others.lights {
                 let (illuminance, _) = other.illuminance(point);
                 light.iter_mut().zip(illuminance).for_each(|(sum, value)| *sum += value);
             }
-            std::array::from_fn(|k| light[k] * tint[k] * scatter as f32)
+            std::array::from_fn(|k| light[k] * tint[k] * phase_albedo as f32)
         })
     }
 }

@@ -21,7 +21,7 @@ use crate::sheet::{
 };
 
 impl FlameSheet {
-    /// A flame at `t` with its sheet turned to `right`: its quad, leaned by the wind, and its warp.
+    /// A flame at `t` with its sheet facing along `right x up`: its quad, which leans with the wind, and its warp.
     pub(crate) fn evaluate_at(
         &self,
         flame: &FlameInstance,
@@ -37,15 +37,15 @@ impl FlameSheet {
         (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, lean))
     }
 
-    /// Number of time samples of the exposure: the gas scrolls by a few pixels between them.
+    /// Number of time samples of the exposure; by default the gas moves by 8 pixels between them.
     pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_meter: f64) -> usize {
-        const PIXELS_APART: f64 = 8.0;
-        const MOST: f64 = 8.0;
+        const PIXELS_PER_SAMPLE: f64 = 8.0;
+        const MAX_SAMPLES: f64 = 8.0;
         match self.parameters.time_samples {
             Auto::Set(count) => count as usize,
             Auto::Auto => {
                 let scrolled = self.rise_speed(flame, shutter.middle()) * shutter.duration() * pixels_per_meter;
-                (scrolled / PIXELS_APART).ceil().clamp(1.0, MOST) as usize
+                (scrolled / PIXELS_PER_SAMPLE).ceil().clamp(1.0, MAX_SAMPLES) as usize
             }
         }
     }
@@ -59,7 +59,7 @@ impl FlameSheet {
         }
     }
 
-    /// A flame's time samples over the exposure, and the pixels they may touch.
+    /// A flame's time samples over the exposure, and the bounding rectangle of its pixels.
     pub(crate) fn samples(
         &self,
         flame: &FlameInstance,

@@ -5,10 +5,10 @@ use fearless_simd::{Simd, u32x16};
 
 /// Linear segments of a table.
 pub(crate) const SEGMENTS: usize = 512;
-/// The greatest float below 1, so that the last segment includes the end.
-const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
+/// The largest float below 1, so that the argument 1 is in the last segment.
+const MAX_ARGUMENT: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// Two functions on [0, 1], piecewise linear: for each segment value and increment of the first, then of the second.
+/// Two functions on [0, 1], piecewise linear. An entry holds value and increment of the first function in a segment, then of the second.
 #[derive(Clone, Debug)]
 pub(crate) struct CurvePair {
     segments: Box<[[f32; 4]; SEGMENTS]>,
@@ -23,15 +23,14 @@ pub(crate) struct TableIndex<S: Simd> {
 /// Segment indices of sixteen arguments, clamped to [0, 1].
 #[inline(always)]
 pub(crate) fn table_index<S: Simd>(x: Lanes<S>) -> TableIndex<S> {
-    let scaled = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(LAST)) * x.broadcast(SEGMENTS as f32);
+    let scaled = x.simd_max(x.broadcast(0.0)).simd_min(x.broadcast(MAX_ARGUMENT)) * x.broadcast(SEGMENTS as f32);
     let (segment, fraction) = wrap_split(scaled, SEGMENTS as u32 - 1);
     TableIndex { segment, fraction }
 }
 
-/// Table indices of sixteen arguments that are often all equal, such as the heights of a horizontal row of pixels: then one lookup
-/// suffices.
+/// Table indices of sixteen arguments. If all are equal, as the heights of a horizontal row of pixels often are, one lookup suffices.
 pub(crate) enum TableLookup<S: Simd> {
-    /// All arguments are equal.
+    /// All arguments are equal to the first, which is also given in all lanes.
     Uniform(f32, Lanes<S>),
     /// Each lane has its own argument.
     PerLane(TableIndex<S>),
@@ -40,7 +39,7 @@ pub(crate) enum TableLookup<S: Simd> {
 /// The table indices of sixteen arguments, and whether they are all equal.
 #[inline(always)]
 pub(crate) fn lookup_index<S: Simd>(x: Lanes<S>) -> TableLookup<S> {
-    /// Spread that counts as equal: a twentieth of a segment.
+    /// Largest difference that counts as equal: a twentieth of a segment.
     const UNIFORM_TOLERANCE: f32 = 0.05 / SEGMENTS as f32;
     let first = x.broadcast(x[0]);
     if any_positive((x - first).simd_abs() - x.broadcast(UNIFORM_TOLERANCE)) {
@@ -90,11 +89,11 @@ impl CurvePair {
     pub(crate) fn lookup<S: Simd>(&self, at: &TableLookup<S>) -> [Lanes<S>; 2] {
         match at {
             TableLookup::Uniform(x, lanes) => self.at(*x).map(|value| lanes.broadcast(value)),
-            TableLookup::PerLane(located) => self.fetch_per_lane(located),
+            TableLookup::PerLane(index) => self.fetch_per_lane(index),
         }
     }
 
-    /// [`fetch`](Self::fetch), out of line.
+    /// [`fetch`](Self::fetch), not inlined.
     fn fetch_per_lane<S: Simd>(&self, at: &TableIndex<S>) -> [Lanes<S>; 2] {
         at.fraction.simd.vectorize(
             #[inline(always)]
@@ -105,7 +104,7 @@ impl CurvePair {
     /// Both functions at one argument.
     #[inline(always)]
     pub(crate) fn at(&self, x: f32) -> [f32; 2] {
-        let scaled = x.simd_max(0.0).simd_min(LAST) * SEGMENTS as f32;
+        let scaled = x.simd_max(0.0).simd_min(MAX_ARGUMENT) * SEGMENTS as f32;
         let segment = scaled as i32;
         let fraction = scaled - segment as f32;
         let [first, first_delta, second, second_delta] = self.segments[segment as usize & (SEGMENTS - 1)];

@@ -16,10 +16,10 @@ use crate::sheet::{
     parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
 };
 
-/// Bins of height for which the horizontal extent of the flame is known.
-const REACH_BINS: usize = 128;
+/// Number of bins of height for which the horizontal extent of the flame is tabulated.
+const EXTENT_BINS: usize = 128;
 
-/// Curves of eqs. (4) to (12) as tables: the part of the mapping that does not change with time.
+/// Curves of eqs. (4) to (12) as tables: everything in the mapping that does not change with time.
 #[derive(Clone, Debug)]
 pub(crate) struct ShapeTables {
     initial_speed: f32,
@@ -30,18 +30,18 @@ pub(crate) struct ShapeTables {
     /// F over the position in the fringe.
     falloff: CurvePair,
     /// H over u'.
-    across: CurvePair,
-    /// V and the brightness over w.
-    heights: CurvePair,
-    /// Fraction of red light left by cooling, and of green relative to red, over w.
+    threshold_across: CurvePair,
+    /// V and the parameter `glow` over w.
+    threshold_and_glow: CurvePair,
+    /// Factor of red light by cooling, and that of green relative to red, over w.
     cooling: CurvePair,
-    /// A and D over w, at the samples of a table.
+    /// A and D over w, as sampled for `widths`.
     width_samples: Vec<[f32; 2]>,
-    /// Greatest x' at which there may be flame, over y.
-    reach: Box<[f32; REACH_BINS]>,
+    /// Largest x' at which there may be flame, over y.
+    max_distance: Box<[f32; EXTENT_BINS]>,
 }
 
-/// The curve with the point (0, 0) that the paper demands prepended, unless it has one.
+/// The curve with the point (0, 0), which the paper requires, prepended unless it has one.
 pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, ParameterError> {
     let mut points = curve.points().to_vec();
     match points.first() {
@@ -55,10 +55,10 @@ pub(crate) fn from_origin(curve: &Curve, key: &'static str) -> Result<Curve, Par
 }
 
 fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterError> {
-    const SLACK: f32 = 1e-6;
+    const TOLERANCE: f32 = 1e-6;
     let widest = samples.iter().enumerate().max_by(|a, b| (a.1[0] + a.1[1]).total_cmp(&(b.1[0] + b.1[1])));
     match widest {
-        Some((i, [core, fringe])) if core + fringe > 1.0 + SLACK => Err(ParameterError {
+        Some((i, [core, fringe])) if core + fringe > 1.0 + TOLERANCE => Err(ParameterError {
             key: "shape.fringe_width",
             kind: ParameterErrorKind::WiderThanSheet {
                 at: i as f64 / (samples.len() - 1) as f64,
@@ -69,7 +69,7 @@ fn check_widths(samples: &[[f32; 2]]) -> Result<(), ParameterError> {
     }
 }
 
-/// Both curves at the samples of a table.
+/// Values of both curves at the arguments of a [`CurvePair`].
 fn samples(first: &Curve, second: &Curve) -> Vec<[f32; 2]> {
     let count = SEGMENTS + 1;
     let rows = [first, second].map(|curve| curve.sample_table(count, 0.0, 1.0));
@@ -87,9 +87,9 @@ pub(crate) struct FlameCoordinates<S: Simd> {
     pub(crate) threshold: Lanes<S>,
     /// Relative brightness and soot at that height.
     pub(crate) glow: Lanes<S>,
-    /// Fraction of red light left by cooling, and of green relative to red.
+    /// Factor of red light by cooling, and that of green relative to red.
     pub(crate) cooling: [Lanes<S>; 2],
-    /// Distance within the fluttering edge, pixels; negative outside.
+    /// Distance inside the fluttering edge, pixels; negative outside.
     edge_distance_pixels: Lanes<S>,
     /// Height above the base, pixels.
     base_distance_pixels: Lanes<S>,
@@ -104,10 +104,9 @@ impl<S: Simd> FlameCoordinates<S> {
         (self.edge_distance_pixels + half).simd_clamp01() * (self.base_distance_pixels + half).simd_clamp01() * top
     }
 
-    /// Greatest number of texels between neighboring pixels of the row, where there may be flame; `texels` are per unit of u and of
-    /// w.
+    /// Maximum number of texels between neighboring pixels of the row where there may be flame; `texels` are the texels per unit of u and of w.
     #[inline(always)]
-    pub(crate) fn span(&self, texels: [f32; 2]) -> f32 {
+    pub(crate) fn max_texel_step(&self, texels: [f32; 2]) -> f32 {
         let step = |values: Lanes<S>| {
             let mut row = [values[LANES - 1]; LANES + 1];
             values.store_slice(&mut row[..LANES]);
@@ -119,13 +118,13 @@ impl<S: Simd> FlameCoordinates<S> {
             .simd_min(one - self.w)
             .simd_min(one - self.threshold);
         let across = step(self.u) * self.u.broadcast(texels[0]);
-        let span = zero.select_lt(inside, step(self.w).fma(self.u.broadcast(texels[1]), across), zero);
+        let texel_steps = zero.select_lt(inside, step(self.w).fma(self.u.broadcast(texels[1]), across), zero);
         let mut each = [0.0; LANES];
-        span.store_slice(&mut each);
+        texel_steps.store_slice(&mut each);
         each.into_iter().fold(0.0, f32::max)
     }
 
-    /// `self + fraction * change`.
+    /// `self + fraction * delta`.
     #[inline(always)]
     pub(crate) fn add_scaled(&self, fraction: f32, delta: &Self) -> Self {
         self.zip_with(delta, |value, delta| delta.fma(value.broadcast(fraction), value))
@@ -138,15 +137,15 @@ impl<S: Simd> FlameCoordinates<S> {
     }
 
     #[inline(always)]
-    fn zip_with(&self, other: &Self, join: impl Fn(Lanes<S>, Lanes<S>) -> Lanes<S>) -> Self {
+    fn zip_with(&self, other: &Self, combine: impl Fn(Lanes<S>, Lanes<S>) -> Lanes<S>) -> Self {
         Self {
-            u: join(self.u, other.u),
-            w: join(self.w, other.w),
-            threshold: join(self.threshold, other.threshold),
-            glow: join(self.glow, other.glow),
-            cooling: [join(self.cooling[0], other.cooling[0]), join(self.cooling[1], other.cooling[1])],
-            edge_distance_pixels: join(self.edge_distance_pixels, other.edge_distance_pixels),
-            base_distance_pixels: join(self.base_distance_pixels, other.base_distance_pixels),
+            u: combine(self.u, other.u),
+            w: combine(self.w, other.w),
+            threshold: combine(self.threshold, other.threshold),
+            glow: combine(self.glow, other.glow),
+            cooling: [combine(self.cooling[0], other.cooling[0]), combine(self.cooling[1], other.cooling[1])],
+            edge_distance_pixels: combine(self.edge_distance_pixels, other.edge_distance_pixels),
+            base_distance_pixels: combine(self.base_distance_pixels, other.base_distance_pixels),
         }
     }
 }
@@ -171,14 +170,14 @@ impl ShapeTables {
             edge_speed: shape.edge_speed as f32,
             contrast: texture.contrast as f32,
             widths: CurvePair::from_samples(|i| width_samples[i]),
-            falloff: CurvePair::new(|coordinates| [1.0 - shape.slowing.eval(coordinates), 0.0]),
-            across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
-            heights: CurvePair::new(|w| [texture.threshold.eval(w), color.glow.eval(w)]),
+            falloff: CurvePair::new(|position| [1.0 - shape.slowing.eval(position), 0.0]),
+            threshold_across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
+            threshold_and_glow: CurvePair::new(|w| [texture.threshold.eval(w), color.glow.eval(w)]),
             cooling: CurvePair::new(|w| cooling_factors(color, w)),
             width_samples,
-            reach: Box::new([1.0; REACH_BINS]),
+            max_distance: Box::new([1.0; EXTENT_BINS]),
         };
-        result.reach = result.compute_reach();
+        result.max_distance = result.compute_max_distance();
         result
     }
 
@@ -191,7 +190,7 @@ impl ShapeTables {
         })
     }
 
-    /// Rise (9), speed profile (11) and slowed rise (12).
+    /// Slowed rise, eq. (12), from rise (9) and speed profile (11).
     #[inline(always)]
     fn slowed_rise<S: Simd>(&self, distance: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
         let rise = equations::rise(y, self.initial_speed);
@@ -205,11 +204,11 @@ impl ShapeTables {
 
     /// T0 with the parameter `contrast` applied; within [0, 1].
     #[inline(always)]
-    pub(crate) fn gas<S: Simd>(&self, texture: Lanes<S>) -> Lanes<S> {
+    pub(crate) fn apply_contrast<S: Simd>(&self, texture: Lanes<S>) -> Lanes<S> {
         texture.fma(texture.broadcast(self.contrast), texture.broadcast(1.0 - self.contrast))
     }
 
-    /// The same for one point.
+    /// Slowed rise, eq. (12), at one point.
     pub(crate) fn slowed_rise_at(&self, distance: f32, y: f32) -> f32 {
         let rise = equations::rise(y, self.initial_speed);
         let [core, fringe] = self.widths.at(rise);
@@ -232,12 +231,12 @@ impl ShapeTables {
         let w = self.slowed_rise(distance, y.simd_clamp01());
         let at = lookup_index(w);
         let ([left, right], [vertical, glow], cooling) =
-            (edges.lookup(&at), self.heights.lookup(&at), self.cooling.lookup(&at));
+            (edges.lookup(&at), self.threshold_and_glow.lookup(&at), self.cooling.lookup(&at));
         let (half, one) = (x.broadcast(0.5), x.broadcast(1.0));
         let edge = x.select_lt(half, left, right);
         let edge_distance_pixels = (edge - distance) * x.broadcast(1.0 / pixel[0]);
         let across = equations::across(distance, edge).simd_min(one);
-        let [horizontal, _] = self.across.lookup(&lookup_index(across));
+        let [horizontal, _] = self.threshold_across.lookup(&lookup_index(across));
         let threshold = equations::threshold(vertical, horizontal);
         FlameCoordinates {
             u: equations::texture_u(across, x),
@@ -253,12 +252,12 @@ impl ShapeTables {
     /// The threshold, eq. (4), over the flat texture square.
     #[inline(always)]
     pub(crate) fn flat_threshold<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
-        let [vertical, _] = self.heights.sample(w);
-        let [horizontal, _] = self.across.sample(equations::axis_distance(u));
+        let [vertical, _] = self.threshold_and_glow.sample(w);
+        let [horizontal, _] = self.threshold_across.sample(equations::axis_distance(u));
         equations::threshold(vertical, horizontal)
     }
 
-    /// Whether no point of a region can lie in the flame; points around its border are given, x relative to the center line.
+    /// Whether a region contains no point of the flame, determined from six points on its border; x is relative to the center line.
     #[inline(always)]
     pub(crate) fn misses_flame(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
         let range = |values: &[f32; 6]| {
@@ -273,18 +272,18 @@ impl ShapeTables {
         } else {
             equations::axis_distance(left).simd_min(equations::axis_distance(right))
         };
-        let bin = |y: f32| (y.simd_clamp01() * (REACH_BINS - 1) as f32) as i32 as usize & (REACH_BINS - 1);
-        !self.reach[bin(low)..bin(high) + 1].iter().any(|reach| nearest <= *reach)
+        let bin = |y: f32| (y.simd_clamp01() * (EXTENT_BINS - 1) as f32) as i32 as usize & (EXTENT_BINS - 1);
+        !self.max_distance[bin(low)..bin(high) + 1].iter().any(|max_distance| nearest <= *max_distance)
     }
 
-    /// For each bin of height the greatest x' with w <= 1 and within the fringe, with a margin for antialiasing.
-    fn compute_reach(&self) -> Box<[f32; REACH_BINS]> {
+    /// For each bin of height the largest x' with w <= 1 inside the fringe, with a margin for antialiasing.
+    fn compute_max_distance(&self) -> Box<[f32; EXTENT_BINS]> {
         const STEPS: usize = 256;
         const MARGIN: f32 = 0.03;
         let max_width_above = self.max_width_above();
-        let mut reach = Box::new([0.0_f32; REACH_BINS]);
-        for edge in 0..=REACH_BINS {
-            let y = (edge as f32 / (REACH_BINS - 1) as f32).min(1.0);
+        let mut extent = Box::new([0.0_f32; EXTENT_BINS]);
+        for edge in 0..=EXTENT_BINS {
+            let y = (edge as f32 / (EXTENT_BINS - 1) as f32).min(1.0);
             let mut max_distance = 0.0_f32;
             for step in 1..=STEPS {
                 let distance = step as f32 / STEPS as f32;
@@ -294,14 +293,14 @@ impl ShapeTables {
                     max_distance = max_distance.max(distance + MARGIN);
                 }
             }
-            for bin in edge.saturating_sub(1)..=edge.min(REACH_BINS - 1) {
-                reach[bin] = reach[bin].max(max_distance);
+            for bin in edge.saturating_sub(1)..=edge.min(EXTENT_BINS - 1) {
+                extent[bin] = extent[bin].max(max_distance);
             }
         }
-        reach
+        extent
     }
 
-    /// Greatest A + D at each sampled height or above.
+    /// Maximum of A + D at each sampled height and above.
     fn max_width_above(&self) -> Vec<f32> {
         let mut widest: Vec<f32> = self.width_samples.iter().map(|[core, fringe]| core + fringe).collect();
         for i in (0..widest.len() - 1).rev() {
@@ -311,11 +310,12 @@ impl ShapeTables {
     }
 }
 
-/// Fraction of red light left at height w, and of green relative to red, where soot has cooled by the fraction `cooling * w`.
+/// Factor of red light at height w, and that of green relative to red, where soot has cooled by the fraction `cooling * w`.
 ///
-/// Wien's law: cooling by a fraction d multiplies the radiance by exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. Blue,
-/// at 460 nm, loses what green loses relative to red, to the power 2.5.
+/// Wien's law: cooling by a fraction d multiplies the radiance by exp(-c2 d / (lambda T)); here for 610 and 540 nm at 1700 K. The factor of blue, at
+/// 460 nm, relative to red is that of green relative to red to the power 2.5.
 fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
+    /// c2 / (lambda T).
     const RED: f64 = 13.87;
     const GREEN: f64 = 15.67;
     if color.kind == Coloring::RgbCurves {

@@ -13,7 +13,7 @@ use crate::sheet::{
     },
 };
 
-/// Light at flame coordinates; `None` where there is none.
+/// Light and opacity at flame coordinates; `None` if all pixels are empty.
 #[inline(always)]
 pub(crate) fn shade_coordinates<S: Simd>(
     shape: &ShapeTables,
@@ -26,30 +26,30 @@ pub(crate) fn shade_coordinates<S: Simd>(
         return None;
     }
     let t1 = equations::above_threshold(
-        shape.gas(state.texture.sample(coordinates.u, coordinates.w)),
+        shape.apply_contrast(state.texture.sample(coordinates.u, coordinates.w)),
         coordinates.threshold,
     );
     let zero = t1.broadcast(0.0);
     let strength = zero.select_lt(t1, coverage * coordinates.glow, zero);
-    let blue = ramp.base_blue[2] > 0.0 && any_positive(coordinates.w.broadcast(BLUE_TOP) - coordinates.w);
-    if !blue && !any_positive(strength) {
+    let has_blue_zone = ramp.base_blue[2] > 0.0 && any_positive(coordinates.w.broadcast(BLUE_TOP) - coordinates.w);
+    if !has_blue_zone && !any_positive(strength) {
         return None;
     }
-    let [red, green_beside_red] = coordinates.cooling;
+    let [red, green_over_red] = coordinates.cooling;
     let (red, opacity) = (red * strength, strength);
-    let green = red * green_beside_red;
-    let blue_left = green * green_beside_red * green_beside_red.simd_sqrt();
+    let green = red * green_over_red;
+    let blue = green * green_over_red * green_over_red.simd_sqrt();
     let mut light = ramp.light(t1);
-    for (plane, left) in light.iter_mut().zip([red, green, blue_left, opacity]) {
-        *plane *= left;
+    for (plane, factor) in light.iter_mut().zip([red, green, blue, opacity]) {
+        *plane *= factor;
     }
-    if blue {
+    if has_blue_zone {
         add_base_blue(&mut light, ramp, coordinates, coverage);
     }
     Some(ShadedBatch { t1, light })
 }
 
-/// Flame coordinates of a batch of pixels; a function boundary for SIMD code.
+/// Flame coordinates of a batch of pixels. Not inlined, so that the code is compiled once.
 pub(crate) fn coordinates<S: Simd>(
     shape: &ShapeTables,
     state: &SheetState,
@@ -64,7 +64,7 @@ pub(crate) fn coordinates<S: Simd>(
     )
 }
 
-/// Light of a batch of pixels, `None` where there is none; a function boundary for SIMD code.
+/// Light and opacity of a batch of pixels of the flame; `None` if all are empty. Not inlined, so that the code is compiled once.
 pub(crate) fn shade<S: Simd>(
     shape: &ShapeTables,
     ramp: &ColorRamp,
@@ -78,10 +78,10 @@ pub(crate) fn shade<S: Simd>(
     )
 }
 
-/// Height w up to which the base burns blue.
+/// Height w at which the blue zone ends.
 const BLUE_TOP: f32 = 0.45;
 
-/// The blue zone at the flame's lower edge, where fuel meets air before soot forms.
+/// Adds the blue zone at the flame's lower edge, where fuel burns before soot has formed.
 #[inline(always)]
 fn add_base_blue<S: Simd>(
     light: &mut [Lanes<S>; 4],
@@ -99,14 +99,14 @@ fn add_base_blue<S: Simd>(
     }
 }
 
-/// The flat texture square of the paper's pictures 1 to 4.
+/// Shades the flat texture square of the paper's pictures 1 to 4, after the threshold if `thresholded`.
 #[inline(always)]
 pub(super) fn shade_flat<S: Simd>(
     shape: &ShapeTables,
     ramp: &ColorRamp,
     state: &SheetState,
     batch: &SheetCoordinates<S>,
-    cut: bool,
+    thresholded: bool,
 ) -> Option<ShadedBatch<S>> {
     let (zero, one) = (batch.x.broadcast(0.0), batch.x.broadcast(1.0));
     let outside = |x: Lanes<S>| (zero - x).simd_max(x - one).simd_max(zero);
@@ -114,8 +114,9 @@ pub(super) fn shade_flat<S: Simd>(
     if !any_positive(strength) {
         return None;
     }
-    let texture = shape.gas(state.texture.sample(batch.x, batch.y));
-    let t1 = if cut { equations::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
+    let texture = shape.apply_contrast(state.texture.sample(batch.x, batch.y));
+    let t1 =
+        if thresholded { equations::above_threshold(texture, shape.flat_threshold(batch.x, batch.y)) } else { texture };
     let mut light = ramp.light(t1);
     for plane in &mut light {
         *plane *= strength;

@@ -27,16 +27,16 @@ pub(crate) struct SheetState {
 }
 
 impl SheetState {
-    /// Texels per unit of u and of w, of the finer layer; a texture that is filtered for small pixels has as many texels as pixels.
+    /// Texels per unit of u and of w, of the finer layer; for a texture that is filtered to a lower resolution at most one texel per pixel.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         let [across, up] = self.texture.texels();
-        let kept = (1.0 / (self.pixel[1] * up)).min(1.0);
-        [across * kept, up * kept]
+        let filter_factor = (1.0 / (self.pixel[1] * up)).min(1.0);
+        [across * filter_factor, up * filter_factor]
     }
 }
 
-/// A sheet at one time of the exposure, as one camera sees it.
+/// A sheet at one time of the exposure, seen by the camera at that time.
 pub(crate) struct TimeSample {
     /// Mapping from pixels to the sheet.
     pub(crate) pixel_to_sheet: PixelToSheet,
@@ -44,22 +44,22 @@ pub(crate) struct TimeSample {
     pub(crate) quad: UprightQuad,
     /// Its state at that time.
     pub(crate) state: SheetState,
-    /// For smoke, its properties.
+    /// Properties of smoke; `None` for a flame.
     pub(crate) smoke: Option<SmokeState>,
     /// Luminance of the brightest color divided by the number of time samples, cd/m^2.
     pub(crate) luminance: f32,
 }
 
-/// Shaded pixels of the flame.
+/// Sixteen shaded pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadedBatch<S: Simd> {
-    /// T1, eq. (5).
+    /// T1, eq. (5); for smoke its density.
     pub(crate) t1: Lanes<S>,
     /// Red, green, blue of luminance up to 1, and opacity.
     pub(crate) light: [Lanes<S>; 4],
 }
 
-/// Light of a batch of pixels of a time sample, whatever its content.
+/// Light and opacity of a batch of pixels of a time sample; `None` if all pixels are empty.
 pub(crate) fn shade_sample<S: Simd>(
     shape: &ShapeTables,
     ramp: &ColorRamp,
@@ -81,7 +81,7 @@ pub(crate) fn shade_sample<S: Simd>(
     }
 }
 
-/// What a sheet shows.
+/// Content of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SheetContent {
     /// The mapped flame.

@@ -9,17 +9,17 @@ use fearless_simd::{Simd, prelude::*};
 use super::{ShadedBatch, SheetState};
 use crate::sheet::render::projection::SheetCoordinates;
 
-/// Heights at which the light on the smoke is sampled.
+/// Number of heights at which the light on the smoke is sampled.
 pub(crate) const LIGHT_SAMPLES: usize = 17;
 
 /// Properties of smoke at one time.
 #[derive(Clone, Debug)]
 pub(crate) struct SmokeState {
-    /// Greatest optical depth.
+    /// Maximum optical depth.
     pub(crate) optical_depth: f32,
     /// Width at the base relative to that at the top.
     pub(crate) base_width: f32,
-    /// Radiance scattered toward the viewer where the smoke is opaque, at `LIGHT_SAMPLES` heights; ACEScg, cd/m^2.
+    /// Radiance that opaque smoke scatters toward the viewer, at `LIGHT_SAMPLES` heights; ACEScg, cd/m^2.
     pub(crate) scattered: [[f32; 3]; LIGHT_SAMPLES],
 }
 
@@ -32,7 +32,7 @@ impl SmokeState {
     }
 }
 
-/// Light and opacity of sixteen pixels of smoke.
+/// Light and opacity of sixteen pixels of smoke; `None` if all are empty.
 #[inline(always)]
 pub(super) fn shade_smoke<S: Simd>(
     state: &SheetState,
@@ -41,7 +41,7 @@ pub(super) fn shade_smoke<S: Simd>(
 ) -> Option<ShadedBatch<S>> {
     let (x, y) = state.warp.unwarp(batch.x, batch.y);
     let (zero, one, two) = (x.broadcast(0.0), x.broadcast(1.0), x.broadcast(2.0));
-    // A plume widens as it rises; its density falls smoothly to 0 at all edges.
+    // The plume widens as it rises; its density decreases smoothly to 0 at all edges.
     let width =
         y.simd_max(zero).simd_sqrt().fma(one - one.broadcast(smoke.base_width), one.broadcast(smoke.base_width));
     let across = (two * (x - one.broadcast(0.5))).simd_abs() / width;
