@@ -72,18 +72,18 @@ struct Subject {
 }
 
 /// Prepares the gas and hands it to `each`.
-fn prepared(subject: &Subject, look: &RenderingParameters, each: impl FnOnce(&PreparedGas)) {
+fn prepared(subject: &Subject, rendering: &RenderingParameters, each: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let gas = gas(&subject.particles, &subject.buffers);
-    if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
+    if let Ok(prepared) = PreparedGas::new(gas, rendering, &subject.view, &surroundings, &Unobserved) {
         each(&prepared);
     }
 }
 
 /// Draws the gas, and hands it to `before` before.
-fn draw(subject: &Subject, look: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
-    prepared(subject, look, |prepared| {
+fn draw(subject: &Subject, rendering: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
+    prepared(subject, rendering, |prepared| {
         before(prepared);
         (0..SIZE[1].div_ceil(STRIP)).into_par_iter().for_each_init(Strip::default, |strip, index| {
             let y = index * STRIP;
@@ -120,19 +120,19 @@ fn gas_720p(criterion: &mut Criterion) {
     let subject =
         Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), buffers: BufferPool::default() };
     let Subject { particles, view, .. } = &subject;
-    let look = RenderingParameters::default();
+    let rendering = RenderingParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
     let mut group = criterion.benchmark_group("flame gas 1280x720");
     group.sample_size(10);
     group.bench_function("sums and detail", |bencher| {
-        pool.install(|| bencher.iter(|| draw(&subject, &look, |_| ())));
+        pool.install(|| bencher.iter(|| draw(&subject, &rendering, |_| ())));
     });
     group.bench_function("sums, detail and haze", |bencher| {
         pool.install(|| {
-            bencher.iter(|| draw(&subject, &look, |prepared| assert!(prepared.deflection().is_some())));
+            bencher.iter(|| draw(&subject, &rendering, |prepared| assert!(prepared.deflection().is_some())));
         });
     });
-    let smooth = RenderingParameters { detail: 0.0, ..look.clone() };
+    let smooth = RenderingParameters { detail: 0.0, ..rendering.clone() };
     group.bench_function("sums alone", |bencher| {
         pool.install(|| bencher.iter(|| draw(&subject, &smooth, |_| ())));
     });
@@ -141,14 +141,14 @@ fn gas_720p(criterion: &mut Criterion) {
             naive(particles, view, |index, [u, v], radius| {
                 let tau = line_integral(math::hypot(u, v), radius)
                     * volume(index)
-                    * soot_absorption(f64::from(particles.soot_fractions()[index]), &look);
+                    * soot_absorption(f64::from(particles.soot_fractions()[index]), &rendering);
                 let [red, green, blue] = color::black_body().radiance(particles.temperatures()[index]).map(f64::from);
                 [tau, tau * red, tau * green, tau * blue]
             });
         });
     });
     // Of gas that neither shines nor hides only the haze is summed.
-    let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
+    let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..rendering.clone() };
     group.bench_function("haze of clear gas", |bencher| {
         pool.install(|| {
             bencher.iter(|| {

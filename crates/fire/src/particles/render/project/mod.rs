@@ -30,18 +30,17 @@ pub(crate) struct ProjectedParticle {
 /// Sprites with coordinates beyond this are discarded, pixels.
 const MAX_PIXEL_COORDINATE: f64 = 1e6;
 
-/// Variance of a pixel's footprint, pixels^2, that is added to every sprite (as in EWA splatting), so that the smallest neither
-/// flicker nor vanish.
+/// Variance of a pixel's footprint, pixels^2, that is added to every sprite (as in EWA splatting), so that small sprites neither flicker nor vanish.
 const PIXEL_FOOTPRINT: f64 = 0.18;
 
-/// Which particles become sprites, and what is recorded of each.
+/// A kind of sprite: which particles it includes, and the record of each.
 pub(crate) trait SpriteKind: Sync {
     type Record: Send + 'static;
     fn includes(&self, index: usize) -> bool;
     fn record(&self, projected: &ProjectedParticle) -> Self::Record;
 }
 
-/// Records of all particles that a view sees, in order, one list per task.
+/// Records of all included particles that are visible in a view, in order, one list per task.
 pub(crate) fn project_particles<'a, K: SpriteKind>(
     gas: &Gas<'a>,
     view: &View,

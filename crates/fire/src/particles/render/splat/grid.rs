@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::spline;
 use crate::particles::render::buffer_pool::{BufferPool, PooledVec};
 
-/// Cells around the covered area that are read: two by interpolation, one by differences, two by the prefilter.
+/// Margin around the covered area, in cells: two are read by interpolation, one by differences, two by the prefilter.
 const MARGIN: i32 = 5;
-/// The same where coarser grids are added, each of which is read as far beyond the finer one.
+/// Margin if coarser grids are added, each of which is read beyond the finer one.
 const NESTED_MARGIN: i32 = 7;
 
 /// Layout of cells over the picture: the center of cell (i, j) is at `(i + 1/2) size` pixels of the whole picture, independent of
@@ -33,8 +33,8 @@ impl Raster {
         Self { size, first: low, columns: (high[0] - low[0]) as usize, rows: (high[1] - low[1]) as usize }
     }
 
-    /// Intersection with `other`.
-    pub(crate) fn within(self, other: &Self) -> Self {
+    /// The cells that are in both.
+    pub(crate) fn intersection(self, other: &Self) -> Self {
         let ends = |cells: &Self| [cells.first[0] + cells.columns as i32, cells.first[1] + cells.rows as i32];
         let first = [0, 1].map(|axis| self.first[axis].max(other.first[axis]));
         let [right, bottom] = [0, 1].map(|axis| ends(&self)[axis].min(ends(other)[axis]));
@@ -68,10 +68,10 @@ impl Raster {
     /// The cell whose center precedes that of a pixel along an axis, and the pixel's phase between it and the next.
     #[inline(always)]
     pub(crate) fn cell_before(&self, axis: usize, pixel: usize) -> (i32, usize) {
-        // In half pixels, so that the integer part is the preceding cell center.
+        // In half pixels, since cell centers may be between pixels.
         let size = self.size as i32;
-        let halves = 2 * pixel as i32 + 1 - size;
-        (halves.div_euclid(2 * size) - self.first[axis], (halves.rem_euclid(2 * size) / 2) as usize)
+        let half_pixels = 2 * pixel as i32 + 1 - size;
+        (half_pixels.div_euclid(2 * size) - self.first[axis], (half_pixels.rem_euclid(2 * size) / 2) as usize)
     }
 
     /// Distance of pixels of each phase from the preceding cell center, cells.
@@ -105,14 +105,14 @@ pub(crate) struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// A grid with uninitialized (arbitrary) values: the caller fills all rows.
+    /// A grid with arbitrary values: the caller must fill all rows.
     pub(crate) fn new(cells: Raster, depth: usize, buffers: &'a BufferPool) -> Self {
         /// Cache line, bytes.
         const LINE: usize = 64;
         let count = cells.columns * cells.rows * depth + LINE / size_of::<f32>();
         let mut values = buffers.take(count);
         if values.len() < count {
-            // Zero pages from the operating system, not touched before they are used.
+            // Zero-filled pages of the operating system, which are not touched before they are used.
             *values = vec![0.0; values.capacity()];
         }
         let start = values.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
@@ -140,7 +140,7 @@ impl<'a> Grid<'a> {
         self.cells.covered()
     }
 
-    /// A row of cells; rows beyond the grid repeat its edge, which is empty.
+    /// A row of cells; rows outside the grid are those at its edge, which are empty.
     pub(crate) fn row(&self, row: i32) -> &[f32] {
         let row = row.clamp(0, self.cells.rows as i32 - 1) as usize;
         &self.values[self.start + row * self.row_length()..][..self.row_length()]
@@ -155,21 +155,21 @@ impl<'a> Grid<'a> {
         (x..x + count).map(column).collect()
     }
 
-    /// The first of the four columns around a position whose preceding cell is `cell`.
+    /// The first of the four columns around a position for which `cell` is the preceding cell.
     #[inline(always)]
     pub(crate) fn first_of_four(&self, cell: i32) -> usize {
         (cell - 1).clamp(0, self.cells.columns as i32 - 4) as usize
     }
 
-    /// One value per cell: the sum over layers of plane `plane` of `planes`.
-    pub(crate) fn one_plane(&self, plane: usize, planes: usize) -> Self {
-        let mut one = Self::new(self.cells, 1, self.pool());
-        one.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
+    /// A grid of one value per cell: plane `plane` of `planes`, summed over layers.
+    pub(crate) fn sum_of_plane(&self, plane: usize, planes: usize) -> Self {
+        let mut sums = Self::new(self.cells, 1, self.pool());
+        sums.values_mut().par_chunks_mut(self.cells.columns).enumerate().for_each(|(row, out)| {
             for (sum, cell) in out.iter_mut().zip(self.row(row as i32).chunks_exact(self.depth)) {
                 *sum = cell[plane..].iter().step_by(planes).sum();
             }
         });
-        one
+        sums
     }
 
     /// The grid of B-spline coefficients: prefiltered along columns and rows, so that the spline interpolates these values.
@@ -194,10 +194,10 @@ impl<'a> Grid<'a> {
         prefiltered
     }
 
-    /// Adds prefiltered cells twice as large, interpolated.
+    /// Adds a prefiltered grid of cells twice as large, interpolated.
     pub(crate) fn add_coarser(&mut self, coarser: &Grid) {
         let cells = self.cells;
-        // Centers of fine cells lie at 1/4 and 3/4 between those of coarse cells.
+        // Centers of fine cells are at 1/4 and 3/4 between those of coarse cells.
         let quarters = [spline::value(0.75), spline::value(0.25)];
         let (row_length, level) = (self.row_length(), Level::new());
         self.values_mut().par_chunks_mut(row_length).enumerate().for_each_init(

@@ -12,8 +12,8 @@ fn seen(particle: Particle) -> [f64; 2] {
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let particles = cloud([particle]);
     let gas = Gas { fade_out: ENDING, ..gas(&particles, &buffers) };
-    let (view, look) = (view(camera()), smooth());
-    let prepared = PreparedGas::new(gas, &look, &view, &surroundings, &Unobserved).unwrap();
+    let (view, rendering) = (view(camera()), smooth());
+    let prepared = PreparedGas::new(gas, &rendering, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
     strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, AOVS.len());
     prepared.draw(&DepthInterval::ALL, &mut strip);
