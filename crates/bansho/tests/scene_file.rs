@@ -309,7 +309,7 @@ fn a_template_states_all_of_its_kinds_setting() {
             let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
             compiled.unwrap_or_else(|error| panic!("{error}")).scene().clone()
         };
-        let stated = parse(&format!("bansho = 2\n{}\n[[{}]]\n", kind.setting, kind.key));
+        let stated = parse(&format!("bansho = 2\n{}\n[[{}]]\n", kind.scene_defaults, kind.key));
         let new = parse(&template::commented(kind));
         assert_eq!((&new.picture, &new.camera, &new.wind), (&stated.picture, &stated.camera, &stated.wind));
         assert_eq!((&new.sky, &new.ground, &new.lights), (&stated.sky, &stated.ground, &stated.lights));

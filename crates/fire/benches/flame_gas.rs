@@ -1,5 +1,5 @@
-//! Drawing of 100,000 particles at 1280 x 720, with and without heat haze, each beside a naive version that evaluates every sprite
-//! at every pixel that it covers.
+//! Drawing of 100,000 particles at 1280 x 720, with and without heat haze, each compared with a naive implementation that evaluates
+//! every sprite at every pixel that it covers.
 
 mod plume;
 mod support;
@@ -40,7 +40,7 @@ const COUNT: usize = 100_000;
 const HEIGHT: f64 = 1.5;
 const TIME: f64 = 3.0;
 
-/// A camera that the plume fills most of the height of.
+/// A view in which the plume fills most of the height.
 fn view() -> View {
     let camera = CameraParameters {
         position: Animated::from([0.0, 0.5 * HEIGHT, 2.2 * HEIGHT]),
@@ -64,24 +64,24 @@ fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
     }
 }
 
-/// What is drawn, and with what memory.
+/// The particles and the view that are drawn, with scratch memory.
 struct Subject {
     particles: Particles,
     view: View,
     buffers: BufferPool,
 }
 
-/// Prepares the gas and hands it to `each`.
-fn prepared(subject: &Subject, rendering: &RenderingParameters, each: impl FnOnce(&PreparedGas)) {
+/// Prepares the gas and passes it to `visit`.
+fn prepared(subject: &Subject, rendering: &RenderingParameters, visit: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let gas = gas(&subject.particles, &subject.buffers);
     if let Ok(prepared) = PreparedGas::new(gas, rendering, &subject.view, &surroundings, &Unobserved) {
-        each(&prepared);
+        visit(&prepared);
     }
 }
 
-/// Draws the gas, and hands it to `before` before.
+/// Draws the gas, after calling `before`.
 fn draw(subject: &Subject, rendering: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
     prepared(subject, rendering, |prepared| {
         before(prepared);
@@ -94,19 +94,19 @@ fn draw(subject: &Subject, rendering: &RenderingParameters, before: impl Fn(&Pre
     });
 }
 
-/// Every sprite evaluated at every pixel that it covers, for `WIDTH` values: light, or deflection.
+/// Evaluates every sprite at every pixel that it covers, with `WIDTH` values: light or deflection.
 fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(usize, [f64; 2], f64) -> [f64; WIDTH]) {
     let mut picture = vec![[0.0_f64; WIDTH]; SIZE[0] * SIZE[1]];
     for index in 0..particles.len() {
         let position = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
-        let Some(seen) = view.camera.project(position) else { continue };
+        let Some(projected) = view.camera.project(position) else { continue };
         let radius = f64::from(particles.support_radii()[index]);
-        let reach = radius * seen.pixels_per_meter;
+        let reach = radius * projected.pixels_per_meter;
         let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-        for y in clip(seen.pixel.y - reach, SIZE[1])..clip(seen.pixel.y + reach + 1.0, SIZE[1]) {
-            for x in clip(seen.pixel.x - reach, SIZE[0])..clip(seen.pixel.x + reach + 1.0, SIZE[0]) {
-                let offset = [x as f64 + 0.5 - seen.pixel.x, y as f64 + 0.5 - seen.pixel.y];
-                let offset = offset.map(|pixels| pixels / seen.pixels_per_meter);
+        for y in clip(projected.pixel.y - reach, SIZE[1])..clip(projected.pixel.y + reach + 1.0, SIZE[1]) {
+            for x in clip(projected.pixel.x - reach, SIZE[0])..clip(projected.pixel.x + reach + 1.0, SIZE[0]) {
+                let offset = [x as f64 + 0.5 - projected.pixel.x, y as f64 + 0.5 - projected.pixel.y];
+                let offset = offset.map(|pixels| pixels / projected.pixels_per_meter);
                 let sums = &mut picture[y * SIZE[0] + x];
                 sums.iter_mut().zip(value(index, offset, radius)).for_each(|(sum, value)| *sum += value);
             }
@@ -147,13 +147,13 @@ fn gas_720p(criterion: &mut Criterion) {
             });
         });
     });
-    // Of gas that neither shines nor hides only the haze is summed.
+    // Gas that neither emits nor absorbs contributes only to the haze.
     let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..rendering.clone() };
     group.bench_function("haze of clear gas", |bencher| {
         pool.install(|| {
             bencher.iter(|| {
                 prepared(&subject, &clear, |prepared| {
-                    black_box(prepared.deflection().map(|bend| bend.depth));
+                    black_box(prepared.deflection().map(|deflection| deflection.depth));
                 });
             });
         });

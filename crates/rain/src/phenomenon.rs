@@ -21,7 +21,7 @@ impl Describe for RainParameters {
     const FIRST_KEYS: &'static [&'static str] =
         &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"];
     // Lamps at dusk along a wet street: drops only show the light of others.
-    const SETTING: &'static str = "\
+    const SCENE_DEFAULTS: &'static str = "\
         camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
         sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
         ground = { wetness = 0.9, puddles = 0.4 }\n\

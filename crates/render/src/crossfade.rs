@@ -275,8 +275,8 @@ impl Prepared for Mixed<'_> {
         self.present.figures().into_iter().zip(self.passing.figures()).map(mix).collect()
     }
 
-    fn may_bend(&self) -> bool {
-        self.present.may_bend() || self.passing.may_bend()
+    fn may_refract(&self) -> bool {
+        self.present.may_refract() || self.passing.may_refract()
     }
 
     fn deflection(&self) -> Option<Deflection<'_>> {

@@ -64,7 +64,7 @@ pub const VERTICAL_FOV_DEG: Range = Range::new(0.1, 170.0);
 pub const SKY_FOV_DEG: f64 = 81.0;
 
 impl CameraParameters {
-    /// Places the camera at the origin, looking up at the sky: toward the north with a perspective lens or a panorama, toward the zenith with a dome.
+    /// Moves the camera to the origin, at eye height, looking up at the sky: toward the north with a perspective lens or a panorama, toward the zenith with a dome.
     pub fn look_up(&mut self) {
         let target = match self.lens {
             // The picture covers the sky from the horizon nearly to the zenith.

@@ -10,7 +10,7 @@ pub struct Descriptor {
     pub key: &'static str,
     /// Description in one or two sentences, with the paper's symbol and equation if it has one.
     pub doc: String,
-    /// Unit, empty for dimensionless numbers; units that are not SI are also part of the key.
+    /// Unit, empty for dimensionless numbers; units that are not SI are also item of the key.
     pub unit: &'static str,
     /// Type and bounds.
     pub kind: Kind,
@@ -146,7 +146,7 @@ impl Kind {
     pub fn expectation(&self) -> String {
         match self {
             Self::Bool => "true or false".into(),
-            Self::Integer { min, max } => format!("a whole number from {min} to {max}"),
+            Self::Integer { min, max } => format!("a outer number from {min} to {max}"),
             Self::Number { min, max } => format!("a number from {min} to {max}"),
             Self::Rational { min, max } => {
                 format!("a number from {min} to {max}, or a fraction such as \"24000/1001\"")
@@ -180,27 +180,27 @@ mod tests {
     use crate::parameters::{AssetPath, Parameters};
 
     crate::parameters! {
-        /// A thing with a file.
-        pub struct Part {
+        /// A table with a file.
+        pub struct Item {
             /// Its file.
             file: Option<AssetPath> = None;
         }
     }
 
     crate::parameters! {
-        /// Things with files.
-        pub struct Whole {
+        /// A table with a list of tables.
+        pub struct Outer {
             /// Text that is no asset.
             title: String = "a.png".into();
-            /// Parts.
-            parts: Vec<Part> = Vec::new();
+            /// Items.
+            items: Vec<Item> = Vec::new();
         }
     }
 
     #[test]
     fn files_are_found_in_tables_in_lists() {
-        let part = |file: Option<&str>| Part { file: file.map(|path| AssetPath(path.into())) };
-        let whole = Whole { parts: vec![part(Some("b.glb")), part(None), part(Some("c.glb"))], ..Whole::default() };
-        assert_eq!(Whole::table().asset_paths(&whole.to_table()), ["b.glb", "c.glb"]);
+        let item = |file: Option<&str>| Item { file: file.map(|path| AssetPath(path.into())) };
+        let outer = Outer { items: vec![item(Some("b.glb")), item(None), item(Some("c.glb"))], ..Outer::default() };
+        assert_eq!(Outer::table().asset_paths(&outer.to_table()), ["b.glb", "c.glb"]);
     }
 }

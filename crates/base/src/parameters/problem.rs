@@ -34,7 +34,7 @@ pub enum ProblemKind {
     Syntax(String),
     /// The text contains too many values: in memory they take a hundred times its length.
     #[error(
-        "the text holds more than {limit} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {limit}"
+        "the text contains more than {limit} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {limit}"
     )]
     TooManyValues {
         /// Maximum number that is read.
@@ -110,7 +110,7 @@ pub enum ProblemKind {
     #[error("{0}")]
     Curve(#[from] crate::math::curve::CurveError),
     /// A curve decreases although it must not.
-    #[error("falls between x = {from} and x = {to}; it must rise or stay level from point to point")]
+    #[error("decreases between x = {from} and x = {to}; it must not decrease from point to point")]
     NotRising {
         /// x where the decrease starts.
         from: f64,

@@ -51,9 +51,10 @@ pub struct PhenomenonKind {
     pub read: fn(&Table, &mut Reader) -> Box<dyn CheckedParameters>,
     /// Whether it is in the sky: if all phenomena of a scene are, the default camera looks up.
     pub in_the_sky: bool,
-    /// Lines of a new scene that show it well (camera, sky, ...), in the syntax of scene files; also the default of a scene with this kind alone.
-    pub setting: &'static str,
-    /// Its own keys that determine its position or size: if one is set, the camera of `setting` may not fit.
+    /// Tables of a scene that show it well (camera, sky, ...), in the syntax of scene files: for new scenes, and as defaults of scenes that contain only
+    /// this kind.
+    pub scene_defaults: &'static str,
+    /// Its own keys that determine its position or size: if one is set, the camera of `scene_defaults` may not show it.
     pub placement_keys: &'static [&'static str],
     /// The most important keys; those in sub-tables and lists of tables are separated by dots.
     pub first_keys: &'static [&'static str],
@@ -68,8 +69,8 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const KEY: &'static str;
     /// See [`PhenomenonKind::in_the_sky`].
     const IN_THE_SKY: bool = false;
-    /// See [`PhenomenonKind::setting`]; empty if the defaults suffice.
-    const SETTING: &'static str = "";
+    /// See [`PhenomenonKind::scene_defaults`]; empty if the defaults suffice.
+    const SCENE_DEFAULTS: &'static str = "";
     /// See [`PhenomenonKind::placement_keys`].
     const PLACEMENT_KEYS: &'static [&'static str] = &[];
     /// The most important keys, with which a short new scene begins; dots separate tables and lists of tables (`burners.diameter`).
@@ -96,7 +97,7 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         table: <Self as Parameters>::table,
         read: read_described::<Self>,
         in_the_sky: Self::IN_THE_SKY,
-        setting: Self::SETTING,
+        scene_defaults: Self::SCENE_DEFAULTS,
         placement_keys: Self::PLACEMENT_KEYS,
         first_keys: Self::FIRST_KEYS,
     };

@@ -41,7 +41,7 @@ impl Describe for FlameParticlesParameters {
         "burners.diameter",
         "burners.heat_release_kw",
     ];
-    const SETTING: &'static str = "\
+    const SCENE_DEFAULTS: &'static str = "\
         camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 

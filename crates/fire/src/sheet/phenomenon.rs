@@ -19,7 +19,7 @@ impl Describe for FlameSheetParameters {
     const KEY: &'static str = "flame_sheet";
     const PLACEMENT_KEYS: &'static [&'static str] = &["position", "width", "height"];
     // The flame nearly fills the height of the picture.
-    const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
+    const SCENE_DEFAULTS: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
     const FIRST_KEYS: &'static [&'static str] = &[
         "position",
         "width",

@@ -29,8 +29,8 @@ impl Streak {
     pub(crate) fn new(from: DVec2, to: DVec2, radius: f64, radiance: [f32; 3], area: f64, depth: f64) -> Option<Self> {
         /// Maximum length, pixels; a longer streak is that of a spark right in front of the lens, and is discarded.
         const MAX_LENGTH: f64 = 4000.0;
-        let reach = DVec2::splat(radius + EDGE_SOFTNESS);
-        let (min_pixel, max_pixel) = (from.min(to) - reach, from.max(to) + reach);
+        let margin = DVec2::splat(radius + EDGE_SOFTNESS);
+        let (min_pixel, max_pixel) = (from.min(to) - margin, from.max(to) + margin);
         if !((max_pixel - min_pixel).max_element() < MAX_LENGTH && min_pixel.abs().max_element() < 1e9) {
             return None;
         }

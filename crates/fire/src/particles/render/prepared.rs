@@ -101,8 +101,8 @@ pub fn depth_intervals(gas: &Gas, rendering: &RenderingParameters, view: &View) 
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
     if rendering.sparks.rate > 0.0 {
         let middle = layers.center(layers.count / 2);
-        let reach = rendering.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
-        intervals.push(DepthInterval { near: (middle - reach).max(0.0), far: middle + reach });
+        let half_depth = rendering.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
+        intervals.push(DepthInterval { near: (middle - half_depth).max(0.0), far: middle + half_depth });
     }
     intervals
 }
@@ -354,7 +354,7 @@ impl Prepared for PreparedGas<'_> {
         sparks.for_each(|spark| spark.draw(self.view.size, strip));
     }
 
-    fn may_bend(&self) -> bool {
+    fn may_refract(&self) -> bool {
         self.rendering.heat_haze_gain > 0.0 && !self.gas.particles.is_empty()
     }
 

@@ -74,10 +74,10 @@ impl<'a> AnyLensProjector<'a> {
         }
         let inverse = matrix.inverse();
         let smaller_eigenvalue = 0.5 * trace - (0.25 * trace * trace - determinant).max(0.0).sqrt();
-        let reach = DVec2::new(matrix.x_axis.x.sqrt(), matrix.y_axis.y.sqrt());
+        let half_size = DVec2::new(matrix.x_axis.x.sqrt(), matrix.y_axis.y.sqrt());
         let size = DVec2::new(camera.size[0], camera.size[1]);
         let center = projection.pixel;
-        let is_visible = (center + reach).cmpgt(DVec2::ZERO).all() && (center - reach).cmplt(size).all();
+        let is_visible = (center + half_size).cmpgt(DVec2::ZERO).all() && (center - half_size).cmplt(size).all();
         if !(is_visible && center.abs().max_element() < MAX_PIXEL_COORDINATE) {
             return None;
         }
@@ -86,7 +86,7 @@ impl<'a> AnyLensProjector<'a> {
         (peak > 0.0).then_some(Ellipse {
             center: center.as_vec2().to_array(),
             shape: [inverse.x_axis.x, inverse.x_axis.y, inverse.y_axis.y].map(|value| value as f32),
-            reach: reach.as_vec2().to_array(),
+            half_size: half_size.as_vec2().to_array(),
             radius: smaller_eigenvalue.max(0.0).sqrt() as f32,
             peak: peak as f32,
         })

@@ -152,7 +152,7 @@ mod tests {
             assert!((a.depth - b.depth).abs() < 1e-5 && near(a.scale, b.scale, 1e-5));
             assert!(near(e.radius, f.radius, 1e-5) && (e.peak / f.peak - 1.0).abs() < 1e-3, "{e:?} {f:?}");
             for axis in 0..2 {
-                assert!(near(e.center[axis], f.center[axis], 1e-5) && near(e.reach[axis], f.reach[axis], 1e-5));
+                assert!(near(e.center[axis], f.center[axis], 1e-5) && near(e.half_size[axis], f.half_size[axis], 1e-5));
                 assert!(near(a.motion[axis], b.motion[axis], 1e-4), "{a:?} {b:?}");
             }
             assert!((0..3).all(|i| (e.shape[i] - f.shape[i]).abs() < 1e-4 * f.shape[0].max(f.shape[2])), "{e:?} {f:?}");

@@ -86,10 +86,10 @@ impl PerspectiveProjector {
         let ellipses = self.ellipses(gas, indices, &now, &motion);
         for (lane, &index) in indices.iter().enumerate() {
             let center = [now.pixel[0][lane], now.pixel[1][lane]];
-            let reach = [ellipses.reach[0][lane], ellipses.reach[1][lane]];
+            let half_size = [ellipses.half_size[0][lane], ellipses.half_size[1][lane]];
             let mut is_visible = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
             for axis in 0..2 {
-                is_visible &= center[axis] + reach[axis] > 0.0 && center[axis] - reach[axis] < self.size[axis];
+                is_visible &= center[axis] + half_size[axis] > 0.0 && center[axis] - half_size[axis] < self.size[axis];
                 is_visible &= center[axis].abs() < MAX_PIXEL_COORDINATE as f32;
             }
             if is_visible {
@@ -97,7 +97,7 @@ impl PerspectiveProjector {
                 let (radius, peak) = (ellipses.radius[lane], ellipses.peak[lane]);
                 records.push(kind.record(&ProjectedParticle {
                     index,
-                    ellipse: Ellipse { center, shape, reach, radius, peak },
+                    ellipse: Ellipse { center, shape, half_size, radius, peak },
                     depth: f64::from(now.depth[lane]),
                     motion: [motion[0][lane], motion[1][lane]],
                     scale: now.scale[lane],
@@ -116,7 +116,7 @@ impl PerspectiveProjector {
         for (radius, &index) in radii.iter_mut().zip(indices) {
             *radius = gas.particles.support_radius[index];
         }
-        let mut ellipses = EllipseBatch { shape: [zero; 3], reach: [zero; 2], radius: zero, peak: zero };
+        let mut ellipses = EllipseBatch { shape: [zero; 3], half_size: [zero; 2], radius: zero, peak: zero };
         for lane in 0..LANES {
             let ball = now.scale[lane] * radii[lane];
             let across = ball.mul_add(ball, (PIXEL_FOOTPRINT / VARIANCE) as f32);
@@ -127,8 +127,8 @@ impl PerspectiveProjector {
             ellipses.shape[0][lane] = yy * inverse;
             ellipses.shape[1][lane] = -BLUR_SCALE * x * y * inverse;
             ellipses.shape[2][lane] = xx * inverse;
-            ellipses.reach[0][lane] = xx.sqrt();
-            ellipses.reach[1][lane] = yy.sqrt();
+            ellipses.half_size[0][lane] = xx.sqrt();
+            ellipses.half_size[1][lane] = yy.sqrt();
             ellipses.radius[lane] = across.sqrt();
             // A ball around the camera is only visible in front of it.
             let in_front = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
@@ -142,7 +142,7 @@ impl PerspectiveProjector {
 
 struct EllipseBatch {
     shape: [Batch; 3],
-    reach: [Batch; 2],
+    half_size: [Batch; 2],
     radius: Batch,
     peak: Batch,
 }

@@ -38,8 +38,8 @@ pub(crate) struct Ellipse {
     pub(crate) center: [f32; 2],
     /// a, b and c, 1/pixel^2.
     pub(crate) shape: [f32; 3],
-    /// Half extents of its bounding box, pixels.
-    pub(crate) reach: [f32; 2],
+    /// Half of the width and height of its bounding box, pixels.
+    pub(crate) half_size: [f32; 2],
     /// Semi-minor axis, pixels.
     pub(crate) radius: f32,
     /// Line integral through the center, for a particle of 1 m^3 with an absorption coefficient of 1/m.
@@ -161,8 +161,8 @@ impl SpriteStatistics {
             let mut statistics = Self::EMPTY;
             for Sprite { ellipse, .. } in task.iter() {
                 for axis in 0..2 {
-                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.reach[axis]);
-                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.reach[axis]);
+                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.half_size[axis]);
+                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.half_size[axis]);
                 }
                 statistics.counts[settings.grid_level(ellipse.radius)] += 1;
             }

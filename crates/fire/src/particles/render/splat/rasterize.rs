@@ -46,9 +46,9 @@ impl<const P: usize> RasterizedSprite<P> {
         let widening = (settings.min_radius_cells * cell / ellipse.radius.max(1e-3)).max(1.0);
         let scale = cell * cell / (widening * widening);
         let center = cells.cell_coordinates(ellipse.center);
-        let reach = ellipse.reach[1] * widening / cell * (1.0 - MIN_S).sqrt();
+        let half_height = ellipse.half_size[1] * widening / cell * (1.0 - MIN_S).sqrt();
         let (first, last) = (cells.first[1], cells.first[1] + cells.rows as i32);
-        let rows = [(center[1] - reach).ceil(), (center[1] + reach).floor() + 1.0];
+        let rows = [(center[1] - half_height).ceil(), (center[1] + half_height).floor() + 1.0];
         let rows = rows.map(|row| (row as i32).clamp(first, last));
         let [a, b, c] = ellipse.shape.map(|value| value * scale);
         let shear = b / a;

@@ -38,7 +38,7 @@ pub(crate) struct PlumeAxis {
     inflow: f32,
     strength: f32,
     /// The burner's diameter, m. The inflow fades out between one and two of them from the axis.
-    reach: f32,
+    diameter: f32,
 }
 
 /// The plume axes of all burners at `t`; `burner_indices` are the burners that the particles at `positions` came from.
@@ -77,7 +77,7 @@ impl PlumeAxis {
             acceleration: burner.acceleration as f32,
             inflow: (INFLOW_FROUDE * math::sqrt(STANDARD_GRAVITY * burner.diameter)) as f32,
             strength: strength as f32,
-            reach: burner.diameter as f32,
+            diameter: burner.diameter as f32,
         };
         axis.smooth(sums);
         axis
@@ -116,7 +116,7 @@ impl PlumeAxis {
         let speed_squared = height.fma(splat(2.0 * self.acceleration), splat(self.speed_squared));
         let speed = speed_squared.simd_sqrt().simd_max(splat(1e-6));
         // A large burner has several plumes: the inflow toward one axis vanishes at a distance of two diameters.
-        let attenuation = (splat(2.0) - distance * splat(1.0 / self.reach)).simd_clamp01();
+        let attenuation = (splat(2.0) - distance * splat(1.0 / self.diameter)).simd_clamp01();
         let max_inflow = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
         let inward = (distance * splat(0.5 * self.acceleration) / speed).simd_min(max_inflow)
             * attenuation
