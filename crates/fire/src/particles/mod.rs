@@ -35,7 +35,7 @@
 //! | section 4.3, step 5 | velocity, then position | `simulate::integrate::IntegrationStep::advance` |
 //! | section 5.1, figure 1 | table of color over temperature, 1 to 10,000 K | [`bansho_base::color::black_body`] |
 //! | section 5.2, figure 2 | poly6 as the sprite, opacity by density | `render::prepared::RadianceSprites::density_values` |
-//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::path`, `render::deflection::HeatHaze` |
+//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::optical_path`, `render::deflection::HeatHaze` |
 //! | figure 7 | squares colored by density | `render::paper_squares::Squares::draw` |
 //! | Heskestad 1983 | `L = 0.235 Q^(2/5) - 1.02 D`: flame height | [`heskestad`] |
 //! | Cetegen and Ahmed 1993 | `1.5 / sqrt(D)` Hz: puffing frequency | `simulate::burner::Burner::puffing_hz` |
