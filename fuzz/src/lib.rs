@@ -8,11 +8,11 @@ use std::{
 
 use bansho_base::{
     color::AlphaConvention,
+    frame::Frame,
     host::{
         assets::{MemoryAssets, Picture},
         observer::Observer,
     },
-    image::Frame,
 };
 use bansho::KINDS;
 use bansho_media::assets::{decode_picture, limits};

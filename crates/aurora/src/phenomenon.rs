@@ -5,9 +5,10 @@ use std::sync::Arc;
 use bansho_base::{
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
     },
@@ -42,7 +43,7 @@ impl Describe for AuroraParameters {
     ];
     const IN_THE_SKY: bool = true;
     // View from the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky is darker than the curtains.
-    const SETTING: &'static str = "\
+    const SCENE_DEFAULTS: &'static str = "\
         picture = { exposure_ev100 = -6.9, white_balance_k = 4000.0 }\n\
         camera = { position = [0.0, 1.7, 0.0], target = [0.0, 32.0, -57.0], vertical_fov_deg = 62.0 }\n\
         sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1, night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 } }\n";

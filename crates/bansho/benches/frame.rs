@@ -7,14 +7,16 @@ use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
     color::{self, encode_srgb},
+    frame::Frame,
     host::{
         assets::{Encoding, MemoryAssets, Picture},
         observer::{Cancelled, Observer, Unobserved},
     },
-    image::{Frame, Image, Rect},
+    image::{Image, Rect},
+    parameters::BuildError,
     phenomenon::{
         Deflection, Phenomenon, PhenomenonInfo, Prepared, Run,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },

@@ -10,7 +10,7 @@ use std::{
 
 use bansho::{
     AlphaConvention, BitDepth, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneBuilder, Shot, Unobserved, View,
-    base::image::DisplayPixels, fire::sheet::FlameSheetParameters, scene::PictureParameters,
+    base::frame::DisplayPixels, fire::sheet::FlameSheetParameters, scene::PictureParameters,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -47,11 +47,12 @@ pub use bansho_sph as sph;
 
 pub use bansho_base::{
     color::{AlphaConvention, View},
+    frame::{DisplayImage, Frame},
     host::{
         assets::{Assets, MemoryAssets},
         observer::{Cancelled, Observer, Stage, Unobserved},
     },
-    image::{DisplayImage, Frame, Image, Rect},
+    image::{Image, Rect},
 };
 pub use bansho_render::{
     BuildErrors, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,

@@ -11,7 +11,7 @@ use support::*;
 const LAKE: &str = "bansho = 2\n[picture]\nsize = [120, 90]\nexposure_ev100 = 0\n[camera]\nposition = [0, 1, 0]\ntarget = [0, 1, -1]\n\
                     vertical_fov_deg = 60\n[[emitter]]\nposition = [0, 2, -4]\nradius = 0.4\n";
 
-fn lit(frame: &bansho_base::image::Frame, rows: std::ops::Range<usize>) -> f64 {
+fn lit(frame: &bansho_base::frame::Frame, rows: std::ops::Range<usize>) -> f64 {
     rows.flat_map(|y| (0..120).map(move |x| (x, y))).map(|(x, y)| luminance(frame, x, y)).sum()
 }
 

@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use bansho::KINDS;
 use bansho_base::{
+    frame::Frame,
     host::{assets::MemoryAssets, observer::Unobserved},
-    image::{Frame, Rect},
+    image::Rect,
 };
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;

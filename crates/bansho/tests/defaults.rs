@@ -16,10 +16,10 @@ const DUSK: ImpliedBackdrop = ImpliedBackdrop { sky: true, ground: true, lights:
 #[test]
 fn every_setting_is_a_scene() {
     for kind in KINDS {
-        let text = format!("bansho = 2\n{}[[{}]]\n", kind.setting, kind.key);
+        let text = format!("bansho = 2\n{}[[{}]]\n", kind.scene_defaults, kind.key);
         let scene = Scene::parse("setting", &text, KINDS).unwrap_or_else(|error| panic!("{}: {error}", kind.key));
         assert_eq!(scene.implied, NONE, "{}: states all of it", kind.key);
-        let setting = bansho_scene::values(kind.setting).unwrap();
+        let setting = bansho_scene::values(kind.scene_defaults).unwrap();
         assert!(matches!(setting.get("camera").map(|node| &node.value), Some(Value::Table(_))), "{}", kind.key);
     }
 }

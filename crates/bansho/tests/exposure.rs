@@ -8,11 +8,12 @@ use std::sync::Arc;
 use bansho::KINDS;
 use bansho_base::{
     color::{self, AlphaConvention, View},
+    frame::{DisplayPixels, Frame},
     host::{
         assets::{Encoding, MemoryAssets, Picture},
         observer::Unobserved,
     },
-    image::{DisplayPixels, Frame, Image, Rect},
+    image::{Image, Rect},
 };
 use bansho_render::{
     PlanOptions,

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use bansho::KINDS;
 use bansho_base::{
+    frame::Frame,
     host::{assets::MemoryAssets, observer::Unobserved},
-    image::Frame,
     parameters::{Kind, TableDescriptor, Value},
 };
 use bansho_render::PlanOptions;

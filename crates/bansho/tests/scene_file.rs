@@ -134,7 +134,7 @@ fn faults_of_a_particle_flame_are_located() {
         ("combustion = { flame_temperature_k = 1e6 }\n", "1000000 is out of range"),
         (
             "burners = [{}, { position = [0, 99, 0] }]\ndomain_max = [5, 5, 5]\n",
-            "test.toml:3:29: flame_particles.0.burners.1.position (burner 2): the burner stands at",
+            "test.toml:3:29: flame_particles.0.burners.1.position (burner 2): the burner is at",
         ),
         ("burners = [{ shape = \"mesh\" }]\n", "burners.0.file (burner 1): a burner of shape \"mesh\" needs a `file`"),
         (
@@ -309,7 +309,7 @@ fn a_template_states_all_of_its_kinds_setting() {
             let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
             compiled.unwrap_or_else(|error| panic!("{error}")).scene().clone()
         };
-        let stated = parse(&format!("bansho = 2\n{}\n[[{}]]\n", kind.setting, kind.key));
+        let stated = parse(&format!("bansho = 2\n{}\n[[{}]]\n", kind.scene_defaults, kind.key));
         let new = parse(&template::commented(kind));
         assert_eq!((&new.picture, &new.camera, &new.wind), (&stated.picture, &stated.camera, &stated.wind));
         assert_eq!((&new.sky, &new.ground, &new.lights), (&stated.sky, &stated.ground, &stated.lights));
@@ -350,13 +350,13 @@ fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
 #[test]
 fn a_models_fault_stays_what_it_is() {
     use bansho_base::parameters::ProblemKind;
-    use bansho_fire::particles::ParticleFaultKind;
+    use bansho_fire::particles::ParticleErrorKind;
     let text = "bansho = 2\n[[flame_particles]]\nparticles = 900000000\n";
     let kinds = bansho::KINDS;
     let error = compiled("new.toml", text, kinds, MemoryAssets::default()).err().unwrap();
     let ProblemKind::Model(fault) = &error.problems[0].kind else { panic!("{error}") };
-    let kind = fault.downcast::<ParticleFaultKind>();
-    assert!(matches!(kind, Some(ParticleFaultKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
+    let kind = fault.downcast::<ParticleErrorKind>();
+    assert!(matches!(kind, Some(ParticleErrorKind::TooManyParticles { count: 900_000_000, .. })), "{error}");
 }
 
 #[test]
@@ -368,7 +368,7 @@ fn flames_together_may_not_have_more_particles_than_fit() {
         compiled("new.toml", &text, kinds, MemoryAssets::default()).err().map(|error| error.to_string())
     };
     let error = check([flame(12_000_000, true), flame(9_000_000, true), flame(8_000_000, true)]).unwrap();
-    let expected = "9000000 particles beside 12000000 of other flames would take 13 GiB; allowed: up to ";
+    let expected = "9000000 particles in addition to 12000000 of other flames would take 13 GiB; allowed: up to ";
     assert!(error.contains("new.toml:6") && error.contains(expected), "{error}");
     // One that is off takes nothing.
     let error = check([flame(900_000, true), flame(20_000_000, false), flame(500_000, true)]).unwrap_or_default();

@@ -10,8 +10,9 @@ use std::sync::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    frame::{DisplayPixels, Frame},
     host::observer::{Observer, Unobserved},
-    image::{DisplayPixels, Frame, Rect},
+    image::Rect,
     math,
 };
 use bansho_render::{

@@ -4,6 +4,7 @@
 
 pub mod camera;
 pub mod color;
+pub mod frame;
 pub mod geometry;
 pub mod host;
 pub mod image;

@@ -1,5 +1,5 @@
-//! Drawing of 100,000 particles at 1280 x 720, with and without heat haze, each beside a naive version that evaluates every sprite
-//! at every pixel that it covers.
+//! Drawing of 100,000 particles at 1280 x 720, with and without heat haze, each compared with a naive implementation that evaluates
+//! every sprite at every pixel that it covers.
 
 mod plume;
 mod support;
@@ -27,7 +27,7 @@ use bansho_base::{
 use bansho_fire::particles::{
     Particles,
     render::{
-        FadeOut, Gas, PreparedGas, RenderingParameters, ScratchPool, line_gradient, line_integral, soot_absorption,
+        BufferPool, FadeOut, Gas, PreparedGas, RenderingParameters, line_gradient, line_integral, soot_absorption,
     },
 };
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -40,7 +40,7 @@ const COUNT: usize = 100_000;
 const HEIGHT: f64 = 1.5;
 const TIME: f64 = 3.0;
 
-/// A camera that the plume fills most of the height of.
+/// A view in which the plume fills most of the height.
 fn view() -> View {
     let camera = CameraParameters {
         position: Animated::from([0.0, 0.5 * HEIGHT, 2.2 * HEIGHT]),
@@ -50,7 +50,7 @@ fn view() -> View {
     View::new(camera, Shutter { open: TIME, close: TIME + 1.0 / 60.0 }, TIME + 1.0 / 30.0, SIZE, 0)
 }
 
-fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
+fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles,
         time: TIME,
@@ -60,30 +60,30 @@ fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
         size: DVec2::ONE,
         key: Key::new(1, "plume"),
         fade_out: FadeOut::NEVER,
-        scratch,
+        buffers,
     }
 }
 
-/// What is drawn, and with what memory.
+/// The particles and the view that are drawn, with scratch memory.
 struct Subject {
     particles: Particles,
     view: View,
-    scratch: ScratchPool,
+    buffers: BufferPool,
 }
 
-/// Prepares the gas and hands it to `each`.
-fn prepared(subject: &Subject, look: &RenderingParameters, each: impl FnOnce(&PreparedGas)) {
+/// Prepares the gas and passes it to `visit`.
+fn prepared(subject: &Subject, rendering: &RenderingParameters, visit: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
-    let gas = gas(&subject.particles, &subject.scratch);
-    if let Ok(prepared) = PreparedGas::new(gas, look, &subject.view, &surroundings, &Unobserved) {
-        each(&prepared);
+    let gas = gas(&subject.particles, &subject.buffers);
+    if let Ok(prepared) = PreparedGas::new(gas, rendering, &subject.view, &surroundings, &Unobserved) {
+        visit(&prepared);
     }
 }
 
-/// Draws the gas, and hands it to `before` before.
-fn draw(subject: &Subject, look: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
-    prepared(subject, look, |prepared| {
+/// Draws the gas, after calling `before`.
+fn draw(subject: &Subject, rendering: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
+    prepared(subject, rendering, |prepared| {
         before(prepared);
         (0..SIZE[1].div_ceil(STRIP)).into_par_iter().for_each_init(Strip::default, |strip, index| {
             let y = index * STRIP;
@@ -94,19 +94,19 @@ fn draw(subject: &Subject, look: &RenderingParameters, before: impl Fn(&Prepared
     });
 }
 
-/// Every sprite evaluated at every pixel that it covers, for `WIDTH` values: light, or deflection.
+/// Evaluates every sprite at every pixel that it covers, with `WIDTH` values: light or deflection.
 fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(usize, [f64; 2], f64) -> [f64; WIDTH]) {
     let mut picture = vec![[0.0_f64; WIDTH]; SIZE[0] * SIZE[1]];
     for index in 0..particles.len() {
         let position = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
-        let Some(seen) = view.camera.project(position) else { continue };
+        let Some(projected) = view.camera.project(position) else { continue };
         let radius = f64::from(particles.support_radii()[index]);
-        let reach = radius * seen.pixels_per_meter;
+        let reach = radius * projected.pixels_per_meter;
         let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-        for y in clip(seen.pixel.y - reach, SIZE[1])..clip(seen.pixel.y + reach + 1.0, SIZE[1]) {
-            for x in clip(seen.pixel.x - reach, SIZE[0])..clip(seen.pixel.x + reach + 1.0, SIZE[0]) {
-                let offset = [x as f64 + 0.5 - seen.pixel.x, y as f64 + 0.5 - seen.pixel.y];
-                let offset = offset.map(|pixels| pixels / seen.pixels_per_meter);
+        for y in clip(projected.pixel.y - reach, SIZE[1])..clip(projected.pixel.y + reach + 1.0, SIZE[1]) {
+            for x in clip(projected.pixel.x - reach, SIZE[0])..clip(projected.pixel.x + reach + 1.0, SIZE[0]) {
+                let offset = [x as f64 + 0.5 - projected.pixel.x, y as f64 + 0.5 - projected.pixel.y];
+                let offset = offset.map(|pixels| pixels / projected.pixels_per_meter);
                 let sums = &mut picture[y * SIZE[0] + x];
                 sums.iter_mut().zip(value(index, offset, radius)).for_each(|(sum, value)| *sum += value);
             }
@@ -118,21 +118,21 @@ fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(
 fn gas_720p(criterion: &mut Criterion) {
     let pool = pinned_pool(2);
     let subject =
-        Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), scratch: ScratchPool::default() };
+        Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), buffers: BufferPool::default() };
     let Subject { particles, view, .. } = &subject;
-    let look = RenderingParameters::default();
+    let rendering = RenderingParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
     let mut group = criterion.benchmark_group("flame gas 1280x720");
     group.sample_size(10);
     group.bench_function("sums and detail", |bencher| {
-        pool.install(|| bencher.iter(|| draw(&subject, &look, |_| ())));
+        pool.install(|| bencher.iter(|| draw(&subject, &rendering, |_| ())));
     });
     group.bench_function("sums, detail and haze", |bencher| {
         pool.install(|| {
-            bencher.iter(|| draw(&subject, &look, |prepared| assert!(prepared.deflection().is_some())));
+            bencher.iter(|| draw(&subject, &rendering, |prepared| assert!(prepared.deflection().is_some())));
         });
     });
-    let smooth = RenderingParameters { detail: 0.0, ..look.clone() };
+    let smooth = RenderingParameters { detail: 0.0, ..rendering.clone() };
     group.bench_function("sums alone", |bencher| {
         pool.install(|| bencher.iter(|| draw(&subject, &smooth, |_| ())));
     });
@@ -141,19 +141,19 @@ fn gas_720p(criterion: &mut Criterion) {
             naive(particles, view, |index, [u, v], radius| {
                 let tau = line_integral(math::hypot(u, v), radius)
                     * volume(index)
-                    * soot_absorption(f64::from(particles.soot_fractions()[index]), &look);
+                    * soot_absorption(f64::from(particles.soot_fractions()[index]), &rendering);
                 let [red, green, blue] = color::black_body().radiance(particles.temperatures()[index]).map(f64::from);
                 [tau, tau * red, tau * green, tau * blue]
             });
         });
     });
-    // Of gas that neither shines nor hides only the haze is summed.
-    let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..look.clone() };
+    // Gas that neither emits nor absorbs contributes only to the haze.
+    let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..rendering.clone() };
     group.bench_function("haze of clear gas", |bencher| {
         pool.install(|| {
             bencher.iter(|| {
                 prepared(&subject, &clear, |prepared| {
-                    black_box(prepared.deflection().map(|bend| bend.depth));
+                    black_box(prepared.deflection().map(|deflection| deflection.depth));
                 });
             });
         });

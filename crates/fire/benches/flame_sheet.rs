@@ -1,4 +1,4 @@
-//! A full flame sheet at 1920 x 1080, from texture to color, and the paper's texture alone, each beside a naive version.
+//! A full flame sheet at 1920 x 1080, from texture to color, and the paper's texture alone, each compared with a naive implementation.
 
 use std::hint::black_box;
 
@@ -35,7 +35,7 @@ fn view(parameters: &FlameSheetParameters) -> View {
     View::new(camera, Shutter { open: 3.0, close: 3.0 + 1.0 / 60.0 }, 3.03, SIZE, 0)
 }
 
-/// Draws one frame; each thread takes every so manieth strip.
+/// Draws one frame; the strips are distributed to the threads in turn.
 fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings::from_wind(&wind);
@@ -58,7 +58,7 @@ fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     });
 }
 
-/// The chain with trigonometry and curves evaluated at every pixel.
+/// All equations with trigonometric functions and curves evaluated at every pixel.
 #[allow(clippy::disallowed_methods, reason = "the naive twin calls the standard library")]
 fn naive_pixel(parameters: &FlameSheetParameters, x: f64, y: f64, scroll: f64) -> [f64; 3] {
     let shape = &parameters.shape;
@@ -80,7 +80,7 @@ fn naive_pixel(parameters: &FlameSheetParameters, x: f64, y: f64, scroll: f64) -
     [&parameters.color.red, &parameters.color.green, &parameters.color.blue].map(|curve| curve.eval(sharp))
 }
 
-/// Eq. (20) as it stands.
+/// Eq. (20), literally.
 #[allow(clippy::disallowed_methods, reason = "the naive twin calls the standard library")]
 fn naive_texture(p: f64, q: f64) -> f64 {
     let (mut sum, mut total, mut weight, mut fx, mut fy) = (0.0, 0.0, 1.0, 16.0, 26.0);

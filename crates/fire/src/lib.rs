@@ -6,7 +6,7 @@
 //! | [`particles`] | burning gas by smoothed-particle hydrodynamics, black-body light, heat haze | Inagaki et al. |
 //! | [`sparks`] | glowing particles in closed form, drawn as streaks | |
 //!
-//! The two flames do not depend on each other. The sheet is evaluated at any time; the particle flame is stepped. Each module's page lists
+//! The two flames do not depend on each other. The sheet is a closed form, which can be evaluated at any time; the particle flame is simulated in steps. Each module's page lists
 //! its references and its equations with the functions that implement them.
 
 pub mod particles;

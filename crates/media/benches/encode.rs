@@ -3,8 +3,10 @@
 use std::{hint::black_box, path::Path};
 
 use bansho_base::{
+    camera::CameraHeader,
     color::AlphaConvention,
-    image::{CameraHeader, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
+    frame::{DisplayImage, DisplayPixels, Frame, FrameHeader},
+    image::{Image, Rect},
 };
 use bansho_media::{
     exr,

@@ -1,8 +1,10 @@
 //! Pictures for this crate's tests.
 
 use bansho_base::{
+    camera::CameraHeader,
     color::AlphaConvention,
-    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+    frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
+    image::{Image, Rect},
 };
 
 /// A small frame in which every value is different, with depth, a layer and an AOV.

@@ -3,8 +3,10 @@
 use std::{collections::BTreeMap, path::Path, process::Command};
 
 use bansho_base::{
+    camera::CameraHeader,
     color,
-    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
+    frame::{Channel, Frame, FrameHeader, Precision},
+    image::{Image, Rect},
 };
 use bansho_media::{exr, output::atomic};
 use half::f16;

@@ -3,8 +3,9 @@
 use std::{collections::BTreeMap, path::Path, process::Command};
 
 use bansho_base::{
-    camera::Lens,
-    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
+    camera::{CameraHeader, Lens},
+    frame::{Channel, Frame, FrameHeader, Precision},
+    image::{Image, Rect},
 };
 use bansho_media::{exr, output::atomic};
 use half::f16;

@@ -3,9 +3,11 @@
 use std::{fs, path::Path};
 
 use bansho_base::{
+    camera::CameraHeader,
     color::AlphaConvention,
+    frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
     host::assets::{AssetProblem, Assets, Encoding, Picture},
-    image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+    image::{Image, Rect},
 };
 use bansho_media::{
     assets::{self, FileAssets, InputLimits, limits::MemoryLimit},

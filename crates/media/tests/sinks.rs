@@ -8,7 +8,7 @@ use std::{
 
 use bansho_base::{
     color::AlphaConvention,
-    image::{DisplayImage, DisplayPixels},
+    frame::{DisplayImage, DisplayPixels},
 };
 use bansho_media::{
     MediaError,

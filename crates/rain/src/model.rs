@@ -5,7 +5,7 @@ use std::{ops::RangeInclusive, sync::LazyLock};
 use bansho_base::{
     host::constructions,
     math::random::Key,
-    parameters::parameter_error::{ParameterError, ParameterErrorKind},
+    parameters::{ParameterError, ParameterErrorKind},
     phenomenon::surroundings::Surroundings,
 };
 

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{Emitter, Light, OtherPhenomena, Publication, Surroundings},
     },
@@ -20,7 +21,7 @@ impl Describe for RainParameters {
     const FIRST_KEYS: &'static [&'static str] =
         &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"];
     // Lamps at dusk along a wet street: drops only scatter the light of others.
-    const SETTING: &'static str = "\
+    const SCENE_DEFAULTS: &'static str = "\
         camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
         sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
         ground = { wetness = 0.9, puddles = 0.4 }\n\

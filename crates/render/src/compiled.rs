@@ -4,12 +4,9 @@ use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
     host::assets::Assets,
-    parameters::Reader,
+    parameters::{BuildError, Reader},
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Run, Stepped, Stepping,
-        kind::{BuildContext, BuildError},
-        strip::Shutter,
-        surroundings::Occluder,
+        Phenomenon, PhenomenonInfo, Run, Stepped, Stepping, kind::BuildContext, strip::Shutter, surroundings::Occluder,
     },
     world::wind::Wind,
 };

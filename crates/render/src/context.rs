@@ -3,8 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
+    frame::FrameHeader,
     host::once::get_or_compute,
-    image::FrameHeader,
     world::sky::{ElevationProfile, Sky},
 };
 

@@ -1,9 +1,10 @@
 //! Seamless loops of what is stepped: the end of one run dissolves into the beginning of the next.
 
 use bansho_base::{
+    frame::Figure,
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, Rect},
     phenomenon::{
         Deflection, Prepared, Run, SnapshotError, Stepped, Stepping,
         strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
@@ -274,8 +275,8 @@ impl Prepared for Mixed<'_> {
         self.present.figures().into_iter().zip(self.passing.figures()).map(mix).collect()
     }
 
-    fn may_bend(&self) -> bool {
-        self.present.may_bend() || self.passing.may_bend()
+    fn may_refract(&self) -> bool {
+        self.present.may_refract() || self.passing.may_refract()
     }
 
     fn deflection(&self) -> Option<Deflection<'_>> {

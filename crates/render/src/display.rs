@@ -2,7 +2,8 @@
 
 use bansho_base::{
     color::{AlphaConvention, DisplayCode, View},
-    image::{DisplayImage, DisplayPixels, Frame, Rect},
+    frame::{DisplayImage, DisplayPixels, Frame},
+    image::Rect,
 };
 use fearless_simd::Level;
 use rayon::prelude::*;

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bansho_base::{
     color,
-    image::{FrameHeader, Rect},
+    frame::FrameHeader,
+    image::Rect,
     phenomenon::strip::{Shutter, View},
 };
 

@@ -3,8 +3,8 @@
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},
     math,
-    parameters::{Auto, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
-    phenomenon::kind::{BuildError, PhenomenonKind},
+    parameters::{Auto, BuildError, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
+    phenomenon::kind::PhenomenonKind,
 };
 
 use super::{FORMAT, SHARED_TABLES, Scene, ValuePath, tables::picture::LightKind};

@@ -18,7 +18,7 @@ const FIRST_SHARED: [(&str, &[&str]); 3] = [
 /// A short scene with one phenomenon of `kind` in its setting: what one changes first, each with a brief comment.
 pub fn short(kind: &PhenomenonKind) -> String {
     // A test holds that settings can be read.
-    let setting = toml::parse(kind.setting).unwrap_or_default();
+    let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
     let (several, others): (Vec<&SharedTable>, Vec<&SharedTable>) =
         SHARED_TABLES.iter().partition(|shared| tables(&setting, shared.key).len() > 1);
@@ -110,7 +110,7 @@ fn brief(parameter: &Descriptor, after: usize) -> String {
 /// A scene with one phenomenon of `kind` in its setting, each parameter explained in a comment.
 pub fn commented(kind: &PhenomenonKind) -> String {
     // A test holds that settings can be read.
-    let setting = toml::parse(kind.setting).unwrap_or_default();
+    let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
     for shared in SHARED_TABLES {
         let stated = tables(&setting, shared.key);

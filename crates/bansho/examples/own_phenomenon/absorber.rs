@@ -21,10 +21,10 @@ use bansho::base::{
     host::observer::{Cancelled, Observer},
     image::Rect,
     math::{self, DVec2},
-    parameters::{ProblemKind, Range},
+    parameters::{BuildError, ProblemKind, Range},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },

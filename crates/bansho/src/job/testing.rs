@@ -6,11 +6,12 @@ use std::sync::{
 };
 
 use bansho_base::{
+    frame::Frame,
     host::{
         assets::MemoryAssets,
         observer::{Observer, Stage, check},
     },
-    image::{Frame, Image, Rect},
+    image::{Image, Rect},
     phenomenon::SnapshotError,
 };
 use bansho_media::output::provenance;

@@ -1,7 +1,7 @@
 //! OpenEXR by its own library: beauty and layers in half, depth and AOVs in float.
 
 use bansho::{
-    base::{image::Frame, math},
+    base::{frame::Frame, math},
     render::display::BitDepth,
 };
 

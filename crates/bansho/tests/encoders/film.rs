@@ -3,7 +3,7 @@
 use std::{path::Path, process::Command};
 
 use bansho::{
-    base::{color::AlphaConvention, image::Frame},
+    base::{color::AlphaConvention, frame::Frame},
     render::display::BitDepth,
 };
 

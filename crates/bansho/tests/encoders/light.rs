@@ -2,9 +2,10 @@
 
 use bansho::{
     base::{
-        camera::Lens,
+        camera::{CameraHeader, Lens},
         color::{AlphaConvention, View},
-        image::{CameraHeader, Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Precision, Rect},
+        frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
+        image::{Image, Rect},
     },
     render::display::{BitDepth, display},
 };

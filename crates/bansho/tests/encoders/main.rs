@@ -15,7 +15,7 @@ use std::{
 use bansho::{
     base::{
         color::{AlphaConvention, View},
-        image::{DisplayImage, Frame},
+        frame::{DisplayImage, Frame},
     },
     media::output::{
         naming::OutputPattern,

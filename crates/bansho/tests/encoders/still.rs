@@ -1,7 +1,7 @@
 //! PNG, APNG and GIF by Pillow, and by the PNG specification where Pillow keeps 8 bits only.
 
 use bansho::{
-    base::{color::View, image::DisplayImage},
+    base::{color::View, frame::DisplayImage},
     render::display::BitDepth,
 };
 

@@ -4,7 +4,7 @@ use std::{ops::Range, path::PathBuf, sync::Arc};
 
 use bansho::{
     BitDepth, CompiledScene, DisplayImage, Plan, PlanOptions, SceneOptions, Shot, Unobserved, View,
-    base::image::{DisplayPixels, Frame},
+    base::frame::{DisplayPixels, Frame},
     media::assets::{FileAssets, decode_picture, limits::MemoryLimit},
 };
 

@@ -3,16 +3,17 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    frame::Figure,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, Rect},
     math::{
         DVec3,
         random::{Key, Purpose, uniform},
     },
-    parameters::Range,
-    phenomenon::kind::{BuildContext, BuildError, Describe},
+    parameters::{BuildError, Range},
     phenomenon::{
         Deflection, Phenomenon, PhenomenonInfo, Prepared, Run, SnapshotError, Stepped, Stepping,
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter as LightEmitter, Light, Publication, Surroundings},
     },

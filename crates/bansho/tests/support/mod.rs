@@ -8,11 +8,12 @@ mod planned;
 use std::sync::Arc;
 
 use bansho_base::{
+    frame::Frame,
     host::{
         assets::{Assets, Encoding, MemoryAssets, Picture},
         observer::Unobserved,
     },
-    image::{Frame, Image},
+    image::Image,
     phenomenon::kind::{Describe, PhenomenonKind},
 };
 use bansho_render::{CompiledScene, PlanOptions, Shot};

@@ -6,7 +6,6 @@ pub mod upright_quad;
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::{
-    image::CameraHeader,
     math,
     parameters::{Range, animated::Animated},
 };
@@ -65,7 +64,7 @@ pub const VERTICAL_FOV_DEG: Range = Range::new(0.1, 170.0);
 pub const SKY_FOV_DEG: f64 = 81.0;
 
 impl CameraParameters {
-    /// Places the camera at the origin, looking up at the sky: toward the north with a perspective lens or a panorama, toward the zenith with a dome.
+    /// Moves the camera to the origin, at eye height, looking up at the sky: toward the north with a perspective lens or a panorama, toward the zenith with a dome.
     pub fn look_up(&mut self) {
         let target = match self.lens {
             // The picture covers the sky from the horizon nearly to the zenith.
@@ -160,6 +159,21 @@ pub struct Projection {
     pub depth: f64,
     /// Pixels covered by one meter perpendicular to the line of sight at that depth.
     pub pixels_per_meter: f64,
+}
+
+/// Camera metadata for file headers, for compositing programs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraHeader {
+    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), meters.
+    pub world_to_camera: [[f32; 4]; 4],
+    /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; `None` for domes and panoramas, for which there is no such matrix.
+    pub world_to_ndc: Option<[[f32; 4]; 4]>,
+    /// Vertical field of view of a perspective lens, degrees.
+    pub vertical_fov_deg: Option<f32>,
+    /// Projection of the lens; `None` for pictures that were not taken through a lens.
+    pub lens: Option<Lens>,
+    /// Full angle of a fisheye's circle, degrees.
+    pub fisheye_fov_deg: Option<f32>,
 }
 
 impl Camera {

@@ -13,7 +13,7 @@ use crate::math;
 const CELLS_ALONG_LONGEST_SIDE: f64 = 64.0;
 /// Cells around the bounding box on every side.
 const MARGIN_CELLS: f64 = 3.0;
-/// Cells across the thickness of a thin mesh, so that some grid points lie inside it,
+/// Cells across the thickness of a thin mesh, so that some grid points are inside it,
 const MIN_CELLS_ACROSS: f64 = 2.5;
 /// and the approximate limit on the total number of cells for that.
 const MAX_CELLS: f64 = 7e5;

@@ -44,7 +44,7 @@ pub enum MeshError {
         vertex_count: usize,
     },
     /// A coordinate is not finite or beyond 1e6 m.
-    #[error("vertex {} is not finite or lies beyond 1e6 m", vertex + 1)]
+    #[error("vertex {} is not finite or beyond 1e6 m", vertex + 1)]
     VertexOutOfBounds {
         /// Index of the vertex, from 0.
         vertex: usize,
@@ -130,21 +130,30 @@ pub struct SurfaceSampler {
     triangles: Vec<(f64, [DVec3; 3])>,
 }
 
+/// A point on a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceSample {
+    /// Position, m.
+    pub position: DVec3,
+    /// Outward unit normal.
+    pub normal: DVec3,
+}
+
 impl SurfaceSampler {
     /// Total area, m^2.
     pub fn area(&self) -> f64 {
         self.triangles.last().map_or(0.0, |(area, _)| *area)
     }
 
-    /// The point and unit normal for three uniform numbers in [0, 1).
-    pub fn sample(&self, [triangle, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+    /// The sample for three uniform numbers in [0, 1).
+    pub fn sample(&self, [triangle, u, v]: [f64; 3]) -> SurfaceSample {
         let target_area = triangle * self.area();
         let index = self.triangles.partition_point(|(area, _)| *area <= target_area).min(self.triangles.len() - 1);
         let vertices = self.triangles[index].1;
         // Folding the unit square over its diagonal keeps the distribution uniform over the triangle.
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         let [a, b, c] = vertices;
-        (a + (b - a) * u + (c - a) * v, area_normal(vertices).normalize_or(DVec3::Y))
+        SurfaceSample { position: a + (b - a) * u + (c - a) * v, normal: area_normal(vertices).normalize_or(DVec3::Y) }
     }
 }
 
@@ -167,7 +176,7 @@ mod tests {
         let mut on_top = 0;
         for i in 0..6000 {
             let f = f64::from(i);
-            let (point, normal) =
+            let SurfaceSample { position: point, normal } =
                 sampler.sample([(f + 0.5) / 6000.0, (f * 0.618_034).fract(), (f * 0.414_214).fract()]);
             let outside = (point - DVec3::splat(0.5)).abs().max_element();
             assert!((outside - 0.5).abs() < 1e-6);

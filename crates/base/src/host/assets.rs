@@ -97,7 +97,7 @@ pub enum AssetProblem {
         /// Upper bound of the memory that reading it takes, bytes.
         bytes: u64,
     },
-    /// It lies outside the folder that a scene is confined to.
+    /// It is outside the folder that a scene is confined to.
     #[error("lies outside {root}, the folder that this scene is confined to; allowed: files within it")]
     Outside {
         /// The folder.
@@ -125,26 +125,26 @@ pub enum AssetProblem {
     #[error("contains no usable mesh: {0}")]
     Mesh(#[from] MeshError),
     /// Its contents are damaged or do not match the extension of its name.
-    #[error("is damaged or not of the kind its name says: {0}")]
+    #[error("is damaged, or its contents do not match the extension of its name: {0}")]
     Damaged(String),
     /// Its stated width or height is too large.
-    #[error("claims {width} x {height} pixels; at most {limit} on a side are read")]
+    #[error("claims {width} x {height} pixels; allowed: up to {limit} per side")]
     TooLarge {
         /// Claimed width.
         width: u64,
         /// Claimed height.
         height: u64,
-        /// Most pixels on a side.
+        /// Maximum number of pixels per side.
         limit: u64,
     },
     /// Its stated number of pixels is too large.
-    #[error("claims {width} x {height} pixels; at most {limit} in all are read")]
+    #[error("claims {width} x {height} pixels; allowed: up to {limit} in total")]
     TooManyPixels {
         /// Claimed width.
         width: u64,
         /// Claimed height.
         height: u64,
-        /// Most pixels in all.
+        /// Maximum number of pixels.
         limit: u64,
     },
     /// The requested channel is not in the picture.

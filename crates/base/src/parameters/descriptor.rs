@@ -1,6 +1,6 @@
 //! Descriptors of parameters: sufficient to parse, document and edit a parameter and to generate random valid values.
 
-use super::Value;
+use super::{Table, Value};
 use crate::host::plural::count_range;
 
 /// One parameter.
@@ -10,7 +10,7 @@ pub struct Descriptor {
     pub key: &'static str,
     /// Description in one or two sentences, with the paper's symbol and equation if it has one.
     pub doc: String,
-    /// Unit, empty for dimensionless numbers; units that are not SI are also part of the key.
+    /// Unit, empty for dimensionless numbers; units that are not SI are also item of the key.
     pub unit: &'static str,
     /// Type and bounds.
     pub kind: Kind,
@@ -36,6 +36,31 @@ pub struct TableDescriptor {
     pub doc: String,
     /// Its parameters, in the order in which they are documented.
     pub parameters: Vec<Descriptor>,
+}
+
+impl TableDescriptor {
+    /// Paths of all assets that `table`, which this describes, refers to at any depth, in the order of the descriptors.
+    pub fn asset_paths(&self, table: &Table) -> Vec<String> {
+        let mut paths = Vec::new();
+        for parameter in &self.parameters {
+            if let Some(node) = table.get(parameter.key) {
+                collect_asset_paths(&node.value, &parameter.kind, &mut paths);
+            }
+        }
+        paths
+    }
+}
+
+fn collect_asset_paths(value: &Value, kind: &Kind, paths: &mut Vec<String>) {
+    match (kind, value) {
+        (Kind::Asset, Value::Text(path)) => paths.push(path.clone()),
+        (Kind::Optional(inner) | Kind::Auto(inner), value) => collect_asset_paths(value, inner, paths),
+        (Kind::List { item, .. }, Value::List(items)) => {
+            items.iter().for_each(|node| collect_asset_paths(&node.value, item, paths));
+        }
+        (Kind::Table(descriptor), Value::Table(table)) => paths.extend(descriptor().asset_paths(table)),
+        _ => {}
+    }
 }
 
 /// One of the allowed names of a choice.
@@ -121,7 +146,7 @@ impl Kind {
     pub fn expectation(&self) -> String {
         match self {
             Self::Bool => "true or false".into(),
-            Self::Integer { min, max } => format!("a whole number from {min} to {max}"),
+            Self::Integer { min, max } => format!("a outer number from {min} to {max}"),
             Self::Number { min, max } => format!("a number from {min} to {max}"),
             Self::Rational { min, max } => {
                 format!("a number from {min} to {max}, or a fraction such as \"24000/1001\"")
@@ -146,5 +171,36 @@ impl Kind {
             }
             Self::Table(_) => "a table".into(),
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(unreachable_pub, reason = "tables are public")]
+mod tests {
+    use crate::parameters::{AssetPath, Parameters};
+
+    crate::parameters! {
+        /// A table with a file.
+        pub struct Item {
+            /// Its file.
+            file: Option<AssetPath> = None;
+        }
+    }
+
+    crate::parameters! {
+        /// A table with a list of tables.
+        pub struct Outer {
+            /// Text that is no asset.
+            title: String = "a.png".into();
+            /// Items.
+            items: Vec<Item> = Vec::new();
+        }
+    }
+
+    #[test]
+    fn files_are_found_in_tables_in_lists() {
+        let item = |file: Option<&str>| Item { file: file.map(|path| AssetPath(path.into())) };
+        let outer = Outer { items: vec![item(Some("b.glb")), item(None), item(Some("c.glb"))], ..Outer::default() };
+        assert_eq!(Outer::table().asset_paths(&outer.to_table()), ["b.glb", "c.glb"]);
     }
 }

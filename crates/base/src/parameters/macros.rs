@@ -114,7 +114,7 @@ macro_rules! parameters {
 ///
 /// ```
 /// bansho_base::choice! {
-///     /// How a thing moves.
+///     /// How an object moves.
 ///     pub enum Motion {
 ///         /// Not at all.
 ///         Still = "still",

@@ -4,23 +4,20 @@
 //! documentation. The parser, error locations, the schema, the book, the inspector and random scenes are all derived from that declaration.
 
 pub mod animated;
-mod assets;
 mod descriptor;
 mod keyed;
 mod macros;
 mod model_error;
-pub mod parameter_error;
 mod problem;
 mod reader;
 mod sample;
 mod types;
 mod value;
 
-pub use assets::assets;
 pub use descriptor::{Choice, Descriptor, Kind, TableDescriptor};
 pub use keyed::{CurveLimits, InterpolationName, MAX_POINTS};
-pub use model_error::ModelError;
-pub use problem::{Problem, ProblemKind, nearest};
+pub use model_error::{ModelError, ParameterError, ParameterErrorKind};
+pub use problem::{BuildError, Problem, ProblemKind, nearest};
 pub use reader::{MAX_PROBLEMS, Problems, Reader};
 pub use sample::sample;
 pub use types::{AssetPath, Auto, Length, Parameter, Parameters, Range, path};

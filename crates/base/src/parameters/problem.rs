@@ -34,7 +34,7 @@ pub enum ProblemKind {
     Syntax(String),
     /// The text contains too many values: in memory they take a hundred times its length.
     #[error(
-        "the text holds more than {limit} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {limit}"
+        "the text contains more than {limit} values and tables (by its commas, dots, brackets, braces and equals signs); allowed: up to {limit}"
     )]
     TooManyValues {
         /// Maximum number that is read.
@@ -110,7 +110,7 @@ pub enum ProblemKind {
     #[error("{0}")]
     Curve(#[from] crate::math::curve::CurveError),
     /// A curve decreases although it must not.
-    #[error("falls between x = {from} and x = {to}; it must rise or stay level from point to point")]
+    #[error("decreases between x = {from} and x = {to}; it must not decrease from point to point")]
     NotRising {
         /// x where the decrease starts.
         from: f64,
@@ -148,6 +148,22 @@ pub enum ProblemKind {
     /// An asset that the scene refers to could not be loaded.
     #[error("{0}")]
     Asset(#[from] AssetError),
+}
+
+/// An error that is only detected when a phenomenon, an obstacle or a plate is built from its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildError {
+    /// Key of the invalid parameter, with sub-tables separated by dots.
+    pub key: String,
+    /// What is wrong.
+    pub kind: ProblemKind,
+}
+
+impl BuildError {
+    /// An error of a model at the parameter `key`.
+    pub fn new(key: impl Into<String>, error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self { key: key.into(), kind: ModelError::new(error).into() }
+    }
 }
 
 /// The list items on a path, counted from 1: ` (shape 2, sheet 1)`. The first table of its kind needs no number.

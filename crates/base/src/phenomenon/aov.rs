@@ -1,6 +1,5 @@
 //! Arbitrary output variables (AOVs): how samples are combined to one value per pixel.
 
-use super::strip::{blend, reset};
 use crate::math::MulAdd;
 
 /// How the samples of an AOV are combined.
@@ -89,6 +88,17 @@ impl AovPlane {
         reset(&mut self.values, pixels, 0.0);
         reset(&mut self.weights, pixels, 0.0);
     }
+}
+
+/// Blends a plane with another one: `weight` of each value and `1 - weight` of the other.
+pub(super) fn blend(values: &mut [f32], others: &[f32], weight: f32) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value = weight.fma(*value - other, *other));
+}
+
+/// Fills a plane of `pixels` pixels with `value`.
+pub(super) fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
+    plane.clear();
+    plane.resize(pixels, value);
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Kinds of phenomena: how each is read from its table in a scene, and built.
 
-use std::{error::Error, sync::Arc};
+use std::sync::Arc;
 
 use crate::{
     host::assets::Assets,
-    parameters::{ModelError, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
+    parameters::{BuildError, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
 };
 
 use super::Phenomenon;
@@ -20,22 +20,6 @@ pub struct BuildContext<'a> {
     pub loop_s: Option<f64>,
     /// Loader of assets.
     pub assets: &'a dyn Assets,
-}
-
-/// An error that is only detected when a phenomenon is built.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BuildError {
-    /// Key of the invalid parameter, with sub-tables separated by dots.
-    pub key: String,
-    /// What is wrong.
-    pub kind: ProblemKind,
-}
-
-impl BuildError {
-    /// An error of the phenomenon's model, at the parameter `key`.
-    pub fn new(key: impl Into<String>, fault: impl Error + Send + Sync + 'static) -> Self {
-        Self { key: key.into(), kind: ModelError::new(fault).into() }
-    }
 }
 
 /// The checked parameters of a phenomenon.
@@ -67,9 +51,10 @@ pub struct PhenomenonKind {
     pub read: fn(&Table, &mut Reader) -> Box<dyn CheckedParameters>,
     /// Whether it is in the sky: if all phenomena of a scene are, the default camera looks up.
     pub in_the_sky: bool,
-    /// Lines of a new scene that show it well (camera, sky, ...), in the syntax of scene files; also the default of a scene with this kind alone.
-    pub setting: &'static str,
-    /// Its own keys that determine its position or size: if one is set, the camera of `setting` may not fit.
+    /// Tables of a scene that show it well (camera, sky, ...), in the syntax of scene files: for new scenes, and as defaults of scenes that contain only
+    /// this kind.
+    pub scene_defaults: &'static str,
+    /// Its own keys that determine its position or size: if one is set, the camera of `scene_defaults` may not show it.
     pub placement_keys: &'static [&'static str],
     /// The most important keys; those in sub-tables and lists of tables are separated by dots.
     pub first_keys: &'static [&'static str],
@@ -84,8 +69,8 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const KEY: &'static str;
     /// See [`PhenomenonKind::in_the_sky`].
     const IN_THE_SKY: bool = false;
-    /// See [`PhenomenonKind::setting`]; empty if the defaults suffice.
-    const SETTING: &'static str = "";
+    /// See [`PhenomenonKind::scene_defaults`]; empty if the defaults suffice.
+    const SCENE_DEFAULTS: &'static str = "";
     /// See [`PhenomenonKind::placement_keys`].
     const PLACEMENT_KEYS: &'static [&'static str] = &[];
     /// The most important keys, with which a short new scene begins; dots separate tables and lists of tables (`burners.diameter`).
@@ -112,7 +97,7 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         table: <Self as Parameters>::table,
         read: read_described::<Self>,
         in_the_sky: Self::IN_THE_SKY,
-        setting: Self::SETTING,
+        scene_defaults: Self::SCENE_DEFAULTS,
         placement_keys: Self::PLACEMENT_KEYS,
         first_keys: Self::FIRST_KEYS,
     };
@@ -130,7 +115,7 @@ impl<P: Describe> CheckedParameters for Described<P> {
     }
 
     fn assets(&self) -> Vec<String> {
-        crate::parameters::assets(&self.0.to_table(), P::table())
+        P::table().asset_paths(&self.0.to_table())
     }
 
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {

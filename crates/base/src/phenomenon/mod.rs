@@ -8,9 +8,10 @@ pub mod surroundings;
 use std::{fmt, sync::Arc};
 
 use crate::{
+    frame::Figure,
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, Rect},
 };
 use strip::{AovDescriptor, DepthInterval, Shutter, Strip, View};
 use surroundings::{OtherPhenomena, Publication, Surroundings};
@@ -72,7 +73,7 @@ pub enum SnapshotError {
     Damaged,
 }
 
-/// A note for the user about how a phenomenon will look; it does not stop the work.
+/// A note for the user about how a phenomenon will look; it does not stop rendering.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remark {
     /// The parameter of the phenomenon's own table that it refers to, as in `shapes.1` (counting from 0); `None` for the phenomenon as a whole.
@@ -264,7 +265,7 @@ pub trait Prepared: Send + Sync {
     }
 
     /// Whether it may refract light anywhere in the picture, including outside the window for which it was prepared.
-    fn may_bend(&self) -> bool {
+    fn may_refract(&self) -> bool {
         self.deflection().is_some()
     }
 

@@ -11,6 +11,8 @@ use crate::{
     math::{self, MulAdd},
 };
 
+use super::aov::{blend, reset};
+
 pub use super::aov::{AovDescriptor, AovPlane, AovRule};
 
 /// When the shutter is open, seconds.
@@ -251,16 +253,6 @@ impl Absorption {
             Self::Colored => 3,
         }
     }
-}
-
-/// Weighted mean: `weight` of each value and `1 - weight` of the other.
-pub(crate) fn blend(values: &mut [f32], others: &[f32], weight: f32) {
-    values.iter_mut().zip(others).for_each(|(value, other)| *value = weight.fma(*value - other, *other));
-}
-
-pub(crate) fn reset(plane: &mut Vec<f32>, pixels: usize, value: f32) {
-    plane.clear();
-    plane.resize(pixels, value);
 }
 
 impl Strip {

@@ -5,9 +5,9 @@ use crate::parameters::Range;
 crate::parameters! {
     /// The still, dry air around all phenomena.
     pub struct Air {
-        /// Its temperature.
+        /// Temperature.
         temperature_k: f64 = 293.15, limits(Range::new(150.0, 400.0)), unit("K");
-        /// Its pressure.
+        /// Pressure.
         pressure_pa: f64 = 101_325.0, limits(Range::new(1_000.0, 1_000_000.0)), unit("Pa");
     }
 }

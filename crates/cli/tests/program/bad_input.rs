@@ -94,7 +94,7 @@ fn sizes_of_nothing_and_of_a_billion_are_refused() {
 #[test]
 fn a_curve_that_falls_where_it_must_rise_is_refused() {
     let error = refused(&format!("{FLAME}texture = {{ threshold = [[0, 0.5], [1, 0.2]] }}\n"), 3);
-    says(&error, &["scene.toml:14:", "threshold", "falls between x = 0 and x = 1"]);
+    says(&error, &["scene.toml:14:", "threshold", "decreases between x = 0 and x = 1"]);
 }
 
 #[test]

@@ -166,8 +166,8 @@ fn a_flame_that_cannot_be_seen_is_told() {
     let burner = "[[flame_particles.burners]]\n";
     let ball = "[[obstacle]]\nshape = \"sphere\"\nradius = 0.5\n";
     for (more, expected) in [
-        (format!("{burner}flow = 0.0\n"), "flame_particles: none of its burners gives gas"),
-        (format!("{burner}{ball}"), "flame_particles: its burner 1 lies within an obstacle"),
+        (format!("{burner}flow = 0.0\n"), "flame_particles: none of its burners emits gas"),
+        (format!("{burner}{ball}"), "flame_particles: its burner 1 is inside an obstacle"),
     ] {
         let folder = Folder::with_scene(&format!("{GAS}{more}"));
         let run = folder.succeed(&["render", "scene.toml", "--frames", "0"]);

@@ -1,18 +1,18 @@
-//! A plume of particles in closed form, to be drawn without simulation.
+//! A plume of particles in closed form, drawn without simulation.
 
 use bansho_base::math::{self, DVec3};
 
 use bansho_fire::particles::{Particle, Particles};
 
-const LIFE: f64 = 1.1;
+const LIFETIME_S: f64 = 1.1;
 const DENSITY: f64 = 0.2;
 
-/// `count` particles of a plume `height` m high at time `t`: born over a disc, drawn inward as they speed up, swaying as they rise.
+/// `count` particles of a plume `height` m high at time `t`: they start on a disk, move inward as they accelerate, and sway as they rise.
 pub(crate) fn plume(count: usize, height: f64, t: f64) -> Particles {
     let mut particles = Particles::new(DVec3::ZERO);
-    let rate = count as f64 / LIFE;
+    let rate = count as f64 / LIFETIME_S;
     let last = (t * rate).floor() as i64;
-    // The plume is about a twentieth of its height cubed.
+    // The volume of the plume is about a twentieth of its height cubed.
     let volume = 0.05 * height * height * height / count as f64;
     for id in (last - count as i64 + 1).max(0)..=last {
         particles.push(particle(id as u64, t - id as f64 / rate, t, height, volume));
@@ -24,18 +24,20 @@ fn particle(id: u64, age: f64, t: f64, height: f64, volume: f64) -> Particle {
     let random =
         bansho_base::math::random::Key::new(1, "plume").uniforms(id, 0, bansho_base::math::random::Purpose::named("p"));
     let [u, v, ..] = random.map(f64::from);
-    let share = (age / LIFE).clamp(0.0, 1.0);
-    let y = height * (0.35 * share + 0.65 * share * share);
-    let speed = height * (0.35 + 1.3 * share) / LIFE;
+    let age_fraction = (age / LIFETIME_S).clamp(0.0, 1.0);
+    let y = height * (0.35 * age_fraction + 0.65 * age_fraction * age_fraction);
+    let speed = height * (0.35 + 1.3 * age_fraction) / LIFETIME_S;
     let (sin, cos) = math::sin_cos(std::f64::consts::TAU * u);
-    let disc = 0.16 * height * math::sqrt(v) * (1.0 - 0.55 * share);
+    let radius = 0.16 * height * math::sqrt(v) * (1.0 - 0.55 * age_fraction);
     let sway = |phase: f64| {
-        0.10 * height * share * math::sin(std::f64::consts::TAU * (1.4 * (t - age) + 1.3 * y / height) + phase)
+        0.10 * height * age_fraction * math::sin(std::f64::consts::TAU * (1.4 * (t - age) + 1.3 * y / height) + phase)
     };
-    let position = [disc * cos + sway(0.0 + 2.0 * u), y, disc * sin + sway(1.7 + 2.0 * v)];
-    let hot = math::smoothstep(0.0, 0.15, share) * (1.0 - 0.35 * math::smoothstep(0.4, 1.0, share));
+    let position = [radius * cos + sway(0.0 + 2.0 * u), y, radius * sin + sway(1.7 + 2.0 * v)];
+    let hot = math::smoothstep(0.0, 0.15, age_fraction) * (1.0 - 0.35 * math::smoothstep(0.4, 1.0, age_fraction));
     let edge = math::sqrt(v) * 0.15;
-    let soot = 1.5e-6 * math::smoothstep(0.05, 0.35, share) * (1.0 - math::smoothstep(0.55 - edge, 1.0 - edge, share));
+    let soot = 1.5e-6
+        * math::smoothstep(0.05, 0.35, age_fraction)
+        * (1.0 - math::smoothstep(0.55 - edge, 1.0 - edge, age_fraction));
     Particle {
         id,
         position: position.map(|value| value as f32),
@@ -45,8 +47,8 @@ fn particle(id: u64, age: f64, t: f64, height: f64, volume: f64) -> Particle {
         temperature: (300.0 + 1650.0 * hot) as f32,
         support_radius: (2.2 * math::cbrt(volume)) as f32,
         age: age as f32,
-        max_age: LIFE as f32,
-        fuel: (1.0 - 3.0 * share).max(0.0) as f32,
+        max_age: LIFETIME_S as f32,
+        fuel: (1.0 - 3.0 * age_fraction).max(0.0) as f32,
         soot: soot as f32,
     }
 }

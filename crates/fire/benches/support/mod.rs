@@ -1,6 +1,6 @@
 //! Shared by benchmarks.
 
-/// A pool whose threads each stay on a core of their own: unpinned they are often packed onto one.
+/// A thread pool with each thread pinned to its own core: unpinned threads are often scheduled on the same core.
 pub(crate) fn pinned_pool(threads: usize) -> rayon::ThreadPool {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
     let pin = move |index: usize| {

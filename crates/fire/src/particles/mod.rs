@@ -1,8 +1,8 @@
 //! Particle flame: burning gas as particles that move by smoothed-particle hydrodynamics and radiate as black bodies.
 //!
 //! # Model
-//! Particles carry mass, velocity, temperature, fuel and soot. Pressure, buoyancy, wind, entrainment, vortex rings and turbulence move them;
-//! they heat, burn, form soot and cool. Each is drawn as the exact line integral of its kernel, so that sums of sprites are the line
+//! Particles carry mass, velocity, temperature, fuel and soot. Pressure, buoyancy, wind, entrainment, vortex rings and turbulence move them.
+//! They burn, heat up, form soot and cool. Each is drawn as the exact line integral of its kernel, so that sums of sprites are the line
 //! integrals of the gas: optical depth, emission, and the optical path that bends light from behind (heat haze). SI units throughout;
 //! temperatures in K, luminance in cd/m^2.
 //!
@@ -35,15 +35,15 @@
 //! | section 4.3, step 5 | velocity, then position | `simulate::integrate::IntegrationStep::advance` |
 //! | section 5.1, figure 1 | table of color over temperature, 1 to 10,000 K | [`bansho_base::color::black_body`] |
 //! | section 5.2, figure 2 | poly6 as the sprite, opacity by density | `render::prepared::RadianceSprites::density_values` |
-//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::path`, `render::deflection::HeatHaze` |
-//! | figure 7 | squares colored by density | `paper_squares::Squares::draw` |
+//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::optical_path`, `render::deflection::HeatHaze` |
+//! | figure 7 | squares colored by density | `render::paper_squares::Squares::draw` |
 //! | Heskestad 1983 | `L = 0.235 Q^(2/5) - 1.02 D`: flame height | [`heskestad`] |
 //! | Cetegen and Ahmed 1993 | `1.5 / sqrt(D)` Hz: puffing frequency | `simulate::burner::Burner::puffing_hz` |
 //!
 //! (4) and (5) are a property of kernels that integrate to 1.
 //!
 //! # Data flow
-//! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper leaves open; `fault` are their errors.
+//! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper does not state; `error` are their errors.
 //! 2. A step (`simulate::Simulation::step`) runs sub-steps. In each, `simulate::fluid` sorts particles and computes density and pressure
 //!    force, `simulate::integrate` advances them (with `simulate::collision`), and `simulate::spawning` adds new ones.
 //! 3. Once per step `simulate::combustion` smooths velocity and temperature, burns fuel, forms soot and cools;
@@ -56,9 +56,8 @@
 //!    objects; `render::aovs` writes AOVs.
 //! 8. `render::prepared` composites layers, squares and [sparks](crate::sparks) into strips.
 
-mod fault;
+mod error;
 mod model;
-pub(crate) mod paper_squares;
 mod parameters;
 mod phenomenon;
 pub mod render;
@@ -66,7 +65,7 @@ pub mod simulate;
 #[cfg(test)]
 mod tests;
 
-pub use fault::{ParticleFault, ParticleFaultKind};
+pub use error::{ParticleError, ParticleErrorKind};
 pub use model::FlameParticles;
 pub use parameters::{
     BurnerParameters, BurnerShape, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters,

@@ -1,4 +1,4 @@
-//! A particle flame: what is built from its parameters, and its state.
+//! A particle flame: constants, which are built once from its parameters, and its state.
 
 use bansho_base::{
     host::{assets::Assets, constructions},
@@ -7,13 +7,13 @@ use bansho_base::{
 };
 
 use super::{
-    fault::{ParticleFault, ParticleFaultKind},
+    error::{ParticleError, ParticleErrorKind},
     parameters::FlameParticlesParameters,
-    render::{FadeOut, Gas, ScratchPool},
+    render::{BufferPool, FadeOut, Gas},
 };
 use crate::particles::simulate::{Simulation, burner::Burner, derived::DerivedConstants, particles::Particles};
 
-/// A particle flame at some moment of its life. The one that is built stands at its beginning; runs are copies of it, which share what is fixed.
+/// A particle flame at one time. As built it is at the beginning of the preroll. Runs are copies of it, which share the constants.
 #[derive(Clone, Debug)]
 pub struct FlameParticles {
     pub(super) name: String,
@@ -25,21 +25,21 @@ pub struct FlameParticles {
     /// Temperature of the air at the last step, K.
     pub(super) air_temperature_k: f64,
     /// Scratch memory of the renderer.
-    pub(super) scratch: ScratchPool,
+    pub(super) buffers: BufferPool,
 }
 
 impl FlameParticles {
     /// The particle flame `name` of a scene, before its preroll. Meshes of burners come from `assets`.
     ///
     /// # Errors
-    /// Parameters that do not go together, a mesh that cannot be had, a flow that does not end a loop as it begins it.
+    /// The parameters contradict each other, a mesh cannot be loaded, or a keyframed value differs at the start and the end of the loop.
     pub fn new(
         mut parameters: FlameParticlesParameters,
         name: &str,
         seed: u64,
         loop_s: Option<f64>,
         assets: &dyn Assets,
-    ) -> Result<Self, ParticleFault> {
+    ) -> Result<Self, ParticleError> {
         if let Some(seconds) = loop_s {
             close_loop(&mut parameters, seconds)?;
         }
@@ -53,19 +53,19 @@ impl FlameParticles {
             time: -steps * parameters.step_s,
             air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
             simulation: Simulation::new(&parameters, constants, key),
-            scratch: ScratchPool::default(),
+            buffers: BufferPool::default(),
             parameters,
         })
     }
 
-    /// The gas as it is now.
+    /// The particles of the current state.
     pub fn particles(&self) -> &Particles {
         &self.simulation.particles
     }
 
     /// The gas as the renderer sees it.
     pub(super) fn gas(&self) -> Gas<'_> {
-        let tallest = self.tallest();
+        let tallest = self.tallest_burner();
         let position = DVec3::from(self.parameters.position) + tallest.position(self.time);
         Gas {
             particles: &self.simulation.particles,
@@ -73,24 +73,26 @@ impl FlameParticles {
             air_temperature_k: self.air_temperature_k,
             detail_speed: match self.parameters.rendering.detail_speed {
                 Auto::Set(speed) => speed,
-                Auto::Auto => UNSTRETCHED * tallest.axis_speed(0.5 * tallest.height),
+                Auto::Auto => ISOTROPIC_DETAIL_SPEED * tallest.axis_speed(0.5 * tallest.height),
             },
             base: position,
             size: DVec2::new(tallest.diameter, tallest.height),
             key: self.key,
             fade_out: self.fade_out(),
-            scratch: &self.scratch,
+            buffers: &self.buffers,
         }
     }
 
     pub(super) fn fade_out(&self) -> FadeOut {
-        /// Duration of the fade-out as a fraction of the afterlife.
-        const FADING: f64 = 0.2;
-        let seconds = (FADING * self.parameters.combustion.burnt_gas_lifetime_s).max(self.parameters.step_s) as f32;
+        /// Duration of the fade-out as a fraction of the time for which burnt gas remains.
+        const FADE_FRACTION: f64 = 0.2;
+        let seconds =
+            (FADE_FRACTION * self.parameters.combustion.burnt_gas_lifetime_s).max(self.parameters.step_s) as f32;
         FadeOut { seconds, domain: self.simulation.constants.domain.map(|corner| corner.as_vec3()) }
     }
 
-    pub(super) fn tallest(&self) -> &Burner {
+    /// The burner with the tallest flame.
+    pub(super) fn tallest_burner(&self) -> &Burner {
         let burners = &self.simulation.constants.burners;
         // There is at least one burner.
         let taller = |a: &&Burner, b: &&Burner| a.height.total_cmp(&b.height);
@@ -98,13 +100,13 @@ impl FlameParticles {
     }
 }
 
-/// Makes animated values repeat with the loop.
-pub(super) fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleFault> {
+/// Makes keyframed values periodic in the loop.
+pub(super) fn close_loop(parameters: &mut FlameParticlesParameters, seconds: f64) -> Result<(), ParticleError> {
     match parameters.close_loop(seconds) {
-        Some(key) => Err(ParticleFault { key, kind: ParticleFaultKind::LoopJumps { seconds } }),
+        Some(key) => Err(ParticleError { key, kind: ParticleErrorKind::LoopJumps { seconds } }),
         None => Ok(()),
     }
 }
 
-/// Speed of gas with isotropic detail, relative to gas half way up the flame.
-pub(super) const UNSTRETCHED: f64 = 0.35;
+/// Speed of gas with isotropic detail, relative to the gas on the axis at half the height of the flame.
+pub(super) const ISOTROPIC_DETAIL_SPEED: f64 = 0.35;

@@ -10,11 +10,11 @@ const LENGTH: Range = Range::new(1e-3, 1e4);
 const KELVIN: Range = Range::new(250.0, 4000.0);
 
 bansho_base::choice! {
-    /// Shape of the area that gas comes from.
+    /// Shape of the surface that gas is emitted from.
     pub enum BurnerShape {
-        /// A round area that faces along the burner's y axis.
+        /// A disk whose normal is the burner's y axis.
         Disk = "disk",
-        /// A point: gas starts within a ball of `diameter`.
+        /// A ball of `diameter`, within which gas is emitted.
         Point = "point",
         /// A strip along the burner's x axis, `length` long and `diameter` wide.
         Line = "line",
@@ -26,29 +26,29 @@ bansho_base::choice! {
 }
 
 bansho_base::choice! {
-    /// What becomes of the pressure, eq. (11), in gas thinner than rho_0.
+    /// Pressure, eq. (11), in gas of lower density than rho_0.
     pub enum NegativePressure {
         /// It is 0.
         Clamped = "clamped",
-        /// It is negative, as in the paper: thin gas pulls itself into strings.
+        /// It is negative, as in the paper: gas of low density contracts into strings (tensile instability).
         Allowed = "allowed",
     }
 }
 
 bansho_base::choice! {
-    /// What becomes of a particle's temperature.
+    /// Model of the temperature of a particle.
     pub enum TemperatureLaw {
-        /// It heats where it burns, and cools by mixing with air and by radiation.
+        /// The gas is heated by combustion, and cools by mixing with air and by radiation.
         Simulated = "simulated",
-        /// It stays what it was at birth, as in the paper.
+        /// The temperature at emission stays constant, as in the paper.
         Constant = "constant",
     }
 }
 
 bansho_base::choice! {
-    /// How the wind acts.
+    /// Model of the wind's effect on the gas.
     pub enum WindForce {
-        /// Air that the gas mixes with brings its own momentum: gas takes up the wind's velocity as it mixes.
+        /// Entrained air adds its momentum: the gas takes on the velocity of the wind as it mixes with air.
         Entrainment = "entrainment",
         /// The wind's velocity, times `wind_response`, is a force per volume, as in the paper.
         BodyForce = "body_force",
@@ -56,13 +56,14 @@ bansho_base::choice! {
 }
 
 bansho_base::parameters! {
-    /// Where burning gas comes from. Its heat release rate and its size say all that is needed.
+    /// A source of burning gas. Its heat release rate and its size determine all other properties, unless they are given.
     pub struct BurnerParameters {
-        /// Shape of the area.
+        /// Shape of the surface.
         shape: BurnerShape = BurnerShape::Disk;
-        /// Where its middle is, from `position` of the flame. Gas leaves a moving burner where it is then, no faster for its motion.
+        /// Position of its center relative to `position` of the flame. If the burner moves, gas is emitted at its current position; the burner's velocity is not added to that of
+        /// the gas.
         position: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), unit("m");
-        /// Turn about x, then y, then z; unturned it blows upward.
+        /// Rotation about x, then y, then z; without rotation gas is emitted upward.
         rotation_deg: [f64; 3] = [0.0, 0.0, 0.0], limits(Range::new(-3600.0, 3600.0)), unit("degrees");
         /// Diameter D of a disk or a point, width of a line.
         diameter: f64 = 0.3, limits(LENGTH), unit("m");
@@ -72,17 +73,17 @@ bansho_base::parameters! {
         size: [f64; 3] = [0.3, 0.3, 0.3], limits(LENGTH), unit("m");
         /// glTF file of a mesh.
         file: Option<AssetPath> = None;
-        /// How many times larger a mesh is than its file says.
+        /// Scale factor of a mesh.
         scale: f64 = 1.0, limits(Range::new(1e-4, 1e4));
-        /// Heat release rate Q; with the size it gives the flame its height (Heskestad 1983).
+        /// Heat release rate Q; together with the size it determines the height of the flame (Heskestad 1983).
         heat_release_kw: f64 = 60.0, limits(Range::new(1e-3, 1e6)), unit("kW");
         /// Height of the flame; `"auto"` is Heskestad's `0.235 Q^(2/5) - 1.02 D`, at least `D / 2`.
         height: Auto<f64> = Auto::Auto, limits(LENGTH), unit("m");
-        /// Speed at which gas leaves the burner; `"auto"` follows from its size.
+        /// Exit speed of the gas; `"auto"` derives it from the size.
         speed: Auto<f64> = Auto::Auto, limits(Range::new(0.0, 100.0)), unit("m/s");
-        /// Temperature of the gas at birth.
+        /// Temperature of the gas at emission.
         temperature_k: f64 = 1150.0, limits(KELVIN), unit("K");
-        /// How much of the gas flows, over time: 0 shuts the burner.
+        /// Gas flow as a fraction of full flow; 0 turns the burner off.
         flow: Animated<f64> = Animated::from(1.0), limits(FRACTION);
     }
 }
@@ -92,42 +93,42 @@ bansho_base::parameters! {
     pub struct FluidParameters {
         /// Support radius d, eq. (2), in mean distances of particles at the burner.
         support_radius: f64 = 2.3, limits(Range::new(1.2, 6.0)), unit("distances");
-        /// Density of reference rho_0, eq. (11), as a share of the density at the burner.
+        /// Rest density rho_0, eq. (11), as a fraction of the density at the burner.
         rest_density: f64 = 0.8, limits(Range::new(0.0, 10.0));
-        /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, in speeds of the gas there: how hard it resists being
-        /// pressed.
+        /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, as a multiple of the exit speed of the gas. It determines how
+        /// compressible the gas is.
         stiffness: f64 = 1.2, limits(Range::new(0.0, 20.0));
-        /// Kernel of the pressure force, eq. (12). The paper's is `"poly6"`, whose gradient vanishes at the center, so that particles clump.
+        /// Kernel of the pressure force, eq. (12). The paper uses `"poly6"`; its gradient vanishes at the center, so that particles clump.
         pressure_kernel: KernelShape = KernelShape::Spiky;
-        /// Pressure of thin gas, eq. (11).
+        /// Pressure of gas of low density, eq. (11).
         negative_pressure: NegativePressure = NegativePressure::Clamped;
-        /// How far neighbors even out their velocities in a hundredth of a second; 0 is the paper's Euler equation, eq. (1).
+        /// Viscosity: fraction of the velocity differences to neighbors that is removed in 0.01 s (XSPH); 0 is the paper's Euler equation, eq. (1).
         viscosity: f64 = 0.12, limits(FRACTION);
-        /// How far neighbors even out temperature in a hundredth of a second.
+        /// Heat conduction: fraction of the temperature differences to neighbors that is removed in 0.01 s.
         conduction: f64 = 0.08, limits(FRACTION);
-        /// Sub-steps that a step is cut into at most. Gas that would need more keeps its time and gives way more easily.
+        /// Maximum number of sub-steps per step. Gas that would need more sub-steps is made more compressible instead.
         max_substeps: i64 = 3, limits(Range::new(1.0, 100.0));
     }
 }
 
 bansho_base::parameters! {
-    /// What moves the gas beside its own pressure.
+    /// Forces on the gas other than pressure.
     pub struct ForceParameters {
-        /// Buoyancy against the air, 1 is physical; 0 in the paper.
+        /// Factor of buoyancy; 1 is physical, 0 is the paper's value.
         buoyancy: f64 = 1.0, limits(Range::new(0.0, 10.0));
-        /// How the wind acts.
+        /// Model of the wind's effect on the gas.
         wind_model: WindForce = WindForce::Entrainment;
-        /// Scale of the wind's effect; for `wind_model = "body_force"` force per volume and wind speed, in N s/m^4.
+        /// Factor of the wind's effect; for `wind_model = "body_force"` force per volume and wind speed, in N s/m^4.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 100.0));
-        /// Entrainment coefficient: speed at which air enters the gas, as a share of the speed between them; slows, dilutes and cools it.
+        /// Entrainment coefficient: speed at which air enters the gas, as a fraction of their relative speed. Entrained air slows, dilutes and cools the gas.
         entrainment: f64 = 0.12, limits(FRACTION);
-        /// How far rising gas that grows faster grows narrower too; 1 keeps its volume.
+        /// Contraction of the plume as the rising gas accelerates; at 1 its volume is conserved.
         plume_contraction: f64 = 0.9, limits(FRACTION);
-        /// Strength of the vortex rings that the fire sheds as it breathes; 1 is usual, 0 is a fire that does not puff.
+        /// Factor of the strength of the vortex rings that the fire sheds; at 0 it does not puff.
         puffing: f64 = 1.0, limits(Range::new(0.0, 5.0));
-        /// How often it sheds them; `"auto"` is `1.5 / sqrt(D)` Hz (Cetegen and Ahmed 1993).
+        /// Frequency of shedding; `"auto"` is `1.5 / sqrt(D)` Hz (Cetegen and Ahmed 1993).
         puffing_hz: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 100.0)), unit("Hz");
-        /// Turbulence: standard deviation of a velocity component, as a share of the speed of the gas; 0 in the paper.
+        /// Turbulence intensity: standard deviation of a velocity component, as a fraction of the speed of the gas; 0 in the paper.
         turbulence: f64 = 0.2, limits(Range::new(0.0, 2.0));
         /// Size of the largest eddies, in burner diameters.
         eddy_size: f64 = 0.8, limits(Range::new(0.05, 20.0)), unit("diameters");
@@ -135,38 +136,37 @@ bansho_base::parameters! {
 }
 
 bansho_base::parameters! {
-    /// How gas burns and what becomes of it.
+    /// Combustion, temperature and soot of the gas.
     pub struct CombustionParameters {
-        /// What becomes of its temperature.
+        /// Model of the temperature.
         temperature_model: TemperatureLaw = TemperatureLaw::Simulated;
-        /// Temperature that burning gas nears.
+        /// Temperature that burning gas approaches.
         flame_temperature_k: f64 = 1900.0, limits(KELVIN), unit("K");
-        /// How long it takes to heat up.
+        /// Time constant of heating.
         heating_time_s: f64 = 0.03, limits(Range::new(1e-3, 10.0)), unit("s");
-        /// How much of the fuel's burning waits for air: 0 burns all gas alike, 1 burns what lies outside first, so that flames
-        /// narrow upward.
+        /// Dependence of combustion on exposure to air: at 0 all gas burns at the same rate, at 1 gas at the surface burns first, so that flames
+        /// taper toward the tip.
         oxygen_dependence: f64 = 0.75, limits(FRACTION);
-        /// Volume fraction of soot that forms in burning gas, in parts per million.
+        /// Volume fraction of soot in burning gas, in parts per million.
         soot_ppm: f64 = 1.2, limits(Range::new(0.0, 100.0)), unit("1e-6");
-        /// Share of the soot that does not burn in the flame and leaves it as smoke.
+        /// Fraction of the soot that is not burned in the flame and becomes smoke.
         smoke_fraction: f64 = 0.0, limits(FRACTION);
-        /// Strength of cooling by the soot's own radiation; 1 is physical.
+        /// Factor of cooling by the radiation of soot; 1 is physical.
         radiative_cooling: f64 = 0.3, limits(Range::new(0.0, 10.0));
-        /// How long burnt gas stays after its fuel is gone, unless it leaves the domain.
+        /// Time for which burnt gas remains after its fuel is consumed, unless it leaves the domain.
         burnt_gas_lifetime_s: f64 = 0.35, limits(Range::new(0.0, 60.0)), unit("s");
     }
 }
 
 bansho_base::parameters! {
-    /// Burning gas as particles that move by smoothed particle hydrodynamics (Inagaki et al.): fires that answer to wind and obstacles.
+    /// Burning gas as particles that move by smoothed-particle hydrodynamics (Inagaki et al.), for fires that interact with wind and obstacles.
     pub struct FlameParticlesParameters {
-        /// Where the flame stands; burners count from here.
+        /// Position of the flame, to which those of burners and domain are relative.
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
-        /// Burners; where the list is empty, one that is all default.
+        /// Burners; an empty list is one burner with default values.
         burners: Vec<BurnerParameters> = Vec::new(), limits(Length { min: 0, max: 200, item: () });
-        /// About how many particles live at a time, all burners together: as many as the design has room for. Gas that burns out early
-        /// leaves up to a fifth of it free, and puffing lets the number swing. More than 20 million are refused with the memory that they
-        /// would take.
+        /// Approximate number of particles alive at a time, of all burners together. The actual number is up to a fifth lower, since some gas burns out
+        /// early, and varies with puffing. More than 20 million are rejected, with an error that states the memory they would take.
         particles: i64 = 12_000, limits(Range::new(1.0, 1e12));
         /// Pressure and viscosity.
         fluid: FluidParameters = FluidParameters::default();
@@ -174,69 +174,69 @@ bansho_base::parameters! {
         forces: ForceParameters = ForceParameters::default();
         /// Burning, heating, cooling, soot.
         combustion: CombustionParameters = CombustionParameters::default();
-        /// How it looks.
+        /// Appearance.
         rendering: RenderingParameters = RenderingParameters::default();
-        /// Least corner of the box that gas may fill, from `position`; `"auto"` leaves room for flame and smoke.
+        /// Minimum corner of the simulated domain relative to `position`, outside which gas is removed; `"auto"` leaves enough space for flame and smoke.
         domain_min: Auto<[f64; 3]> = Auto::Auto, unit("m");
-        /// Greatest corner of the box that gas may fill, from `position`.
+        /// Maximum corner of the simulated domain relative to `position`.
         domain_max: Auto<[f64; 3]> = Auto::Auto, unit("m");
-        /// Length of a step; particles are drawn between steps by their velocity.
+        /// Time step. Between steps positions are extrapolated by the velocities.
         step_s: f64 = 1.0 / 120.0, limits(Range::new(1e-4, 0.05)), unit("s");
-        /// How long it burns before the shot; `"auto"` until the flame is developed.
+        /// Duration of the simulation before the shot; `"auto"` is long enough for the flame to develop fully.
         preroll_s: Auto<f64> = Auto::Auto, limits(Range::new(0.0, 600.0)), unit("s");
     }
 }
 
 bansho_base::choice! {
-    /// What becomes of a particle in the picture.
+    /// How a particle is drawn.
     pub enum SpriteStyle {
-        /// What a ray sees of its ball: sums are the exact line integrals of the gas, so that light and opacity follow from its soot.
+        /// The line integral of its kernel: sums of sprites are the exact line integrals of the gas, and light and opacity follow from its soot.
         LineIntegral = "line_integral",
-        /// The paper's: poly6 itself, times the color of a black body, added; opacity from density.
+        /// The paper's sprite: poly6 itself, times the color of a black body, added; opacity depends on density.
         Poly6 = "poly6",
-        /// The paper's figure 7: a square, the redder the denser the gas.
+        /// A square colored by density, as in the paper's figure 7: red where the gas is dense.
         Squares = "squares",
     }
 }
 
 bansho_base::parameters! {
-    /// How the gas is drawn.
+    /// Rendering of the gas.
     pub struct RenderingParameters {
-        /// What becomes of a particle: exact line integrals, the paper's sprites, or squares that show the density.
+        /// How a particle is drawn: exact line integrals, the paper's sprites, or squares that show the density.
         sprite: SpriteStyle = SpriteStyle::LineIntegral;
-        /// How strongly soot absorbs, and so shines, beside what its volume fraction gives.
+        /// Factor of absorption and emission of soot; at 1 they follow from its volume fraction.
         soot_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
-        /// How unevenly gas finer than the particles burns: 0 is the smooth sum of the particles alone. The mean light stays.
+        /// Amount of detail finer than the particles, by intermittent burning; 0 is the smooth sum of the particles. The mean light does not change.
         detail: f64 = 0.85, limits(FRACTION);
-        /// Size of that detail, in support radii.
+        /// Size of the detail, in support radii.
         detail_size: f64 = 0.9, limits(Range::new(0.05, 20.0));
-        /// How crisp the edges of burning gas are.
+        /// Sharpness of the edges of burning gas.
         sharpness: f64 = 0.7, limits(FRACTION);
-        /// Speed of gas that draws detail as it is; faster gas stretches it along its way.
+        /// Speed of gas whose detail is isotropic; faster gas stretches the detail along its motion.
         detail_speed: Auto<f64> = Auto::Auto, limits(Range::new(0.01, 1000.0)), unit("m/s");
-        /// Light of the thin blue zone where fresh gas begins to burn.
+        /// Factor of the light of the thin blue zone in which gas begins to burn.
         base_blue: f64 = 1.0, limits(Range::new(0.0, 1000.0));
         /// Opacity of the center of a poly6 sprite in gas of mean density.
         opacity: f64 = 0.06, limits(FRACTION);
         /// Side of the squares of `sprite = "squares"`, in support radii.
         square_size: f64 = 0.25, limits(Range::new(0.001, 10.0));
-        /// Share of the light of others that soot scatters on rather than takes away: what makes smoke visible.
+        /// Single-scattering albedo of soot for the light of other objects, which makes smoke visible.
         smoke_albedo: f64 = 0.3, limits(FRACTION);
-        /// How strongly hot gas bends the light of what lies behind; 1 is physical, 0 leaves it straight.
+        /// Factor of the refraction of light from behind by hot gas; 1 is physical, 0 is none.
         heat_haze_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();
-        /// Light on others.
+        /// Light on other objects.
         light: GasLightParameters = GasLightParameters::default();
     }
 }
 
 bansho_base::parameters! {
-    /// The light that the flame throws on others; follows what the gas radiates at each moment.
+    /// Light of the flame on other objects. It follows the gas's emission over time.
     pub struct GasLightParameters {
-        /// Scale of that light; 0 for none.
+        /// Factor of that light; 0 for none.
         scale: f64 = 1.0, limits(Range::new(0.0, 1000.0));
-        /// How many point lights stand along the flame.
+        /// Number of point lights along the flame.
         count: i64 = 3, limits(Range::new(1.0, 16.0));
     }
 }

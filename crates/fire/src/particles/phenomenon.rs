@@ -1,4 +1,4 @@
-//! `impl Phenomenon`: how the renderer uses a particle flame.
+//! `impl Phenomenon` for the particle flame.
 
 use std::sync::Arc;
 
@@ -7,16 +7,17 @@ use bansho_base::{
     geometry::point_cloud::{PointCloud, Quantity},
     host::observer::{Cancelled, Observer},
     math::{self, DVec3},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
     },
 };
 
 use super::{
-    fault::ParticleFaultKind,
+    error::ParticleErrorKind,
     model::FlameParticles,
     parameters::{FlameParticlesParameters, TemperatureLaw},
     render::{self, PreparedGas, SpriteStyle},
@@ -40,21 +41,21 @@ impl Describe for FlameParticlesParameters {
         "burners.diameter",
         "burners.heat_release_kw",
     ];
-    const SETTING: &'static str = "\
+    const SCENE_DEFAULTS: &'static str = "\
         camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
 
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
-        check_particle_count(self.particles, others).map_err(|fault| BuildError::new(fault.key, fault.kind))?;
+        check_particle_count(self.particles, others).map_err(|error| BuildError::new(error.key, error.kind))?;
         Ok(self.particles + others)
     }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match FlameParticles::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
             Ok(flame) => Ok(Arc::new(flame)),
-            Err(fault) => Err(match fault.kind {
-                ParticleFaultKind::Asset(error) => BuildError { key: fault.key, kind: error.into() },
-                other => BuildError::new(fault.key, other),
+            Err(error) => Err(match error.kind {
+                ParticleErrorKind::Asset(asset_error) => BuildError { key: error.key, kind: asset_error.into() },
+                other => BuildError::new(error.key, other),
             }),
         }
     }
@@ -62,46 +63,45 @@ impl Describe for FlameParticlesParameters {
 
 impl Phenomenon for FlameParticles {
     fn info(&self) -> PhenomenonInfo<'_> {
-        let DerivedConstants { preroll, dissolve, .. } = *self.simulation.constants;
-        let stepping = Stepping { step: self.parameters.step_s, preroll, crossfade: dissolve };
+        let DerivedConstants { preroll, crossfade, .. } = *self.simulation.constants;
+        let stepping = Stepping { step: self.parameters.step_s, preroll, crossfade };
         PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
     fn luminance(&self) -> f64 {
-        /// Mean of bright parts relative to a whole flame of the hottest soot.
-        const BRIGHT: f64 = 0.09;
+        /// Mean luminance of the bright parts, relative to a uniform flame with soot of the highest temperature.
+        const BRIGHT_PARTS: f64 = 0.09;
         let hottest = match self.parameters.combustion.temperature_model {
             TemperatureLaw::Simulated => self.parameters.combustion.flame_temperature_k,
-            TemperatureLaw::Constant => self.tallest().parameters.temperature_k,
+            TemperatureLaw::Constant => self.tallest_burner().parameters.temperature_k,
         };
-        let black = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
+        let black_body = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
         let absorption =
             render::soot_absorption(self.parameters.combustion.soot_ppm * 1e-6, &self.parameters.rendering);
         let emissivity = match self.parameters.rendering.sprite {
-            SpriteStyle::LineIntegral => -math::exp_m1(-absorption * 0.5 * self.tallest().diameter),
+            SpriteStyle::LineIntegral => -math::exp_m1(-absorption * 0.5 * self.tallest_burner().diameter),
             SpriteStyle::Poly6 | SpriteStyle::Squares => 1.0,
         };
-        BRIGHT * black * emissivity
+        BRIGHT_PARTS * black_body * emissivity
     }
 
     fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let burners = &self.simulation.constants.burners;
-        let gives = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
-        if !burners.iter().any(gives) {
-            return Some(Remark::new("none of its burners gives gas; a `flow` above 0 would"));
+        let emits_gas = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
+        if !burners.iter().any(emits_gas) {
+            return Some(Remark::new("none of its burners emits gas; set a `flow` above 0"));
         }
         let origin = DVec3::from(self.parameters.position);
-        let is_buried = |burner: &Burner| {
-            let within = |birth: u64| {
-                let place = origin + burner.spawn_point(self.simulation.key, birth, 0.0).position;
-                neighbors.occluders().any(|occluder| occluder.signed_distance(place) < 0.0)
+        let is_inside_obstacle = |burner: &Burner| {
+            let is_inside = |id: u64| {
+                let position = origin + burner.spawn_point(self.simulation.key, id, 0.0).position;
+                neighbors.occluders().any(|occluder| occluder.signed_distance(position) < 0.0)
             };
-            // As many births as show it.
-            gives(burner) && (0..32).all(within)
+            // 32 random spawn points represent the whole surface of the burner.
+            emits_gas(burner) && (0..32).all(is_inside)
         };
-        burners.iter().position(is_buried).map(|index| {
-            let message =
-                format!("its burner {} lies within an obstacle, from which its gas cannot come out", index + 1);
+        burners.iter().position(is_inside_obstacle).map(|index| {
+            let message = format!("its burner {} is inside an obstacle, so that its gas cannot escape", index + 1);
             Remark::at(format!("burners.{index}"), message)
         })
     }

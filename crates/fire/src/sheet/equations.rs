@@ -1,7 +1,7 @@
 //! The paper's equations for one point, one function each, numbered as in Ohshima and Itahashi.
 //!
-//! Values of the user's curves are arguments, so that the same functions serve SIMD batches with curve tables and hand-worked
-//! tests. Nothing branches on data or evaluates an elementary function beyond a square root.
+//! Values of the user's curves are arguments, so that the same functions serve SIMD batches with curve tables and tests with numbers
+//! computed by hand. No function branches on data; the only elementary function is the square root.
 
 pub use bansho_base::math::simd::Real;
 
@@ -34,7 +34,7 @@ pub fn speed_profile<N: Real>(falloff: N, edge_speed: f32) -> N {
     falloff.broadcast(1.0 - edge_speed).fma(falloff, falloff.broadcast(edge_speed))
 }
 
-/// Slowed rise `w = w_p / K`, eq. (12). Above 1 lies outside the flame.
+/// Slowed rise `w = w_p / K`, eq. (12). Values above 1 are outside the flame.
 #[inline(always)]
 pub fn slowed_rise<N: Real>(rise: N, speed: N) -> N {
     rise / speed
@@ -66,7 +66,7 @@ pub fn threshold<N: Real>(vertical: N, horizontal: N) -> N {
     (one - vertical).fma(horizontal - one, one)
 }
 
-/// What rises above the threshold, `T1 = max(0, T0 - L)`, eq. (5).
+/// Excess over the threshold, `T1 = max(0, T0 - L)`, eq. (5).
 #[inline(always)]
 pub fn above_threshold<N: Real>(texture: N, threshold: N) -> N {
     (texture - threshold).simd_max(texture.broadcast(0.0))

@@ -1,21 +1,19 @@
-//! A flame sheet: what is built once from its parameters.
+//! A flame sheet: built once from its parameters, immutable.
 
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
+    camera::{Camera, upright_quad::right_facing},
     host::{constructions, once::get_or_compute},
-    parameters::parameter_error::{ParameterError, ParameterErrorKind},
+    math::{self, DVec2, DVec3, random::Key},
+    parameters::{ParameterError, ParameterErrorKind},
 };
 
 use super::{
-    FlameSheetParameters, Instance, TextureKind,
     animate::{clock::Clock, warp::FlameWaves},
-    render::{
-        color_ramp::ColorRamp,
-        curve_tables::{ShapeTables, instance_key},
-        flame_instance::{FlameInstance, TextureSource},
-    },
-    texture::{FractalLayers, PaperLayer},
+    parameters::{Facing, FlameSheetParameters, Instance, TextureKind},
+    tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
+    texture::{FractalLayers, PaperLayer, TextureSource},
 };
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
@@ -24,7 +22,7 @@ pub struct FlameSheet {
     pub(super) name: String,
     pub(super) parameters: FlameSheetParameters,
     pub(super) clock: Clock,
-    /// Made when it is first seen: there may be thousands of sheets, each of which is made to be checked.
+    /// Computed when the sheet is first drawn: a scene may contain thousands of sheets, and each is constructed to check its parameters.
     pub(super) tables: OnceLock<Tables>,
     pub(super) flames: Vec<FlameInstance>,
 }
@@ -33,7 +31,7 @@ impl FlameSheet {
     /// The flame sheet `name` of a scene; in a seamless loop it repeats every `loop_s` seconds.
     ///
     /// # Errors
-    /// Parameters that do not go together; each alone is within its bounds.
+    /// The parameters contradict each other, although each is within its bounds.
     pub fn new(
         parameters: FlameSheetParameters,
         name: &str,
@@ -58,32 +56,81 @@ impl FlameSheet {
 
     pub(super) fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
-        let make = || Tables {
+        let compute = || Tables {
             shape: Box::new(ShapeTables::new(shape, texture, color)),
             ramp: Box::new(ColorRamp::new(texture, color, *stage)),
         };
-        get_or_compute(&self.tables, make)
+        get_or_compute(&self.tables, compute)
     }
 
-    /// What of the chain does not change with time.
+    /// The mapping to flame coordinates and the threshold: tables that do not change with time.
     pub(crate) fn shape(&self) -> &ShapeTables {
         &self.tables().shape
     }
 
-    /// From gas to light.
+    /// The table from T1 to light.
     pub(crate) fn ramp(&self) -> &ColorRamp {
         &self.tables().ramp
     }
 }
 
-/// What a sheet is drawn with, and depends on its parameters alone.
+/// Tables that depend on the parameters alone.
 #[derive(Clone, Debug)]
 pub(super) struct Tables {
     pub(super) shape: Box<ShapeTables>,
     pub(super) ramp: Box<ColorRamp>,
 }
 
-pub(super) fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
+/// One instance of a flame: its placement, fluctuations and texture.
+#[derive(Clone, Debug)]
+pub(crate) struct FlameInstance {
+    pub(crate) placement: Instance,
+    pub(crate) key: Key,
+    pub(crate) waves: FlameWaves,
+    pub(crate) texture_source: TextureSource,
+}
+
+impl FlameSheet {
+    /// Center of a flame's base at `t`, m.
+    pub(crate) fn base(&self, flame: &FlameInstance, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.placement.position)
+    }
+
+    /// A flame's own time, with its phase.
+    pub(crate) fn flame_time(&self, flame: &FlameInstance, t: f64) -> f64 {
+        t + self.parameters.phase_s + flame.placement.phase_s
+    }
+
+    /// Width and height of a flame's sheet, m.
+    pub(crate) fn sheet_size(&self, flame: &FlameInstance) -> DVec2 {
+        DVec2::new(self.parameters.width, self.parameters.height) * flame.placement.scale
+    }
+
+    /// Mean speed of the rising gas, m/s.
+    pub(crate) fn rise_speed(&self, flame: &FlameInstance, t: f64) -> f64 {
+        // The texture passes over a height in 1/s seconds, whatever the acceleration.
+        self.clock.speed(t) * self.sheet_size(flame).y
+    }
+
+    /// Horizontal direction across a flame's sheet.
+    pub(crate) fn right(&self, flame: &FlameInstance, camera: &Camera, base: DVec3) -> DVec3 {
+        match self.parameters.facing {
+            Facing::Camera => right_facing(camera, base),
+            Facing::Fixed => {
+                let (sin, cos) = math::sin_cos((self.parameters.yaw_deg + flame.placement.yaw_deg).to_radians());
+                DVec3::new(cos, 0.0, -sin)
+            }
+        }
+    }
+
+    /// Luminance of the brightest color at `t`, cd/m^2.
+    pub(crate) fn luminance_at(&self, t: f64) -> f64 {
+        self.parameters.color.luminance.at(self.clock.time(t))
+    }
+}
+
+/// The flames at all placements.
+fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
@@ -100,10 +147,16 @@ pub(super) fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, c
     placements.into_iter().enumerate().map(flame).collect()
 }
 
-/// Size of the fractal's tongues in sheet widths and heights, beside the usual: they keep their form on a sheet of any aspect.
-pub(super) fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
-    /// Width over height of the sheet for which the usual size is meant.
-    const USUAL: f64 = 0.65;
-    let aspect = parameters.width / parameters.height / USUAL;
+/// Width and length of the fractal's tongues relative to the default, in sheet widths and heights: their shape in meters does not depend on the aspect ratio
+/// of the sheet.
+fn tongue_size(parameters: &FlameSheetParameters) -> [f64; 2] {
+    /// Width over height of the sheet to which the parameters `tongue_width` and `tongue_length` refer.
+    const REFERENCE_ASPECT: f64 = 0.65;
+    let aspect = parameters.width / parameters.height / REFERENCE_ASPECT;
     [parameters.texture.tongue_width / aspect.clamp(0.05, 20.0), parameters.texture.tongue_length]
+}
+
+/// Key of the random numbers of one instance.
+fn instance_key(seed: u64, name: &str, variation: i64, index: usize) -> Key {
+    Key::new(seed, &format!("{name}/{variation}/{index}"))
 }

@@ -16,9 +16,9 @@ fn curve(points: &[[f64; 2]]) -> Curve {
 }
 
 bansho_base::choice! {
-    /// The texture that stands for the gas.
+    /// The texture that represents the gas.
     pub enum TextureKind {
-        /// Layers of warped gradient noise that rise at different speeds; never visibly repeats.
+        /// Layers of warped gradient noise that rise at different speeds; no visible repetition.
         Fractal = "fractal",
         /// The paper's sum of cosines, eq. (20), halved so that it lies in [0, 1]; repeats every 0.483 sheet heights.
         OhshimaItahashi = "ohshima_itahashi",
@@ -28,7 +28,7 @@ bansho_base::choice! {
 bansho_base::choice! {
     /// How the sharpened texture T2 becomes color.
     pub enum Coloring {
-        /// T2 gives temperature and density of glowing soot, Planck's law gives the light.
+        /// T2 determines temperature and density of the soot; its light follows from Planck's law.
         BlackBody = "black_body",
         /// The curves `red`, `green` and `blue`, eq. (7).
         RgbCurves = "rgb_curves",
@@ -36,154 +36,154 @@ bansho_base::choice! {
 }
 
 bansho_base::choice! {
-    /// Which stage of the chain is shown; all but the flame show the flat texture square (u, w) as the paper's pictures 1 to 4.
+    /// Stage of the computation that is shown. All stages but `flame` show the flat texture square (u, w), as the paper's pictures 1 to 4.
     pub enum Stage {
         /// The finished flame.
         Flame = "flame",
         /// The texture T0 (picture 1).
         Texture = "texture",
-        /// After the threshold, T1 (picture 2).
+        /// T1, after the threshold (picture 2).
         Thresholded = "thresholded",
-        /// After sharpening, T2 (picture 3).
+        /// T2, after sharpening (picture 3).
         Sharpened = "sharpened",
-        /// Colored, before it is mapped to the flame's shape (picture 4).
+        /// After coloring, before the mapping to the shape of the flame (picture 4).
         Colored = "colored",
     }
 }
 
 bansho_base::choice! {
-    /// Which way a sheet looks.
+    /// Direction that a sheet faces.
     pub enum Facing {
-        /// Turned about the vertical to face the camera.
+        /// Toward the camera, by rotation about the vertical.
         Camera = "camera",
-        /// As `yaw_deg` says.
+        /// Fixed, as given by `yaw_deg`.
         Fixed = "fixed",
     }
 }
 
 bansho_base::parameters! {
-    /// The outline of the flame and how its gas moves, eqs. (9) to (18).
+    /// Outline of the flame and motion of its gas, eqs. (9) to (18).
     pub struct ShapeParameters {
-        /// k, eq. (9): 0 starts slowly and accelerates much, 1 rises at one speed.
+        /// k, eq. (9): initial speed of the gas. At 0 it starts from rest and accelerates, at 1 its speed is constant.
         initial_speed: f64 = 0.7, limits(FRACTION);
-        /// h, eq. (11): slowest speed, at the edge, as a share of the fastest, on the axis.
+        /// h, eq. (11): speed at the edge, where it is lowest, as a fraction of the speed on the axis.
         edge_speed: f64 = 0.55, limits(Range::new(0.02, 1.0));
-        /// A(w), eq. (11): half width of the core that rises evenly, over height; 1 is the edge of the sheet.
+        /// A(w), eq. (11): half width of the core, which rises at uniform speed, as a function of height; 1 is the edge of the sheet.
         core_width: Curve = curve(&[[0.0, 0.26], [0.1, 0.44], [0.22, 0.54], [0.5, 0.38], [1.0, 0.12]]),
             limits(CurveLimits::unit_to(0.01, 1.0));
-        /// D(w), eq. (11): width of the fringe that flutters, over height; begins at (0, 0). A + D must stay within 1.
+        /// D(w), eq. (11): width of the fringe, which flutters, as a function of height; it starts at (0, 0). A + D must not exceed 1.
         fringe_width: Curve = curve(&[[0.0, 0.0], [0.3, 0.22], [0.6, 0.42], [1.0, 0.4]]), limits(CurveLimits::default());
-        /// 1 - F, eq. (11): how the gas slows across the fringe, from 0 at its inner edge to 1 at its outer one.
+        /// 1 - F, eq. (11): decrease of speed across the fringe, from 0 at its inner edge to 1 at its outer edge.
         slowing: Curve = curve(&[[0.0, 0.0], [0.5, 0.4], [1.0, 1.0]]), limits(CurveLimits::default().rising());
-        /// Strength of P, eq. (15): how far the edge swings into the fringe; 0 leaves it still at its outer edge.
+        /// Strength of P, eq. (15): how far the edge moves into the fringe. At 0 it stays at the outer edge.
         flutter: f64 = 0.6, limits(FRACTION);
-        /// Swings of the edge in a sheet height.
+        /// Waves of the edge per sheet height.
         flutter_waves: f64 = 1.1, limits(Range::new(0.1, 20.0)), unit("1/height");
-        /// How far the tip wanders sideways, in sheet widths.
+        /// Sideways amplitude of the tip, in sheet widths.
         sway: f64 = 0.05, limits(FRACTION);
-        /// How often it wanders to and fro.
+        /// Frequency of the sideways motion.
         sway_hz: f64 = 0.7, limits(Range::new(0.01, 20.0)), unit("Hz");
-        /// How much the whole flame grows and shrinks, as a share of its height.
+        /// Amplitude of the variation of the flame's height, as a fraction of the height.
         flicker: f64 = 0.08, limits(Range::new(0.0, 0.5));
-        /// How often it does; fires puff at about 1.5 / sqrt(width in m) Hz.
+        /// Frequency of the variation in height. Real fires puff at about 1.5 / sqrt(width in m) Hz.
         flicker_hz: f64 = 2.0, limits(Range::new(0.01, 40.0)), unit("Hz");
     }
 }
 
 bansho_base::parameters! {
-    /// The texture and how it is cut and sharpened, eqs. (4) to (6) and (20).
+    /// Texture, threshold and sharpening, eqs. (4) to (6) and (20).
     pub struct TextureParameters {
-        /// Which texture.
+        /// Kind of texture.
         kind: TextureKind = TextureKind::Fractal;
-        /// Octaves of the paper's texture, a number that it does not give.
+        /// Number of octaves of the paper's texture. The paper does not state it.
         octaves: i64 = 5, limits(Range::new(1.0, 6.0));
-        /// Width of the fractal's tongues, 1 for about three across the flame.
+        /// Width of the tongues of the fractal texture; at 1 there are about three across the flame.
         tongue_width: f64 = 1.0, limits(Range::new(0.1, 10.0));
-        /// Length of the fractal's tongues, 1 for about half the flame's height.
+        /// Length of the tongues of the fractal texture; at 1 about half the flame's height.
         tongue_length: f64 = 1.0, limits(Range::new(0.1, 10.0));
-        /// Contrast of the texture: 1 as it is, toward 0 an even gas, as in a still candle.
+        /// Contrast of the texture. At 0 the gas is uniform, as in the flame of a candle in still air; 1 leaves the texture unchanged.
         contrast: f64 = 1.0, limits(FRACTION);
-        /// V(w), eq. (4): threshold over height.
+        /// V(w), eq. (4): threshold as a function of height.
         threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]),
             limits(CurveLimits::default().rising());
-        /// H(u), eq. (4): threshold over the distance from the axis, 0 on the axis to 1 at both edges.
+        /// H(u), eq. (4): threshold as a function of the distance from the axis, from 0 on the axis to 1 at both edges.
         threshold_across: Curve = curve(&[[0.0, 0.0], [0.5, 0.1], [0.82, 0.45], [1.0, 1.0]]), limits(CurveLimits::default().rising());
-        /// C(s), eq. (6): begins at (0, 0), peaks below s = 1 and falls after, so that the core is not flat.
+        /// C(s), eq. (6): sharpening. It starts at (0, 0). A maximum below s = 1 keeps the core from being uniform.
         sharpen: Curve = curve(&[[0.0, 0.0], [0.06, 0.22], [0.16, 0.48], [0.4, 0.82], [0.7, 1.0], [1.0, 0.86]]),
             limits(CurveLimits::default());
     }
 }
 
 bansho_base::parameters! {
-    /// From the sharpened texture T2 to light, eq. (7) and beyond.
+    /// Light from the sharpened texture T2, eq. (7) and extensions.
     pub struct ColorParameters {
-        /// Which coloring.
+        /// Method of coloring.
         kind: Coloring = Coloring::BlackBody;
         /// Luminance of the brightest color.
         luminance: Animated<f64> = Animated::from(12_000.0), limits(Range::new(0.0, 1e7)), unit("cd/m^2");
-        /// R(s), eq. (7), as a display shows it (sRGB-encoded); for `kind = "rgb_curves"`.
+        /// R(s), eq. (7), sRGB-encoded; for `kind = "rgb_curves"`.
         red: Curve = curve(&[[0.0, 0.0], [0.25, 0.75], [0.5, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
-        /// G(s), eq. (7), as a display shows it; for `kind = "rgb_curves"`.
+        /// G(s), eq. (7), sRGB-encoded; for `kind = "rgb_curves"`.
         green: Curve = curve(&[[0.0, 0.0], [0.25, 0.12], [0.6, 0.62], [1.0, 0.98]]), limits(CurveLimits::default());
-        /// B(s), eq. (7), as a display shows it; for `kind = "rgb_curves"`.
+        /// B(s), eq. (7), sRGB-encoded; for `kind = "rgb_curves"`.
         blue: Curve = curve(&[[0.0, 0.0], [0.4, 0.02], [0.75, 0.2], [1.0, 0.72]]), limits(CurveLimits::default());
-        /// Temperature of the soot where T2 is nearly 0: tips and edges.
+        /// Temperature of the soot where T2 is close to 0, at tips and edges.
         edge_temperature_k: f64 = 1100.0, limits(KELVIN), unit("K");
         /// Temperature of the soot where T2 is 1.
         core_temperature_k: f64 = 1950.0, limits(KELVIN), unit("K");
-        /// How much the soot has cooled at the tip, as a share of its temperature; for `kind = "black_body"`.
+        /// Decrease of the soot temperature toward the tip, as a fraction of the temperature; for `kind = "black_body"`.
         cooling: f64 = 0.17, limits(Range::new(0.0, 0.6));
-        /// Optical depth of the soot where T2 is 1: how much the flame hides what is behind it.
+        /// Optical depth of the soot where T2 is 1. It determines how much light from behind the flame absorbs.
         soot_optical_depth: f64 = 0.35, limits(Range::new(0.0, 20.0));
-        /// Brightness and soot over height w, from the dark zone at the base.
+        /// Factor of brightness and soot as a function of height w; low in the dark zone at the base.
         glow: Curve = curve(&[[0.0, 0.0], [0.1, 0.12], [0.3, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
-        /// Luminance of the blue light at the base, as a share of `luminance`.
+        /// Luminance of the blue light at the base, as a fraction of `luminance`.
         base_blue: f64 = 0.0, limits(FRACTION);
     }
 }
 
 bansho_base::parameters! {
-    /// Smoke above the flame: a second sheet of the same texture, cut softly.
+    /// Smoke above the flame: a second sheet with the same texture and a soft threshold.
     pub struct SmokeParameters {
-        /// Greatest optical depth; 0 for no smoke.
+        /// Maximum optical depth; 0 for no smoke.
         optical_depth: f64 = 0.0, limits(Range::new(0.0, 20.0));
-        /// Share of the light that it scatters on rather than takes away.
+        /// Single-scattering albedo: fraction of the attenuated light that is scattered instead of absorbed.
         albedo: f64 = 0.55, limits(FRACTION);
-        /// Tint of what it scatters, linear red, green and blue.
+        /// Tint of the scattered light, linear red, green and blue.
         color: [f64; 3] = [0.95, 0.97, 1.0], limits(FRACTION);
         /// Height of the smoke in flame heights.
         height: f64 = 3.0, limits(Range::new(0.1, 50.0));
         /// Width of the smoke at its top in flame widths.
         width: f64 = 2.0, limits(Range::new(0.1, 50.0));
-        /// Where it begins, in flame heights above the base.
+        /// Height at which it starts, in flame heights above the base.
         base_height: f64 = 0.45, limits(Range::new(0.0, 10.0));
-        /// How fast it scrolls beside the flame.
+        /// Scroll speed relative to that of the flame.
         speed: f64 = 0.35, limits(Range::new(0.0, 10.0));
-        /// How much of the fire's own light reaches it from beneath.
+        /// Factor of the flame's own light that illuminates the smoke from below.
         fire_light: f64 = 1.0, limits(Range::new(0.0, 100.0));
     }
 }
 
 bansho_base::parameters! {
-    /// The light that the flame throws on others; follows what the flame radiates at each moment.
+    /// Light of the flame on other objects. It follows the flame's emission over time.
     pub struct LightParameters {
-        /// Scale of that light; 0 for none.
+        /// Factor of that light; 0 for none.
         scale: f64 = 1.0, limits(Range::new(0.0, 1000.0));
-        /// How many point lights stand along the flame.
+        /// Number of point lights along the flame.
         count: i64 = 2, limits(Range::new(1.0, 3.0));
     }
 }
 
 bansho_base::parameters! {
-    /// Another flame of the same kind.
+    /// An instance of the flame.
     pub struct Instance {
-        /// Where its base stands, from `position`.
+        /// Position of its base relative to `position` of the flame.
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
-        /// Its size beside the first.
+        /// Size relative to `width` and `height` of the flame.
         scale: f64 = 1.0, limits(Range::new(0.01, 100.0));
-        /// How far it is ahead in time.
+        /// Time offset: how far it is ahead.
         phase_s: f64 = 0.0, unit("s");
-        /// Turn about the vertical where sheets do not face the camera.
+        /// Rotation about the vertical for `facing = "fixed"`, added to that of the flame.
         yaw_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
     }
 }
@@ -191,23 +191,23 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// A small, near flame on an upright sheet (Ohshima & Itahashi): candle, torch, hearth, campfire.
     pub struct FlameSheetParameters {
-        /// Where the middle of its base stands.
+        /// Position of the center of its base.
         position: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), unit("m");
         /// Width of the sheet.
         width: f64 = 1.1, limits(Range::new(0.001, 1000.0)), unit("m");
         /// Height of the sheet.
         height: f64 = 1.7, limits(Range::new(0.001, 1000.0)), unit("m");
-        /// Which way it looks.
+        /// Direction that the sheet faces.
         facing: Facing = Facing::Camera;
-        /// Turn about the vertical for `facing = "fixed"`; at 0 it looks along +z.
+        /// Rotation about the vertical for `facing = "fixed"`; at 0 it faces +z.
         yaw_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
-        /// Scroll speed s in sheet heights a second, eq. (1).
+        /// Scroll speed s, eq. (1), in sheet heights per second.
         speed: Animated<f64> = Animated::from(1.1), limits(Range::new(0.0, 100.0)), unit("1/s");
-        /// How far it is ahead in time.
+        /// Time offset: how far it is ahead.
         phase_s: f64 = 0.0, unit("s");
-        /// Another number gives another flame of the same kind.
+        /// Number that selects other random numbers for an otherwise equal flame.
         variation: i64 = 0, limits(Range::new(0.0, 1e6));
-        /// How much the wind bends it; 0 not at all, 1 as the gas would drift.
+        /// Response to the wind: 0 for none, 1 for gas that drifts with the wind.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 10.0));
         /// Outline and motion.
         shape: ShapeParameters = ShapeParameters::default();
@@ -219,13 +219,13 @@ bansho_base::parameters! {
         sparks: SparkParameters = SparkParameters::default();
         /// Smoke.
         smoke: SmokeParameters = SmokeParameters::default();
-        /// Light on others.
+        /// Light on other objects.
         light: LightParameters = LightParameters::default();
-        /// Flames at these places; one at `position` where the list is empty.
+        /// Instances of the flame; an empty list is one instance at `position`.
         instances: Vec<Instance> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
-        /// Moments that are averaged while the shutter is open; `"auto"` follows the scroll in pixels.
+        /// Number of time samples that are averaged over the exposure; `"auto"` depends on the scroll in pixels.
         time_samples: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 64.0));
-        /// Which stage of the chain is shown.
+        /// Stage of the computation that is shown.
         stage: Stage = Stage::Flame;
     }
 }

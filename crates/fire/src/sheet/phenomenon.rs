@@ -1,12 +1,13 @@
-//! `impl Phenomenon`: how the renderer uses a flame sheet.
+//! `impl Phenomenon` for the flame sheet.
 
 use std::sync::Arc;
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
-        kind::{BuildContext, BuildError, Describe},
+        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{Publication, Surroundings},
     },
@@ -17,8 +18,8 @@ use super::{FlameSheetParameters, model::FlameSheet, render, render::aovs::AOVS}
 impl Describe for FlameSheetParameters {
     const KEY: &'static str = "flame_sheet";
     const PLACEMENT_KEYS: &'static [&'static str] = &["position", "width", "height"];
-    // From where the flame nearly fills the height of the picture.
-    const SETTING: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
+    // The flame nearly fills the height of the picture.
+    const SCENE_DEFAULTS: &'static str = "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n";
     const FIRST_KEYS: &'static [&'static str] = &[
         "position",
         "width",
@@ -35,7 +36,7 @@ impl Describe for FlameSheetParameters {
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match FlameSheet::new(self.clone(), context.name, context.seed, context.loop_s) {
             Ok(sheet) => Ok(Arc::new(sheet)),
-            Err(fault) => Err(BuildError::new(fault.key, fault.kind)),
+            Err(error) => Err(BuildError::new(error.key, error.kind)),
         }
     }
 }
@@ -46,9 +47,9 @@ impl Phenomenon for FlameSheet {
     }
 
     fn luminance(&self) -> f64 {
-        /// Bright parts beside the very brightest: most of a flame is far dimmer than its hottest soot.
-        const BRIGHT: f64 = 0.28;
-        BRIGHT * self.parameters.color.luminance.bounds()[1]
+        /// Luminance of the bright parts relative to the maximum: most of a flame is far dimmer than its hottest soot.
+        const BRIGHT_PARTS: f64 = 0.28;
+        BRIGHT_PARTS * self.parameters.color.luminance.bounds()[1]
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {

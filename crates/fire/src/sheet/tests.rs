@@ -112,7 +112,7 @@ fn field<S: Simd>(simd: S, sheet: &FlameSheet, t: f64) -> Vec<[f32; 4]> {
         let (x, y) = state.warp.unwarp(x, y);
         let coordinates = sheet.shape().coordinates(x, y, &state.warp.edges, state.pixel);
         let coverage = coordinates.coverage(state.pixel);
-        let texture = sheet.shape().gas(state.texture.sample(coordinates.u, coordinates.w));
+        let texture = sheet.shape().apply_contrast(state.texture.sample(coordinates.u, coordinates.w));
         let cut = equations::above_threshold(texture, coordinates.threshold);
         for lane in 0..LANES {
             values.push([texture[lane], cut[lane], coordinates.threshold[lane], coverage[lane]]);
@@ -293,7 +293,7 @@ fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
             content: SheetContent::Flame,
             absorbs: true,
             row_band: rows,
-            minification: f32::INFINITY,
+            max_minification: f32::INFINITY,
         };
         let rect = Rect::from_size(320, 480);
         let mut strip = Strip::default();
@@ -350,7 +350,7 @@ fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
             content: SheetContent::Flame,
             absorbs: true,
             row_band: 2,
-            minification,
+            max_minification: minification,
         };
         let rect = Rect::from_size(size[0], size[1]);
         let mut strip = Strip::default();

@@ -1,4 +1,4 @@
-//! Sparks: each is a function of its index and the time, so that any frame can be rendered alone.
+//! Sparks in closed form: each is a function of its index and the time, so that any frame can be rendered alone.
 
 mod streak;
 
@@ -19,21 +19,21 @@ pub(crate) use streak::Streak;
 const FRACTION: Range = Range::new(0.0, 1.0);
 
 bansho_base::parameters! {
-    /// Glowing sparks that the fire throws up.
+    /// Glowing sparks that rise from the fire.
     pub struct SparkParameters {
-        /// How many a second and flame; 0 for none.
+        /// Number per second and flame; 0 for none.
         rate: f64 = 0.0, limits(Range::new(0.0, 1_000.0)), unit("1/s");
-        /// Speed at which they rise at first.
+        /// Initial speed, upward.
         speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
-        /// How much that differs between them, as a share.
+        /// Variation of the speed between sparks, as a fraction: from 1 minus to 1 plus this fraction of `speed`.
         speed_variation: f64 = 0.5, limits(FRACTION);
-        /// How far they swirl sideways.
+        /// Horizontal amplitude of their swirl.
         swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
-        /// How long they glow.
+        /// Maximum time for which they glow.
         lifetime_s: f64 = 1.8, limits(Range::new(0.05, 20.0)), unit("s");
-        /// Their diameter.
+        /// Diameter.
         diameter: f64 = 0.004, limits(Range::new(1e-5, 1.0)), unit("m");
-        /// Temperature at birth; they cool to 900 K.
+        /// Initial temperature; they cool to 900 K.
         temperature_k: f64 = 1750.0, limits(Range::new(900.0, 4000.0)), unit("K");
     }
 }
@@ -45,8 +45,8 @@ const EXTINCTION_TEMPERATURE_K: f64 = 900.0;
 struct Spark {
     /// Age, s.
     age: f64,
-    /// Duration of its glow, s.
-    life: f64,
+    /// Time for which it glows, s.
+    lifetime_s: f64,
     /// Initial position relative to the base, in widths and heights of the fire.
     start: DVec3,
     /// Initial speed, m/s.
@@ -61,7 +61,7 @@ struct Spark {
 pub(crate) struct SparkEmitter<'a> {
     pub(crate) parameters: &'a SparkParameters,
     pub(crate) key: Key,
-    /// The fire's own time at the middle of the exposure, s; it repeats in a loop.
+    /// The fire's own time at the middle of the exposure, s; periodic in a loop.
     pub(crate) now: f64,
     pub(crate) loop_s: Option<f64>,
     /// Center of its base, m.
@@ -75,14 +75,14 @@ pub(crate) struct SparkEmitter<'a> {
 }
 
 impl SparkEmitter<'_> {
-    /// Streaks of the sparks that the exposure sees.
+    /// Streaks of the sparks that are visible in the exposure.
     pub(crate) fn streaks(&self, view: &View, wind: &Wind) -> Vec<Streak> {
         let sparks = self.parameters;
         if sparks.rate <= 0.0 {
             return Vec::new();
         }
-        // In a loop the number of sparks is whole, and spark n + births_per_loop is spark n again.
-        let (rate, births_per_loop) = match self.loop_s {
+        // In a loop the number of sparks is an integer, and spark n + sparks_per_loop is spark n again.
+        let (rate, sparks_per_loop) = match self.loop_s {
             Some(length) => {
                 ((sparks.rate * length).round().max(1.0) / length, Some((sparks.rate * length).round().max(1.0) as i64))
             }
@@ -90,7 +90,7 @@ impl SparkEmitter<'_> {
         };
         let (first, last) =
             (((self.now - sparks.lifetime_s) * rate).floor() as i64 - 1, (self.now * rate).ceil() as i64);
-        let loop_index = |id: i64| births_per_loop.map_or(id, |births_per_loop| id.rem_euclid(births_per_loop)) as u64;
+        let loop_index = |id: i64| sparks_per_loop.map_or(id, |sparks_per_loop| id.rem_euclid(sparks_per_loop)) as u64;
         (first..=last)
             .filter_map(|id| {
                 let spark = self.spark(loop_index(id), self.now - id as f64 / rate, rate)?;
@@ -99,17 +99,17 @@ impl SparkEmitter<'_> {
             .collect()
     }
 
-    /// Spark `id`, if it glows `since_turn` seconds (minus its random delay) after it was due.
-    fn spark(&self, id: u64, since_turn: f64, rate: f64) -> Option<Spark> {
+    /// Spark `id`, if it glows `seconds_since_due` seconds after the time of its index; it starts after a random delay of up to one interval.
+    fn spark(&self, id: u64, seconds_since_due: f64, rate: f64) -> Option<Spark> {
         let sparks = self.parameters;
         let first = self.key.uniforms(id, 0, Purpose::named("spark start")).map(f64::from);
         let second = self.key.uniforms(id, 0, Purpose::named("spark flight")).map(f64::from);
-        let age = since_turn - first[0] / rate;
-        let life = sparks.lifetime_s * (0.35 + 0.65 * first[1] * first[1]);
+        let age = seconds_since_due - first[0] / rate;
+        let lifetime_s = sparks.lifetime_s * (0.35 + 0.65 * first[1] * first[1]);
         let vary = |variate: f64| 1.0 + sparks.speed_variation * (2.0 * variate - 1.0);
-        (0.0..life).contains(&age).then(|| Spark {
+        (0.0..lifetime_s).contains(&age).then(|| Spark {
             age,
-            life,
+            lifetime_s,
             start: DVec3::new(0.5 * (first[2] - 0.5), 0.05 + 0.35 * first[3], 0.3 * (second[3] - 0.5)),
             speed: sparks.speed * vary(second[0]),
             phases: [second[1], second[2]],
@@ -117,12 +117,12 @@ impl SparkEmitter<'_> {
         })
     }
 
-    /// Displacement of a spark at `age` in still air, m: it slows down as it cools, and swirls in a growing spiral.
+    /// Displacement of a spark at `age` in still air, m: it decelerates by drag and swirls in a growing spiral.
     fn displacement(&self, spark: &Spark, age: f64) -> DVec3 {
         const DRAG: f64 = 1.3;
-        let life = self.parameters.lifetime_s;
-        let rise = spark.speed * life * -math::exp_m1(-DRAG * age / life) / DRAG;
-        let swirl = self.parameters.swirl * age / (age + 0.4 * life);
+        let lifetime_s = self.parameters.lifetime_s;
+        let rise = spark.speed * lifetime_s * -math::exp_m1(-DRAG * age / lifetime_s) / DRAG;
+        let swirl = self.parameters.swirl * age / (age + 0.4 * lifetime_s);
         let angle = |phase: f64, turns: f64| std::f64::consts::TAU * (phase + turns * age);
         let wander = |phase: f64| {
             math::sin(angle(phase, spark.turns)) + 0.45 * math::sin(angle(1.7 * phase, 2.7 * spark.turns))
@@ -132,7 +132,7 @@ impl SparkEmitter<'_> {
         DVec3::new(swirl * wander(spark.phases[0]), rise, swirl * wander(spark.phases[1]))
     }
 
-    /// Displacement by the wind at the end of its first `age` seconds, m.
+    /// Displacement by the wind since a spark started `age` seconds before `t`, m.
     fn drift(&self, wind: &Wind, origin: DVec3, t: f64, age: f64) -> DVec3 {
         const STEPS: usize = 4;
         let step = age / STEPS as f64;
@@ -147,14 +147,14 @@ impl SparkEmitter<'_> {
         let size = self.size;
         let origin = self.base + DVec3::new(spark.start.x * size.x, spark.start.y * size.y, spark.start.z * size.x);
         let project_at = |at: f64, camera: &Camera| {
-            let age = (spark.age + at - t).clamp(0.0, spark.life);
+            let age = (spark.age + at - t).clamp(0.0, spark.lifetime_s);
             camera.project(origin + self.displacement(spark, age) + self.drift(wind, origin, at, age))
         };
         let opened = project_at(view.shutter.open, &view.camera_at(view.shutter.open))?;
         let closed = project_at(view.shutter.close, &view.camera_at(view.shutter.close))?;
-        let cooled = math::pow(spark.age / spark.life, 0.8);
+        let cooled_fraction = math::pow(spark.age / spark.lifetime_s, 0.8);
         let hottest = self.parameters.temperature_k;
-        let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled);
+        let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled_fraction);
         let radius = 0.5 * self.parameters.diameter * self.scale * opened.pixels_per_meter;
         let area = std::f64::consts::PI * radius * radius;
         let radiance = color::black_body().radiance(temperature as f32);

@@ -12,7 +12,7 @@ pub(crate) struct Streak {
     from: DVec2,
     to: DVec2,
     radius: f64,
-    /// ACEScg at full coverage, cd/m^2, such that the streak's total light is the spark's.
+    /// ACEScg at full coverage, cd/m^2, such that the light of the whole streak is that of the spark.
     radiance: [f32; 3],
     /// Depth, m.
     pub(crate) depth: f64,
@@ -27,29 +27,29 @@ const EDGE_SOFTNESS: f64 = 0.7;
 impl Streak {
     /// A streak that distributes the light `radiance` times `area` (square pixels) over its coverage.
     pub(crate) fn new(from: DVec2, to: DVec2, radius: f64, radiance: [f32; 3], area: f64, depth: f64) -> Option<Self> {
-        /// Longer streaks are discarded: the spark crosses the lens.
+        /// Maximum length, pixels; a longer streak is that of a spark right in front of the lens, and is discarded.
         const MAX_LENGTH: f64 = 4000.0;
-        let reach = DVec2::splat(radius + EDGE_SOFTNESS);
-        let (min_pixel, max_pixel) = (from.min(to) - reach, from.max(to) + reach);
+        let margin = DVec2::splat(radius + EDGE_SOFTNESS);
+        let (min_pixel, max_pixel) = (from.min(to) - margin, from.max(to) + margin);
         if !((max_pixel - min_pixel).max_element() < MAX_LENGTH && min_pixel.abs().max_element() < 1e9) {
             return None;
         }
         let whole = |fraction: DVec2| [fraction.x.floor() as i64, fraction.y.floor() as i64];
         let mut streak =
             Self { from, to, radius, radiance, depth, min_pixel: whole(min_pixel), max_pixel: whole(max_pixel) };
-        let covered = streak.covered();
-        if covered <= 0.0 {
+        let covered_area = streak.covered_area();
+        if covered_area <= 0.0 {
             return None;
         }
-        streak.radiance = radiance.map(|value| value * (area / covered) as f32);
+        streak.radiance = radiance.map(|value| value * (area / covered_area) as f32);
         Some(streak)
     }
 
-    /// Sum of the coverage over all pixels: counted where that is cheap, else the area of a capsule with soft edges.
-    fn covered(&self) -> f64 {
-        const MAX_COUNTED_PIXELS: i64 = 4096;
+    /// Sum of the coverage over all pixels: summed explicitly for small streaks, otherwise the area of a capsule with soft edges.
+    fn covered_area(&self) -> f64 {
+        const MAX_SUMMED_PIXELS: i64 = 4096;
         if (self.max_pixel[0] - self.min_pixel[0] + 1) * (self.max_pixel[1] - self.min_pixel[1] + 1)
-            <= MAX_COUNTED_PIXELS
+            <= MAX_SUMMED_PIXELS
         {
             return self.pixels().map(|(x, y)| self.coverage(x, y)).sum();
         }
@@ -63,7 +63,7 @@ impl Streak {
         (min_pixel[1]..=max_pixel[1]).flat_map(move |y| (min_pixel[0]..=max_pixel[0]).map(move |x| (x, y)))
     }
 
-    /// Coverage of a pixel by the distance of its center.
+    /// Coverage of a pixel, from the distance of its center to the segment.
     fn coverage(&self, x: i64, y: i64) -> f64 {
         let point = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let along = self.to - self.from;
@@ -72,7 +72,7 @@ impl Streak {
         1.0 - math::smoothstep(self.radius - EDGE_SOFTNESS, self.radius + EDGE_SOFTNESS, distance)
     }
 
-    /// The pixels of the picture that it may touch.
+    /// Bounding rectangle in the picture.
     pub(crate) fn bounds(&self, picture: [usize; 2]) -> Rect {
         let clip = |value: i64, side: usize| value.clamp(0, side as i64) as usize;
         let start = [clip(self.min_pixel[0], picture[0]), clip(self.min_pixel[1], picture[1])];
@@ -83,7 +83,7 @@ impl Streak {
         Rect { x: start[0], y: start[1], width: end[0] - start[0], height: end[1] - start[1] }
     }
 
-    /// Adds its light to the strip, behind what the strip holds.
+    /// Adds its light to the strip, behind the current contents.
     pub(crate) fn draw(&self, picture: [usize; 2], strip: &mut Strip) {
         let rect = self.bounds(picture).intersection(&strip.rect);
         for y in rect.y..rect.bottom() {
@@ -123,7 +123,7 @@ mod tests {
         {
             let streak = Streak::new(DVec2::new(20.3, 20.9), to, radius, [1.0; 3], 1.0, 2.0).unwrap();
             let counted: f64 = streak.pixels().map(|(x, y)| streak.coverage(x, y)).sum();
-            assert!((streak.covered() / counted - 1.0).abs() < 2e-3, "{} {counted}", streak.covered());
+            assert!((streak.covered_area() / counted - 1.0).abs() < 2e-3, "{} {counted}", streak.covered_area());
         }
     }
 }

@@ -1,8 +1,9 @@
 //! The attributes of an OpenEXR header, as bytes ("OpenEXR File Layout": name, type, size, value; little-endian).
 
 use bansho_base::{
+    camera::CameraHeader,
     color::white_balance::chromaticity,
-    image::{CameraHeader, FrameHeader, Precision},
+    frame::{FrameHeader, Precision},
 };
 
 use super::{

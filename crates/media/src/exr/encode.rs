@@ -14,7 +14,7 @@ use ::exr::{
         header::Header,
     },
 };
-use bansho_base::image::{Frame, Precision};
+use bansho_base::frame::{Frame, Precision};
 
 use super::{
     attribute::{self, Window},
@@ -140,7 +140,7 @@ fn crate_header(planes: &[ChannelPlane<'_>], width: usize, height: usize) -> Hea
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::{camera::Lens, image::Channel};
+    use bansho_base::{camera::Lens, frame::Channel};
 
     use super::*;
     use crate::testing;

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, ops::Range};
 
-use bansho_base::image::{Frame, Precision};
+use bansho_base::frame::{Frame, Precision};
 use half::slice::HalfFloatSliceExt;
 
 /// Largest finite half: brighter pixels are clamped to it, since infinities and NaN spoil every filter.

@@ -4,7 +4,7 @@
 
 use std::{io::Write, path::Path};
 
-use bansho_base::image::DisplayImage;
+use bansho_base::frame::DisplayImage;
 
 use super::{ordered::FilmEncoder, timing};
 use crate::{
@@ -112,7 +112,7 @@ impl FilmEncoder for ApngFilm {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::image::DisplayPixels;
+    use bansho_base::frame::DisplayPixels;
 
     use super::*;
     use crate::testing;

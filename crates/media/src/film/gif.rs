@@ -11,7 +11,7 @@ use std::{
 };
 
 use ::gif::{DisposalMethod, Encoder, Extension, Repeat};
-use bansho_base::image::{DisplayImage, DisplayPixels};
+use bansho_base::frame::{DisplayImage, DisplayPixels};
 
 use super::{
     ordered::FilmEncoder,

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color::{AlphaConvention, decode_srgb, decode_srgb8, encode_srgb},
-    image::{DisplayImage, DisplayPixels},
+    frame::{DisplayImage, DisplayPixels},
 };
 
 /// `picture` over black, blended as its [`AlphaConvention`] says, so that what is seen is the light that was there.

@@ -1,6 +1,6 @@
 //! Frame numbers drawn into pictures for viewing, such as the cells of a contact sheet.
 
-use bansho_base::image::{DisplayImage, DisplayPixels};
+use bansho_base::frame::{DisplayImage, DisplayPixels};
 
 /// Columns and rows of a glyph.
 const GLYPH: [usize; 2] = [5, 7];

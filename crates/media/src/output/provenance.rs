@@ -200,7 +200,7 @@ mod tests {
         let sink = Sink::open(pattern, options).unwrap();
         for index in 0..2 {
             let slot = FrameSlot { index, number: index as i64 };
-            let picture = bansho_base::image::DisplayImage { opaque, ..testing::display(34, 16, index) };
+            let picture = bansho_base::frame::DisplayImage { opaque, ..testing::display(34, 16, index) };
             let linear = testing::frame(34, 16);
             let picture = match sink.picture_format() {
                 PictureFormat::Frame => Picture::Linear(&linear),
@@ -287,7 +287,7 @@ mod tests {
         let channel = frame.channels[0].clone();
         frame.channels.extend((0..300).map(|index| {
             let name = format!("{}{index}.R", "long".repeat(50));
-            bansho_base::image::Channel { name, ..channel.clone() }
+            bansho_base::frame::Channel { name, ..channel.clone() }
         }));
         let file = exr::encode(&frame, Path::new("a.exr")).unwrap();
         assert!(file.windows(9).position(|bytes| bytes == b"bansho:ve").unwrap() > HEAD_BYTES as usize);

@@ -54,7 +54,7 @@ fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
 mod tests {
     use bansho_base::{
         color::AlphaConvention,
-        image::{DisplayImage, DisplayPixels},
+        frame::{DisplayImage, DisplayPixels},
     };
 
     use super::*;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::AlphaConvention,
-    image::{DisplayImage, DisplayPixels, Frame},
+    frame::{DisplayImage, DisplayPixels, Frame},
 };
 
 use super::{

@@ -1,6 +1,9 @@
 //! Sprite sheets: flipbooks for game engines, and contact sheets.
 
-use bansho_base::image::{DisplayImage, DisplayPixels, Image, Rect};
+use bansho_base::{
+    frame::{DisplayImage, DisplayPixels},
+    image::{Image, Rect},
+};
 
 /// Why pictures cannot be laid out on a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

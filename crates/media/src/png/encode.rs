@@ -6,7 +6,7 @@ use ::png::{
     BitDepth, ColorType, DeflateCompression, Encoder, EncodingError, Filter, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent,
 };
-use bansho_base::image::{DisplayImage, DisplayPixels};
+use bansho_base::frame::{DisplayImage, DisplayPixels};
 
 use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{

@@ -1,7 +1,8 @@
 //! A prepared frame of rain: streaks in chunks, and the medium of single scattering. It draws strips of the picture.
 
 use bansho_base::{
-    image::{Figure, Rect},
+    frame::Figure,
+    image::Rect,
     phenomenon::{
         Prepared,
         strip::{AovDescriptor, AovPlane, AovRule, DepthInterval, Strip, View},

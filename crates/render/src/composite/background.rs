@@ -1,7 +1,8 @@
 //! What lies behind the slices that are being drawn: the plate, or all that is farther, perhaps seen through air that bends light.
 
 use bansho_base::{
-    image::{Channel, Frame, Image, Rect},
+    frame::{Channel, Frame},
+    image::{Image, Rect},
     math::{MulAdd, approximations},
     phenomenon::{Deflection, strip::View},
 };

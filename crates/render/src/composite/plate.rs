@@ -11,8 +11,8 @@ use bansho_base::{
     },
     image::Image,
     math::DVec2,
+    parameters::BuildError,
     phenomenon::LevelMirror,
-    phenomenon::kind::BuildError,
 };
 
 use super::mirror;

@@ -4,8 +4,8 @@
 //! through the layer between. AOVs are not bent.
 
 use bansho_base::{
+    frame::{Frame, FrameHeader},
     host::observer::{Cancelled, Observer},
-    image::{Frame, FrameHeader},
     phenomenon::Deflection,
 };
 

@@ -1,11 +1,12 @@
 //! From prepared phenomena to a frame: strip by strip, slice by slice, nearest first, the plate behind all.
 
 use bansho_base::{
+    frame::{Channel, Frame, FrameHeader, Precision},
     host::{
         observer::{self, Cancelled, Observer},
         scratch_pool::ScratchPool,
     },
-    image::{Channel, Frame, FrameHeader, Image, Precision, Rect},
+    image::{Image, Rect},
     math::MulAdd,
     phenomenon::{
         Prepared,

@@ -6,12 +6,13 @@ pub(crate) mod stepping;
 use std::sync::Arc;
 
 use bansho_base::{
+    frame::{Channel, FigureSet, Frame},
     geometry::point_cloud::PointCloud,
     host::observer::{self, Cancelled, Observer, Stage, StageGuard},
-    image::{Channel, FigureSet, Frame, Rect},
+    image::Rect,
+    parameters::BuildError,
     phenomenon::{
         LevelMirror, Prepared, SnapshotError,
-        kind::BuildError,
         strip::View,
         surroundings::{Publication, Surroundings},
     },
@@ -205,7 +206,7 @@ impl Shot {
         let behind = plate.color.is_some() || self.runs.len() > 1;
         let is_whole = view.window == Rect::from_size(view.size[0], view.size[1]);
         // Also where the window itself sees nothing bent: a picture before which light is bent is rounded otherwise everywhere.
-        if !is_whole && behind && prepared.iter().any(|prepared| prepared.may_bend()) {
+        if !is_whole && behind && prepared.iter().any(|prepared| prepared.may_refract()) {
             return Ok(None);
         }
         let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());

@@ -59,7 +59,7 @@ fn only_kind<'a>(root: &Table, kinds: &'a [PhenomenonKind]) -> Option<&'a Phenom
 
 fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> ImpliedBackdrop {
     // A test holds that settings can be read.
-    let setting = toml::parse(kind.setting).unwrap_or_default();
+    let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let states = |key: &str| root.get(key).is_some();
     let sky = !states("sky") && !states("light");
     let has = |key: &str| setting.get(key).is_some();

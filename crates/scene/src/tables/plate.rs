@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::assets::{AssetError, AssetProblem, Assets, Picture},
-    parameters::ProblemKind,
-    phenomenon::kind::BuildError,
+    parameters::{BuildError, ProblemKind},
 };
 
 use super::picture::PlateParameters;

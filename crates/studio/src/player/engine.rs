@@ -4,7 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use bansho::{
     AlphaConvention, Assets, BitDepth, DisplayImage, Observer, RenderError, Shot, View,
-    base::image::{DisplayPixels, Frame},
+    base::frame::{DisplayPixels, Frame},
     display,
     media::{
         MediaError,

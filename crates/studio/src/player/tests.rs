@@ -7,9 +7,9 @@ use bansho::{
     AlphaConvention, Assets, BitDepth, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneOptions, Shot, Unobserved,
     View,
     base::{
+        frame::DisplayPixels,
         geometry::{mesh::Mesh, strokes::Drawing},
         host::assets::{AssetError, Picture as Plate},
-        image::DisplayPixels,
     },
     display, parse_scene,
 };

@@ -3,8 +3,8 @@
 
 use bansho_base::{
     color::View,
+    frame::{DisplayImage, Frame},
     host::observer::{Observer, Stage, StageGuard},
-    image::{DisplayImage, Frame},
 };
 use bansho_media::output::{
     label,
@@ -92,7 +92,8 @@ fn own_fingerprint(job: &PreparedJob) -> [u8; 32] {
 mod tests {
     use bansho_base::{
         color::{self, AlphaConvention},
-        image::{DisplayPixels, Image, Rect},
+        frame::DisplayPixels,
+        image::{Image, Rect},
     };
     use bansho_render::display::{BitDepth, display};
 

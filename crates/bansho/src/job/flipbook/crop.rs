@@ -4,8 +4,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    frame::{DisplayPixels, Frame},
     host::observer::Observer,
-    image::{DisplayPixels, Frame, Rect},
+    image::Rect,
 };
 use bansho_render::{
     CompiledScene, Plan, Shot,

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    frame::{DisplayImage, DisplayPixels, Frame, FrameHeader},
     host::observer::{Observer, Stage, StageGuard, check},
-    image::{DisplayImage, DisplayPixels, Frame, FrameHeader, Image, Rect},
+    image::{Image, Rect},
 };
 use bansho_media::{
     exr,

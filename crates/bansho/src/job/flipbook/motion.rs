@@ -2,8 +2,9 @@
 
 use bansho_base::{
     color,
+    frame::{DisplayImage, Frame, FrameHeader},
     host::observer::Observer,
-    image::{DisplayImage, Frame, FrameHeader, Image},
+    image::Image,
 };
 
 use super::files::Files;

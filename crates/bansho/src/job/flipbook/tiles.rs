@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use bansho_base::{host::observer::Observer, image::Frame};
+use bansho_base::{frame::Frame, host::observer::Observer};
 use bansho_media::output::sprite_sheet::SheetLayout;
 
 use crate::job::{

@@ -1,8 +1,8 @@
 //! The frames of a job, one after the other: drawn here, finished by whichever thread of the pool is free.
 
 use bansho_base::{
+    frame::Frame,
     host::observer::{Observer, check},
-    image::Frame,
 };
 use bansho_render::{RenderError, Shot};
 

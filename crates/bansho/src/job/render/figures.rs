@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho_base::image::{Figure, FigureSet, Frame};
+use bansho_base::frame::{Figure, FigureSet, Frame};
 use bansho_media::{
     MediaError,
     output::{atomic, overwrite_policy::OverwritePolicy, provenance},

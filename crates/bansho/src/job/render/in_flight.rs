@@ -10,8 +10,8 @@ use std::{
 };
 
 use bansho_base::{
+    frame::Frame,
     host::observer::{Observer, Stage},
-    image::Frame,
 };
 
 use crate::job::{error::JobError, observer::JobObserver};

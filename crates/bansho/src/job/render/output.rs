@@ -8,8 +8,8 @@ use std::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    frame::{DisplayImage, Frame},
     host::observer::{Observer, Stage, StageGuard},
-    image::{DisplayImage, Frame},
 };
 use bansho_media::{
     MediaError,

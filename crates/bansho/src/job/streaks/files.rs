@@ -6,8 +6,10 @@ use std::{
 };
 
 use bansho_base::{
+    camera::CameraHeader,
     color::ev100_of_white_luminance,
-    image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
+    frame::{Channel, Frame, FrameHeader, Precision},
+    image::{Image, Rect},
     math::DVec3,
 };
 use bansho_media::{

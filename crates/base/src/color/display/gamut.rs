@@ -14,8 +14,11 @@
 //! Each step is a bijection onto its range and depends only on quantities that the inverse has already recovered, so the whole transform has an
 //! exact inverse on the cube.
 
-use super::tone::ToneCurve;
-use crate::math::MulAdd;
+use super::{tone::ToneCurve, transfer::clamp_components};
+use crate::{
+    color::space::{acescg_from_srgb, srgb_from_acescg},
+    math::MulAdd,
+};
 
 /// Compression at which a color is halfway to white (`c0`): chosen by eye on ramps of black bodies from 1000 to 3000 K.
 const HALF_WHITE_COMPRESSION: f32 = 17.0;
@@ -99,7 +102,7 @@ fn expand_saturation(s: f32, c: f32) -> f32 {
 
 /// Linear sRGB of any size and sign to linear display sRGB within 0..=1. Components must be [`sanitized`].
 #[inline(always)]
-pub(super) fn to_cube(tone: &ToneCurve, rgb: [f32; 3]) -> [f32; 3] {
+fn to_cube(tone: &ToneCurve, rgb: [f32; 3]) -> [f32; 3] {
     let sorted = sort_components(rgb);
     let largest = max(sorted[0], BLACK);
     let (range, rise) = (sorted[0] - sorted[2], sorted[1] - sorted[2]);
@@ -120,7 +123,7 @@ pub(super) fn to_cube(tone: &ToneCurve, rgb: [f32; 3]) -> [f32; 3] {
 
 /// Inverse of [`to_cube`] for `display` with components within 0..=1; the brightest colors map to linear sRGB outside the gamut.
 #[inline(always)]
-pub(super) fn from_cube(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
+fn from_cube(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
     let sorted = sort_components(display);
     let brightness = max(sorted[0], BLACK);
     let (range, rise) = (sorted[0] - sorted[2], sorted[1] - sorted[2]);
@@ -135,6 +138,19 @@ pub(super) fn from_cube(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
     let largest = largest - BLACK;
     let chroma = largest * saturation;
     with_sorted_components(display, sorted, [largest, chroma.fma(t - 1.0, largest), largest - chroma])
+}
+
+/// Exposed ACEScg to linear display sRGB under a tone curve.
+#[inline(always)]
+pub(super) fn display_from_acescg(tone: &ToneCurve, [r, g, b]: [f32; 3]) -> [f32; 3] {
+    let finite = [sanitized(r), sanitized(g), sanitized(b)];
+    to_cube(tone, srgb_from_acescg(finite))
+}
+
+/// Inverse of [`display_from_acescg`].
+#[inline(always)]
+pub(super) fn acescg_from_display(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
+    acescg_from_srgb(from_cube(tone, clamp_components(display)))
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 
 use super::{
     alpha::AlphaConvention,
+    gamut::{acescg_from_display, display_from_acescg},
     quantize::{DisplayCode, dither_phase, encoded_alpha_codes, linear_alpha_codes, opaque_codes},
     tone::ToneCurve,
-    view::{acescg_from_display, clamped, display_from_acescg},
+    transfer::clamp_components,
 };
 
 /// Pixels processed together: a whole number of vectors at any width.
@@ -39,7 +40,7 @@ struct Clamped;
 impl DisplayTransform for Clamped {
     #[inline(always)]
     fn apply(&self, acescg: [f32; 3]) -> [f32; 3] {
-        clamped(acescg)
+        clamp_components(acescg)
     }
 }
 

@@ -44,6 +44,12 @@ pub(super) fn clamp_unit(x: f32) -> f32 {
     if non_negative < 1.0 { non_negative } else { 1.0 }
 }
 
+/// Components clamped to 0..=1.
+#[inline(always)]
+pub(super) fn clamp_components([r, g, b]: [f32; 3]) -> [f32; 3] {
+    [clamp_unit(r), clamp_unit(g), clamp_unit(b)]
+}
+
 /// Linear light of an sRGB value, exact to rounding. Values outside 0..=1 and NaN are clamped.
 #[must_use]
 pub fn decode_srgb(encoded: f32) -> f32 {

@@ -4,16 +4,13 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     alpha::AlphaConvention,
-    gamut::{from_cube, sanitized, to_cube},
+    gamut::{acescg_from_display, display_from_acescg, sanitized},
     quantize::DisplayCode,
     row,
     tone::ToneCurve,
-    transfer::clamp_unit,
+    transfer::clamp_components,
 };
-use crate::color::{
-    space::{acescg_from_srgb, srgb_from_acescg},
-    white_balance::WhiteBalance,
-};
+use crate::color::{space::acescg_from_srgb, white_balance::WhiteBalance};
 
 /// Scene brightness up to which the default view is the identity.
 const KNEE: f32 = 0.6;
@@ -95,7 +92,7 @@ impl View {
         match (&self.tone, &self.balance) {
             (Some(tone), Some(balance)) => display_from_acescg(tone, apply_balance(balance, acescg)),
             (Some(tone), None) => display_from_acescg(tone, acescg),
-            (None, _) => clamped(acescg),
+            (None, _) => clamp_components(acescg),
         }
     }
 
@@ -108,7 +105,7 @@ impl View {
         match (&self.tone, &self.balance) {
             (Some(tone), Some(balance)) => balance.invert(acescg_from_display(tone, display)),
             (Some(tone), None) => acescg_from_display(tone, display),
-            (None, _) => acescg_from_srgb(clamped(display)),
+            (None, _) => acescg_from_srgb(clamp_components(display)),
         }
     }
 
@@ -182,25 +179,6 @@ impl View {
 #[inline(always)]
 fn apply_balance(balance: &WhiteBalance, [r, g, b]: [f32; 3]) -> [f32; 3] {
     balance.apply([sanitized(r), sanitized(g), sanitized(b)])
-}
-
-/// Exposed ACEScg to linear display sRGB under a tone curve.
-#[inline(always)]
-pub(super) fn display_from_acescg(tone: &ToneCurve, [r, g, b]: [f32; 3]) -> [f32; 3] {
-    let finite = [sanitized(r), sanitized(g), sanitized(b)];
-    to_cube(tone, srgb_from_acescg(finite))
-}
-
-/// Inverse of [`display_from_acescg`].
-#[inline(always)]
-pub(super) fn acescg_from_display(tone: &ToneCurve, display: [f32; 3]) -> [f32; 3] {
-    acescg_from_srgb(from_cube(tone, clamped(display)))
-}
-
-/// Components clamped to 0..=1.
-#[inline(always)]
-pub(super) fn clamped([r, g, b]: [f32; 3]) -> [f32; 3] {
-    [clamp_unit(r), clamp_unit(g), clamp_unit(b)]
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ fn gray_and_colored_absorption_come_to_the_same() {
 }
 
 #[test]
-fn dissolves_mix_light_and_transmittance_and_keep_what_is_nearest() {
+fn crossfades_mix_light_and_transmittance_and_keep_what_is_nearest() {
     let mut strip = Strip::default();
     strip.reset(Rect::from_size(1, 1), Some(&|_| &[9.0]), 2);
     let mut other = strip.empty_like();

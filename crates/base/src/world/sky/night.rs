@@ -52,7 +52,7 @@ pub struct Night {
     airglow: f64,
     /// Luminance of the twilight overhead, cd/m^2.
     twilight: f64,
-    /// Unit vector to where the sun stands below the horizon.
+    /// Horizontal unit vector toward the azimuth of the sun.
     sunward: DVec3,
     extinction: f64,
 }
@@ -110,7 +110,7 @@ impl Night {
         self.almucantar(elevation).radiance(self.sunwardness(direction) as f32)
     }
 
-    /// Unit vector to where the sun stands below the horizon.
+    /// Horizontal unit vector toward the azimuth of the sun.
     #[must_use]
     pub fn sunward(&self) -> DVec3 {
         self.sunward
@@ -133,18 +133,18 @@ impl Night {
         let overhead = self.transmittance(std::f64::consts::FRAC_PI_2);
         // Scattering replaces 30 % of the light lost by extinction.
         let diffuse = 0.3 + 0.7 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
-        let mut even = blackbody_light(BACKGROUND_K, BACKGROUND * diffuse);
+        let mut uniform = blackbody_light(BACKGROUND_K, BACKGROUND * diffuse);
         for (wavelength_nm, kilorayleigh, altitude_km) in AIRGLOW {
             let scale = LUMINOUS_EFFICACY_LM_PER_W * KILORAYLEIGH / wavelength_nm;
             let brightness = self.airglow * kilorayleigh * van_rhijn(elevation, altitude_km) * diffuse * scale;
-            even += DVec3::from(ACESCG_FROM_XYZ.apply(line_xyz(wavelength_nm))) * brightness;
+            uniform += DVec3::from(ACESCG_FROM_XYZ.apply(line_xyz(wavelength_nm))) * brightness;
         }
         // Twilight: blue overhead, brighter and yellow low above the sun.
         let low = math::exp(-elevation / TWILIGHT_ARCH);
         let blue = blackbody_light(10_000.0, self.twilight);
         let single = |color: DVec3| color.to_array().map(|value| value as f32);
         Almucantar {
-            uniform: single(even + blue),
+            uniform: single(uniform + blue),
             glow: single(blackbody_light(3200.0, self.twilight * 9.0 * low * low)),
             blue: single(blue * (2.0 * low)),
         }

@@ -9,8 +9,8 @@ use super::gas::Gas;
 use crate::particles::{
     parameters::RenderingParameters,
     render::{
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{ColumnExtents, DepthLayer, GasResolver, RowBuffer, spline},
+        project::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{ColumnExtents, DepthLayer, GasResolver, LayerSums, RowBuffer},
         splat::{
             MIN_RADIUS_CELLS, SplatSettings, Sprite,
             grid::{Grid, weighted_sum},
@@ -31,19 +31,19 @@ pub const AOVS: &[AovDescriptor] = &[
     AovDescriptor {
         name: "optical_depth",
         unit: "",
-        doc: "Optical depth of soot along the line of sight, before detail; 0 where there is none.",
+        doc: "Optical depth of soot along the line of sight, without detail; 0 where there is none.",
         rule: AovRule::Sum,
     },
     AovDescriptor {
         name: "deflection.X",
         unit: "rad",
-        doc: "Angle to the right by which hot gas bends the light of what lies behind, with the artist's gain; 0 where it is straight.",
+        doc: "Angle to the right by which hot gas deflects light from behind, including `heat_haze_gain`; 0 without deflection.",
         rule: AovRule::Sum,
     },
     AovDescriptor {
         name: "deflection.Y",
         unit: "rad",
-        doc: "Angle upward by which hot gas bends the light of what lies behind, with the artist's gain; 0 where it is straight.",
+        doc: "Angle upward by which hot gas deflects light from behind, including `heat_haze_gain`; 0 without deflection.",
         rule: AovRule::Sum,
     },
     AovDescriptor {
@@ -70,20 +70,20 @@ const MOTION: [usize; 2] = [4, 5];
 pub(crate) struct MotionField<'a> {
     grid: Grid<'a>,
     weights: Vec<[f32; 4]>,
-    /// Least and greatest motion of any particle, for each component.
+    /// Minimum and maximum motion of all particles, for each component.
     min_max: [[f32; 2]; 2],
 }
 
 /// Glowing particles as sprites of their motion.
 struct MotionSprites<'a> {
     gas: &'a Gas<'a>,
-    look: &'a RenderingParameters,
+    rendering: &'a RenderingParameters,
 }
 
 impl MotionSprites<'_> {
     #[inline(always)]
-    fn light(&self, index: usize) -> f64 {
-        self.gas.absorption(index, self.look) * self.gas.luminance(index) * self.gas.volume(index)
+    fn luminous_volume(&self, index: usize) -> f64 {
+        self.gas.absorption(index, self.rendering) * self.gas.luminance(index) * self.gas.volume(index)
     }
 }
 
@@ -92,20 +92,20 @@ impl SpriteKind for MotionSprites<'_> {
 
     #[inline(always)]
     fn includes(&self, index: usize) -> bool {
-        self.light(index) > 0.0
+        self.luminous_volume(index) > 0.0
     }
 
     #[inline(always)]
-    fn record(&self, seen: &ProjectedParticle) -> Sprite<3> {
-        let weight = (self.light(seen.index) * f64::from(seen.ellipse.peak)) as f32;
-        let values = [weight, weight * seen.motion[0], weight * seen.motion[1]];
-        Sprite { ellipse: seen.ellipse, layer: 0, next_layer_weight: 0.0, values }
+    fn record(&self, projected: &ProjectedParticle) -> Sprite<3> {
+        let weight = (self.luminous_volume(projected.index) * f64::from(projected.ellipse.peak)) as f32;
+        let values = [weight, weight * projected.motion[0], weight * projected.motion[1]];
+        Sprite { ellipse: projected.ellipse, layer: 0, next_layer_weight: 0.0, values }
     }
 }
 
 impl<'a> MotionField<'a> {
-    pub(crate) fn new(gas: &Gas<'a>, look: &RenderingParameters, view: &View) -> Option<Self> {
-        let sprites = project_particles(gas, view, &MotionSprites { gas, look });
+    pub(crate) fn new(gas: &Gas<'a>, rendering: &RenderingParameters, view: &View) -> Option<Self> {
+        let sprites = project_particles(gas, view, &MotionSprites { gas, rendering });
         let motions = |axis: usize| {
             sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])
         };
@@ -119,10 +119,10 @@ impl<'a> MotionField<'a> {
                 window: view.window,
             },
             &sprites,
-            gas.scratch,
+            gas.buffers,
         );
         let grid = grid.sums()?;
-        Some(Self { weights: spline::weights(&grid.cells), grid, min_max })
+        Some(Self { weights: grid.cells.spline_weights(), grid, min_max })
     }
 
     /// Motion of the gas at a pixel until the next frame, pixels to the right and down.
@@ -131,9 +131,9 @@ impl<'a> MotionField<'a> {
         let ((column, across), (row, down)) = (cells.cell_before(0, x), cells.cell_before(1, y));
         let start = 3 * self.grid.first_of_four(column);
         let rows = [-1, 0, 1, 2].map(|k| &self.grid.row(row + k)[start..start + 12]);
-        let mut four = [0.0; 12];
-        weighted_sum(&mut four, rows, &self.weights[down]);
-        let plane = |plane: usize| (0..4).map(|k| four[3 * k + plane] * self.weights[across][k]).sum::<f32>();
+        let mut columns = [0.0; 12];
+        weighted_sum(&mut columns, rows, &self.weights[down]);
+        let plane = |plane: usize| (0..4).map(|k| columns[3 * k + plane] * self.weights[across][k]).sum::<f32>();
         let weight = plane(0);
         let mean = |axis: usize| {
             let [min_value, max_value] = self.min_max[axis];
@@ -143,7 +143,7 @@ impl<'a> MotionField<'a> {
     }
 }
 
-/// Least and greatest value.
+/// Minimum and maximum.
 pub(crate) fn min_max(values: impl Iterator<Item = f32>) -> [f32; 2] {
     values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min_value, max_value], value| {
         [min_value.min(value), max_value.max(value)]
@@ -152,7 +152,7 @@ pub(crate) fn min_max(values: impl Iterator<Item = f32>) -> [f32; 2] {
 
 impl GasResolver<'_> {
     /// Adds the AOVs of a layer in `rect` of a strip. Evaluated only where AOVs are requested, one pixel at a time.
-    pub(crate) fn measure_layer(
+    pub(crate) fn write_layer_aovs(
         &self,
         layer: &DepthLayer,
         extents: &ColumnExtents,
@@ -161,7 +161,7 @@ impl GasResolver<'_> {
         row: &mut RowBuffer,
         strip: &mut Strip,
     ) {
-        /// Least luminance that counts as glowing, cd/m^2.
+        /// Luminance above which temperature and motion are recorded, cd/m^2.
         const MIN_LUMINANCE: f32 = 1e-3;
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
@@ -171,15 +171,16 @@ impl GasResolver<'_> {
                 for pixel in x.max(rect.x)..(x + 16).min(rect.right()) {
                     let lane = pixel - x;
                     let index = (y - strip.rect.y) * strip.rect.width + pixel - strip.rect.x;
-                    let [tau, glow, heat] = [sums.tau[lane], sums.glow[lane], sums.heat[lane]];
+                    let LayerSums { tau, luminance, luminance_kelvin, .. } = &sums;
+                    let (tau, luminance, luminance_kelvin) = (tau[lane], luminance[lane], luminance_kelvin[lane]);
                     if !strip.visible(index, layer.depth as f32) {
                         continue;
                     }
                     strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
-                    if glow > MIN_LUMINANCE {
-                        strip.aovs[TEMPERATURE].add(index, self.temperature(heat, glow), glow);
+                    if luminance > MIN_LUMINANCE {
+                        strip.aovs[TEMPERATURE].add(index, self.temperature(luminance_kelvin, luminance), luminance);
                         let motion_pixels = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
-                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, motion_pixels[axis], glow));
+                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, motion_pixels[axis], luminance));
                     }
                 }
             }

@@ -1,7 +1,7 @@
-//! Heat haze: hot gas has a lower refractive index, and light bends toward denser air.
+//! Heat haze: hot gas has a lower refractive index than air, and light is refracted toward higher indices.
 //!
 //! In the paraxial approximation the deflection of a ray is the gradient of the optical path length across it. The path length is a
-//! sum of sprites, as optical depth is.
+//! sum of sprites, like the optical depth.
 
 use bansho_base::{
     image::{Image, Rect},
@@ -15,8 +15,8 @@ use crate::particles::{
     parameters::RenderingParameters,
     render::{
         depth_layers::is_visible,
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{PATH, PLANES, spline},
+        project::{ProjectedParticle, SpriteKind, project_particles},
+        resolve::{PATH, PLANES},
         splat::{
             MIN_RADIUS_CELLS, SplatSettings, Sprite,
             grid::{Grid, weighted_sum},
@@ -45,10 +45,13 @@ pub(crate) struct HeatHaze {
 /// Optical path difference to air along a ray through the center of a particle's sprite, in pixels at its depth: the gradient of
 /// the summed path differences, per pixel, is an angle.
 #[inline(always)]
-pub(crate) fn path(gas: &Gas, look: &RenderingParameters, seen: &ProjectedParticle) -> f32 {
-    let refractivity_excess = refractivity_excess(gas, seen.index);
-    let length = look.heat_haze_gain * refractivity_excess * gas.volume(seen.index) * f64::from(seen.ellipse.peak);
-    (length * f64::from(seen.scale)) as f32
+pub(crate) fn optical_path(gas: &Gas, rendering: &RenderingParameters, projected: &ProjectedParticle) -> f32 {
+    let refractivity_excess = refractivity_excess(gas, projected.index);
+    let length = rendering.heat_haze_gain
+        * refractivity_excess
+        * gas.volume(projected.index)
+        * f64::from(projected.ellipse.peak);
+    (length * f64::from(projected.scale)) as f32
 }
 
 /// Refractivity of a particle's gas minus that of the surrounding air.
@@ -57,10 +60,10 @@ fn refractivity_excess(gas: &Gas, index: usize) -> f64 {
     refractivity(f64::from(gas.particles.temperature[index])) - refractivity(gas.air_temperature_k)
 }
 
-/// Particles as sprites of their optical path: those that emit and absorb nothing, or all.
+/// Particles as sprites of their optical path: those that neither emit nor absorb, or all.
 struct RefractionSprites<'a> {
     gas: &'a Gas<'a>,
-    look: &'a RenderingParameters,
+    rendering: &'a RenderingParameters,
     whole_gas: bool,
 }
 
@@ -69,28 +72,33 @@ impl SpriteKind for RefractionSprites<'_> {
 
     #[inline(always)]
     fn includes(&self, index: usize) -> bool {
-        (self.whole_gas || !is_visible(self.gas, self.look, index)) && refractivity_excess(self.gas, index) != 0.0
+        (self.whole_gas || !is_visible(self.gas, self.rendering, index)) && refractivity_excess(self.gas, index) != 0.0
     }
 
     #[inline(always)]
-    fn record(&self, seen: &ProjectedParticle) -> Sprite<1> {
-        Sprite { ellipse: seen.ellipse, layer: 0, next_layer_weight: 0.0, values: [path(self.gas, self.look, seen)] }
+    fn record(&self, projected: &ProjectedParticle) -> Sprite<1> {
+        Sprite {
+            ellipse: projected.ellipse,
+            layer: 0,
+            next_layer_weight: 0.0,
+            values: [optical_path(self.gas, self.rendering, projected)],
+        }
     }
 }
 
 impl HeatHaze {
-    /// `None` where nothing is deflected.
+    /// The deflection in the window of a view; `None` if there is none.
     ///
-    /// `splatted` holds the paths of the visible gas inside the window; only the remaining gas is splatted here, or `whole_gas`
-    /// where no gas is visible in the whole picture.
+    /// `splatted` contains the optical paths of the visible gas, if any is inside the window. The remaining gas is splatted here; with `whole_gas`, for
+    /// when no gas has been splatted at all, all of it.
     pub(crate) fn new(
         gas: &Gas,
-        look: &RenderingParameters,
+        rendering: &RenderingParameters,
         view: &View,
         splatted: Option<&Grid<'_>>,
         whole_gas: bool,
     ) -> Option<Self> {
-        if look.heat_haze_gain <= 0.0 {
+        if rendering.heat_haze_gain <= 0.0 {
             return None;
         }
         let settings = SplatSettings {
@@ -100,10 +108,13 @@ impl HeatHaze {
             picture: view.size,
             window: view.window,
         };
-        let rest =
-            splat(&settings, &project_particles(gas, view, &RefractionSprites { gas, look, whole_gas }), gas.scratch)
-                .sums();
-        let paths: Vec<OpticalPathField> = [(splatted, PATH, PLANES), (rest.as_ref(), 0, 1)]
+        let remaining = splat(
+            &settings,
+            &project_particles(gas, view, &RefractionSprites { gas, rendering, whole_gas }),
+            gas.buffers,
+        )
+        .sums();
+        let paths: Vec<OpticalPathField> = [(splatted, PATH, PLANES), (remaining.as_ref(), 0, 1)]
             .into_iter()
             .filter_map(|(grid, plane, planes)| Some(OpticalPathField::new(grid?, plane, planes)))
             .collect();
@@ -113,10 +124,10 @@ impl HeatHaze {
     /// The gradient of the summed paths at every pixel, to the right and upward.
     fn from_paths(paths: &[OpticalPathField], window: Rect) -> Option<Self> {
         let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
-        let rect = covered.reduce(|whole_gas, covered| whole_gas.union(&covered))?;
+        let rect = covered.reduce(|union, covered| union.union(&covered))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         let level = Level::new();
-        // A grid holds nothing beyond its own cells.
+        // Outside its cells a grid contributes nothing.
         let fields = paths.iter().map(|paths| {
             let covered = paths.sums.covered().intersection(&rect);
             (paths, covered, paths.sums.columns(covered.x, covered.width))
@@ -135,7 +146,7 @@ impl HeatHaze {
     }
 
     /// Writes the angles to the AOVs of a strip.
-    pub(crate) fn measure(&self, strip: &mut Strip) {
+    pub(crate) fn write_aovs(&self, strip: &mut Strip) {
         let rect = self.rect.intersection(&strip.rect);
         for y in rect.y..rect.bottom() {
             for x in rect.x..rect.right() {
@@ -149,7 +160,7 @@ impl HeatHaze {
     }
 }
 
-/// Summed optical paths with spline weights for values and slopes.
+/// Summed optical paths, with spline weights for values and slopes.
 struct OpticalPathField<'a> {
     sums: Grid<'a>,
     weights: Vec<[f32; 4]>,
@@ -159,9 +170,9 @@ struct OpticalPathField<'a> {
 impl<'a> OpticalPathField<'a> {
     fn new(grid: &Grid<'a>, plane: usize, planes: usize) -> Self {
         Self {
-            sums: grid.one_plane(plane, planes),
-            weights: spline::weights(&grid.cells),
-            slopes: spline::slopes(&grid.cells),
+            sums: grid.sum_of_plane(plane, planes),
+            weights: grid.cells.spline_weights(),
+            slopes: grid.cells.spline_slopes(),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Depth layers of the gas, and statistics over all particles from which they follow.
+//! Depth layers of the gas, and the statistics over all particles from which they are derived.
 //!
 //! Gas in different layers has its own detail, and other phenomena can be composited between layers.
 
@@ -13,10 +13,13 @@ use rayon::prelude::*;
 
 use crate::particles::{
     parameters::{RenderingParameters, SpriteStyle},
-    render::{gas::Gas, prepared::PARTICLES_PER_TASK, resolve::detail::DetailScale},
+    render::{
+        gas::{Gas, PARTICLES_PER_TASK},
+        resolve::detail::DetailScale,
+    },
 };
 
-/// Layers of equal thickness, at multiples of it, so that they stay in place while the gas moves.
+/// Layers of equal thickness, at multiples of it, so that they do not move with the gas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DepthLayers {
     /// Depth of the near side of the first layer, m.
@@ -26,7 +29,7 @@ pub(crate) struct DepthLayers {
     pub(crate) count: usize,
 }
 
-/// Greatest number of layers of a flame.
+/// Maximum number of layers of a flame.
 pub(crate) const MAX_LAYERS: usize = 4;
 
 /// Moments of the gas's distribution in depth: weight, weight times depth, and weight times depth squared.
@@ -53,9 +56,9 @@ impl DepthMoments {
 }
 
 impl DepthLayers {
-    /// Layers that hold the bulk of the gas; gas farther out belongs to the outermost.
+    /// Layers that cover two standard deviations of the gas on both sides of the mean; gas beyond belongs to the outermost layers.
     ///
-    /// `min_thickness` is their least thickness, m.
+    /// Their thickness is at least `min_thickness`, m.
     pub(crate) fn new(&DepthMoments { total, first, second }: &DepthMoments, min_thickness: f64) -> Self {
         let mean = if total > 0.0 { first / total } else { 0.0 };
         let deviation = if total > 0.0 { (second / total - mean * mean).max(0.0).sqrt() } else { 0.0 };
@@ -68,12 +71,12 @@ impl DepthLayers {
         Self { near: (near / thickness).floor() * thickness, thickness, count: count(thickness) as usize }
     }
 
-    /// The layer before a depth, and the weight of the next layer there (linear interpolation between layer centers).
+    /// The layer in front of a depth, and the weight of the next layer there (linear interpolation between layer centers).
     #[inline(always)]
     pub(crate) fn layer_at(&self, depth: f64) -> (usize, f32) {
-        let layer_at = ((depth - self.near) / self.thickness - 0.5).clamp(0.0, (self.count - 1) as f64);
-        let layer = (layer_at as usize).min(self.count.saturating_sub(2));
-        (layer, (layer_at - layer as f64) as f32)
+        let position = ((depth - self.near) / self.thickness - 0.5).clamp(0.0, (self.count - 1) as f64);
+        let layer = (position as usize).min(self.count.saturating_sub(2));
+        (layer, (position - layer as f64) as f32)
     }
 
     /// Depth of a layer's center, m.
@@ -91,30 +94,43 @@ impl DepthLayers {
 
 /// Whether a particle contributes to the picture's light or opacity.
 #[inline(always)]
-pub(crate) fn is_visible(gas: &Gas, look: &RenderingParameters, index: usize) -> bool {
-    match look.sprite {
-        SpriteStyle::LineIntegral => gas.absorption(index, look) > 0.0 || gas.is_blue(index, look),
+pub(crate) fn is_visible(gas: &Gas, rendering: &RenderingParameters, index: usize) -> bool {
+    match rendering.sprite {
+        SpriteStyle::LineIntegral => gas.absorption(index, rendering) > 0.0 || gas.is_blue(index, rendering),
         SpriteStyle::Poly6 | SpriteStyle::Squares => true,
     }
 }
 
-/// Sums over the visible gas, as seen by a view.
+/// Sums over the gas, as seen by a view.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GasStatistics {
-    spread: DepthMoments,
+    /// Depth of the visible gas, weighted by volume.
+    depth: DepthMoments,
     /// Sum of all support radii, m.
     radius_sum: f64,
-    /// Sums of luminous intensity, and of it times support radius, absorption coefficient and pixels per meter.
-    light: [f64; 4],
+    luminous: LuminousSums,
+}
+
+/// Sums over the gas that emits light, weighted by luminous intensity.
+#[derive(Clone, Copy, Debug, Default)]
+struct LuminousSums {
+    /// Sum of luminous intensity.
+    intensity: f64,
+    /// Of the support radius, m.
+    radius: f64,
+    /// Of the absorption coefficient, 1/m.
+    absorption: f64,
+    /// Of the pixels per meter.
+    pixels_per_meter: f64,
 }
 
 impl GasStatistics {
-    pub(crate) fn new(gas: &Gas, look: &RenderingParameters, view: &View) -> Self {
+    pub(crate) fn new(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Self {
         let (count, level) = (gas.particles.len(), Level::new());
         let of_task = |task: usize| {
             let mut statistics = Self::default();
             let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
-            dispatch!(level, _simd => statistics.add_all(gas, look, view, range.clone()));
+            dispatch!(level, _simd => statistics.add_all(gas, rendering, view, range.clone()));
             statistics
         };
         // Tasks are summed in order, so that the result does not depend on the number of threads.
@@ -123,17 +139,17 @@ impl GasStatistics {
     }
 
     #[inline(always)]
-    fn add_all(&mut self, gas: &Gas, look: &RenderingParameters, view: &View, range: Range<usize>) {
+    fn add_all(&mut self, gas: &Gas, rendering: &RenderingParameters, view: &View, range: Range<usize>) {
         for index in range {
-            self.add(gas, look, view, index);
+            self.add(gas, rendering, view, index);
         }
     }
 
     #[inline(always)]
-    fn add(&mut self, gas: &Gas, look: &RenderingParameters, view: &View, index: usize) {
+    fn add(&mut self, gas: &Gas, rendering: &RenderingParameters, view: &View, index: usize) {
         let radius = f64::from(gas.particles.support_radius[index]);
         self.radius_sum += radius;
-        if !is_visible(gas, look, index) {
+        if !is_visible(gas, rendering, index) {
             return;
         }
         let depth = view.camera.depth(gas.position(index, view.shutter.middle()));
@@ -141,40 +157,41 @@ impl GasStatistics {
             return;
         }
         let volume = gas.volume(index);
-        self.spread.add(depth, volume);
-        let absorption = gas.absorption(index, look);
-        if absorption > 0.0 && look.sprite == SpriteStyle::LineIntegral {
-            let light = absorption * volume * gas.luminance(index);
-            let scale = view.camera.focal_pixels / depth;
-            for (sum, value) in self.light.iter_mut().zip([1.0, radius, absorption, scale]) {
-                *sum += light * value;
-            }
+        self.depth.add(depth, volume);
+        let absorption = gas.absorption(index, rendering);
+        if absorption > 0.0 && rendering.sprite == SpriteStyle::LineIntegral {
+            let intensity = absorption * volume * gas.luminance(index);
+            self.luminous.intensity += intensity;
+            self.luminous.radius += intensity * radius;
+            self.luminous.absorption += intensity * absorption;
+            self.luminous.pixels_per_meter += intensity * (view.camera.focal_pixels / depth);
         }
     }
 
     fn merge(mut self, other: &Self) -> Self {
-        self.spread.merge(&other.spread);
+        self.depth.merge(&other.depth);
         self.radius_sum += other.radius_sum;
-        for (sum, other) in self.light.iter_mut().zip(other.light) {
-            *sum += other;
-        }
+        self.luminous.intensity += other.luminous.intensity;
+        self.luminous.radius += other.luminous.radius;
+        self.luminous.absorption += other.luminous.absorption;
+        self.luminous.pixels_per_meter += other.luminous.pixels_per_meter;
         self
     }
 
     /// The depth layers.
     pub(crate) fn layers(&self, gas: &Gas) -> DepthLayers {
-        /// Thickness of a layer in mean support radii: independent of the view, so that layers stay in place.
+        /// Thickness of a layer in mean support radii: independent of the view, so that layers do not move with the camera.
         const THICKNESS: f64 = 1.6;
-        DepthLayers::new(&self.spread, THICKNESS * self.radius_sum / gas.particles.len().max(1) as f64)
+        DepthLayers::new(&self.depth, THICKNESS * self.radius_sum / gas.particles.len().max(1) as f64)
     }
 
-    /// Luminance-weighted means that set the scale of detail; `None` where nothing glows.
-    pub(crate) fn scale(&self, gas: &Gas, view: &View) -> Option<DetailScale> {
-        let [total, radius, absorption, pixels] = self.light;
-        (total > 0.0).then(|| DetailScale {
-            radius: radius / total,
-            absorption: absorption / total,
-            pixels_per_meter: pixels / total,
+    /// Means, weighted by luminous intensity, that determine the scale of detail; `None` if no gas emits light.
+    pub(crate) fn detail_scale(&self, gas: &Gas, view: &View) -> Option<DetailScale> {
+        let LuminousSums { intensity, radius, absorption, pixels_per_meter } = self.luminous;
+        (intensity > 0.0).then(|| DetailScale {
+            radius: radius / intensity,
+            absorption: absorption / intensity,
+            pixels_per_meter: pixels_per_meter / intensity,
             time: view.shutter.middle(),
             exposure_s: view.shutter.duration(),
             camera_motion: camera_motion(gas.particles.origin, view),

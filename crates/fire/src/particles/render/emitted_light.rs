@@ -10,7 +10,7 @@ use bansho_base::{
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::{gas::Gas, prepared::PARTICLES_PER_TASK};
+use super::gas::{Gas, PARTICLES_PER_TASK};
 use crate::particles::parameters::RenderingParameters;
 
 /// Slabs of height over which emission is accumulated.
@@ -23,13 +23,15 @@ struct Slab {
     intensity: [f64; 3],
     /// Intensity times position.
     position_moment: DVec3,
+    /// Sum of intensity times the square of the distance from the vertical axis through the origin.
     radial_moment: f64,
     /// Sum of absorption coefficient times volume, m^2: optical depth times area.
     absorption_area: f64,
 }
 
 impl Slab {
-    fn point_lights_of_gas(&self) -> f64 {
+    /// Sum of the components of the intensity.
+    fn power(&self) -> f64 {
         self.intensity.iter().sum::<f64>().max(0.0)
     }
 
@@ -45,36 +47,36 @@ impl Slab {
     }
 }
 
-/// Point lights that represent the gas at `t`: `rendering.light.count` segments of equal power along its height, each at its center of
-/// intensity, so that they move as smoothly as the gas.
+/// Point lights that represent the gas at `t`: `rendering.light.count` segments of equal power along its height, each at its center of intensity, which
+/// moves as smoothly as the gas.
 ///
 /// Soot of volume V with absorption coefficient k and temperature T emits `V k B(T)` in every direction. Self-absorption of a
 /// segment is that of a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
-pub fn point_lights_of_gas(gas: &Gas, look: &RenderingParameters, t: f64) -> Vec<Light> {
-    let count = look.light.count.max(1) as usize;
-    if look.light.scale <= 0.0 || gas.particles.is_empty() {
+pub fn point_lights_of_gas(gas: &Gas, rendering: &RenderingParameters, t: f64) -> Vec<Light> {
+    let count = rendering.light.count.max(1) as usize;
+    if rendering.light.scale <= 0.0 || gas.particles.is_empty() {
         return Vec::new();
     }
-    let slabs = slabs(gas, look, t);
-    let total: f64 = slabs.iter().map(Slab::point_lights_of_gas).sum();
+    let slabs = slabs(gas, rendering, t);
+    let total: f64 = slabs.iter().map(Slab::power).sum();
     if total.is_nan() || total <= 0.0 {
         return Vec::new();
     }
     (0..count)
-        .filter_map(|fraction| {
-            range_light(&slabs, [fraction, fraction + 1].map(|edge| total * edge as f64 / count as f64), look)
+        .filter_map(|index| {
+            segment_light(&slabs, [index, index + 1].map(|edge| total * edge as f64 / count as f64), rendering)
         })
         .collect()
 }
 
-/// Emission by height; a particle is distributed to the two nearest slabs.
-fn slabs(gas: &Gas, look: &RenderingParameters, t: f64) -> Vec<Slab> {
+/// Emission by height. Each particle is distributed to the two nearest slabs.
+fn slabs(gas: &Gas, rendering: &RenderingParameters, t: f64) -> Vec<Slab> {
     let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = Level::new();
     let task_slabs = |range: Range<usize>| {
         let mut slabs = vec![Slab::default(); SLABS + 1];
-        dispatch!(level, _simd => add_to_slabs(gas, look, t, range.clone(), [low, step], &mut slabs));
+        dispatch!(level, _simd => add_to_slabs(gas, rendering, t, range.clone(), [low, step], &mut slabs));
         slabs
     };
     // Tasks are summed in order, so that the result does not depend on the number of threads.
@@ -91,22 +93,22 @@ fn tasks(gas: &Gas) -> Vec<Range<usize>> {
     (0..count).step_by(PARTICLES_PER_TASK).map(|first| first..(first + PARTICLES_PER_TASK).min(count)).collect()
 }
 
-/// Least and greatest height of particles, m.
+/// Minimum and maximum height of the particles, m.
 fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
-    let task_slabs = |range: Range<usize>| {
+    let task_range = |range: Range<usize>| {
         range
             .map(|index| gas.position(index, t).y)
             .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
     };
     let min_max = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    tasks(gas).into_par_iter().map(task_slabs).reduce(|| (f64::MAX, f64::MIN), min_max)
+    tasks(gas).into_par_iter().map(task_range).reduce(|| (f64::MAX, f64::MIN), min_max)
 }
 
 /// Adds particles to slabs that are `step` apart, from the height `low` on.
 #[inline(always)]
 fn add_to_slabs(
     gas: &Gas,
-    look: &RenderingParameters,
+    rendering: &RenderingParameters,
     t: f64,
     range: Range<usize>,
     [low, step]: [f64; 2],
@@ -114,7 +116,7 @@ fn add_to_slabs(
 ) {
     let table = color::black_body();
     for index in range {
-        let absorption_area = gas.absorption(index, look) * gas.volume(index);
+        let absorption_area = gas.absorption(index, rendering) * gas.volume(index);
         if absorption_area <= 0.0 {
             continue;
         }
@@ -131,19 +133,19 @@ fn add_to_slabs(
     }
 }
 
-/// The light of the part of the flame between two values of cumulative power.
-fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &RenderingParameters) -> Option<Light> {
+/// The light of the segment of the flame between two values of cumulative power.
+fn segment_light(slabs: &[Slab], [from, to]: [f64; 2], rendering: &RenderingParameters) -> Option<Light> {
     let mut sum = Slab::default();
     let mut cumulative = 0.0;
     for slab in slabs {
-        let next_cumulative = cumulative + slab.point_lights_of_gas();
-        let taken = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
-        if taken > 0.0 {
-            sum.add(slab, taken / slab.point_lights_of_gas());
+        let next_cumulative = cumulative + slab.power();
+        let overlap = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
+        if overlap > 0.0 {
+            sum.add(slab, overlap / slab.power());
         }
         cumulative = next_cumulative;
     }
-    let power = sum.point_lights_of_gas();
+    let power = sum.power();
     if power <= 0.0 {
         return None;
     }
@@ -153,7 +155,7 @@ fn range_light(slabs: &[Slab], [from, to]: [f64; 2], look: &RenderingParameters)
     // Seen from the side, a segment covers about a disc of twice its standard deviation.
     let tau = sum.absorption_area / (4.0 * std::f64::consts::PI * radius * radius);
     let escape_fraction = if tau > 1e-6 { -bansho_base::math::exp_m1(-tau) / tau } else { 1.0 };
-    let scale = look.light.scale * escape_fraction;
+    let scale = rendering.light.scale * escape_fraction;
     Some(Light {
         emitter: Emitter::Point { position, radius },
         intensity: sum.intensity.map(|value| (value * scale) as f32),

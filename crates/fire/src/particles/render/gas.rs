@@ -5,9 +5,12 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, parameters::RenderingParameters, render::splat::scratch_pool::ScratchPool};
+use crate::particles::{Particles, parameters::RenderingParameters, render::buffer_pool::BufferPool};
 
-/// The gas of one flame at one time, with what rendering needs of its surroundings.
+/// Particles per task of the thread pool.
+pub(crate) const PARTICLES_PER_TASK: usize = 2048;
+
+/// The gas of one flame at one time, with all other inputs of its rendering.
 #[derive(Clone, Copy, Debug)]
 pub struct Gas<'a> {
     /// The particles.
@@ -27,10 +30,10 @@ pub struct Gas<'a> {
     /// How particles fade out before they are removed.
     pub fade_out: FadeOut,
     /// Scratch memory that is kept from frame to frame.
-    pub scratch: &'a ScratchPool,
+    pub buffers: &'a BufferPool,
 }
 
-/// Fading of particles before they are removed, so that none vanishes abruptly.
+/// Fade-out of particles before they are removed, so that none vanishes abruptly.
 #[derive(Clone, Copy, Debug)]
 pub struct FadeOut {
     /// Duration of the fade, s.
@@ -43,7 +46,7 @@ impl FadeOut {
     /// No fading.
     pub const NEVER: Self = Self { seconds: f32::MIN_POSITIVE, domain: [Vec3::MIN, Vec3::MAX] };
 
-    /// Remaining fraction of a particle at `position` that moves at `velocity` and has `seconds` to live.
+    /// Fraction of a particle that is drawn: it is at `position`, moves at `velocity` and is removed in `seconds`.
     #[inline(always)]
     pub(crate) fn remaining_fraction(&self, position: Vec3, velocity: Vec3, seconds: f32) -> f32 {
         let [low, high] = self.domain;
@@ -61,8 +64,8 @@ impl FadeOut {
 /// Absorption coefficient of soot per volume fraction, 1/m: `4.9 / lambda` (Dalzell and Sarofim 1969) for green light.
 const VISIBLE_SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 
-/// Luminance per meter of freshly burning gas in the light of CH and C2, cd/m^2. The real reaction zone is a film of a millimeter
-/// with some tens of cd/m^2; particles spread it over centimeters.
+/// Luminance per meter of freshly burning gas in the light of CH and C2, cd/m^2. The real reaction zone is about 1 mm thick and has some tens of cd/m^2;
+/// particles distribute it over centimeters.
 const BLUE_LUMINANCE: f64 = 300.0;
 
 /// Fraction of burned fuel at which the blue light is strongest.
@@ -70,8 +73,8 @@ const BLUE_PEAK_BURNED: f64 = 0.06;
 
 /// Absorption coefficient of soot for a volume fraction, 1/m.
 #[inline(always)]
-pub fn soot_absorption(volume_fraction: f64, look: &RenderingParameters) -> f64 {
-    volume_fraction * VISIBLE_SOOT_ABSORPTION * look.soot_gain
+pub fn soot_absorption(volume_fraction: f64, rendering: &RenderingParameters) -> f64 {
+    volume_fraction * VISIBLE_SOOT_ABSORPTION * rendering.soot_gain
 }
 
 impl Gas<'_> {
@@ -85,7 +88,7 @@ impl Gas<'_> {
         self.particles.origin + DVec3::new(coordinate(0), coordinate(1), coordinate(2))
     }
 
-    /// Volume m / rho that a particle represents, m^3, times its fade-out.
+    /// Volume m / rho that a particle represents, m^3, times the factor of its fade-out.
     #[inline(always)]
     pub(crate) fn volume(&self, index: usize) -> f64 {
         let Particles { position, velocity, density, mass, max_age, age, .. } = self.particles;
@@ -97,8 +100,8 @@ impl Gas<'_> {
 
     /// Absorption coefficient of a particle's soot, 1/m.
     #[inline(always)]
-    pub(crate) fn absorption(&self, index: usize, look: &RenderingParameters) -> f64 {
-        soot_absorption(f64::from(self.particles.soot[index]), look)
+    pub(crate) fn absorption(&self, index: usize, rendering: &RenderingParameters) -> f64 {
+        soot_absorption(f64::from(self.particles.soot[index]), rendering)
     }
 
     /// Luminance of a black body at a particle's temperature, cd/m^2.
@@ -107,27 +110,27 @@ impl Gas<'_> {
         f64::from(color::luminance(color::black_body().radiance(self.particles.temperature[index])))
     }
 
-    /// Whether a particle emits blue light: it has begun to burn and is not burnt out.
+    /// Whether a particle emits blue light: it has started to burn and is not burnt out.
     #[inline(always)]
-    pub(crate) fn is_blue(&self, index: usize, look: &RenderingParameters) -> bool {
-        /// Fuel fraction at which less than 1e-4 of the greatest blue light is left.
+    pub(crate) fn is_blue(&self, index: usize, rendering: &RenderingParameters) -> bool {
+        /// Fuel fraction below which the blue light is less than 1e-4 of its maximum.
         const BURNT_OUT: f32 = 1.0 - 14.0 * BLUE_PEAK_BURNED as f32;
         let fuel = self.particles.fuel[index];
-        look.base_blue > 0.0 && fuel < 1.0 && fuel > BURNT_OUT
+        rendering.base_blue > 0.0 && fuel < 1.0 && fuel > BURNT_OUT
     }
 
     /// Luminance per meter of a particle's gas in the blue light of CH and C2, cd/m^2.
     ///
-    /// CH and C2 exist where fuel has just begun to burn, and nowhere that soot has formed.
+    /// CH and C2 exist where fuel has just started to burn; where soot has formed there are none.
     #[inline(always)]
-    pub(crate) fn blue_luminance(&self, index: usize, look: &RenderingParameters) -> f64 {
-        if !self.is_blue(index, look) {
+    pub(crate) fn blue_luminance(&self, index: usize, rendering: &RenderingParameters) -> f64 {
+        if !self.is_blue(index, rendering) {
             return 0.0;
         }
         /// Volume fraction of soot that quenches the blue light to one half.
         const QUENCHING_SOOT: f64 = 1e-7;
-        let burnt = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BLUE_PEAK_BURNED;
-        let sooty = f64::from(self.particles.soot[index]).max(0.0) / QUENCHING_SOOT;
-        BLUE_LUMINANCE * look.base_blue * burnt * math::exp(1.0 - burnt) / (1.0 + sooty * sooty)
+        let burned = (1.0 - f64::from(self.particles.fuel[index])).clamp(0.0, 1.0) / BLUE_PEAK_BURNED;
+        let relative_soot = f64::from(self.particles.soot[index]).max(0.0) / QUENCHING_SOOT;
+        BLUE_LUMINANCE * rendering.base_blue * burned * math::exp(1.0 - burned) / (1.0 + relative_soot * relative_soot)
     }
 }

@@ -4,29 +4,29 @@
 //! 2. `depth_layers`: statistics over all particles, and depth layers of constant thickness.
 //! 3. `project`: the elliptical sprite of each particle, for every lens.
 //! 4. `splat`: line integrals of the kernel (`kernel`), rasterized (`rasterize`) and summed on grids (`grid`) as coarse as the sprites are
-//!    smooth, with memory from a pool (`scratch_pool`).
-//! 5. `resolve`: spline interpolation (`spline`, `upsample`), detail below the size of particles (`detail`, `strain`), and light per pixel.
-//! 6. `deflection`: heat haze. `emitted_light`: point lights for other objects. `aovs`: AOVs.
+//!    smooth, which cubic B-splines interpolate (`spline`). Memory comes from `buffer_pool`.
+//! 5. `resolve`: interpolation along rows (`upsample`), detail below the size of particles (`detail`, `strain`), and light per pixel.
+//! 6. `deflection`: heat haze. `emitted_light`: point lights for other objects. `aovs`: AOVs. `paper_squares`: the paper's figure 7.
 //! 7. `prepared`: one frame, drawn into strips.
 
 mod aovs;
+pub(crate) mod buffer_pool;
 mod deflection;
 mod depth_layers;
 mod emitted_light;
 pub(crate) mod gas;
+mod paper_squares;
 mod prepared;
 pub(crate) mod project;
 pub(crate) mod resolve;
 pub(crate) mod splat;
 
 pub use aovs::AOVS;
+pub use buffer_pool::BufferPool;
 pub use emitted_light::point_lights_of_gas;
 pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
-pub use splat::{
-    kernel::{line_gradient, line_integral},
-    scratch_pool::ScratchPool,
-};
+pub use splat::kernel::{line_gradient, line_integral};
 
 pub use crate::particles::parameters::{GasLightParameters, RenderingParameters, SpriteStyle};
 

@@ -26,14 +26,14 @@ use super::{
 use crate::{
     chemiluminescence_color,
     particles::{
-        paper_squares::Squares,
         parameters::{RenderingParameters, SpriteStyle},
         render::{
             depth_layers::{GasStatistics, is_visible},
-            project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+            paper_squares::Squares,
+            project::{ProjectedParticle, SpriteKind, project_particles},
             resolve::{
                 BLUE, ColumnExtents, DETAIL_OFFSET, DepthLayer, GasResolver, LUMINANCE, LUMINANCE_KELVIN, PATH, PLANES,
-                TAU, detail::Detail, spline, strain::Strain, upsample::RowInterpolator,
+                TAU, detail::Detail, strain::Strain, upsample::RowInterpolator,
             },
             splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, grid::Grid, kernel::Profile, splat},
         },
@@ -44,20 +44,17 @@ use crate::{
 /// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {
     gas: Gas<'a>,
-    look: &'a RenderingParameters,
+    rendering: &'a RenderingParameters,
     view: &'a View,
     level: Level,
     layers: DepthLayers,
     mode: DrawMode<'a>,
     sparks: Vec<Streak>,
-    /// Computed where it is requested as an AOV or bends the light from behind.
+    /// Computed on demand: for its AOV, or to refract light from behind.
     haze: OnceLock<Option<HeatHaze>>,
 }
 
-/// Particles per task of the thread pool.
-pub(crate) const PARTICLES_PER_TASK: usize = 2048;
-
-/// How the particles are drawn.
+/// How the particles are drawn in this view.
 enum DrawMode<'a> {
     /// The view sees no particles.
     Empty,
@@ -73,18 +70,18 @@ struct SplattedGas<'a> {
     grid: Grid<'a>,
     extents: ColumnExtents,
     weights: Vec<[f32; 4]>,
-    across: RowInterpolator,
+    row_interpolator: RowInterpolator,
     detail: Option<(Detail, Strain)>,
     scattered: Vec<[f32; 3]>,
-    /// Where AOVs are requested, and anything glows.
+    /// If AOVs are requested and any gas emits light.
     motion: Option<MotionField<'a>>,
     temperatures: [f32; 2],
 }
 
 /// Sparks of the fire.
-fn spark_emitter<'a>(gas: &Gas, look: &'a RenderingParameters, view: &View) -> SparkEmitter<'a> {
+fn spark_emitter<'a>(gas: &Gas, rendering: &'a RenderingParameters, view: &View) -> SparkEmitter<'a> {
     SparkEmitter {
-        parameters: &look.sparks,
+        parameters: &rendering.sparks,
         key: gas.key,
         now: view.shutter.middle(),
         loop_s: None,
@@ -96,16 +93,16 @@ fn spark_emitter<'a>(gas: &Gas, look: &'a RenderingParameters, view: &View) -> S
 }
 
 /// Depth intervals of the gas and its sparks.
-pub fn depth_intervals(gas: &Gas, look: &RenderingParameters, view: &View) -> Vec<DepthInterval> {
-    if gas.particles.is_empty() && look.sparks.rate <= 0.0 {
+pub fn depth_intervals(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Vec<DepthInterval> {
+    if gas.particles.is_empty() && rendering.sparks.rate <= 0.0 {
         return Vec::new();
     }
-    let layers = GasStatistics::new(gas, look, view).layers(gas);
+    let layers = GasStatistics::new(gas, rendering, view).layers(gas);
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
-    if look.sparks.rate > 0.0 {
+    if rendering.sparks.rate > 0.0 {
         let middle = layers.center(layers.count / 2);
-        let reach = look.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
-        intervals.push(DepthInterval { near: (middle - reach).max(0.0), far: middle + reach });
+        let half_depth = rendering.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
+        intervals.push(DepthInterval { near: (middle - half_depth).max(0.0), far: middle + half_depth });
     }
     intervals
 }
@@ -117,22 +114,22 @@ impl<'a> PreparedGas<'a> {
     /// The observer asked to stop.
     pub fn new(
         gas: Gas<'a>,
-        look: &'a RenderingParameters,
+        rendering: &'a RenderingParameters,
         view: &'a View,
         surroundings: &Surroundings,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         check(observer)?;
-        let statistics = GasStatistics::new(&gas, look, view);
+        let statistics = GasStatistics::new(&gas, rendering, view);
         let layers = statistics.layers(&gas);
-        let mode = match look.sprite {
-            SpriteStyle::Squares => DrawMode::Squares(Squares::new(&gas, look, view)),
-            _ => splat_gas(&gas, look, view, &statistics, surroundings),
+        let mode = match rendering.sprite {
+            SpriteStyle::Squares => DrawMode::Squares(Squares::new(&gas, rendering, view)),
+            _ => splat_gas(&gas, rendering, view, &statistics, surroundings),
         };
         check(observer)?;
-        let mut sparks = spark_emitter(&gas, look, view).streaks(view, surroundings.wind);
+        let mut sparks = spark_emitter(&gas, rendering, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        let prepared = Self { gas, look, view, level: Level::new(), layers, mode, sparks, haze: OnceLock::new() };
+        let prepared = Self { gas, rendering, view, level: Level::new(), layers, mode, sparks, haze: OnceLock::new() };
         if view.aovs_requested {
             prepared.haze();
         }
@@ -146,18 +143,18 @@ impl<'a> PreparedGas<'a> {
         (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
     }
 
-    fn resolve<'b>(&'b self, splat_gas: &'b SplattedGas<'_>) -> GasResolver<'b> {
+    fn resolver<'b>(&'b self, splatted: &'b SplattedGas<'_>) -> GasResolver<'b> {
         GasResolver {
-            grid: &splat_gas.grid,
+            grid: &splatted.grid,
             camera: &self.view.camera,
             origin: self.gas.particles.origin,
-            detail: splat_gas.detail.as_ref().map(|(detail, strain)| (detail, strain)),
-            self_absorption: self.look.sprite == SpriteStyle::LineIntegral,
+            detail: splatted.detail.as_ref().map(|(detail, strain)| (detail, strain)),
+            self_absorption: self.rendering.sprite == SpriteStyle::LineIntegral,
             blue: chemiluminescence_color(),
-            scattered: &splat_gas.scattered,
-            weights: &splat_gas.weights,
-            across: &splat_gas.across,
-            temperatures: splat_gas.temperatures,
+            scattered: &splatted.scattered,
+            weights: &splatted.weights,
+            row_interpolator: &splatted.row_interpolator,
+            temperatures: splatted.temperatures,
         }
     }
 }
@@ -165,23 +162,23 @@ impl<'a> PreparedGas<'a> {
 /// Splats all sprites into their depth layers.
 fn splat_gas<'a>(
     gas: &Gas<'a>,
-    look: &RenderingParameters,
+    rendering: &RenderingParameters,
     view: &View,
     statistics: &GasStatistics,
     surroundings: &Surroundings,
 ) -> DrawMode<'a> {
     let layers = statistics.layers(gas);
-    let detail = statistics.scale(gas, view).and_then(|scale| Detail::new(gas, look, &scale));
+    let detail = statistics.detail_scale(gas, view).and_then(|scale| Detail::new(gas, rendering, &scale));
     let radiance = RadianceSprites {
         gas,
-        look,
+        rendering,
         layers: &layers,
-        opacity: mean_density(gas).map_or(0.0, |density| look.opacity / density),
+        opacity: mean_density(gas).map_or(0.0, |density| rendering.opacity / density),
         detail: detail.as_ref(),
         seconds_since_state: view.shutter.middle() - gas.time,
     };
     let sprites = project_particles(gas, view, &radiance);
-    let profile = if look.sprite == SpriteStyle::Poly6 { Profile::POLY6 } else { Profile::LINE };
+    let profile = if rendering.sprite == SpriteStyle::Poly6 { Profile::POLY6 } else { Profile::LINE };
     let grid = match splat(
         &SplatSettings {
             profile,
@@ -191,7 +188,7 @@ fn splat_gas<'a>(
             window: view.window,
         },
         &sprites,
-        gas.scratch,
+        gas.buffers,
     ) {
         SplatResult::Sums(grid) => grid,
         SplatResult::OutsideWindow => return DrawMode::OutsideWindow,
@@ -203,15 +200,15 @@ fn splat_gas<'a>(
         (detail, strain)
     };
     let detail = detail.map(with_strain);
-    let scattered = (0..layers.count).map(|layer| scattered(gas, look, view, layers.center(layer), surroundings));
+    let scattered = (0..layers.count).map(|layer| scattered(gas, rendering, view, layers.center(layer), surroundings));
     DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
-        weights: spline::weights(&grid.cells),
-        across: RowInterpolator::new(&grid, view.size[0], &spline::weights(&grid.cells)),
+        weights: grid.cells.spline_weights(),
+        row_interpolator: RowInterpolator::new(&grid, view.size[0], &grid.cells.spline_weights()),
         grid,
         detail,
         scattered: scattered.collect(),
-        motion: if view.aovs_requested { MotionField::new(gas, look, view) } else { None },
+        motion: if view.aovs_requested { MotionField::new(gas, rendering, view) } else { None },
         temperatures: min_max(gas.particles.temperature.iter().copied()),
     }))
 }
@@ -219,7 +216,7 @@ fn splat_gas<'a>(
 /// Visible particles as sprites of emission and absorption.
 struct RadianceSprites<'a> {
     gas: &'a Gas<'a>,
-    look: &'a RenderingParameters,
+    rendering: &'a RenderingParameters,
     layers: &'a DepthLayers,
     /// Opacity of a poly6 sprite per density.
     opacity: f64,
@@ -233,36 +230,36 @@ impl SpriteKind for RadianceSprites<'_> {
 
     #[inline(always)]
     fn includes(&self, index: usize) -> bool {
-        is_visible(self.gas, self.look, index)
+        is_visible(self.gas, self.rendering, index)
     }
 
     #[inline(always)]
-    fn record(&self, seen: &ProjectedParticle) -> Sprite<PLANES> {
-        let (layer, next_layer_weight) = self.layers.layer_at(seen.depth);
-        let mut values = match self.look.sprite {
-            SpriteStyle::Poly6 => self.density_values(seen.index),
-            _ => self.values(seen),
+    fn record(&self, projected: &ProjectedParticle) -> Sprite<PLANES> {
+        let (layer, next_layer_weight) = self.layers.layer_at(projected.depth);
+        let mut values = match self.rendering.sprite {
+            SpriteStyle::Poly6 => self.density_values(projected.index),
+            _ => self.values(projected),
         };
         if let Some(detail) = self.detail {
-            let offset = detail.detail_offset(self.gas, seen.index, self.seconds_since_state);
+            let offset = detail.detail_offset(self.gas, projected.index, self.seconds_since_state);
             for axis in 0..3 {
                 values[DETAIL_OFFSET + axis] = values[TAU] * offset[axis];
             }
         }
-        Sprite { ellipse: seen.ellipse, layer, next_layer_weight, values }
+        Sprite { ellipse: projected.ellipse, layer, next_layer_weight, values }
     }
 }
 
 impl RadianceSprites<'_> {
     /// Line integrals through the center of a particle's sprite.
     #[inline(always)]
-    fn values(&self, seen: &ProjectedParticle) -> [f32; PLANES] {
-        let (gas, index) = (self.gas, seen.index);
-        let length = gas.volume(index) * f64::from(seen.ellipse.peak);
-        let tau = length * gas.absorption(index, self.look);
+    fn values(&self, projected: &ProjectedParticle) -> [f32; PLANES] {
+        let (gas, index) = (self.gas, projected.index);
+        let length = gas.volume(index) * f64::from(projected.ellipse.peak);
+        let tau = length * gas.absorption(index, self.rendering);
         let mut values = self.emission_values(index, tau);
-        values[BLUE] = (length * gas.blue_luminance(index, self.look)) as f32;
-        values[PATH] = deflection::path(gas, self.look, seen);
+        values[BLUE] = (length * gas.blue_luminance(index, self.rendering)) as f32;
+        values[PATH] = deflection::optical_path(gas, self.rendering, projected);
         values
     }
 
@@ -272,14 +269,14 @@ impl RadianceSprites<'_> {
         self.emission_values(index, self.opacity * f64::from(self.gas.particles.density[index]))
     }
 
-    /// Optical depth, and the luminance that goes with it.
+    /// Optical depth, and the luminance of soot of that depth.
     #[inline(always)]
     fn emission_values(&self, index: usize, tau: f64) -> [f32; PLANES] {
-        let glow = tau * self.gas.luminance(index);
+        let luminance = tau * self.gas.luminance(index);
         let mut values = [0.0; PLANES];
         values[TAU] = tau as f32;
-        values[LUMINANCE] = glow as f32;
-        values[LUMINANCE_KELVIN] = (glow * f64::from(self.gas.particles.temperature[index])) as f32;
+        values[LUMINANCE] = luminance as f32;
+        values[LUMINANCE_KELVIN] = (luminance * f64::from(self.gas.particles.temperature[index])) as f32;
         values
     }
 }
@@ -291,10 +288,16 @@ fn mean_density(gas: &Gas) -> Option<f64> {
 }
 
 /// Radiance that opaque soot at a depth scatters toward the camera: isotropic single scattering of other lights.
-fn scattered(gas: &Gas, look: &RenderingParameters, view: &View, depth: f64, surroundings: &Surroundings) -> [f32; 3] {
+fn scattered(
+    gas: &Gas,
+    rendering: &RenderingParameters,
+    view: &View,
+    depth: f64,
+    surroundings: &Surroundings,
+) -> [f32; 3] {
     let toward = (gas.particles.origin - view.camera.position).normalize_or(DVec3::NEG_Z);
     let position = view.camera.position + toward * depth;
-    let scale = (look.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
+    let scale = (rendering.smoke_albedo / (4.0 * std::f64::consts::PI)) as f32;
     let mut sum = [0.0; 3];
     for light in &surroundings.others.lights {
         let (illuminance, _) = light.illuminance(position);
@@ -306,22 +309,22 @@ fn scattered(gas: &Gas, look: &RenderingParameters, view: &View, depth: f64, sur
 impl Prepared for PreparedGas<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let gas = match &self.mode {
-            DrawMode::SplattedGas(splat_gas) if self.layers_in(slice).next().is_some() => splat_gas.grid.covered(),
+            DrawMode::SplattedGas(splatted) if self.layers_in(slice).next().is_some() => splatted.grid.covered(),
             DrawMode::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
-        // Gas that refracts extends farther than gas that emits.
-        let all = self.measured_haze(slice).map_or(gas, |haze| gas.union(&haze.rect));
+        // The gas that refracts extends beyond the gas that emits.
+        let all = self.haze_for_aovs(slice).map_or(gas, |haze| gas.union(&haze.rect));
         let sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth));
         sparks.fold(all, |all, spark| all.union(&spark.bounds(self.view.size)))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth)).peekable();
-        if let DrawMode::SplattedGas(splat_gas) = &self.mode {
-            let resolve = self.resolve(splat_gas);
-            let mut row = resolve.row();
-            let rect = splat_gas.grid.covered().intersection(&strip.rect);
+        if let DrawMode::SplattedGas(splatted) = &self.mode {
+            let resolver = self.resolver(splatted);
+            let mut row = resolver.row();
+            let rect = splatted.grid.covered().intersection(&strip.rect);
             for layer in self.layers_in(slice) {
                 while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
                     spark.draw(self.view.size, strip);
@@ -329,9 +332,16 @@ impl Prepared for PreparedGas<'_> {
                 if rect.is_empty() {
                     continue;
                 }
-                dispatch!(self.level, _simd => resolve.draw_layer(&layer, &splat_gas.extents, rect, &mut row, strip));
+                dispatch!(self.level, _simd => resolver.draw_layer(&layer, &splatted.extents, rect, &mut row, strip));
                 if !strip.aovs.is_empty() {
-                    resolve.measure_layer(&layer, &splat_gas.extents, splat_gas.motion.as_ref(), rect, &mut row, strip);
+                    resolver.write_layer_aovs(
+                        &layer,
+                        &splatted.extents,
+                        splatted.motion.as_ref(),
+                        rect,
+                        &mut row,
+                        strip,
+                    );
                 }
             }
         }
@@ -339,13 +349,13 @@ impl Prepared for PreparedGas<'_> {
             squares.draw(slice, strip);
         }
         if !strip.aovs.is_empty() {
-            self.measure_deflection(slice, strip);
+            self.write_deflection_aovs(slice, strip);
         }
         sparks.for_each(|spark| spark.draw(self.view.size, strip));
     }
 
-    fn may_bend(&self) -> bool {
-        self.look.heat_haze_gain > 0.0 && !self.gas.particles.is_empty()
+    fn may_refract(&self) -> bool {
+        self.rendering.heat_haze_gain > 0.0 && !self.gas.particles.is_empty()
     }
 
     fn deflection(&self) -> Option<Deflection<'_>> {
@@ -356,27 +366,27 @@ impl Prepared for PreparedGas<'_> {
 }
 
 impl PreparedGas<'_> {
-    /// The haze, computed by all threads. Where AOVs are requested it exists before strips are drawn.
+    /// The haze, computed by all threads of the pool. If AOVs are requested it is computed before strips are drawn.
     fn haze(&self) -> Option<&HeatHaze> {
-        let (summed, all) = match &self.mode {
-            DrawMode::SplattedGas(splat_gas) if self.look.sprite == SpriteStyle::LineIntegral => {
-                (Some(&splat_gas.grid), false)
+        let (splatted, whole_gas) = match &self.mode {
+            DrawMode::SplattedGas(gas) if self.rendering.sprite == SpriteStyle::LineIntegral => {
+                (Some(&gas.grid), false)
             }
-            DrawMode::OutsideWindow if self.look.sprite == SpriteStyle::LineIntegral => (None, false),
+            DrawMode::OutsideWindow if self.rendering.sprite == SpriteStyle::LineIntegral => (None, false),
             _ => (None, true),
         };
-        get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.look, self.view, summed, all)).as_ref()
+        get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.rendering, self.view, splatted, whole_gas)).as_ref()
     }
 
-    /// The haze, in the one slice in which its AOV is written.
-    fn measured_haze(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
-        let is_here = self.view.aovs_requested && slice.contains(self.layers.center(self.layers.count - 1));
-        self.haze.get().and_then(Option::as_ref).filter(|_| is_here)
+    /// The haze, if its AOVs are requested and are written in this slice, that of the last layer.
+    fn haze_for_aovs(&self, slice: &DepthInterval) -> Option<&HeatHaze> {
+        let is_written_here = self.view.aovs_requested && slice.contains(self.layers.center(self.layers.count - 1));
+        self.haze.get().and_then(Option::as_ref).filter(|_| is_written_here)
     }
 
-    fn measure_deflection(&self, slice: &DepthInterval, strip: &mut Strip) {
-        if let Some(haze) = self.measured_haze(slice) {
-            haze.measure(strip);
+    fn write_deflection_aovs(&self, slice: &DepthInterval, strip: &mut Strip) {
+        if let Some(haze) = self.haze_for_aovs(slice) {
+            haze.write_aovs(strip);
         }
     }
 }

@@ -17,7 +17,7 @@ use bansho_base::{
 };
 
 use crate::particles::{
-    fault::ParticleFaultKind,
+    error::ParticleErrorKind,
     parameters::{BurnerParameters, BurnerShape, FlameParticlesParameters},
 };
 
@@ -26,14 +26,14 @@ const AXIS_ACCELERATION: f64 = 23.0;
 /// Speed of gas where it leaves the burner, in `sqrt(g D)`.
 const BASE_FROUDE: f64 = 0.4;
 
-/// A burner of a flame, with its scales.
+/// A burner with the length and velocity scales that follow from its parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Burner {
     pub(crate) parameters: BurnerParameters,
     /// Rotation and scale; the position varies over time.
     placement: Transform,
-    area: BurnerSurface,
-    /// Diameter D across which gas burns, m; it sets puffing frequency and eddy size.
+    surface: BurnerSurface,
+    /// Diameter D of the burning gas, m, which determines puffing frequency and eddy size.
     pub(crate) diameter: f64,
     /// Area through which gas is emitted, m^2.
     pub(crate) area_m2: f64,
@@ -49,13 +49,14 @@ pub(crate) struct Burner {
     pub(crate) extent: [DVec3; 2],
 }
 
+/// Surface or volume over which particles are spawned, with its sampler.
 #[derive(Clone, Debug)]
 enum BurnerSurface {
-    Disc,
+    Disk,
     Ball,
     Strip,
-    Surface(SurfaceSampler),
-    Cuboid,
+    Box,
+    Mesh(SurfaceSampler),
 }
 
 /// Position and direction at which a particle is spawned.
@@ -63,7 +64,7 @@ enum BurnerSurface {
 pub(crate) struct SpawnPoint {
     pub(crate) position: DVec3,
     pub(crate) direction: DVec3,
-    /// Radial position on a disc or strip: 0 at the center, 1 at the rim; a mean value for other shapes.
+    /// Radial position on a disk or strip and in a ball: 0 at the center, 1 at the rim; a mean value for other shapes.
     pub(crate) radial_fraction: f64,
 }
 
@@ -72,14 +73,14 @@ impl Burner {
         parameters: &BurnerParameters,
         flame: &FlameParticlesParameters,
         assets: &dyn Assets,
-    ) -> Result<Self, ParticleFaultKind> {
+    ) -> Result<Self, ParticleErrorKind> {
         let scale = if parameters.shape == BurnerShape::Mesh { parameters.scale } else { 1.0 };
         let placement = Transform::new([0.0; 3], parameters.rotation_deg, scale);
-        let (area, size) = area(parameters, assets)?;
-        let equivalent = math::sqrt(4.0 * size.area_m2 / std::f64::consts::PI);
+        let (surface, size) = surface(parameters, assets)?;
+        let equivalent_diameter = math::sqrt(4.0 * size.area_m2 / std::f64::consts::PI);
         let height = match parameters.height {
             Auto::Set(height) => height,
-            Auto::Auto => heskestad(parameters.heat_release_kw, equivalent).max(0.5 * size.diameter),
+            Auto::Auto => heskestad(parameters.heat_release_kw, equivalent_diameter).max(0.5 * size.diameter),
         };
         let speed = match parameters.speed {
             Auto::Set(speed) => speed.max(1e-3),
@@ -88,7 +89,7 @@ impl Burner {
         Ok(Self {
             parameters: parameters.clone(),
             placement,
-            area,
+            surface,
             diameter: size.diameter,
             area_m2: size.area_m2,
             height,
@@ -96,7 +97,7 @@ impl Burner {
             acceleration: AXIS_ACCELERATION * flame.forces.buoyancy,
             bounding_radius: size.bounding_radius,
             extent: match &size.mesh {
-                Some(mesh) => extent(mesh, &placement),
+                Some(mesh) => mesh_extent(mesh, &placement),
                 None => primitive_extent(parameters, &placement),
             },
         })
@@ -131,10 +132,10 @@ impl Burner {
         let words = key.words(id, 0, Purpose::named("birthplace"));
         let (position, direction) = self.sample_local(words);
         let radius = 0.5 * self.parameters.diameter;
-        let radial_fraction = match self.area {
-            BurnerSurface::Disc | BurnerSurface::Ball => position.length() / radius,
+        let radial_fraction = match self.surface {
+            BurnerSurface::Disk | BurnerSurface::Ball => position.length() / radius,
             BurnerSurface::Strip => position.z.abs() / radius,
-            BurnerSurface::Cuboid | BurnerSurface::Surface(_) => std::f64::consts::FRAC_1_SQRT_2,
+            BurnerSurface::Box | BurnerSurface::Mesh(_) => std::f64::consts::FRAC_1_SQRT_2,
         };
         let placement = Transform { position: self.position(t), ..self.placement };
         SpawnPoint {
@@ -144,13 +145,13 @@ impl Burner {
         }
     }
 
-    /// Position and direction in the burner's own coordinates.
+    /// Position and direction of a spawn point in the burner's local coordinates.
     fn sample_local(&self, words: [u32; 4]) -> (DVec3, DVec3) {
         let [u, v, w, _] = words.map(|word| f64::from(uniform(word)));
         let radius = 0.5 * self.parameters.diameter;
         let (sine, cosine) = math::sin_cos(std::f64::consts::TAU * v);
-        match &self.area {
-            BurnerSurface::Disc => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
+        match &self.surface {
+            BurnerSurface::Disk => (DVec3::new(cosine, 0.0, sine) * (radius * math::sqrt(u)), DVec3::Y),
             BurnerSurface::Ball => {
                 let height = 2.0 * w - 1.0;
                 let across = math::sqrt((1.0 - height * height).max(0.0));
@@ -160,8 +161,11 @@ impl Burner {
                 let along = self.parameters.length * (u - 0.5);
                 (DVec3::new(along, 0.0, self.parameters.diameter * (w - 0.5)), DVec3::Y)
             }
-            BurnerSurface::Cuboid => box_surface_point(self.parameters.size, [u, v, w]),
-            BurnerSurface::Surface(sampler) => sampler.sample([uniform_f64(words[0], words[3]), v, w]),
+            BurnerSurface::Box => box_surface_point(self.parameters.size, [u, v, w]),
+            BurnerSurface::Mesh(sampler) => {
+                let sample = sampler.sample([uniform_f64(words[0], words[3]), v, w]);
+                (sample.position, sample.normal)
+            }
         }
     }
 }
@@ -172,7 +176,8 @@ pub fn heskestad(heat_release_kw: f64, diameter: f64) -> f64 {
     0.235 * math::pow(heat_release_kw, 0.4) - 1.02 * diameter
 }
 
-struct Size {
+/// Dimensions of a burner.
+struct BurnerSize {
     diameter: f64,
     area_m2: f64,
     bounding_radius: f64,
@@ -180,13 +185,13 @@ struct Size {
 }
 
 /// Corners of the bounding box of a rotated mesh.
-fn extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
+fn mesh_extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
     let corners = mesh.triangles().flatten().map(|corner| placement.point_in_world(corner));
-    let primitive_extent = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
-    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], primitive_extent)
+    let extend = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
+    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], extend)
 }
 
-/// The same for the analytic shapes.
+/// Corners of the bounding box of a rotated burner of an analytic shape.
 fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
@@ -206,20 +211,24 @@ fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DV
     [-half, half]
 }
 
-fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSurface, Size), ParticleFaultKind> {
+/// The surface of a burner and its size.
+fn surface(
+    parameters: &BurnerParameters,
+    assets: &dyn Assets,
+) -> Result<(BurnerSurface, BurnerSize), ParticleErrorKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
-    let disc_area = 0.25 * std::f64::consts::PI * diameter * diameter;
-    let size = |diameter, area_m2, bounding_radius| Size { diameter, area_m2, bounding_radius, mesh: None };
+    let disk_area = 0.25 * std::f64::consts::PI * diameter * diameter;
+    let size = |diameter, area_m2, bounding_radius| BurnerSize { diameter, area_m2, bounding_radius, mesh: None };
     Ok(match parameters.shape {
-        BurnerShape::Disk => (BurnerSurface::Disc, size(diameter, disc_area, 0.5 * diameter)),
-        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, disc_area, 0.5 * diameter)),
+        BurnerShape::Disk => (BurnerSurface::Disk, size(diameter, disk_area, 0.5 * diameter)),
+        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, disk_area, 0.5 * diameter)),
         BurnerShape::Line => (BurnerSurface::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
         BurnerShape::Box => {
             let surface = 2.0 * (x * y + y * z + z * x);
-            (BurnerSurface::Cuboid, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
+            (BurnerSurface::Box, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
         }
         BurnerShape::Mesh => {
-            let file = parameters.file.as_ref().ok_or(ParticleFaultKind::NoFile)?;
+            let file = parameters.file.as_ref().ok_or(ParticleErrorKind::NoFile)?;
             let mesh = assets.mesh(&file.0)?;
             let [min, max] = mesh.bounds();
             let sides = (max - min) * scale;
@@ -227,22 +236,22 @@ fn area(parameters: &BurnerParameters, assets: &dyn Assets) -> Result<(BurnerSur
             let area_m2 = sampler.area() * scale * scale;
             let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
             let bounding_radius = min.abs().max(max.abs()).length() * scale;
-            (BurnerSurface::Surface(sampler), Size { mesh: Some(mesh), ..size(across, area_m2, bounding_radius) })
+            (BurnerSurface::Mesh(sampler), BurnerSize { mesh: Some(mesh), ..size(across, area_m2, bounding_radius) })
         }
     })
 }
 
-/// Uniformly distributed point on the surface of a box, and its normal.
-fn box_surface_point(sides: [f64; 3], [which, u, v]: [f64; 3]) -> (DVec3, DVec3) {
+/// Point on the surface of a box and the normal there, for three uniform numbers; the points are uniformly distributed by area.
+fn box_surface_point(sides: [f64; 3], [face, u, v]: [f64; 3]) -> (DVec3, DVec3) {
     let faces = [0, 1, 2].map(|axis| sides[(axis + 1) % 3] * sides[(axis + 2) % 3]);
-    let mut wanted = which * 2.0 * faces.iter().sum::<f64>();
+    let mut target_area = face * 2.0 * faces.iter().sum::<f64>();
     let (mut axis, mut side) = (2, 1.0);
     for face in 0..6 {
-        if wanted < faces[face / 2] {
+        if target_area < faces[face / 2] {
             (axis, side) = (face / 2, if face % 2 == 0 { -1.0 } else { 1.0 });
             break;
         }
-        wanted -= faces[face / 2];
+        target_area -= faces[face / 2];
     }
     let (mut position, mut direction) = (DVec3::ZERO, DVec3::ZERO);
     position[axis] = 0.5 * side * sides[axis];
@@ -342,6 +351,6 @@ mod tests {
         assert!(spawn_points(&point).all(|spawn_point| spawn_point.position.length() <= 0.05));
         let missing = BurnerParameters { shape: BurnerShape::Mesh, ..Default::default() };
         let fault = Burner::new(&missing, &FlameParticlesParameters::default(), &MemoryAssets::default());
-        assert_eq!(fault.unwrap_err(), ParticleFaultKind::NoFile);
+        assert_eq!(fault.unwrap_err(), ParticleErrorKind::NoFile);
     }
 }

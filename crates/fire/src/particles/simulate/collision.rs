@@ -5,13 +5,13 @@ use bansho_base::{
     phenomenon::surroundings::Occluder,
 };
 
-/// Most passes over all solids per step; a particle that has not come to rest by then does not move.
+/// Maximum number of passes over all solids per sub-step. If a particle's end point has not converged by then, the particle does not move.
 const MAX_ITERATIONS: usize = 3;
-/// Most sphere-tracing steps along one displacement.
+/// Maximum number of sphere-tracing steps along one displacement.
 const MAX_MARCH_STEPS: f64 = 128.0;
 /// Bisection steps that refine a contact; the remaining error is small compared with the clearance.
 const BISECTION_STEPS: usize = 8;
-/// Factor by which a distance may be overestimated: beyond its grid, the distance to a mesh is measured by way of the grid's edge.
+/// Factor by which a distance may be overestimated: outside its grid, the distance to a mesh is that of the grid's edge plus the distance to the edge.
 const DISTANCE_OVERESTIMATE: f64 = 3.0;
 /// Change of the end point, in clearances, below which the iteration has converged.
 const CONVERGENCE_TOLERANCE: f64 = 1e-6;
@@ -62,11 +62,11 @@ impl Colliders<'_> {
                 return (end, velocities);
             }
         }
-        // Wedged between solids: it stays where it is.
+        // Not converged, as between two solids: the particle stays at its position.
         (position, [Vec3::ZERO; N])
     }
 
-    /// First contact within the clearance of a solid by sphere tracing; `None` where the displacement only leads out of it.
+    /// First point of the displacement within the clearance of a solid, by sphere tracing; `None` if there is none.
     fn contact(&self, occluder: &Occluder, start: DVec3, to: DVec3) -> Option<Contact> {
         let clearance = f64::from(self.clearance);
         let (displacement, length) = (to - start, (to - start).length());

@@ -14,8 +14,9 @@ use crate::particles::{
     simulate::{
         fluid::{NeighborSums, Neighborhood},
         forces::external_forces::{BurnerForces, ExternalForces},
-        particle_lanes::{BatchUpdate, RowBatch, SharedColumns, add_scaled, for_each_burner_batch, length},
+        particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
         particles::Particles,
+        vectors::{add_scaled, length},
     },
 };
 
@@ -25,15 +26,15 @@ const SPECIFIC_HEAT: f32 = 1200.0;
 const STEFAN_BOLTZMANN: f32 = 5.670_374e-8;
 /// Planck-mean absorption of soot, 1/(m K), per volume fraction (Tien 1968): `kappa = 1862 f_v T`.
 const PLANCK_MEAN_SOOT_ABSORPTION: f32 = 1862.0;
-/// Temperature inside the flame, where gas lacks air, relative to that at its front.
+/// Temperature in the interior of the flame, where gas lacks air, relative to that at the flame front.
 pub(crate) const INNER_TEMPERATURE: f32 = 0.72;
-/// Factor by which burnt gas cools faster by mixing than burning gas, whose heat release makes up for it.
+/// Factor by which burnt gas cools faster by mixing than burning gas, in which heat release compensates for mixing.
 const BURNT_MIXING_FACTOR: f32 = 2.5;
-/// Fuel fractions between which soot exists: below the first it burns off, above the second it has not formed.
+/// Range of the fuel fraction in which soot exists: below the first it oxidizes, above the second it has not yet formed.
 const SOOT_FUEL_RANGE: [f32; 2] = [0.16, 0.97];
 /// Interval of the fuel fraction over which soot forms.
 const SOOT_FORMATION_WIDTH: f32 = 0.17;
-/// Greatest growth of a particle's drawing radius.
+/// Maximum growth factor of the support radius with which a particle is drawn.
 const MAX_RADIUS_GROWTH: f32 = 3.0;
 
 /// Thermochemical state of a particle.
@@ -63,31 +64,34 @@ pub(crate) struct AmbientConditions<R> {
     /// Temperature of the air, K.
     pub(crate) air_temperature: f32,
     /// Support radius d at spawning, m.
-    pub(crate) smallest_radius: f32,
+    pub(crate) spawn_radius: f32,
 }
 
 /// Parameters of the combustion model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CombustionModel {
-    reacting: bool,
+    /// Whether temperatures are simulated.
+    simulates_temperature: bool,
     flame_temperature: f32,
     heating_time_s: f32,
     oxygen_dependence: f32,
-    soot: f32,
-    smoke: f32,
-    radiation: f32,
+    /// Volume fraction of soot in burning gas.
+    soot_fraction: f32,
+    /// Fraction of the soot that is not burned.
+    smoke_fraction: f32,
+    radiative_cooling: f32,
 }
 
 impl From<&CombustionParameters> for CombustionModel {
-    fn from(life: &CombustionParameters) -> Self {
+    fn from(parameters: &CombustionParameters) -> Self {
         Self {
-            reacting: life.temperature_model == TemperatureLaw::Simulated,
-            flame_temperature: life.flame_temperature_k as f32,
-            heating_time_s: life.heating_time_s as f32,
-            oxygen_dependence: life.oxygen_dependence as f32,
-            soot: life.soot_ppm as f32 * 1e-6,
-            smoke: life.smoke_fraction as f32,
-            radiation: life.radiative_cooling as f32,
+            simulates_temperature: parameters.temperature_model == TemperatureLaw::Simulated,
+            flame_temperature: parameters.flame_temperature_k as f32,
+            heating_time_s: parameters.heating_time_s as f32,
+            oxygen_dependence: parameters.oxygen_dependence as f32,
+            soot_fraction: parameters.soot_ppm as f32 * 1e-6,
+            smoke_fraction: parameters.smoke_fraction as f32,
+            radiative_cooling: parameters.radiative_cooling as f32,
         }
     }
 }
@@ -102,21 +106,25 @@ impl CombustionModel {
         seconds: f32,
     ) -> ParticleState<R> {
         let splat = |value: f32| state.fuel.broadcast(value);
-        // Exposed gas burns faster than the mean, enclosed gas slower; a mean exposure of 1/3 burns at the mean rate.
-        let air =
+        // Exposed gas burns faster than the mean, enclosed gas slower; gas with an exposure of 1/3 burns at the mean rate.
+        let air_factor =
             conditions.air_exposure.fma(splat(2.4 * self.oxygen_dependence), splat(1.0 - 0.8 * self.oxygen_dependence));
-        let fuel = (state.fuel - conditions.burning * air * splat(seconds)).simd_max(splat(0.0));
+        let fuel = (state.fuel - conditions.burning * air_factor * splat(seconds)).simd_max(splat(0.0));
         let growth = conditions.mixing.fma(splat(seconds * (1.0 / 3.0)), splat(1.0));
         ParticleState {
             fuel,
-            temperature: if self.reacting { self.temperature(state, conditions, seconds) } else { state.temperature },
-            soot: splat(self.soot) * self.soot_fraction(fuel),
+            temperature: if self.simulates_temperature {
+                self.temperature(state, conditions, seconds)
+            } else {
+                state.temperature
+            },
+            soot: splat(self.soot_fraction) * self.relative_soot(fuel),
             support_radius: (state.support_radius * growth)
-                .simd_min(splat(MAX_RADIUS_GROWTH * conditions.smallest_radius)),
+                .simd_min(splat(MAX_RADIUS_GROWTH * conditions.spawn_radius)),
         }
     }
 
-    /// Temperature after heating, mixing and radiation. Each is integrated implicitly, so that any step is stable.
+    /// Temperature after heating, mixing and radiation. Each is integrated implicitly, so that time steps of any length are stable.
     #[inline(always)]
     fn temperature<R: Real>(&self, state: ParticleState<R>, conditions: &AmbientConditions<R>, seconds: f32) -> R {
         let splat = |value: f32| state.fuel.broadcast(value);
@@ -134,17 +142,18 @@ impl CombustionModel {
         // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a relaxation rate toward the temperature of the air.
         let absorption = state.soot * temperature * splat(PLANCK_MEAN_SOOT_ABSORPTION);
         let fourth = temperature.fma(temperature, air * air) * (temperature + air);
-        let power = absorption * fourth * splat(self.radiation * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
+        let power =
+            absorption * fourth * splat(self.radiative_cooling * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
         relax_implicit(temperature, air, power / conditions.density)
     }
 
-    /// Soot relative to the greatest amount: none in fresh gas, 1 where it burns, the smoke fraction in burnt gas.
+    /// Soot relative to that of burning gas: 0 in fresh gas, the smoke fraction in burnt gas.
     #[inline(always)]
-    pub(crate) fn soot_fraction<R: Real>(&self, fuel: R) -> R {
+    pub(crate) fn relative_soot<R: Real>(&self, fuel: R) -> R {
         let splat = |value: f32| fuel.broadcast(value);
         let formed = smoothstep((splat(SOOT_FUEL_RANGE[1]) - fuel) * splat(1.0 / SOOT_FORMATION_WIDTH));
         let unburnt = smoothstep(fuel * splat(1.0 / SOOT_FUEL_RANGE[0]));
-        formed * unburnt.fma(splat(1.0 - self.smoke), splat(self.smoke))
+        formed * unburnt.fma(splat(1.0 - self.smoke_fraction), splat(self.smoke_fraction))
     }
 }
 
@@ -163,13 +172,13 @@ fn smoothstep<R: Real>(x: R) -> R {
 
 /// Time to which the parameters `viscosity` and `conduction` refer, s.
 const SMOOTHING_TIME: f32 = 0.01;
-/// Greatest fraction of the difference to its neighbors that a step removes. A particle next to thinner gas has larger weights, and
-/// must not overshoot.
+/// Maximum fraction of the difference to its neighbors that a step removes, so that particles next to gas of lower density, which have larger weights,
+/// do not overshoot.
 const MAX_SMOOTHING: f32 = 0.5;
-/// Mean offset of the neighbors of a particle on a flat surface of the gas, in support radii.
+/// Mean offset of the neighbors of a particle at a flat surface of the gas, in support radii.
 const SURFACE_OFFSET: f32 = 0.2;
-/// A particle counts as isolated where its own contribution to its density exceeds the first fraction, fully after a further
-/// second.
+/// A particle starts to count as isolated where its own contribution to its density exceeds the first fraction, and is fully isolated where it exceeds
+/// that by the second.
 const ISOLATED_FRACTION: [f32; 2] = [0.2, 0.5];
 
 /// One combustion step of all particles, over `seconds`.
@@ -177,10 +186,12 @@ pub(crate) struct CombustionStep<'a> {
     pub(crate) combustion: &'a CombustionModel,
     pub(crate) forces: &'a ExternalForces<'a>,
     pub(crate) neighbor_sums: &'a NeighborSums,
-    /// XSPH smoothing of velocity and of temperature over [`SMOOTHING_TIME`].
-    pub(crate) smoothing: [f32; 2],
-    /// How long burnt gas stays, s.
-    pub(crate) afterlife: f32,
+    /// XSPH smoothing of velocity over [`SMOOTHING_TIME`].
+    pub(crate) viscosity: f32,
+    /// XSPH smoothing of temperature over [`SMOOTHING_TIME`].
+    pub(crate) conduction: f32,
+    /// Time for which burnt gas remains, s.
+    pub(crate) burnt_gas_lifetime_s: f32,
     /// Support radius d, m.
     pub(crate) radius: f32,
     pub(crate) seconds: f32,
@@ -213,7 +224,7 @@ impl SharedColumns for CombustionInputs<'_> {
 
 impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
     #[inline(always)]
-    fn rows<S: Simd>(
+    fn update<S: Simd>(
         &self,
         simd: S,
         burner: &BurnerForces,
@@ -254,7 +265,7 @@ impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
 }
 
 impl CombustionStep<'_> {
-    /// Smooths, burns and cools all particles, and writes how much each is exposed to air.
+    /// Smooths, burns and cools all particles, and writes the exposure of each to air.
     pub(crate) fn update_thermochemistry(&self, particles: &mut Particles, air_exposure: &mut Vec<f32>) {
         air_exposure.resize(particles.len(), 0.0);
         let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, max_age, .. } = particles;
@@ -266,18 +277,18 @@ impl CombustionStep<'_> {
             weight: &self.neighbor_sums.weights,
             sums: self.neighbor_sums.sums.each_ref().map(Vec::as_slice),
         };
-        let living = [u, v, w, temperature, fuel, soot, support_radius, max_age, air_exposure];
-        for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, living);
+        let columns = [u, v, w, temperature, fuel, soot, support_radius, max_age, air_exposure];
+        for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, columns);
     }
 
-    /// Exposure to air: from the offset of the neighbors' center (a surface), or from missing neighbors.
+    /// Exposure to air, from the offset of the mean position of the neighbors (at a surface) or from the lack of neighbors (isolated).
     #[inline(always)]
     fn air_exposure<R: Real>(&self, weight: R, neighborhood: &Neighborhood<R>) -> R {
         let splat = |value: f32| weight.broadcast(value);
         let one_over_sum = splat(1.0) / neighborhood.weight.simd_max(splat(f32::MIN_POSITIVE));
         let offset = length(&neighborhood.offset) * one_over_sum * splat(1.0 / (self.radius * SURFACE_OFFSET));
-        let own = weight * one_over_sum * splat(KernelShape::Poly6.at_center::<3>(self.radius));
-        let isolated = (own - splat(ISOLATED_FRACTION[0])) * splat(1.0 / ISOLATED_FRACTION[1]);
+        let own_fraction = weight * one_over_sum * splat(KernelShape::Poly6.at_center::<3>(self.radius));
+        let isolated = (own_fraction - splat(ISOLATED_FRACTION[0])) * splat(1.0 / ISOLATED_FRACTION[1]);
         offset.simd_max(isolated).simd_clamp01()
     }
 
@@ -287,15 +298,15 @@ impl CombustionStep<'_> {
         let fraction = |smoothing: f32| (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING);
         let per_weight = density.simd_rsqrt();
         [
-            per_weight * density.broadcast(fraction(self.smoothing[0])),
-            per_weight * density.broadcast(fraction(self.smoothing[1])),
+            per_weight * density.broadcast(fraction(self.viscosity)),
+            per_weight * density.broadcast(fraction(self.conduction)),
         ]
     }
 
     /// Fuel consumption rate of a mean particle at a speed, 1/s.
     #[inline(always)]
     fn burn_rate_at_speed<R: Real>(&self, burner: &BurnerForces, speed: R) -> R {
-        speed.fma(speed.broadcast(burner.burning[0]), speed.broadcast(burner.burning[1]))
+        speed.fma(speed.broadcast(burner.burned_per_meter), speed.broadcast(burner.burned_per_second))
     }
 
     #[inline(always)]
@@ -309,14 +320,14 @@ impl CombustionStep<'_> {
         let density =
             air_exposure.broadcast(self.forces.density_at_1_k) / temperature.simd_max(air_exposure.broadcast(1.0));
         let air_temperature = self.forces.air_temperature;
-        AmbientConditions { air_exposure, mixing, burning, density, air_temperature, smallest_radius: self.radius }
+        AmbientConditions { air_exposure, mixing, burning, density, air_temperature, spawn_radius: self.radius }
     }
 
-    /// Age at which a particle is removed: unchanged, or its age plus the afterlife where it has just burnt out.
+    /// Age at which a particle is removed: unchanged, or its age plus the lifetime of burnt gas where it has just burnt out.
     #[inline(always)]
     fn removal_age<R: Real>(&self, old: &ParticleState<R>, new: &ParticleState<R>, age: R, removal_age: R) -> R {
         let none = age.broadcast(f32::MIN_POSITIVE);
-        let burnt_out = old.fuel.select_lt(none, removal_age, age + age.broadcast(self.afterlife));
+        let burnt_out = old.fuel.select_lt(none, removal_age, age + age.broadcast(self.burnt_gas_lifetime_s));
         new.fuel.select_lt(none, burnt_out, removal_age)
     }
 }
@@ -335,7 +346,7 @@ mod tests {
         burning: 2.0,
         density: 0.25,
         air_temperature: 293.0,
-        smallest_radius: 0.02,
+        spawn_radius: 0.02,
     };
 
     fn combustion() -> CombustionModel {
@@ -370,7 +381,7 @@ mod tests {
     #[test]
     fn black_body_cooling_of_dense_soot_follows_the_fourth_power() {
         // dT/dt = -4 sigma kappa T^4 / (rho c_p), worked by hand at 1500 K with 1e-6 of soot.
-        let combustion = CombustionModel { heating_time_s: 1e9, radiation: 1.0, ..combustion() };
+        let combustion = CombustionModel { heating_time_s: 1e9, radiative_cooling: 1.0, ..combustion() };
         let state = ParticleState { temperature: 1500.0, soot: 1e-6, ..STATE };
         let cooled = combustion.advance(state, &AmbientConditions { mixing: 0.0, ..CONDITIONS }, 1e-5);
         let kappa = 1862.0 * 1e-6 * 1500.0;
@@ -393,7 +404,7 @@ mod tests {
                 burning: splat(2.0),
                 density: splat(0.25),
                 air_temperature: 293.0,
-                smallest_radius: 0.02,
+                spawn_radius: 0.02,
             };
             let ParticleState { temperature, fuel, soot, support_radius } = combustion().advance(state, &conditions, 0.02);
             [temperature, fuel, soot, support_radius].map(|values| values.as_slice().to_vec())
@@ -408,15 +419,15 @@ mod tests {
 
     #[test]
     fn constant_temperature_stays() {
-        let combustion = CombustionModel { reacting: false, ..combustion() };
+        let combustion = CombustionModel { simulates_temperature: false, ..combustion() };
         assert_eq!(combustion.advance(STATE, &CONDITIONS, 0.1).temperature, 1200.0);
     }
 
     #[test]
     fn soot_forms_in_burning_gas_and_burns_unless_it_is_smoke() {
         let clean = combustion();
-        assert_eq!((clean.soot_fraction(1.0), clean.soot_fraction(0.5), clean.soot_fraction(0.0)), (0.0, 1.0, 0.0));
-        let smoky = CombustionModel { smoke: 0.4, ..clean };
-        assert!((smoky.soot_fraction(0.0) - 0.4).abs() < 1e-6);
+        assert_eq!((clean.relative_soot(1.0), clean.relative_soot(0.5), clean.relative_soot(0.0)), (0.0, 1.0, 0.0));
+        let smoky = CombustionModel { smoke_fraction: 0.4, ..clean };
+        assert!((smoky.relative_soot(0.0) - 0.4).abs() < 1e-6);
     }
 }

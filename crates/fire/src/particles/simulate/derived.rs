@@ -1,4 +1,4 @@
-//! Constants of the simulation that the paper leaves open, derived in SI units from size and exit velocity of the burners.
+//! Constants of the simulation that the paper does not state, derived in SI units from size and exit velocity of the burners.
 
 use bansho_base::{
     host::{assets::Assets, memory},
@@ -9,27 +9,27 @@ use bansho_base::{
 
 use super::burner::Burner;
 use crate::particles::{
-    fault::{ParticleFault, ParticleFaultKind},
+    error::{ParticleError, ParticleErrorKind},
     parameters::{BurnerParameters, FlameParticlesParameters},
 };
 
-/// Most particles of all flames of a scene.
+/// Maximum number of particles of all flames of a scene.
 const MAX_PARTICLES: i64 = 20_000_000;
-/// Bytes per particle, measured over a run: its state and the buffers of a step. Drawing takes more, temporarily.
+/// Bytes per particle, measured over a run: its state and the buffers of a step. Drawing temporarily takes more.
 const MEMORY_PER_PARTICLE: f64 = 670.0;
-/// Age, in rise times, at which gas is removed even if an obstacle holds it.
+/// Age, in rise times, at which gas is removed even if an obstacle prevents it from rising.
 const MAX_RISE_TIMES: f64 = 3.0;
 /// Relative amplitude of the fuel flow's pulsation as a fire puffs.
 const FLOW_PULSATION: f64 = 0.6;
 /// Tolerance for burners at the edge of the domain, relative to their size: rotation rounds.
 const BURNER_TOLERANCE: f64 = 1e-6;
-/// Least residence time in steps, so that the number of particles spawned in one step is bounded.
+/// Minimum residence time in steps, so that the number of particles spawned in one step is bounded.
 const MIN_STEPS: f64 = 4.0;
 
 /// Constants derived from the parameters.
 ///
 /// Every particle represents the same volume V of gas at spawning. V follows from `particles`, the number alive at a time: a burner
-/// of area A and exit velocity w spawns `A w / V` per second, and gas stays for the rise time plus its afterlife. The support
+/// of area A and exit velocity w spawns `A w / V` per second, and gas remains for the rise time plus the lifetime of burnt gas. The support
 /// radius d is `fluid.support_radius` times `V^(1/3)`; the mass m is V times the density of air at the temperature of the gas; rho_0 is a
 /// fraction of that density; k is the square of a speed of sound, a multiple of the gas's own speed.
 #[derive(Clone, Debug)]
@@ -56,8 +56,8 @@ pub(crate) struct DerivedConstants {
     /// Preroll before the shot, s.
     pub(crate) preroll: f64,
     /// Duration of the crossfade of a seamless loop, s.
-    pub(crate) dissolve: f64,
-    /// Greatest number of particles alive.
+    pub(crate) crossfade: f64,
+    /// Maximum number of particles alive.
     pub(crate) max_particles: usize,
 }
 
@@ -66,14 +66,15 @@ impl DerivedConstants {
         parameters: &FlameParticlesParameters,
         loop_s: Option<f64>,
         assets: &dyn Assets,
-    ) -> Result<Self, ParticleFault> {
+    ) -> Result<Self, ParticleError> {
         check_particle_count(parameters.particles, 0)?;
         let burners = burners(parameters, assets)?;
         let domain = domain(parameters, &burners)?;
         let residence_times: Vec<f64> = burners.iter().map(|burner| residence_time(parameters, burner)).collect();
         let fluxes: Vec<f64> = burners.iter().map(|burner| burner.area_m2 * burner.speed).collect();
-        let living: f64 = fluxes.iter().zip(&residence_times).map(|(flux, residence_time)| flux * residence_time).sum();
-        let volume = living / parameters.particles as f64;
+        let total_volume: f64 =
+            fluxes.iter().zip(&residence_times).map(|(flux, residence_time)| flux * residence_time).sum();
+        let volume = total_volume / parameters.particles as f64;
         let support_radius = support_radius(parameters, volume, &domain)?;
         let coolest = burners.iter().map(|burner| burner.parameters.temperature_k).fold(f64::INFINITY, f64::min);
         let density = Air::default().density_at(coolest);
@@ -81,7 +82,7 @@ impl DerivedConstants {
         let sound = parameters.fluid.stiffness * fastest;
         let longest_residence = residence_times.into_iter().fold(0.0, f64::max);
         // After the longest residence time all gas has been replaced.
-        let dissolve = loop_s.map_or(0.0, |turn| longest_residence.min(turn));
+        let crossfade = loop_s.map_or(0.0, |seconds| longest_residence.min(seconds));
         Ok(Self {
             rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
@@ -92,8 +93,8 @@ impl DerivedConstants {
             rest_density: (parameters.fluid.rest_density * density) as f32,
             stiffness_per_kelvin: (sound * sound / coolest) as f32,
             domain,
-            preroll: preroll(parameters, longest_residence) + 0.5 * dissolve,
-            dissolve,
+            preroll: preroll(parameters, longest_residence) + 0.5 * crossfade,
+            crossfade,
             max_particles: 2 * parameters.particles as usize + 16,
             burners,
         })
@@ -105,7 +106,7 @@ impl DerivedConstants {
     }
 }
 
-/// Residence time of gas of a burner, s: rise time plus afterlife.
+/// Residence time of gas of a burner, s: rise time plus lifetime of burnt gas.
 fn residence_time(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
     (burner.rise_time() + parameters.combustion.burnt_gas_lifetime_s).max(MIN_STEPS * parameters.step_s)
 }
@@ -115,12 +116,12 @@ fn support_radius(
     parameters: &FlameParticlesParameters,
     volume: f64,
     domain: &[DVec3; 2],
-) -> Result<f64, ParticleFault> {
+) -> Result<f64, ParticleError> {
     let (radius, side) = (parameters.fluid.support_radius * math::cbrt(volume), (domain[1] - domain[0]).min_element());
     if radius <= side {
         return Ok(radius);
     }
-    Err(ParticleFault { key: "particles".into(), kind: ParticleFaultKind::SupportBeyondDomain { radius, side } })
+    Err(ParticleError { key: "particles".into(), kind: ParticleErrorKind::SupportBeyondDomain { radius, side } })
 }
 
 /// Preroll before the shot, s; by default twice the longest residence time.
@@ -131,80 +132,84 @@ fn preroll(parameters: &FlameParticlesParameters, longest_residence: f64) -> f64
     }
 }
 
-/// Whether the operating system would grant the memory of so many particles.
-fn have_memory(count: i64) -> bool {
+/// Whether memory for `count` particles can be allocated.
+fn fits_in_memory(count: i64) -> bool {
     memory::can_allocate(count as f64 * MEMORY_PER_PARTICLE)
 }
 
-/// Checks whether `count` particles may be alive beside the `others` of all other flames.
+/// Checks whether `count` particles are allowed in addition to the `others` of all other flames.
 ///
 /// # Errors
-/// Too many particles, or not enough memory; the error says how many are allowed.
-pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleFault> {
-    let taken = (MAX_PARTICLES - others).max(0);
-    if count <= taken && have_memory(count + others) {
+/// There are too many particles, or not enough memory; the error states how many are allowed.
+pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleError> {
+    let remaining = (MAX_PARTICLES - others).max(0);
+    if count <= remaining && fits_in_memory(count + others) {
         return Ok(());
     }
     let max_particles =
-        memory::largest_fitting_count(taken.min(count), |max_particles| have_memory(max_particles + others));
-    let max_particles = if count > taken && have_memory(taken + others) { taken } else { max_particles };
+        memory::largest_fitting_count(remaining.min(count), |max_particles| fits_in_memory(max_particles + others));
+    let max_particles = if count > remaining && fits_in_memory(remaining + others) { remaining } else { max_particles };
     let gib = (count as f64 + others as f64) * MEMORY_PER_PARTICLE / f64::from(1 << 30);
-    let kind = ParticleFaultKind::TooManyParticles { count, others, gib, most: max_particles };
-    Err(ParticleFault { key: "particles".into(), kind })
+    let kind = ParticleErrorKind::TooManyParticles { count, others, gib, limit: max_particles };
+    Err(ParticleError { key: "particles".into(), kind })
 }
 
-fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleFault> {
+fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleError> {
     let single = [BurnerParameters::default()];
     let listed = if parameters.burners.is_empty() { &single[..] } else { &parameters.burners };
-    let make = |(index, burner): (usize, &BurnerParameters)| {
+    let build = |(index, burner): (usize, &BurnerParameters)| {
         Burner::new(burner, parameters, assets)
-            .map_err(|kind| ParticleFault { key: format!("burners.{index}.file"), kind })
+            .map_err(|kind| ParticleError { key: format!("burners.{index}.file"), kind })
     };
-    listed.iter().enumerate().map(make).collect()
+    listed.iter().enumerate().map(build).collect()
 }
 
-/// The domain: as given, or with a margin of three flame heights around the burners.
-fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleFault> {
+/// Corners of the domain: as given, or with a margin of three flame heights around the burners.
+fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[DVec3; 2], ParticleError> {
     if let (Auto::Set(min), Auto::Set(max)) = (parameters.domain_min, parameters.domain_max)
         && DVec3::from(min).cmpge(DVec3::from(max)).any()
     {
-        return Err(ParticleFault { key: "domain_max".into(), kind: ParticleFaultKind::EmptyDomain { min, max } });
+        return Err(ParticleError { key: "domain_max".into(), kind: ParticleErrorKind::EmptyDomain { min, max } });
     }
     for (index, burner) in burners.iter().enumerate() {
         let corners = burner.parameters.position.bounds().map(DVec3::from);
-        let reached = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
-        for position in corners.into_iter().chain(reached) {
-            stands_within(parameters, position, BURNER_TOLERANCE * burner.bounding_radius).map_err(
+        let extents = [corners[0] + burner.extent[0], corners[1] + burner.extent[1]];
+        for position in corners.into_iter().chain(extents) {
+            check_within_domain(parameters, position, BURNER_TOLERANCE * burner.bounding_radius).map_err(
                 |(corner, kind)| {
-                    // A parameter that the user did not write is not named as the faulty one.
-                    let moved = burner.parameters.position != Animated::from([0.0; 3]);
-                    ParticleFault { key: if moved { format!("burners.{index}.position") } else { corner.into() }, kind }
+                    // The error names the position only if the scene sets it, otherwise the corner.
+                    let is_position_set = burner.parameters.position != Animated::from([0.0; 3]);
+                    ParticleError {
+                        key: if is_position_set { format!("burners.{index}.position") } else { corner.into() },
+                        kind,
+                    }
                 },
             )?;
         }
     }
-    let room = |burner: &Burner| burner.bounding_radius + 3.0 * burner.height;
-    // The bounding box of each burner's motion.
-    let ways = || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
-    let low = ways().map(|(burner, [low, _])| low - room(burner)).fold(DVec3::INFINITY, DVec3::min);
-    let high = ways().map(|(burner, [_, high])| high + room(burner)).fold(DVec3::NEG_INFINITY, DVec3::max);
-    let given = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
-    Ok([given(parameters.domain_min, low), given(parameters.domain_max, high)])
+    let margin = |burner: &Burner| burner.bounding_radius + 3.0 * burner.height;
+    // The bounding box of each burner's position over time.
+    let position_bounds =
+        || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
+    let low = position_bounds().map(|(burner, [low, _])| low - margin(burner)).fold(DVec3::INFINITY, DVec3::min);
+    let high = position_bounds().map(|(burner, [_, high])| high + margin(burner)).fold(DVec3::NEG_INFINITY, DVec3::max);
+    let set_or = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
+    Ok([set_or(parameters.domain_min, low), set_or(parameters.domain_max, high)])
 }
 
-/// Checks whether a point of a burner lies within the given corners of the domain, with a tolerance of `slack` m. The error names
-/// the corner that it lies beyond.
-fn stands_within(
+/// Checks whether a point of a burner lies within the given corners of the domain, with a `tolerance`, m. The error is returned with the key of the
+/// corner that the point is beyond.
+fn check_within_domain(
     parameters: &FlameParticlesParameters,
     position: DVec3,
-    slack: f64,
-) -> Result<(), (&'static str, ParticleFaultKind)> {
+    tolerance: f64,
+) -> Result<(), (&'static str, ParticleErrorKind)> {
     let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
     let beyond =
-        |corner, limit| Err((corner, ParticleFaultKind::OutsideDomain { position: position.into(), corner, limit }));
+        |corner, limit| Err((corner, ParticleErrorKind::OutsideDomain { position: position.into(), corner, limit }));
     match (domain_min, domain_max) {
-        (Auto::Set(min), _) if (position + slack).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
-        (_, Auto::Set(max)) if (position - slack).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
+        (Auto::Set(min), _) if (position + tolerance).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
+        (_, Auto::Set(max)) if (position - tolerance).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
         _ => Ok(()),
     }
 }
@@ -216,7 +221,7 @@ mod tests {
     use super::*;
     use crate::particles::parameters::BurnerShape;
 
-    fn constants(parameters: &FlameParticlesParameters) -> Result<DerivedConstants, ParticleFault> {
+    fn constants(parameters: &FlameParticlesParameters) -> Result<DerivedConstants, ParticleError> {
         DerivedConstants::new(parameters, None, &MemoryAssets::default())
     }
 
@@ -238,7 +243,7 @@ mod tests {
     }
 
     /// A flame on a triangle of 0.5 m^2, offset by `far` from the mesh's origin, in a domain of 2 m in each direction.
-    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<DerivedConstants, ParticleFault> {
+    fn on_a_mesh_beside_its_origin(far: f32, rotation_deg: [f64; 3]) -> Result<DerivedConstants, ParticleError> {
         let corners = vec![[far, 0.0, 0.0], [far, 0.0, 1.0], [far + 1.0, 0.0, 0.0]];
         let mut assets = MemoryAssets::default();
         assets.insert_mesh("far.gltf", Mesh::new(corners, vec![[0, 1, 2]]).unwrap());
@@ -260,7 +265,7 @@ mod tests {
             let fault = on_a_mesh_beside_its_origin(far, [0.0, turn, 0.0]).unwrap_err();
             assert_eq!(fault.key, key);
             assert!(
-                matches!(fault.kind, ParticleFaultKind::OutsideDomain { position, .. } if position[0].abs() >= 50.0)
+                matches!(fault.kind, ParticleErrorKind::OutsideDomain { position, .. } if position[0].abs() >= 50.0)
             );
         }
     }
@@ -289,7 +294,7 @@ mod tests {
         let narrow = vec![BurnerParameters { diameter: 0.015, ..Default::default() }];
         let [domain_min, domain_max] = thin;
         let wide = FlameParticlesParameters { particles: 5, burners: narrow, domain_min, domain_max, ..default() };
-        assert!(matches!(fault(wide).kind, ParticleFaultKind::SupportBeyondDomain { .. }));
+        assert!(matches!(fault(wide).kind, ParticleErrorKind::SupportBeyondDomain { .. }));
         let many = fault(FlameParticlesParameters { particles: 900_000_000, ..default() });
         let expected = "particles: 900000000 particles would take 562 GiB; allowed: up to ";
         let max_particles: Option<i64> =

@@ -13,7 +13,7 @@ use crate::particles::parameters::{FluidParameters, NegativePressure};
 /// Speed of gas relative to its neighbors, as a fraction of its speed.
 const RELATIVE_SPEED: f32 = 0.15;
 
-/// SPH solver: sorting, density, equation of state, pressure force and neighbor sums, with their buffers.
+/// SPH solver: neighbor search, density, equation of state, pressure force and neighbor sums, with their buffers.
 #[derive(Clone, Debug)]
 pub(crate) struct FluidSolver {
     equation_of_state: StateEquation,
@@ -25,7 +25,7 @@ pub(crate) struct FluidSolver {
     /// Accelerations by pressure, m/s^2.
     pub(crate) acceleration: [Vec<f32>; 3],
     pub(crate) neighbor_sums: NeighborSums,
-    /// Exposure to air of each particle at the beginning of this step, 0 to 1.
+    /// Exposure of each particle to air at the beginning of this step, 0 to 1.
     pub(crate) air_exposure: Vec<f32>,
 }
 
@@ -55,8 +55,8 @@ impl FluidSolver {
     /// Gas that would need more sub-steps than allowed is made more compressible: `compute_pressure_forces` limits k such that
     /// sound travels at most a fifth of d in a sub-step, and the integration limits every acceleration.
     ///
-    /// Accelerations do not enter the condition: buoyancy and wind move neighbors alike, that by pressure is bounded by the speed
-    /// of sound, and the integration limits the rest. Forces of the last step would also have to be part of every snapshot.
+    /// Accelerations do not enter the condition: buoyancy and wind accelerate neighbors equally, acceleration by pressure is bounded by the speed of sound,
+    /// and the integration limits the remaining ones. If they did, forces of the last step would also have to be part of every snapshot.
     pub(crate) fn substep_count(&self, particles: &Particles, seconds: f32) -> u32 {
         let [u, v, w] = &particles.velocity;
         let speed_squared = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];

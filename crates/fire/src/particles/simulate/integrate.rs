@@ -17,15 +17,15 @@ use crate::particles::{
     parameters::WindForce,
     simulate::{
         forces::external_forces::{BurnerForces, ExternalForces},
-        particle_lanes::{add_scaled, clamp_length, length, subtract},
+        vectors::{add_scaled, clamp_length, length, subtract},
     },
 };
 
-/// Greatest speed of gas, m/s.
+/// Maximum speed of gas, m/s.
 pub(crate) const MAX_SPEED: f32 = 150.0;
 /// Distance that gas keeps from solids, in support radii.
 const CLEARANCE: f32 = 0.2;
-/// Least density for a wind that is a force per volume, kg/m^3.
+/// Minimum density by which a force per volume is divided, kg/m^3.
 const MIN_DENSITY: f32 = 1e-6;
 
 /// One sub-step of `seconds`.
@@ -44,8 +44,8 @@ pub(crate) struct IntegrationStep<'a> {
 #[derive(Clone, Copy, Debug)]
 struct ForceInputs<R> {
     velocity: [R; 3],
-    /// Velocity without that of the air's own motion.
-    own: [R; 3],
+    /// Velocity without `drift`, the velocity by which the air's motion advects the particle.
+    own_velocity: [R; 3],
     acceleration: [R; 3],
     temperature: R,
     density: R,
@@ -74,7 +74,7 @@ impl SharedColumns for IntegrationInputs<'_> {
 
 impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
     #[inline(always)]
-    fn rows<S: Simd>(
+    fn update<S: Simd>(
         &self,
         simd: S,
         burner: &BurnerForces,
@@ -86,17 +86,17 @@ impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
         let velocity = rows.load_all(simd, [u, v, w]);
         let gas = ForceInputs {
             velocity,
-            own: subtract(&velocity, &rows.load_all(simd, [d, e, f])),
+            own_velocity: subtract(&velocity, &rows.load_all(simd, [d, e, f])),
             acceleration: rows.load_all(simd, inputs.acceleration),
             temperature: rows.load(simd, inputs.temperature),
             density: rows.load(simd, inputs.density),
             air_exposure: rows.load(simd, inputs.air_exposure),
         };
         let wind = burner.wind_field.at(simd, &position);
-        let own = self.apply_forces(burner, &gas, &wind);
+        let own_velocity = self.apply_forces(burner, &gas, &wind);
         let age_before = rows.load(simd, age);
-        let drift = burner.velocity(&burner.flow(simd, &position), length(&own), age_before);
-        let velocity = clamp_length(&add_scaled(&own, &drift, age_before.broadcast(1.0)), MAX_SPEED);
+        let drift = burner.advection_velocity(&burner.air_velocity(simd, &position), length(&own_velocity), age_before);
+        let velocity = clamp_length(&add_scaled(&own_velocity, &drift, age_before.broadcast(1.0)), MAX_SPEED);
         let after = self.advect(simd, position, [velocity, drift], rows.0.len());
         for (values, arrays) in after.into_iter().zip([[x, y, z], [u, v, w], [d, e, f]]) {
             for (batch, array) in values.into_iter().zip(arrays) {
@@ -117,16 +117,16 @@ impl IntegrationStep<'_> {
             density: &particles.density,
             air_exposure: self.air_exposure,
         };
-        let moving = [x, y, z, u, v, w, d, e, f, age];
-        for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, moving);
+        let columns = [x, y, z, u, v, w, d, e, f, age];
+        for_each_burner_batch(self, &self.forces.burner_forces, &particles.burner, inputs, columns);
     }
 
-    /// Own velocity after pressure, buoyancy and wind.
+    /// Velocity without drift after pressure, buoyancy and wind.
     #[inline(always)]
     fn apply_forces<R: Real>(&self, burner: &BurnerForces, gas: &ForceInputs<R>, wind: &[R; 3]) -> [R; 3] {
         let Self { forces, seconds, .. } = *self;
         let splat = |value: f32| gas.density.broadcast(value);
-        // No force moves a particle by more than d/4 in a sub-step.
+        // Acceleration by pressure moves a particle by at most d/4 in a sub-step.
         let max_acceleration = 0.25 * self.radius / (seconds * seconds);
         let mut acceleration = clamp_length(&gas.acceleration, max_acceleration);
         let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
@@ -136,8 +136,8 @@ impl IntegrationStep<'_> {
             acceleration =
                 add_scaled(&acceleration, wind, splat(forces.wind_response) / gas.density.simd_max(splat(MIN_DENSITY)));
         }
-        let accelerated = add_scaled(&gas.own, &acceleration, splat(seconds));
-        // Entrained air brings its own momentum.
+        let accelerated = add_scaled(&gas.own_velocity, &acceleration, splat(seconds));
+        // Entrained air adds its momentum.
         let gain = if per_volume { 0.0 } else { forces.wind_response };
         let air = [wind[0] * splat(gain), wind[1] * splat(gain), wind[2] * splat(gain)];
         let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * splat(seconds);
@@ -152,13 +152,19 @@ impl IntegrationStep<'_> {
 
     /// Velocity after the drag of cross wind, horizontal and implicit: `C rho_air / (rho r) |w - u| (w - u)`.
     ///
-    /// Hot gas is several times less dense than air, so that it also bends in wind that it hardly mixes with.
+    /// Hot gas is several times less dense than air, so that wind deflects it even where little air is entrained.
     #[inline(always)]
-    fn apply_cross_drag<R: Real>(&self, burner: &BurnerForces, own: &[R; 3], air: &[R; 3], density_ratio: R) -> [R; 3] {
-        let mut across = subtract(air, own);
+    fn apply_cross_drag<R: Real>(
+        &self,
+        burner: &BurnerForces,
+        velocity: &[R; 3],
+        air: &[R; 3],
+        density_ratio: R,
+    ) -> [R; 3] {
+        let mut across = subtract(air, velocity);
         across[1] = density_ratio.broadcast(0.0);
         let rate = density_ratio * length(&across) * density_ratio.broadcast(burner.drag * self.seconds);
-        add_scaled(own, &across, rate / (rate + rate.broadcast(1.0)))
+        add_scaled(velocity, &across, rate / (rate + rate.broadcast(1.0)))
     }
 
     /// Positions, velocities and drift velocities after advection and collisions; the first `count` lanes are valid.
@@ -189,18 +195,18 @@ impl IntegrationStep<'_> {
         vectors
     }
 
-    /// Collides the first `count` lanes with solids, one by one.
+    /// Moves the first `count` lanes, one by one, with collisions.
     #[inline(never)]
     fn resolve_collisions(&self, vectors: &mut [[[f32; LANES]; 3]; 3], count: usize) {
         let ExternalForces { occluders, origin, .. } = *self.forces;
         let colliders = Colliders { occluders, origin, clearance: CLEARANCE * self.radius };
         for lane in 0..count {
             let [position, velocity, drift] = vectors.map(|all| Vec3::from(all.map(|values| values[lane])));
-            let (position, [remaining, own]) =
+            let (position, [new_velocity, own_velocity]) =
                 colliders.collide(position, velocity * self.seconds, [velocity, velocity - drift]);
-            // A collision that takes away drift must not increase the own velocity, to which eddies are proportional.
-            let drift = if remaining == velocity { drift } else { remaining - own };
-            for (all, vector) in vectors.iter_mut().zip([position, remaining, drift]) {
+            // A collision that removes drift must not increase the velocity without drift, to which eddies are proportional.
+            let drift = if new_velocity == velocity { drift } else { new_velocity - own_velocity };
+            for (all, vector) in vectors.iter_mut().zip([position, new_velocity, drift]) {
                 for c in 0..3 {
                     all[c][lane] = vector[c];
                 }
@@ -238,7 +244,14 @@ mod tests {
         let acceleration = vector(2).map(|component| component * 300.0);
         let (temperature, density) = (300.0 + 1500.0 * temperature, 0.1 + density);
         (
-            ForceInputs { velocity: vector(0), own: vector(1), acceleration, temperature, density, air_exposure },
+            ForceInputs {
+                velocity: vector(0),
+                own_velocity: vector(1),
+                acceleration,
+                temperature,
+                density,
+                air_exposure,
+            },
             vector(3),
         )
     }
@@ -271,7 +284,7 @@ mod tests {
                 let vector = |value: &dyn Fn(usize) -> [f32; 3]| [0, 1, 2].map(|c| batch(&|lane| value(lane)[c]));
                 let gas = ForceInputs {
                     velocity: vector(&|lane| all[lane].0.velocity),
-                    own: vector(&|lane| all[lane].0.own),
+                    own_velocity: vector(&|lane| all[lane].0.own_velocity),
                     acceleration: vector(&|lane| all[lane].0.acceleration),
                     temperature: batch(&|lane| all[lane].0.temperature),
                     density: batch(&|lane| all[lane].0.density),
@@ -282,7 +295,7 @@ mod tests {
             for (lane, (gas, wind)) in all.iter().enumerate() {
                 let alone = motion.apply_forces(burner, gas, wind);
                 assert_eq!(together.each_ref().map(|values| values[lane]), alone);
-                assert!(alone != gas.own);
+                assert!(alone != gas.own_velocity);
             }
         }
     }

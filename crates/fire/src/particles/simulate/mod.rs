@@ -1,7 +1,8 @@
 //! The state of the flame, and its time steps.
 //!
-//! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` everything that the
-//! air does, `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state.
+//! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` the external forces,
+//! `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state. `particle_lanes` and `vectors` are
+//! SIMD utilities.
 
 use std::sync::Arc;
 
@@ -39,8 +40,9 @@ pub(crate) mod particle_lanes;
 pub mod particles;
 pub(crate) mod snapshot;
 pub(crate) mod spawning;
+pub(crate) mod vectors;
 
-/// The simulation: particles, and all that moves them.
+/// The simulation of one flame: particles, solver and constants.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulation {
     /// Shared by all runs.
@@ -93,21 +95,21 @@ impl Simulation {
             solver.compute_pressure_forces(particles, seconds);
             if substep == 0 {
                 solver.sum_over_neighbors(particles);
-                let smoothing = [parameters.fluid.viscosity, parameters.fluid.conduction].map(|share| share as f32);
-                let (neighbor_sums, afterlife) =
-                    (&solver.neighbor_sums, parameters.combustion.burnt_gas_lifetime_s as f32);
+                let (viscosity, conduction) = (parameters.fluid.viscosity as f32, parameters.fluid.conduction as f32);
+                let neighbor_sums = &solver.neighbor_sums;
                 let combustion_step = CombustionStep {
                     combustion,
                     forces: &forces,
                     neighbor_sums,
-                    smoothing,
-                    afterlife,
+                    viscosity,
+                    conduction,
+                    burnt_gas_lifetime_s: parameters.combustion.burnt_gas_lifetime_s as f32,
                     radius,
                     seconds: step_seconds,
                 };
                 combustion_step.update_thermochemistry(particles, &mut solver.air_exposure);
             } else {
-                forces.advance_vortex_rings(t);
+                forces.advance_rings_and_eddies(t);
             }
             let (acceleration, air_exposure) =
                 (solver.acceleration.each_ref().map(Vec::as_slice), &solver.air_exposure);
@@ -117,7 +119,7 @@ impl Simulation {
         self.remove_expired();
     }
 
-    /// Removes particles that have reached their greatest age, have left the domain, or are not finite.
+    /// Removes particles that have reached their maximum age, have left the domain, or are not finite.
     fn remove_expired(&mut self) {
         let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
         let Particles { position, velocity, temperature, age, max_age, .. } = &self.particles;

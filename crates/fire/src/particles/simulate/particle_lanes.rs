@@ -1,11 +1,11 @@
-//! SIMD batches of sixteen particles that came from one burner, and vector operations on them.
+//! SIMD batches of sixteen particles that came from one burner.
 //!
 //! Particles of all burners are mixed in memory. Within each task their row indices are sorted by burner, and batches gather and
 //! scatter rows.
 
 use std::ops::Range;
 
-use bansho_base::math::simd::{LANES, Lanes, Real};
+use bansho_base::math::simd::{LANES, Lanes};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use rayon::prelude::*;
 
@@ -22,40 +22,40 @@ pub(crate) trait SharedColumns: Copy + Sync {
 
 /// An update of `N` columns, for a batch of sixteen particles of one burner at a time.
 pub(crate) trait BatchUpdate<S: SharedColumns, const N: usize>: Sync {
-    /// Updates some rows of a task.
-    fn rows<V: Simd>(&self, simd: V, burner: &BurnerForces, rows: RowBatch, shared: S, moving: &mut [&mut [f32]; N]);
+    /// Updates a batch of rows of a task: reads `inputs`, reads and writes `columns`.
+    fn update<V: Simd>(&self, simd: V, burner: &BurnerForces, rows: RowBatch, inputs: S, columns: &mut [&mut [f32]; N]);
 }
 
 /// Runs an update over all particles, burner by burner within each task.
 pub(crate) fn for_each_burner_batch<S: SharedColumns, const N: usize>(
-    work: &impl BatchUpdate<S, N>,
+    update: &impl BatchUpdate<S, N>,
     burner_forces: &[BurnerForces],
     burners: &[u32],
-    shared: S,
-    moving: [&mut Vec<f32>; N],
+    inputs: S,
+    columns: [&mut Vec<f32>; N],
 ) {
     let level = Level::new();
-    split_into_tasks(moving).into_par_iter().enumerate().for_each(|(task, mut moving)| {
+    split_into_tasks(columns).into_par_iter().enumerate().for_each(|(task, mut columns)| {
         let first = task * PARTICLES_PER_TASK;
-        let range = first..first + moving[0].len();
+        let range = first..first + columns[0].len();
         let sorted = RowsByBurner::new(&burners[range.clone()], burner_forces.len());
-        let shared = shared.slice(range);
-        dispatch!(level, simd => update_task(simd, work, burner_forces, &sorted, shared, &mut moving));
+        let inputs = inputs.slice(range);
+        dispatch!(level, simd => update_task(simd, update, burner_forces, &sorted, inputs, &mut columns));
     });
 }
 
 #[inline(always)]
 fn update_task<V: Simd, S: SharedColumns, const N: usize>(
     simd: V,
-    work: &impl BatchUpdate<S, N>,
+    update: &impl BatchUpdate<S, N>,
     burner_forces: &[BurnerForces],
     sorted: &RowsByBurner,
-    shared: S,
-    moving: &mut [&mut [f32]; N],
+    inputs: S,
+    columns: &mut [&mut [f32]; N],
 ) {
-    for (number, burner) in burner_forces.iter().enumerate() {
-        for rows in sorted.of(number).chunks(LANES) {
-            work.rows(simd, burner, RowBatch(rows), shared, moving);
+    for (index, burner) in burner_forces.iter().enumerate() {
+        for rows in sorted.rows_of(index).chunks(LANES) {
+            update.update(simd, burner, RowBatch(rows), inputs, columns);
         }
     }
 }
@@ -95,7 +95,7 @@ impl RowsByBurner {
     }
 
     /// The rows of a burner, ascending.
-    fn of(&self, burner: usize) -> &[u32] {
+    fn rows_of(&self, burner: usize) -> &[u32] {
         let start = if burner == 0 { 0 } else { self.ends[burner - 1] };
         &self.rows[start..self.ends[burner]]
     }
@@ -152,51 +152,6 @@ impl RowBatch<'_> {
     }
 }
 
-/// Dot product.
-#[inline(always)]
-pub(crate) fn dot<R: Real>(one: &[R; 3], other: &[R; 3]) -> R {
-    one[0].fma(other[0], one[1].fma(other[1], one[2] * other[2]))
-}
-
-/// Euclidean length.
-#[inline(always)]
-pub(crate) fn length<R: Real>(vector: &[R; 3]) -> R {
-    dot(vector, vector).simd_sqrt()
-}
-
-/// `one - other`.
-#[inline(always)]
-pub(crate) fn subtract<R: Real>(one: &[R; 3], other: &[R; 3]) -> [R; 3] {
-    let mut difference = *one;
-    for c in 0..3 {
-        difference[c] = one[c] - other[c];
-    }
-    difference
-}
-
-/// `one + other * factor`.
-#[inline(always)]
-pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R; 3] {
-    let mut sum = *one;
-    for c in 0..3 {
-        sum[c] = other[c].fma(factor, one[c]);
-    }
-    sum
-}
-
-/// Scales a vector down to `max_length` where it is longer.
-#[inline(always)]
-pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], max_length: f32) -> [R; 3] {
-    let splat = |value: f32| vector[0].broadcast(value);
-    let squared = dot(vector, vector).simd_max(splat(f32::MIN_POSITIVE));
-    let scale = (squared.simd_rsqrt() * splat(max_length)).simd_min(splat(1.0));
-    let mut clamped = *vector;
-    for c in 0..3 {
-        clamped[c] = vector[c] * scale;
-    }
-    clamped
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,7 +163,7 @@ mod tests {
         let values: Vec<f32> = (0..100).map(|row| row as f32).collect();
         let mut seen = vec![0.0; 100];
         for burner in 0..5 {
-            let rows = sorted.of(burner);
+            let rows = sorted.rows_of(burner);
             assert!(rows.iter().all(|row| burners[*row as usize] as usize == burner) && rows.is_sorted());
             for rows in rows.chunks(LANES).map(RowBatch) {
                 bansho_base::dispatch_baseline!(simd => {
@@ -219,13 +174,5 @@ mod tests {
             }
         }
         assert!((0..100).all(|row| seen[row] == 2.0 * values[row]), "{seen:?}");
-    }
-
-    #[test]
-    fn long_vectors_are_shortened_and_others_stay() {
-        assert_eq!(clamp_length(&[1.0, -2.0, 2.0], 3.1), [1.0, -2.0, 2.0]);
-        assert_eq!(clamp_length(&[0.0; 3], 1.0), [0.0; 3]);
-        let clamped = clamp_length(&[10.0, -20.0, 20.0], 3.0);
-        assert!((length(&clamped) - 3.0).abs() < 1e-5 && (clamped[1] + 2.0).abs() < 1e-5, "{clamped:?}");
     }
 }

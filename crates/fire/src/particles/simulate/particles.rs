@@ -1,4 +1,4 @@
-//! Particles as structure of arrays.
+//! Particles as a structure of arrays.
 
 use bansho_base::math::DVec3;
 use bansho_sph::{Cells, retain};
@@ -12,7 +12,7 @@ const DENSITY: usize = 14;
 /// One particle, for [`Particles::push`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
-    /// Unique number in the run: it seeds all random numbers of the particle.
+    /// Unique number within a run; all random numbers of the particle depend on it.
     pub id: u64,
     /// Position x, m, relative to [`Particles::origin`].
     pub position: [f32; 3],
@@ -45,7 +45,7 @@ pub struct Particles {
     pub(crate) position: [Vec<f32>; 3],
     pub(crate) velocity: [Vec<f32>; 3],
     pub(crate) spawn_point: [Vec<f32>; 3],
-    /// Velocity by which the air's own motion advects the particle, m/s; part of `velocity`.
+    /// Velocity by which the air's motion advects the particle, m/s; included in `velocity`.
     pub(crate) drift: [Vec<f32>; 3],
     /// Burning rate relative to the mean.
     pub(crate) burn_rate: Vec<f32>,
@@ -127,7 +127,7 @@ impl Particles {
         }
     }
 
-    /// Sorts the particles by cell, then by id, and one more column with them. Densities are not sorted: they are to be recomputed.
+    /// Sorts the particles, and the column `companion` with them, by cell, then by id. Densities are not sorted, since they are recomputed afterwards.
     pub(crate) fn sort(&mut self, cells: &mut Cells<3>, companion: &mut Vec<f32>) {
         cells.assign(self.positions(), &self.id);
         cells.reorder(&mut self.id);

@@ -13,7 +13,7 @@ use bansho_base::{
 
 use super::*;
 use crate::particles::{
-    render::{PreparedGas, RenderingParameters, ScratchPool},
+    render::{BufferPool, PreparedGas, RenderingParameters},
     simulate::snapshot,
 };
 
@@ -25,18 +25,18 @@ fn small() -> FlameParticlesParameters {
 fn any_number_of_threads_gives_the_same_bits() {
     // So many that every part of a step, and of the drawing, is split into several tasks.
     let parameters = FlameParticlesParameters { particles: 30_000, ..Default::default() };
-    let look = RenderingParameters::default();
+    let rendering = RenderingParameters::default();
     let camera = CameraParameters { position: Animated::from([0.0, 0.4, 3.0]), ..CameraParameters::default() };
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.04, [256, 192], 0);
-    let (wind, scratch) = (Wind::new(WindParameters::default(), 1, None), ScratchPool::default());
+    let (wind, buffers) = (Wind::new(WindParameters::default(), 1, None), BufferPool::default());
     let state = |threads| {
         let mut simulation = simulation(&parameters);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             World::default().run_steps(&mut simulation, -40, 0, |_, _| {});
-            let gas = gas(&simulation, &scratch);
+            let gas = gas(&simulation, &buffers);
             let around = Surroundings::from_wind(&wind);
-            let prepared = PreparedGas::new(gas, &look, &view, &around, &Unobserved).unwrap();
+            let prepared = PreparedGas::new(gas, &rendering, &view, &around, &Unobserved).unwrap();
             let mut strip = Strip::default();
             strip.reset(Rect::from_size(256, 192), None, 0);
             prepared.draw(&DepthInterval::ALL, &mut strip);

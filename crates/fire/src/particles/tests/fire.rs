@@ -138,8 +138,8 @@ fn gas_stands_on_its_burner_after_a_step_of_any_length() {
 
 /// Light that gas of a kind sends, and that times its height.
 fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> [f64; 2] {
-    let scratch = ScratchPool::default();
-    let gas = gas(simulation, &scratch);
+    let buffers = BufferPool::default();
+    let gas = gas(simulation, &buffers);
     let mut sums = [0.0; 2];
     for index in 0..gas.particles.len() {
         let light = of(&gas, index) * gas.volume(index);
@@ -151,17 +151,17 @@ fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> 
 
 #[test]
 fn blue_light_stands_at_the_base_and_yellow_light_above_it() {
-    let (parameters, look) = (fire(60.0, 0.3), RenderingParameters::default());
+    let (parameters, rendering) = (fire(60.0, 0.3), RenderingParameters::default());
     let mut simulation = simulation(&parameters);
     let (mut blue, mut yellow, mut high) = ([0.0; 2], [0.0; 2], 0.0);
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         if t > 0.0 {
-            let blue_light = |gas: &Gas, index| gas.blue_luminance(index, &look);
+            let blue_light = |gas: &Gas, index| gas.blue_luminance(index, &rendering);
             let add = |sum: &mut [f64; 2], more: [f64; 2]| (0..2).for_each(|i| sum[i] += more[i]);
             add(&mut blue, light_by_height(simulation, blue_light));
             add(
                 &mut yellow,
-                light_by_height(simulation, |gas, index| gas.absorption(index, &look) * gas.luminance(index)),
+                light_by_height(simulation, |gas, index| gas.absorption(index, &rendering) * gas.luminance(index)),
             );
             let above =
                 |gas: &Gas, index| if position(simulation, index).y > 0.4 { blue_light(gas, index) } else { 0.0 };

@@ -17,7 +17,7 @@ use bansho_base::{
 
 use super::{
     parameters::FlameParticlesParameters,
-    render::{FadeOut, Gas, ScratchPool},
+    render::{BufferPool, FadeOut, Gas},
 };
 use crate::particles::simulate::{Simulation, derived::DerivedConstants};
 
@@ -64,7 +64,7 @@ fn lit(simulation: &Simulation) -> Vec<usize> {
 }
 
 /// The gas as the drawing sees it.
-fn gas<'a>(simulation: &'a Simulation, scratch: &'a ScratchPool) -> Gas<'a> {
+fn gas<'a>(simulation: &'a Simulation, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles: &simulation.particles,
         time: 0.0,
@@ -74,6 +74,6 @@ fn gas<'a>(simulation: &'a Simulation, scratch: &'a ScratchPool) -> Gas<'a> {
         size: DVec2::ONE,
         key: Key::new(1, "flame"),
         fade_out: FadeOut::NEVER,
-        scratch,
+        buffers,
     }
 }

@@ -1,9 +1,8 @@
-//! Time, texture scroll and periodic frequencies of a sheet; a seamless loop closes by construction.
+//! Time, texture scroll and frequencies of a sheet; in a seamless loop all are periodic by construction.
 
 use bansho_base::parameters::animated::Animated;
 
-/// The clock of one flame sheet: `S(t)`, the distance that its texture has scrolled, and frequencies rounded to those that close a
-/// loop.
+/// The clock of one flame sheet: the distance `s (t - t0)` that its texture has scrolled, and frequencies rounded to multiples of the loop's.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
     speed: Animated<f64>,
@@ -38,20 +37,19 @@ impl Clock {
         self.loop_s
     }
 
-    /// The frequency nearest to `hz` that closes the loop.
+    /// The frequency nearest to `hz` that is periodic in the loop.
     pub(crate) fn frequency(&self, hz: f64) -> f64 {
         self.loop_s.map_or(hz, |length| (hz * length).round().max(1.0) / length)
     }
 
-    /// The number of waves per sheet height (of either sign) nearest to `waves` that closes the loop.
-    ///
-    /// Zero waves close any loop; `least` is the least number of whole waves per loop.
-    pub(crate) fn waves(&self, waves: f64, least: f64) -> f64 {
+    /// The number of waves per sheet height (of either sign) nearest to `waves` with an integer number of waves in the distance that the texture scrolls
+    /// in a loop; at least `min_per_loop`.
+    pub(crate) fn waves(&self, waves: f64, min_per_loop: f64) -> f64 {
         if self.loop_s.is_none() || self.scroll_per_loop <= 0.0 {
             return waves;
         }
-        let whole = (waves.abs() * self.scroll_per_loop).round().max(least);
-        (whole / self.scroll_per_loop).copysign(waves)
+        let per_loop = (waves.abs() * self.scroll_per_loop).round().max(min_per_loop);
+        (per_loop / self.scroll_per_loop).copysign(waves)
     }
 }
 

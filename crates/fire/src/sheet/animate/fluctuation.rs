@@ -7,7 +7,7 @@ use bansho_base::math::{
 
 const WAVES: usize = 6;
 
-/// Frequencies of the sines relative to the second, mutually irrational; amplitudes fall as 1/sqrt(f).
+/// Frequencies of the sines relative to the second, in irrational ratios; amplitudes decrease as 1/sqrt(f).
 const RATIOS: [f64; WAVES] = [0.412_7, 1.0, 1.618_03, 2.539_1, 3.763_7, 5.871_3];
 
 /// A function of one variable in [-1, 1] with mean 0.
@@ -19,7 +19,7 @@ pub(crate) struct Fluctuation {
 }
 
 impl Fluctuation {
-    /// Sines about `frequency` (cycles per unit of the variable), each rounded by `fit` to one that closes a loop.
+    /// Sines about `frequency` (cycles per unit of the variable), each rounded by `fit` to one that is periodic in a loop.
     ///
     /// `roughness` in [0, 1] weights the higher frequencies.
     pub(crate) fn new(key: Key, purpose: Purpose, frequency: f64, roughness: f64, fit: impl Fn(f64) -> f64) -> Self {
@@ -31,7 +31,7 @@ impl Fluctuation {
         Self {
             frequencies: RATIOS.map(|ratio| fit(ratio * frequency)),
             phases: std::array::from_fn(phase),
-            // Six sines never peak together: a factor of 1.4 uses the range, and the clamp catches the rest.
+            // Six sines hardly ever peak together: a factor of 1.4 makes use of the range, and rare larger sums are clamped.
             amplitudes: raw.map(|amplitude| (1.4 * amplitude / total) as f32),
         }
     }
@@ -51,9 +51,9 @@ impl Fluctuation {
         values.fill(0.0);
         for i in 0..WAVES {
             let phase = math::reduce_phase(self.frequencies[i].fma(start, self.phases[i]));
-            let turn = (self.frequencies[i] * step) as f32;
+            let phase_step = (self.frequencies[i] * step) as f32;
             for (index, value) in values.iter_mut().enumerate() {
-                *value = self.amplitudes[i].fma(approximations::sin_turns(turn.fma(index as f32, phase)), *value);
+                *value = self.amplitudes[i].fma(approximations::sin_turns(phase_step.fma(index as f32, phase)), *value);
             }
         }
         values.iter_mut().for_each(|value| *value = value.clamp(-1.0, 1.0));

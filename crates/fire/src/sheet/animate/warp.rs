@@ -13,7 +13,10 @@ use fearless_simd::Simd;
 use super::{clock::Clock, fluctuation::Fluctuation};
 use crate::sheet::{
     parameters::{FlameSheetParameters, ShapeParameters},
-    render::curve_tables::{CurvePair, SEGMENTS, ShapeTables, lookup_index},
+    tables::{
+        curve_pair::{CurvePair, SEGMENTS, lookup_index},
+        shape_tables::ShapeTables,
+    },
 };
 
 /// The fluctuations of one flame: its edges P (15), the sway of its center line and the flicker of its height.
@@ -26,7 +29,7 @@ pub(crate) struct FlameWaves {
 }
 
 impl FlameWaves {
-    /// The fluctuations that `key` gives a flame of this shape.
+    /// The fluctuations of a flame of this shape with the random numbers of `key`.
     pub(crate) fn new(shape: &ShapeParameters, key: Key, clock: &Clock) -> Self {
         let edge_fluctuation = |name| {
             let fit = |waves: f64| clock.waves(waves, 1.0);
@@ -53,12 +56,12 @@ pub(crate) struct WindLean {
 }
 
 impl WindLean {
-    /// Greatest tangent of leaning and bending.
+    /// Maximum of both tangents.
     const MAX_TANGENT: f64 = 1.5;
 
     /// Deflection by `wind` at `point` of gas that rises at `rise_speed` m/s.
     ///
-    /// The tangent is drift over rise. It saturates smoothly, since a flame that lies flat is not a sheet.
+    /// The tangent is the ratio of drift to rise. It saturates smoothly, since a sheet cannot represent a horizontal flame.
     pub(crate) fn new(wind: &Wind, point: DVec3, t: f64, right: DVec3, rise_speed: f64, response: f64) -> Self {
         let velocity = wind.at(point, t) * (response / rise_speed.max(0.05));
         let soft_clamp = |tangent: f64| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT);
@@ -73,9 +76,9 @@ pub(crate) struct WarpState {
     pub(crate) edges: CurvePair,
     /// Displacement of the center line to the right, in sheet widths, over y.
     center: CurvePair,
-    /// Least and greatest displacement.
+    /// Minimum and maximum displacement.
     pub(crate) center_range: [f64; 2],
-    /// Factor of y, below 1 while the flame is taller than the mean.
+    /// Factor of y: mean height over current height, times the headroom of the sheet.
     height_scale: f32,
     /// Distance that the texture has scrolled, sheet heights.
     pub(crate) scroll: f64,
@@ -95,7 +98,7 @@ impl WarpState {
         fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, lean))
     }
 
-    /// Inverse warp: the point of the unbent flame of mean height that is seen at (x, y) of the sheet.
+    /// Inverse warp: the point of the undeformed flame of mean height that appears at (x, y) of the sheet.
     #[inline(always)]
     pub(crate) fn unwarp<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
         let [center, _] = self.center.lookup(&lookup_index(y));
@@ -128,20 +131,21 @@ fn evaluate_warp(
     let edge_fluctuation = |waves: &Fluctuation| {
         let mut values = [0.0; SEGMENTS + 1];
         waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
-        // P in [0, 1]; with less strength it stays closer to 1, the outermost edge.
+        // P in [0, 1]; the weaker the flutter, the closer it stays to 1, the outer edge of the fringe.
         values.map(|value| (0.5 * shape_parameters.flutter as f32).mul_add(value - 1.0, 1.0))
     };
     let edges = shape.edges(&edge_fluctuation(&waves.left), &edge_fluctuation(&waves.right));
     let center = center_line(parameters, waves, time, lean);
-    let ends = (0..=16).map(|i| f64::from(center.at(i as f32 / 16.0)[0]));
-    let center_range = ends.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
+    let samples = (0..=16).map(|i| f64::from(center.at(i as f32 / 16.0)[0]));
+    let center_range = samples.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
     let flicker = shape_parameters.flicker * f64::from(waves.flicker.at(time));
     // Sheets have headroom: at the mean height the flame fills 1 / (1 + flicker) of the sheet.
     let height_scale = ((1.0 + shape_parameters.flicker) / (1.0 + flicker)) as f32;
     WarpState { edges, center, center_range, height_scale, scroll }
 }
 
-/// Displacement grows as y^1.5, as of gas in uniform wind that accelerates upward; sway travels up with the gas.
+/// Center line of a flame at one time. Its displacement is proportional to y^1.5, as for gas that accelerates upward in uniform wind; sway travels upward
+/// with the gas.
 #[inline(always)]
 fn center_line(parameters: &FlameSheetParameters, waves: &FlameWaves, time: f64, lean: WindLean) -> CurvePair {
     /// Time for sway to travel from base to tip, as a fraction of its period.

@@ -9,9 +9,12 @@ use bansho_base::{
 use fearless_simd::Simd;
 
 use super::shade::{SheetContent, TimeSample, shade_sample};
-use crate::sheet::{FlameSheet, render::flame_instance::FlameInstance};
+use crate::sheet::{
+    equations,
+    model::{FlameInstance, FlameSheet},
+};
 
-/// What a flame sheet can write beside its light, in the order of a strip's planes.
+/// AOVs of a flame sheet, in the order of a strip's planes.
 pub(crate) const AOVS: &[AovDescriptor] = &[
     AovDescriptor {
         name: "temperature_k",
@@ -44,7 +47,7 @@ const TEMPERATURE: usize = 0;
 const OPTICAL_DEPTH: usize = 1;
 const MOTION: [usize; 2] = [2, 3];
 
-/// One flame, and what its AOVs depend on.
+/// One flame with the inputs of its AOVs.
 pub(crate) struct AovContext<'a> {
     pub(crate) sheet: &'a FlameSheet,
     pub(crate) flame: &'a FlameInstance,
@@ -117,19 +120,19 @@ impl AovContext<'_> {
     }
 }
 
-/// Least dw/dy: gas moves at most at twice the scroll speed. sqrt(y) of eq. (9) has that slope at the top; near the base it is
-/// steeper and the gas slower.
+/// Minimum of dw/dy: gas moves at most at twice the scroll speed. sqrt(y) of eq. (9) has that slope at the top; near the base it is steeper and the gas is
+/// slower.
 const MIN_SLOPE: f32 = 0.5;
 
 impl FlameSheet {
     /// dy/dt of the gas at (x, y), sheet heights per second: s / (dw/dy).
     fn gas_speed(&self, flame: &FlameInstance, x: f64, y: f64, t: f64) -> f64 {
         const STEP: f32 = 0.01;
-        let distance = crate::sheet::equations::axis_distance(x as f32);
+        let distance = equations::axis_distance(x as f32);
         let y = (y as f32).clamp(0.02, 0.98);
         let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);
-        // Where the outline folds the mapping over, its slope is not a speed of gas.
+        // Where the outline makes the mapping fold over, its slope is not that of the gas and is clamped.
         self.clock.speed(self.flame_time(flame, t)) / f64::from(slope.max(MIN_SLOPE))
     }
 }

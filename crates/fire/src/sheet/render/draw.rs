@@ -13,49 +13,53 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use super::shade::{ShadedBatch, SheetContent, TimeSample, coordinates, shade_coordinates, shade_sample};
-use crate::sheet::render::{
+use super::shade::{
+    ShadedBatch, SheetContent, TimeSample,
+    flame::{coordinates, shade_coordinates},
+    shade_sample,
+};
+use crate::sheet::tables::{
     color_ramp::ColorRamp,
-    curve_tables::{FlameCoordinates, ShapeTables},
+    shape_tables::{FlameCoordinates, ShapeTables},
 };
 
-/// What is drawn of one sheet.
+/// One sheet with the inputs of drawing.
 #[derive(Clone, Copy)]
 pub(crate) struct DrawContext<'a> {
     pub(crate) shape: &'a ShapeTables,
     pub(crate) ramp: &'a ColorRamp,
     pub(crate) samples: &'a [TimeSample],
     pub(crate) content: SheetContent,
-    /// Whether it hides what is behind.
+    /// Whether it absorbs light from behind.
     pub(crate) absorbs: bool,
     /// Distance between exact rows, a power of two.
     pub(crate) row_band: usize,
-    /// Texels between neighboring pixels above which pixels are supersampled, [`MAX_MINIFICATION`].
-    pub(crate) minification: f32,
+    /// Texels between neighboring pixels above which pixels are supersampled: [`MAX_MINIFICATION`], except in tests.
+    pub(crate) max_minification: f32,
 }
 
-/// Texels between neighboring pixels up to which one lookup per pixel shows no aliasing.
+/// Texels between neighboring pixels up to which one lookup per pixel causes no visible aliasing.
 pub(crate) const MAX_MINIFICATION: f32 = 4.0;
 
-/// Supersampling offsets from the pixel center, pixels across and up: no two in one column or row.
+/// Supersampling offsets from the pixel center, pixels across and up: rotated grid, no two in one column or row.
 const SUPERSAMPLES_4: [[f32; 2]; 4] = [[-0.375, 0.125], [-0.125, -0.375], [0.125, 0.375], [0.375, -0.125]];
-/// The same for less than twice the greatest minification.
+/// Offsets for up to twice the maximum minification.
 const SUPERSAMPLES_2: [[f32; 2]; 2] = [[-0.25, 0.25], [0.25, -0.25]];
 
 /// Distance between exact rows for a sheet of that height: 1 up to 255 pixels, 16 from 1024 on.
 pub(crate) fn row_band_height(height_pixels: f64) -> usize {
-    /// Distances, and the heights from which on they apply.
+    /// Distances between exact rows, and the minimum sheet heights for which they are used.
     const BANDS: [(usize, f64); 3] = [(16, 1024.0), (4, 512.0), (2, 256.0)];
-    BANDS.into_iter().find(|(_, least)| height_pixels >= *least).map_or(1, |(rows, _)| rows)
+    BANDS.into_iter().find(|(_, min_height)| height_pixels >= *min_height).map_or(1, |(rows, _)| rows)
 }
 
-/// Pixels of a row that are tested together for whether any flame can be there.
+/// Pixels of a row that are tested together for being outside the flame.
 const GROUP_COLUMNS: usize = 4 * LANES;
 
-/// Draws all time samples of one sheet into `rect` of `strip`, behind what it holds.
+/// Draws all time samples of one sheet into `rect` of `strip`, behind its current contents.
 ///
-/// Batches begin at multiples of sixteen columns of the whole picture and bands at multiples of their height, so that strips and
-/// crops change no pixel.
+/// Batches start at multiples of sixteen columns of the whole picture and bands at multiples of their height, so that pixels do not depend on strips and
+/// crops.
 #[inline(always)]
 pub(crate) fn draw_rows<S: Simd>(simd: S, context: &DrawContext, rect: Rect, strip: &mut Strip) {
     let start = rect.x / LANES * LANES;
@@ -90,7 +94,7 @@ fn draw_each_row<S: Simd>(simd: S, context: &DrawContext, columns: Range<usize>,
 struct SheetSamples<S: Simd> {
     coordinates: FlameCoordinates<S>,
     depth: Lanes<S>,
-    /// Greatest number of texels per pixel, relative to the threshold of supersampling.
+    /// Maximum number of texels per pixel, relative to the threshold of supersampling.
     minification: f32,
 }
 
@@ -98,28 +102,28 @@ struct SheetSamples<S: Simd> {
 struct RowBand<S: Simd> {
     /// The first row of the band.
     first: Vec<SheetSamples<S>>,
-    /// The first row of the next band minus that.
+    /// The first row of the next band minus that of this one.
     delta: Vec<SheetSamples<S>>,
     /// The first row of the next band.
     next: Vec<SheetSamples<S>>,
 }
 
 impl<S: Simd> RowBand<S> {
-    /// With capacity for a group of columns.
+    /// Empty rows with capacity for a group of columns.
     #[inline(always)]
     fn new(context: &DrawContext) -> Self {
-        let room = || Vec::with_capacity(GROUP_COLUMNS / LANES * context.samples.len());
-        Self { first: room(), delta: room(), next: room() }
+        let allocate = || Vec::with_capacity(GROUP_COLUMNS / LANES * context.samples.len());
+        Self { first: allocate(), delta: allocate(), next: allocate() }
     }
 
-    /// Discards both rows where the next band does not follow on them.
+    /// Discards both rows, for a band that does not follow the previous one.
     #[inline(always)]
     fn clear(&mut self) {
         self.first.clear();
         self.next.clear();
     }
 
-    /// Advances to the band that begins at `row`.
+    /// Advances to the band that starts at `row`.
     #[inline(always)]
     fn advance(&mut self, simd: S, context: &DrawContext, columns: &Range<usize>, row: usize) {
         std::mem::swap(&mut self.first, &mut self.next);
@@ -142,7 +146,7 @@ impl<S: Simd> RowBand<S> {
     }
 }
 
-/// Draws the flame in some columns, band by band; the last row of a band is the first of the next.
+/// Draws the flame in a range of columns, band by band.
 #[inline(always)]
 fn draw_bands<S: Simd>(
     simd: S,
@@ -167,10 +171,10 @@ fn draw_bands<S: Simd>(
         for row in first.max(rect.y)..(first + context.row_band).min(rect.bottom()) {
             let fraction = (row - first) as f32 / context.row_band as f32;
             for batch in 0..batch_count {
-                let spots = batch * context.samples.len()..(batch + 1) * context.samples.len();
-                let delta = row_band.delta.get(spots.clone()).unwrap_or(&[]);
+                let range = batch * context.samples.len()..(batch + 1) * context.samples.len();
+                let delta = row_band.delta.get(range.clone()).unwrap_or(&[]);
                 let column = columns.start + batch * LANES;
-                let sums = average_samples(simd, context, &row_band.first[spots], delta, fraction, [column, row]);
+                let sums = average_samples(simd, context, &row_band.first[range], delta, fraction, [column, row]);
                 sums.composite(column, row, rect, context.absorbs, strip);
             }
         }
@@ -190,7 +194,7 @@ fn add_sheet_samples<S: Simd>(
         for sample in context.samples {
             let batch = sample.pixel_to_sheet.batch(simd, column, row);
             let coordinates = coordinates(context.shape, &sample.state, &batch);
-            let minification = coordinates.span(sample.state.texels()) / context.minification;
+            let minification = coordinates.max_texel_step(sample.state.texels()) / context.max_minification;
             samples_of_row.push(SheetSamples { coordinates, depth: batch.depth, minification });
         }
     }
@@ -227,7 +231,7 @@ fn average_samples<S: Simd>(
     sums
 }
 
-/// Adds a time sample of sixteen pixels, averaged over several points of each.
+/// Adds a time sample of sixteen pixels, averaged over several points of each pixel.
 fn add_supersampled<S: Simd>(
     simd: S,
     context: &DrawContext,
@@ -240,13 +244,13 @@ fn add_supersampled<S: Simd>(
         #[inline(always)]
         || {
             let batch = sample.pixel_to_sheet.batch(simd, pixel[0], pixel[1]);
-            let spots = 1.0 / offsets.len() as f32;
+            let weight = 1.0 / offsets.len() as f32;
             for &[across, up] in offsets {
-                let near = batch.offset_by(0.5 * across * sample.state.pixel[0], up * sample.state.pixel[1]);
-                let coordinates = coordinates(context.shape, &sample.state, &near);
+                let offset_batch = batch.offset_by(0.5 * across * sample.state.pixel[0], up * sample.state.pixel[1]);
+                let coordinates = coordinates(context.shape, &sample.state, &offset_batch);
                 if let Some(mut shade) = shade_coordinates(context.shape, context.ramp, &sample.state, &coordinates) {
                     for plane in &mut shade.light {
-                        *plane *= spots;
+                        *plane *= weight;
                     }
                     sums.add(&shade, batch.depth, sample.luminance, context.samples.len());
                 }
@@ -255,7 +259,7 @@ fn add_supersampled<S: Simd>(
     );
 }
 
-/// Whether no flame can be in some columns between two rows.
+/// Whether there is certainly no flame in a range of columns between two rows.
 #[inline(always)]
 fn misses_flame(shape: &ShapeTables, sample: &TimeSample, columns: &Range<usize>, rows: [usize; 2]) -> bool {
     let (mut x, mut y) = ([0.0; 6], [0.0; 6]);
@@ -270,7 +274,7 @@ fn misses_flame(shape: &ShapeTables, sample: &TimeSample, columns: &Range<usize>
     shape.misses_flame(&x, &y)
 }
 
-/// Mean light and opacity of sixteen pixels over the exposure, and the least depth at which they see anything.
+/// Mean light and opacity of sixteen pixels over the exposure, and the depth of their nearest sample.
 struct PixelSums<S: Simd> {
     light: [Lanes<S>; 4],
     depth: Lanes<S>,
@@ -293,7 +297,7 @@ impl<S: Simd> PixelSums<S> {
         self.covered = true;
     }
 
-    /// Composites the pixels behind what the strip holds, where the plate does not hide them.
+    /// Composites the pixels behind the contents of the strip, where the plate does not hide them.
     #[inline(always)]
     fn composite(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
         if !self.covered {
@@ -319,7 +323,7 @@ struct PixelArrays {
     depth: [f32; LANES],
 }
 
-/// Composites those of sixteen pixels that lie in `rect` behind what the strip holds, where the plate does not hide them.
+/// Composites those of sixteen pixels that are inside `rect` behind the contents of the strip, where the plate does not hide them.
 fn composite(pixels: &PixelArrays, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
     let row = (y - strip.rect.y) * strip.rect.width;
     for lane in 0..LANES {

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     math::{
-        DVec3, lerp,
+        DVec3,
         simd::{LANES, Lanes, Real, ramp},
     },
     phenomenon::{
@@ -14,60 +14,60 @@ use fearless_simd::{Level, Simd, prelude::*};
 
 use super::{
     projection::SheetCoordinates,
-    shade::{SheetState, shade},
+    shade::{SheetState, flame::shade},
 };
 use crate::sheet::{
-    FlameSheet,
     animate::warp::{WarpState, WindLean},
-    render::flame_instance::FlameInstance,
+    model::{FlameInstance, FlameSheet},
 };
 
-/// Rows of the grid; it is sixteen wide.
+/// Rows of the grid, which has sixteen columns.
 const ROWS: usize = 32;
 
-/// Luminous intensity of each row of the grid, cd (ACEScg), in all directions that see the sheet's face.
+/// Luminous intensity of each row of the grid, from the base up, cd (ACEScg).
 pub(crate) type RowIntensities = [[f32; 3]; ROWS];
 
 impl FlameSheet {
-    /// Luminous intensity of the rows of a flame's sheet at `t`, from the base up: luminance times area, summed over cells.
+    /// Luminous intensity of the rows of a flame's sheet at `t`: luminance times area, summed over cells.
     ///
-    /// Wind is ignored. The sheet is thin and turned to every viewer, so that its intensity is isotropic.
+    /// Wind is ignored. The intensity is isotropic, as the sheet represents a flame that looks the same from all sides.
     pub(crate) fn row_intensities(&self, flame: &FlameInstance, t: f64) -> RowIntensities {
-        let calm = WindLean { across: 0.0, toward: 0.0 };
+        let no_wind = WindLean { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
-        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, calm);
+        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, no_wind);
         let texture = flame.texture_source.texture(warp.scroll);
         let state = SheetState { warp, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
         let size = self.sheet_size(flame);
         let cell_area = size.x * size.y / (LANES * ROWS) as f64;
         let scale = (cell_area * self.luminance_at(t)) as f32;
-        fearless_simd::dispatch!(Level::new(), simd => row_light(simd, self, &state, scale))
+        fearless_simd::dispatch!(Level::new(), simd => row_intensities(simd, self, &state, scale))
     }
 
     /// Point lights that represent a flame while the shutter is open.
     pub(crate) fn point_lights(&self, flame: &FlameInstance, shutter: Shutter) -> Vec<Light> {
         let t = shutter.middle();
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
-        let row_light = self.row_intensities(flame, t);
+        let row_intensities = self.row_intensities(flame, t);
         let count = self.parameters.light.count.max(1) as usize;
         let scale = self.parameters.light.scale as f32;
         let light_position = |height: f64| base + DVec3::Y * (height * size.y);
         (0..count)
-            .map(|index| equal_energy_segment(&row_light, index, count))
-            .filter(|(intensity, _)| intensity.iter().any(|value| *value * scale > 0.0))
-            .map(|(intensity, height)| Light {
-                emitter: Emitter::Point { position: light_position(height), radius: 0.15 * size.x },
-                intensity: intensity.map(|value| value * scale),
+            .map(|index| equal_energy_segment(&row_intensities, index, count))
+            .filter(|segment| segment.intensity.iter().any(|value| *value * scale > 0.0))
+            .map(|segment| Light {
+                emitter: Emitter::Point { position: light_position(segment.height), radius: 0.15 * size.x },
+                intensity: segment.intensity.map(|value| value * scale),
             })
             .collect()
     }
 }
 
+/// Shades a grid over the sheet and sums its rows.
 #[inline(always)]
-fn row_light<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f32) -> RowIntensities {
+fn row_intensities<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f32) -> RowIntensities {
     let x = ramp(simd, 0.5 / LANES as f32, 1.0 / LANES as f32);
-    let mut row_light = [[0.0; 3]; ROWS];
-    for (index, row) in row_light.iter_mut().enumerate() {
+    let mut row_intensities = [[0.0; 3]; ROWS];
+    for (index, row) in row_intensities.iter_mut().enumerate() {
         let y = Lanes::splat(simd, (index as f32 + 0.5) / ROWS as f32);
         let batch = SheetCoordinates { x, y, depth: y.broadcast(1.0) };
         if let Some(shade) = shade(sheet.shape(), sheet.ramp(), state, &batch) {
@@ -76,18 +76,26 @@ fn row_light<S: Simd>(simd: S, sheet: &FlameSheet, state: &SheetState, scale: f3
             }
         }
     }
-    row_light
+    row_intensities
 }
 
-/// Segment `index` of `count` of the rows, each with the same energy, and the height of its center.
-///
-/// Segments of equal energy move smoothly as the flame flickers.
-fn equal_energy_segment(row_light: &RowIntensities, index: usize, count: usize) -> ([f32; 3], f64) {
+/// Light of a range of heights of the flame.
+struct LightSegment {
+    /// Luminous intensity, cd (ACEScg).
+    intensity: [f32; 3],
+    /// Height of its center of energy, in sheet heights.
+    height: f64,
+}
+
+/// Segment `index` of `count` segments of equal energy: their centers move smoothly as the flame flickers.
+fn equal_energy_segment(row_intensities: &RowIntensities, index: usize, count: usize) -> LightSegment {
+    /// Height of a segment without energy.
+    const DARK_HEIGHT: f64 = 0.3;
     let energy = |row: &[f32; 3]| f64::from(row.iter().sum::<f32>().max(0.0));
-    let total: f64 = row_light.iter().map(energy).sum();
+    let total: f64 = row_intensities.iter().map(energy).sum();
     let (from, to) = (total * index as f64 / count as f64, total * (index + 1) as f64 / count as f64);
     let (mut cumulative, mut intensity, mut height_moment) = (0.0, [0.0_f32; 3], 0.0);
-    for (row_index, row) in row_light.iter().enumerate() {
+    for (row_index, row) in row_intensities.iter().enumerate() {
         let next_cumulative = cumulative + energy(row);
         let overlap = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
         if overlap > 0.0 {
@@ -99,8 +107,8 @@ fn equal_energy_segment(row_light: &RowIntensities, index: usize, count: usize) 
         }
         cumulative = next_cumulative;
     }
-    let overlap = to - from;
-    (intensity, if overlap > 0.0 { height_moment / overlap } else { lerp(0.0, 1.0, 0.3) })
+    let energy = to - from;
+    LightSegment { intensity, height: if energy > 0.0 { height_moment / energy } else { DARK_HEIGHT } }
 }
 
 #[cfg(test)]
@@ -108,16 +116,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_have_equal_energy_and_add_up() {
-        let mut row_light = [[0.0; 3]; ROWS];
-        for (i, row) in row_light.iter_mut().enumerate().take(10) {
+    fn segments_have_equal_energy_and_add_up() {
+        let mut row_intensities = [[0.0; 3]; ROWS];
+        for (i, row) in row_intensities.iter_mut().enumerate().take(10) {
             *row = [3.0, 2.0, 1.0 + i as f32];
         }
-        let segments: Vec<_> = (0..3).map(|index| equal_energy_segment(&row_light, index, 3)).collect();
-        let energy = |fraction: &([f32; 3], f64)| fraction.0.iter().sum::<f32>();
+        let segments: Vec<_> = (0..3).map(|index| equal_energy_segment(&row_intensities, index, 3)).collect();
+        let energy = |segment: &LightSegment| segment.intensity.iter().sum::<f32>();
         assert!((energy(&segments[0]) - energy(&segments[2])).abs() < 1e-3);
-        let red: f32 = segments.iter().map(|fraction| fraction.0[0]).sum();
+        let red: f32 = segments.iter().map(|segment| segment.intensity[0]).sum();
         assert!((red - 30.0).abs() < 1e-4);
-        assert!(segments[0].1 < segments[1].1 && segments[1].1 < segments[2].1);
+        assert!(segments[0].height < segments[1].height && segments[1].height < segments[2].height);
     }
 }

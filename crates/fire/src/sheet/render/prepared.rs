@@ -16,12 +16,12 @@ use super::{
     aovs::{AovContext, write_aov_rows},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
+    time_samples::pixels_per_meter,
 };
 use crate::{
     sheet::{
-        FlameSheet,
+        model::{FlameInstance, FlameSheet},
         parameters::Stage,
-        render::flame_instance::{FlameInstance, pixels_per_meter},
     },
     sparks::{SparkEmitter, Streak},
 };
@@ -34,7 +34,7 @@ pub(crate) struct PreparedSheet<'a> {
     commands: Vec<DrawCommand<'a>>,
 }
 
-/// One item at one depth.
+/// A sheet or a spark at one depth.
 struct DrawCommand<'a> {
     flame: &'a FlameInstance,
     depth: f64,
@@ -68,7 +68,7 @@ impl<'a> PreparedSheet<'a> {
 }
 
 impl FlameSheet {
-    /// Flame, smoke and sparks of one instance.
+    /// Adds flame, smoke and sparks of one instance.
     fn add_draw_commands<'a>(
         &'a self,
         flame: &'a FlameInstance,
@@ -99,7 +99,7 @@ impl FlameSheet {
         }
     }
 
-    /// Sparks of one instance.
+    /// Emitter of the sparks of one instance.
     fn spark_emitter(&self, flame: &FlameInstance, view: &View) -> SparkEmitter<'_> {
         let t = view.shutter.middle();
         SparkEmitter {
@@ -126,8 +126,8 @@ impl FlameSheet {
 
 impl Prepared for PreparedSheet<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let shown = self.commands.iter().filter(|command| slice.contains(command.depth));
-        shown.fold(Rect::default(), |all, command| all.union(&command.rect))
+        let in_slice = self.commands.iter().filter(|command| slice.contains(command.depth));
+        in_slice.fold(Rect::default(), |all, command| all.union(&command.rect))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
@@ -162,12 +162,12 @@ impl PreparedSheet<'_> {
             content,
             absorbs,
             row_band,
-            minification: MAX_MINIFICATION,
+            max_minification: MAX_MINIFICATION,
         };
         fearless_simd::dispatch!(self.level, simd => draw_rows(simd, &context, rect, strip));
         if !strip.aovs.is_empty() {
-            let measured = AovContext { sheet, flame: command.flame, view: self.view, samples, content };
-            fearless_simd::dispatch!(self.level, simd => write_aov_rows(simd, &measured, rect, strip));
+            let context = AovContext { sheet, flame: command.flame, view: self.view, samples, content };
+            fearless_simd::dispatch!(self.level, simd => write_aov_rows(simd, &context, rect, strip));
         }
     }
 }

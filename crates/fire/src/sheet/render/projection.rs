@@ -15,7 +15,7 @@ use fearless_simd::{Simd, prelude::*};
 pub(crate) struct SheetCoordinates<S: Simd> {
     /// Across the sheet.
     pub(crate) x: Lanes<S>,
-    /// Up the sheet; far outside where the pixel does not see the sheet's plane.
+    /// Up the sheet; far outside if the pixel's ray misses the sheet's plane.
     pub(crate) y: Lanes<S>,
     /// Depth, m.
     pub(crate) depth: Lanes<S>,
@@ -29,22 +29,22 @@ impl<S: Simd> SheetCoordinates<S> {
     }
 }
 
-/// Depth of pixels that do not see the plane; finite, so that it can be interpolated.
-const BEYOND: f32 = 1e30;
-/// A y that lies outside every flame.
-const OUTSIDE: f32 = -1e6;
+/// Depth of pixels whose rays miss the plane; finite, so that it can be interpolated.
+const MISS_DEPTH: f32 = 1e30;
+/// The y of these pixels, outside every flame.
+const MISS_Y: f32 = -1e6;
 
 /// Mapping from pixels to the sheet.
 #[derive(Clone, Debug)]
 pub(crate) enum PixelToSheet {
     /// Perspective: x/depth, y/depth and 1/depth are linear in pixel coordinates (a homography).
     Linear {
-        /// Constant, per column and per row, of x/depth, y/depth and 1/depth.
+        /// Of x/depth, y/depth and 1/depth: the constant term, the term per column and the term per row.
         forms: [[f64; 3]; 3],
         /// Near clipping depth.
         near: f64,
     },
-    /// Other lenses: some rays of each batch are traced.
+    /// Other lenses: three or all rays of each batch are traced.
     Rays {
         /// The camera.
         camera: Camera,
@@ -54,7 +54,7 @@ pub(crate) enum PixelToSheet {
 }
 
 impl PixelToSheet {
-    /// The mapping to `quad` seen by `camera`; `None` where it is seen exactly edge on.
+    /// The mapping to `quad` seen by `camera`; `None` if it is seen exactly edge on.
     pub(crate) fn new(camera: &Camera, quad: &UprightQuad) -> Option<Self> {
         let normal = quad.right.cross(quad.up);
         let offset = normal.dot(quad.base - camera.position);
@@ -92,15 +92,15 @@ impl PixelToSheet {
 }
 
 impl PixelToSheet {
-    /// Sheet coordinates and depth at a pixel position; `None` where it does not see the sheet's plane.
+    /// Sheet coordinates and depth at a pixel position; `None` if the ray misses the sheet's plane.
     #[inline(always)]
     pub(crate) fn at(&self, px: f64, py: f64) -> Option<[f64; 3]> {
         match self {
             Self::Rays { camera, quad } => intersect_sheet(camera, quad, px, py),
             Self::Linear { forms, near } => {
                 let [x, y, inverse] = forms.map(|[constant, column, row]| column * px + row * py + constant);
-                let seen = inverse > 0.0 && inverse * near <= 1.0;
-                seen.then(|| [x / inverse, y / inverse, 1.0 / inverse])
+                let is_visible = inverse > 0.0 && inverse * near <= 1.0;
+                is_visible.then(|| [x / inverse, y / inverse, 1.0 / inverse])
             }
         }
     }
@@ -125,11 +125,11 @@ fn linear_batch<S: Simd>(simd: S, forms: &[[f64; 3]; 3], near: f64, column: usiz
     let inverse = linear(simd, forms[2], px, py);
     let depth = inverse.broadcast(1.0) / inverse;
     // A depth beyond `near` is an inverse depth in (0, 1/near].
-    let seen = inverse.simd_gt(inverse.broadcast(0.0)) & inverse.simd_le(inverse.broadcast((1.0 / near) as f32));
+    let is_visible = inverse.simd_gt(inverse.broadcast(0.0)) & inverse.simd_le(inverse.broadcast((1.0 / near) as f32));
     SheetCoordinates {
-        x: seen.select(linear(simd, forms[0], px, py) * depth, depth.broadcast(0.0)),
-        y: seen.select(linear(simd, forms[1], px, py) * depth, depth.broadcast(OUTSIDE)),
-        depth: seen.select(depth, depth.broadcast(BEYOND)),
+        x: is_visible.select(linear(simd, forms[0], px, py) * depth, depth.broadcast(0.0)),
+        y: is_visible.select(linear(simd, forms[1], px, py) * depth, depth.broadcast(MISS_Y)),
+        depth: is_visible.select(depth, depth.broadcast(MISS_DEPTH)),
     }
 }
 
@@ -161,24 +161,23 @@ fn intersect_sheet(camera: &Camera, quad: &UprightQuad, px: f64, py: f64) -> Opt
     Some([offset.dot(quad.right) / quad.size.x + 0.5, offset.dot(quad.up) / quad.size.y, depth])
 }
 
-/// Traces the rays of three pixels of a batch and interpolates with a parabola, which is off by less than a thousandth of a pixel
-/// where the sheet is small in the field of view. Where one of the three misses the plane, or curvature is large, all pixels are
-/// traced.
+/// Traces the rays of three pixels of a batch and interpolates with a parabola: the error is less than a thousandth of a pixel if the sheet is small in the
+/// field of view. If one of the three misses the plane, or if the curvature is large, all rays are traced.
 fn ray_batch(camera: &Camera, quad: &UprightQuad, column: usize, row: usize) -> SheetCoordinateArrays {
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
-    let mut batch = SheetCoordinateArrays { x: [0.0; LANES], y: [OUTSIDE; LANES], depth: [BEYOND; LANES] };
+    let mut batch = SheetCoordinateArrays { x: [0.0; LANES], y: [MISS_Y; LANES], depth: [MISS_DEPTH; LANES] };
     let knots = [0.0, 7.5, 15.0].map(|step| intersect_sheet(camera, quad, px + step, py));
-    let gentle = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
+    let is_nearly_linear = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
         (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2] && (a[2] - c[2]).abs() < 0.1 * b[2]
     };
     if let [Some(a), Some(b), Some(c)] = knots
-        && gentle(a, b, c)
+        && is_nearly_linear(a, b, c)
     {
         for i in 0..LANES {
             let s = i as f64 / 7.5 - 1.0;
             let [x, y, depth] = std::array::from_fn(|k| {
-                let (slope, bend) = (0.5 * (c[k] - a[k]), 0.5 * (c[k] + a[k]) - b[k]);
-                (bend.mul_add(s, slope).mul_add(s, b[k])) as f32
+                let (slope, curvature) = (0.5 * (c[k] - a[k]), 0.5 * (c[k] + a[k]) - b[k]);
+                (curvature.mul_add(s, slope).mul_add(s, b[k])) as f32
             });
             (batch.x[i], batch.y[i], batch.depth[i]) = (x, y, depth);
         }
@@ -192,7 +191,7 @@ fn ray_batch(camera: &Camera, quad: &UprightQuad, column: usize, row: usize) -> 
     batch
 }
 
-/// Bounding rectangle of the pixels that may see the sheet between `left` and `right` (x), up to `top` (y).
+/// Bounding rectangle of the pixels in which the sheet between `left` and `right` (x) and up to `top` (y) may appear.
 pub(crate) fn bounds(
     camera: &Camera,
     quad: &UprightQuad,
@@ -207,14 +206,14 @@ pub(crate) fn bounds(
     for i in 0..=STEPS {
         for j in 0..=STEPS {
             let x = left + (right - left) * i as f64 / STEPS as f64;
-            let Some(seen) = camera.project(quad.point(x, top * j as f64 / STEPS as f64)) else {
+            let Some(projection) = camera.project(quad.point(x, top * j as f64 / STEPS as f64)) else {
                 return whole;
             };
-            low = low.min(seen.pixel);
-            high = high.max(seen.pixel);
+            low = low.min(projection.pixel);
+            high = high.max(projection.pixel);
         }
     }
-    // Edges may bulge between the points for curved lenses.
+    // With a fisheye or panorama edges may curve beyond the sampled points.
     let margin = DVec2::splat(2.0) + (high - low) * if camera.lens == Lens::Perspective { 0.0 } else { 0.05 };
     let (low, high) = ((low - margin).max(DVec2::ZERO), high + margin);
     let end = [high.x, high.y].map(|side| side.ceil().max(0.0) as usize);
@@ -312,7 +311,7 @@ mod tests {
         let base = camera.position + camera.world_from_camera.col(2) * 2.0 - DVec3::Y;
         let behind = UprightQuad::new(base, right_facing(&camera, base), DVec2::ONE, 0.0);
         let batch = seen_batch(&PixelToSheet::new(&camera, &behind).unwrap(), 320, 240);
-        assert!(batch.y.iter().all(|y| *y == OUTSIDE));
+        assert!(batch.y.iter().all(|y| *y == MISS_Y));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! A single periodic table repeats when it has scrolled by its height. Here the scroll direction is slanted, so that the table
 //! returns shifted by an irrational fraction of its width, and a second, finer layer rises faster with the opposite slant. Both
-//! also change the gas as it rises, as a real flame does.
+//! also make the pattern change as it rises, as in a real flame.
 
 use std::sync::{Arc, LazyLock};
 
@@ -22,7 +22,7 @@ const CELLS: [usize; 2] = [8, 8];
 /// The noise table, common to all flames, which differ by their offsets.
 pub(crate) static FRACTAL: LazyLock<Arc<TextureTable>> = LazyLock::new(|| Arc::new(TextureTable::new(&warped_noise())));
 
-/// A texture as texels, row after row.
+/// The texels of a table, row after row.
 type Texels = Vec<f32>;
 
 /// Periodic gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table.
@@ -34,34 +34,50 @@ fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
             [cos, sin]
         })
         .collect();
-    let (across, up) = (axis(COLUMNS, cells[0]), axis(ROWS, cells[1]));
+    let (across, up) = (lattice_coordinates(COLUMNS, cells[0]), lattice_coordinates(ROWS, cells[1]));
     let mut texels = Vec::with_capacity(ROWS * COLUMNS);
-    for (low, high, fy, fade_y) in &up {
-        for (left, right, fx, fade_x) in &across {
-            let dot = |column: usize, row: usize, x: f32, y: f32| {
+    for y in &up {
+        for x in &across {
+            let dot = |column: usize, row: usize, offset: [f32; 2]| {
                 let gradient = gradients[row * cells[0] + column];
-                gradient[0] * x + gradient[1] * y
+                gradient[0] * offset[0] + gradient[1] * offset[1]
             };
-            let below = math::f32::lerp(dot(*left, *low, *fx, *fy), dot(*right, *low, fx - 1.0, *fy), *fade_x);
-            let above =
-                math::f32::lerp(dot(*left, *high, *fx, fy - 1.0), dot(*right, *high, fx - 1.0, fy - 1.0), *fade_x);
-            texels.push(math::f32::lerp(below, above, *fade_y));
+            let (fx, fy) = (x.fraction, y.fraction);
+            let below =
+                math::f32::lerp(dot(x.cell, y.cell, [fx, fy]), dot(x.next_cell, y.cell, [fx - 1.0, fy]), x.fade);
+            let above = math::f32::lerp(
+                dot(x.cell, y.next_cell, [fx, fy - 1.0]),
+                dot(x.next_cell, y.next_cell, [fx - 1.0, fy - 1.0]),
+                x.fade,
+            );
+            texels.push(math::f32::lerp(below, above, y.fade));
         }
     }
     texels
 }
 
-/// For each of `count` texels: its cell, the next cell, the fraction within it, and the faded fraction.
-fn axis(count: usize, cells: usize) -> Vec<(usize, usize, f32, f32)> {
+/// Position of a texel on a periodic lattice along one axis.
+struct LatticeCoordinate {
+    cell: usize,
+    next_cell: usize,
+    /// Fraction within the cell.
+    fraction: f32,
+    /// Quintic fade of the fraction.
+    fade: f32,
+}
+
+/// Lattice coordinates of `count` texels on a lattice of `cells` cells.
+fn lattice_coordinates(count: usize, cells: usize) -> Vec<LatticeCoordinate> {
     let width = count / cells;
     let coordinate = |i: usize| {
         let f = (i % width) as f32 / width as f32;
-        (i / width, (i / width + 1) % cells, f, f * f * f * (f * (f * 6.0 - 15.0) + 10.0))
+        let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+        LatticeCoordinate { cell: i / width, next_cell: (i / width + 1) % cells, fraction: f, fade }
     };
     (0..count).map(coordinate).collect()
 }
 
-/// Octaves of noise, each of twice the frequency and `gain` times the amplitude of the last.
+/// Sum of octaves of noise, each with twice the frequency and `gain` times the amplitude of the previous one.
 fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
     let mut sum = vec![0.0_f32; ROWS * COLUMNS];
     let mut amplitude = 1.0;
@@ -76,7 +92,7 @@ fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
 
 /// Domain-warped noise: its coordinates are displaced by other noise.
 fn warped_noise() -> Texels {
-    /// Greatest displacement across and up, texels, at a noise value of 1.
+    /// Displacement across and up at a noise value of 1, texels.
     const WARP_TEXELS: [f32; 2] = [34.0, 60.0];
     let key = Key::new(1985, "flame sheet fractal");
     let gas = TextureTable::new(&octaves(4, 0.5, key, Purpose::named("gas")));
@@ -89,7 +105,7 @@ fn warped_noise() -> Texels {
     equalize_histogram((0..ROWS * COLUMNS).map(coordinate).collect())
 }
 
-/// Histogram equalization: replaces each value by its rank in [0, 1]. The paper asks for a texture without frequent values.
+/// Histogram equalization: replaces each value by its rank in [0, 1]. The paper requires a texture whose values are uniformly distributed.
 fn equalize_histogram(texels: Texels) -> Texels {
     const BINS: usize = 4096;
     let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
@@ -109,7 +125,7 @@ fn equalize_histogram(texels: Texels) -> Texels {
     texels.into_iter().map(rank).collect()
 }
 
-/// Mean of two uniformly distributed numbers, equalized again: their sum has a triangular distribution.
+/// Mean of two uniformly distributed numbers, equalized: their sum has a triangular distribution, whose cumulative distribution function is applied.
 #[inline(always)]
 pub(super) fn mix_equalized<N: Real>(a: N, b: N) -> N {
     let (sum, one) = (a + b, a.broadcast(1.0));
@@ -127,7 +143,7 @@ struct LayerMapping {
     slant: f64,
     /// Table heights per sheet height.
     heights: f64,
-    /// Speed relative to the scroll.
+    /// Speed relative to the scroll speed.
     rate: f64,
     /// Offset, in table widths and heights.
     start: [f64; 2],
@@ -140,8 +156,8 @@ pub(crate) struct FractalLayers {
 }
 
 impl FractalLayers {
-    /// Layers whose tongues are `width` times as wide and `length` times as long as the default, and which rise at `speed` times
-    /// the scroll; `key` sets their offsets.
+    /// Layers whose tongues are `width` times as wide and `length` times as long as the default, and which rise at `speed` times the scroll speed;
+    /// `key` determines their offsets.
     pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
         let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
         let coarse =
@@ -150,11 +166,11 @@ impl FractalLayers {
             LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
         let fit = |mapping: LayerMapping| {
             let heights = mapping.heights / length;
-            // Wave numbers of the scroll at the layer's own rate, rounded to those that close a loop.
-            let pace = mapping.rate * speed.max(1e-3);
-            let closed = clock.waves(heights * pace, 1.0) / (heights * pace);
-            let stretch = closed.clamp(0.8, 1.25);
-            let rate = pace * closed / stretch;
+            // The number of tables that pass in a loop is rounded to an integer: by a stretch of at most 25 %, and beyond that by the speed.
+            let layer_speed = mapping.rate * speed.max(1e-3);
+            let rounding = clock.waves(heights * layer_speed, 1.0) / (heights * layer_speed);
+            let stretch = rounding.clamp(0.8, 1.25);
+            let rate = layer_speed * rounding / stretch;
             let slant = clock.waves(mapping.slant * rate, 0.0) / rate;
             LayerMapping { widths: mapping.widths / width, slant, heights: heights * stretch, rate, ..mapping }
         };
@@ -169,8 +185,11 @@ impl FractalLayers {
             let row = math::reduce_phase(mapping.start[1] - mapping.heights * scroll);
             let (columns, rows) = (COLUMNS as f64, ROWS as f64);
             TextureLayer {
-                columns: [(columns * mapping.widths) as f32, (columns * mapping.slant) as f32, columns as f32 * column],
-                rows: [(rows * mapping.heights) as f32, rows as f32 * row],
+                columns_per_u: (columns * mapping.widths) as f32,
+                columns_per_w: (columns * mapping.slant) as f32,
+                first_column: columns as f32 * column,
+                rows_per_w: (rows * mapping.heights) as f32,
+                first_row: rows as f32 * row,
             }
         };
         Texture::Mixed(table.clone(), [layer(&self.mappings[0]), layer(&self.mappings[1])])

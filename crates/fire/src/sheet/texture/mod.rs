@@ -5,9 +5,13 @@ mod paper;
 
 use std::sync::{Arc, OnceLock};
 
-use bansho_base::math::simd::{Lanes, Real, gather, wrap_split};
+use bansho_base::math::{
+    self,
+    simd::{Lanes, Real, gather, wrap_split},
+};
 use fearless_simd::{Level, Simd, dispatch};
-pub(crate) use fractal::{FRACTAL, FractalLayers};
+use fractal::FRACTAL;
+pub(crate) use fractal::FractalLayers;
 pub(crate) use paper::PaperLayer;
 pub use paper::{PaperTexture, paper_texture};
 
@@ -24,7 +28,7 @@ pub(crate) const MAX_LEVEL: usize = 5;
 #[derive(Clone, Debug)]
 pub(crate) struct TextureTable {
     corners: Box<[[f32; 4]; ROWS * COLUMNS]>,
-    /// Texels of ever coarser levels, computed on demand.
+    /// Texels of successively coarser filter levels, computed on demand.
     coarser: [OnceLock<Box<[f32]>>; MAX_LEVEL],
 }
 
@@ -37,7 +41,7 @@ impl TextureTable {
             [at(row, column), at(row, column + 1), at(row + 1, column), at(row + 1, column + 1)]
         };
         let corners: Vec<[f32; 4]> = (0..ROWS * COLUMNS).map(corner).collect();
-        // The range above has exactly the array's length.
+        // The conversion never fails: the range has exactly the array's length.
         let corners = corners.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([[0.0; 4]; ROWS * COLUMNS]));
         Self { corners, coarser: Default::default() }
     }
@@ -116,11 +120,12 @@ fn filter_columns(before: &[f32], texels: &mut [f32], spacing: usize, amount: f3
     }
 }
 
+/// Blends a row by `amount` with the binomial mean of itself and the rows, or shifted copies, on both sides.
 #[inline(always)]
-fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, filtered: &mut [f32]) {
-    let (row, next, last) = (&row[..COLUMNS], &next[..COLUMNS], &last[..COLUMNS]);
+fn blend(row: &[f32], [next, previous]: [&[f32]; 2], amount: f32, filtered: &mut [f32]) {
+    let (row, next, previous) = (&row[..COLUMNS], &next[..COLUMNS], &previous[..COLUMNS]);
     for (i, value) in filtered.iter_mut().enumerate() {
-        let mean = 0.25 * (next[i] + last[i]) + 0.5 * row[i];
+        let mean = 0.25 * (next[i] + previous[i]) + 0.5 * row[i];
         *value = (mean - row[i]).fma(amount, row[i]);
     }
 }
@@ -128,19 +133,22 @@ fn blend(row: &[f32], [next, last]: [&[f32]; 2], amount: f32, filtered: &mut [f3
 /// Mapping of texture coordinates (u, w) to columns and rows of the table at one time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TextureLayer {
-    /// Columns per unit of u and of w, and the offset.
-    pub(crate) columns: [f32; 3],
-    /// Rows per unit of w, and the offset.
-    pub(crate) rows: [f32; 2],
+    pub(crate) columns_per_u: f32,
+    pub(crate) columns_per_w: f32,
+    /// Column at u = w = 0.
+    pub(crate) first_column: f32,
+    pub(crate) rows_per_w: f32,
+    /// Row at w = 0.
+    pub(crate) first_row: f32,
 }
 
 impl TextureLayer {
     /// Looks up the layer at sixteen points.
     #[inline(always)]
     fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
-        let [across, slant, first] = self.columns;
-        let column = u.fma(u.broadcast(across), w.fma(w.broadcast(slant), w.broadcast(first)));
-        table.sample(column, w.fma(w.broadcast(self.rows[0]), w.broadcast(self.rows[1])))
+        let slant = w.fma(w.broadcast(self.columns_per_w), w.broadcast(self.first_column));
+        let column = u.fma(u.broadcast(self.columns_per_u), slant);
+        table.sample(column, w.fma(w.broadcast(self.rows_per_w), w.broadcast(self.first_row)))
     }
 }
 
@@ -149,7 +157,7 @@ impl TextureLayer {
 pub(crate) enum Texture {
     /// One layer.
     Single(Arc<TextureTable>, TextureLayer),
-    /// Two layers, each uniformly distributed over [0, 1], mixed so that the mixture is too.
+    /// A coarse and a fine layer, each uniformly distributed over [0, 1], mixed so that the result is uniformly distributed too.
     Mixed(Arc<TextureTable>, [TextureLayer; 2]),
 }
 
@@ -158,7 +166,7 @@ impl Texture {
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         let (Self::Single(_, fine) | Self::Mixed(_, [_, fine])) = self;
-        [fine.columns[0].abs(), fine.rows[0].abs()]
+        [fine.columns_per_u.abs(), fine.rows_per_w.abs()]
     }
 
     /// T0 at sixteen points; in [0, 1].
@@ -166,9 +174,74 @@ impl Texture {
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         match self {
             Self::Single(table, layer) => layer.sample(table, u, w),
-            Self::Mixed(table, [mip_level, fine]) => {
-                fractal::mix_equalized(mip_level.sample(table, u, w), fine.sample(table, u, w))
+            Self::Mixed(table, [coarse, fine]) => {
+                fractal::mix_equalized(coarse.sample(table, u, w), fine.sample(table, u, w))
             }
+        }
+    }
+}
+
+/// Source of a flame's texture.
+#[derive(Clone, Debug)]
+pub(crate) enum TextureSource {
+    /// The layers of this flame on the common noise table.
+    Fractal(FractalLayers),
+    /// The paper's table, common to all instances.
+    Paper(Arc<PaperLayer>),
+}
+
+impl TextureSource {
+    /// Texels of the table per sheet height.
+    fn texels_up(&self) -> f64 {
+        match self {
+            Self::Fractal(layers) => layers.texels_up(),
+            Self::Paper(layer) => layer.texels_up(),
+        }
+    }
+}
+
+impl TextureSource {
+    /// T0 after `scroll` sheet heights, at full resolution.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
+            Self::Paper(layer) => layer.at(scroll),
+        }
+    }
+
+    /// This texture with its table low-pass filtered (as a mip level) for a sheet `height_pixels` tall.
+    pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredTexture {
+        let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
+        match self {
+            Self::Fractal(layers) if level > 0.0 => {
+                FilteredTexture::Fractal(*layers, Arc::new(FRACTAL.filtered(level)))
+            }
+            Self::Fractal(layers) => FilteredTexture::Fractal(*layers, FRACTAL.clone()),
+            Self::Paper(layer) if level > 0.0 => FilteredTexture::Paper(Arc::new(layer.filtered(level))),
+            Self::Paper(layer) => FilteredTexture::Paper(layer.clone()),
+        }
+    }
+}
+
+/// A flame's texture, filtered for one frame.
+pub(crate) enum FilteredTexture {
+    /// Layers and their filtered table.
+    Fractal(FractalLayers, Arc<TextureTable>),
+    /// The paper's texture.
+    Paper(Arc<PaperLayer>),
+}
+
+impl FilteredTexture {
+    /// Fractal layers filtered for a sheet `height_pixels` tall.
+    pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
+        TextureSource::Fractal(layers).filtered(height_pixels)
+    }
+
+    /// T0 after `scroll` sheet heights.
+    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+        match self {
+            Self::Fractal(layers, table) => layers.at(table, scroll),
+            Self::Paper(layer) => layer.at(scroll),
         }
     }
 }

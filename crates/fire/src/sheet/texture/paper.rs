@@ -56,9 +56,9 @@ impl Octave {
     /// With a = Fx x, b = Px(y), c = Fy y, d = Py(x): cos(a+b) cos(c+d) is the product of (cos a cos b - sin a sin b) and (cos c
     /// cos d - sin c sin d), where a, d depend on x and b, c on y.
     fn factors(coordinate: f64, frequency: f64) -> [f64; 4] {
-        let (sin_own, cos_own) = math::sin_cos(frequency * coordinate);
+        let (sin_coordinate, cos_coordinate) = math::sin_cos(frequency * coordinate);
         let (sin_phase, cos_phase) = math::sin_cos(FRAC_PI_2 * math::sin(0.5 * frequency * coordinate));
-        [cos_own * cos_phase, cos_own * sin_phase, sin_own * cos_phase, sin_own * sin_phase]
+        [cos_coordinate * cos_phase, cos_coordinate * sin_phase, sin_coordinate * cos_phase, sin_coordinate * sin_phase]
     }
 }
 
@@ -78,7 +78,7 @@ impl PaperTexture {
         let total: f64 = terms.iter().map(|octave| octave.weight).sum();
         let column_factors = |octave: &Octave| {
             let factors: Vec<[f64; 4]> = p.iter().map(|p| Octave::factors(*p, octave.across)).collect();
-            // cos a cos d, cos a sin d, sin a cos d, sin a sin d meet cos b cos c, cos b sin c, sin b cos c, sin b sin c.
+            // cos a cos d, cos a sin d, sin a cos d, sin a sin d are multiplied by cos b cos c, cos b sin c, sin b cos c, sin b sin c.
             let scale = 0.5 * octave.weight / total;
             [0, 1, 2, 3].map(|k| {
                 let sign = if k == 0 || k == 3 { scale } else { -scale };
@@ -86,7 +86,7 @@ impl PaperTexture {
             })
         };
         let row_factors = |q: &f64| {
-            // Own is c = Fy y, phase is b = Px(y): reorder [cc cb, cc sb, sc cb, sc sb] to match the columns.
+            // Here the coordinate term is c = Fy y and the phase term b = Px(y): reorder [cc cb, cc sb, sc cb, sc sb] to match the columns.
             let reorder =
                 |[cc_cb, cc_sb, sc_cb, sc_sb]: [f64; 4]| [cc_cb, sc_cb, cc_sb, sc_sb].map(|value| value as f32);
             terms.iter().flat_map(|octave| reorder(Octave::factors(*q, octave.up))).collect()
@@ -117,7 +117,8 @@ impl PaperTexture {
 #[derive(Clone, Debug)]
 pub(crate) struct PaperLayer {
     table: Arc<TextureTable>,
-    waves: f64,
+    /// Scroll speed relative to the parameter: 1, unless a loop requires an integer number of periods.
+    relative_speed: f64,
 }
 
 impl PaperLayer {
@@ -129,21 +130,30 @@ impl PaperLayer {
         let mut texels = vec![0.0; ROWS * COLUMNS];
         let level = fearless_simd::Level::new();
         fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
-        Self { table: Arc::new(TextureTable::new(&texels)), waves: clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q }
+        Self {
+            table: Arc::new(TextureTable::new(&texels)),
+            relative_speed: clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q,
+        }
     }
 
     /// The texture after `scroll` sheet heights, eq. (1).
     pub(crate) fn at(&self, scroll: f64) -> Texture {
         let columns = (COLUMNS as f64 / PERIOD_P) as f32;
         let rows = ROWS as f64 / PERIOD_Q;
-        // `waves` is 1 unless a loop requires a whole number of periods.
-        let offset = math::reduce_phase(-self.waves * scroll / PERIOD_Q) * ROWS as f32;
-        Texture::Single(self.table.clone(), TextureLayer { columns: [columns, 0.0, 0.0], rows: [rows as f32, offset] })
+        let offset = math::reduce_phase(-self.relative_speed * scroll / PERIOD_Q) * ROWS as f32;
+        let layer = TextureLayer {
+            columns_per_u: columns,
+            columns_per_w: 0.0,
+            first_column: 0.0,
+            rows_per_w: rows as f32,
+            first_row: offset,
+        };
+        Texture::Single(self.table.clone(), layer)
     }
 
-    /// The same with the table filtered to `level`.
+    /// This layer with its table filtered to `level`.
     pub(crate) fn filtered(&self, level: f32) -> Self {
-        Self { table: Arc::new(self.table.filtered(level)), waves: self.waves }
+        Self { table: Arc::new(self.table.filtered(level)), relative_speed: self.relative_speed }
     }
 
     /// Texels per sheet height.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::AlphaConvention,
-    image::{DisplayImage, DisplayPixels},
+    frame::{DisplayImage, DisplayPixels},
 };
 
 use crate::output::{flatten, naming::OutputKind};

@@ -7,16 +7,19 @@ use bansho_base::{
     phenomenon::strip::View,
 };
 
-use super::sprite::{Ellipse, MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
+use super::{MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
 use crate::particles::render::{
     gas::Gas,
-    splat::kernel::{LINE_PEAK, VARIANCE},
+    splat::{
+        Ellipse,
+        kernel::{LINE_PEAK, VARIANCE},
+    },
 };
 
 type Batch = [f32; LANES];
 
 /// A perspective camera at this frame and the next.
-pub(crate) struct PerspectiveProjector {
+pub(super) struct PerspectiveProjector {
     now: PinholeCamera,
     next: PinholeCamera,
     /// Exposure time as a fraction of the frame interval.
@@ -33,8 +36,8 @@ struct ProjectedBatch {
 }
 
 impl PerspectiveProjector {
-    /// `None` where the lens is not rectilinear.
-    pub(crate) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
+    /// The projector of a view; `None` unless the lens is a perspective lens.
+    pub(super) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
         let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
         (view.camera.lens == Lens::Perspective).then(|| Self {
             now: pinhole(&view.camera, view.shutter.middle()),
@@ -46,33 +49,33 @@ impl PerspectiveProjector {
 
     /// Records the particles of `range` that are included and visible.
     #[inline(always)]
-    pub(crate) fn project<K: SpriteKind>(
+    pub(super) fn project<K: SpriteKind>(
         &self,
         gas: &Gas,
         range: std::ops::Range<usize>,
         kind: &K,
         records: &mut Vec<K::Record>,
     ) {
-        let (mut chosen, mut count) = ([range.start; LANES], 0);
+        let (mut indices, mut count) = ([range.start; LANES], 0);
         for index in range {
             if !kind.includes(index) {
                 continue;
             }
-            chosen[count] = index;
+            indices[count] = index;
             count += 1;
             if count == LANES {
-                self.project_batch(gas, &chosen, kind, records);
+                self.project_batch(gas, &indices, kind, records);
                 count = 0;
             }
         }
         if count > 0 {
-            self.project_batch(gas, &chosen[..count], kind, records);
+            self.project_batch(gas, &indices[..count], kind, records);
         }
     }
 
     #[inline(always)]
-    fn project_batch<K: SpriteKind>(&self, gas: &Gas, chosen: &[usize], kind: &K, records: &mut Vec<K::Record>) {
-        let (now, next) = (self.now.project(gas, chosen), self.next.project(gas, chosen));
+    fn project_batch<K: SpriteKind>(&self, gas: &Gas, indices: &[usize], kind: &K, records: &mut Vec<K::Record>) {
+        let (now, next) = (self.now.project(gas, indices), self.next.project(gas, indices));
         let mut motion = [[0.0; LANES]; 2];
         for axis in 0..2 {
             for lane in 0..LANES {
@@ -80,21 +83,21 @@ impl PerspectiveProjector {
                 motion[axis][lane] = if next.depth[lane] >= self.next.near { moved } else { 0.0 };
             }
         }
-        let ellipses = self.ellipses(gas, chosen, &now, &motion);
-        for (lane, &index) in chosen.iter().enumerate() {
+        let ellipses = self.ellipses(gas, indices, &now, &motion);
+        for (lane, &index) in indices.iter().enumerate() {
             let center = [now.pixel[0][lane], now.pixel[1][lane]];
-            let reach = [ellipses.reach[0][lane], ellipses.reach[1][lane]];
-            let mut shown = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
+            let half_size = [ellipses.half_size[0][lane], ellipses.half_size[1][lane]];
+            let mut is_visible = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
             for axis in 0..2 {
-                shown &= center[axis] + reach[axis] > 0.0 && center[axis] - reach[axis] < self.size[axis];
-                shown &= center[axis].abs() < MAX_PIXEL_COORDINATE as f32;
+                is_visible &= center[axis] + half_size[axis] > 0.0 && center[axis] - half_size[axis] < self.size[axis];
+                is_visible &= center[axis].abs() < MAX_PIXEL_COORDINATE as f32;
             }
-            if shown {
+            if is_visible {
                 let shape = [ellipses.shape[0][lane], ellipses.shape[1][lane], ellipses.shape[2][lane]];
                 let (radius, peak) = (ellipses.radius[lane], ellipses.peak[lane]);
                 records.push(kind.record(&ProjectedParticle {
                     index,
-                    ellipse: Ellipse { center, shape, reach, radius, peak },
+                    ellipse: Ellipse { center, shape, half_size, radius, peak },
                     depth: f64::from(now.depth[lane]),
                     motion: [motion[0][lane], motion[1][lane]],
                     scale: now.scale[lane],
@@ -105,28 +108,29 @@ impl PerspectiveProjector {
 
     /// Circles blurred along their motion: the matrix `q + k b b^T` with the motion blur b has the eigenvalue q across it.
     #[inline(always)]
-    fn ellipses(&self, gas: &Gas, chosen: &[usize], now: &ProjectedBatch, motion: &[Batch; 2]) -> EllipseBatch {
-        const SMEAR: f32 = (1.0 / (12.0 * VARIANCE)) as f32;
+    fn ellipses(&self, gas: &Gas, indices: &[usize], now: &ProjectedBatch, motion: &[Batch; 2]) -> EllipseBatch {
+        /// Squared radius per squared length of motion: the variance of a box over that of a sprite.
+        const BLUR_SCALE: f32 = (1.0 / (12.0 * VARIANCE)) as f32;
         let zero = [0.0; LANES];
         let mut radii = zero;
-        for (radius, &index) in radii.iter_mut().zip(chosen) {
+        for (radius, &index) in radii.iter_mut().zip(indices) {
             *radius = gas.particles.support_radius[index];
         }
-        let mut ellipses = EllipseBatch { shape: [zero; 3], reach: [zero; 2], radius: zero, peak: zero };
+        let mut ellipses = EllipseBatch { shape: [zero; 3], half_size: [zero; 2], radius: zero, peak: zero };
         for lane in 0..LANES {
             let ball = now.scale[lane] * radii[lane];
             let across = ball.mul_add(ball, (PIXEL_FOOTPRINT / VARIANCE) as f32);
             let (x, y) = (motion[0][lane] * self.shutter_fraction, motion[1][lane] * self.shutter_fraction);
-            let (xx, yy) = ((SMEAR * x).mul_add(x, across), (SMEAR * y).mul_add(y, across));
-            let determinant = across * (across + SMEAR * x.mul_add(x, y * y));
+            let (xx, yy) = ((BLUR_SCALE * x).mul_add(x, across), (BLUR_SCALE * y).mul_add(y, across));
+            let determinant = across * (across + BLUR_SCALE * x.mul_add(x, y * y));
             let inverse = 1.0 / determinant;
             ellipses.shape[0][lane] = yy * inverse;
-            ellipses.shape[1][lane] = -SMEAR * x * y * inverse;
+            ellipses.shape[1][lane] = -BLUR_SCALE * x * y * inverse;
             ellipses.shape[2][lane] = xx * inverse;
-            ellipses.reach[0][lane] = xx.sqrt();
-            ellipses.reach[1][lane] = yy.sqrt();
+            ellipses.half_size[0][lane] = xx.sqrt();
+            ellipses.half_size[1][lane] = yy.sqrt();
             ellipses.radius[lane] = across.sqrt();
-            // Only the part of a ball in front of the camera is visible.
+            // A ball around the camera is only visible in front of it.
             let in_front = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
             let in_front = in_front * in_front * (3.0 - 2.0 * in_front);
             let peak = LINE_PEAK as f32 * in_front * now.scale[lane] * now.scale[lane] / determinant.sqrt();
@@ -138,7 +142,7 @@ impl PerspectiveProjector {
 
 struct EllipseBatch {
     shape: [Batch; 3],
-    reach: [Batch; 2],
+    half_size: [Batch; 2],
     radius: Batch,
     peak: Batch,
 }
@@ -153,11 +157,11 @@ struct PinholeCamera {
     center: [f32; 2],
     near: f32,
     /// Time since the particles' state, s.
-    since: f32,
+    seconds_since_state: f32,
 }
 
 impl PinholeCamera {
-    fn new(camera: &Camera, origin: DVec3, since: f64) -> Self {
+    fn new(camera: &Camera, origin: DVec3, seconds_since_state: f64) -> Self {
         let axis = |i: usize| camera.world_from_camera.col(i).as_vec3().to_array();
         Self {
             axes: [axis(0), axis(1), axis(2)],
@@ -165,17 +169,17 @@ impl PinholeCamera {
             focal_pixels: camera.focal_pixels as f32,
             center: camera.principal_point.as_vec2().to_array(),
             near: camera.near as f32,
-            since: since as f32,
+            seconds_since_state: seconds_since_state as f32,
         }
     }
 
     #[inline(always)]
-    fn project(&self, gas: &Gas, chosen: &[usize]) -> ProjectedBatch {
+    fn project(&self, gas: &Gas, indices: &[usize]) -> ProjectedBatch {
         let mut positions = [[0.0; LANES]; 3];
         for axis in 0..3 {
             let (position, velocity) = (&gas.particles.position[axis], &gas.particles.velocity[axis]);
-            for (moved, &index) in positions[axis].iter_mut().zip(chosen) {
-                *moved = self.since.mul_add(velocity[index], position[index]);
+            for (moved, &index) in positions[axis].iter_mut().zip(indices) {
+                *moved = self.seconds_since_state.mul_add(velocity[index], position[index]);
             }
         }
         let mut local = [[0.0; LANES]; 3];

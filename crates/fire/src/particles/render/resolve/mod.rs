@@ -18,7 +18,6 @@ use crate::particles::render::{
 };
 
 pub(crate) mod detail;
-pub(crate) mod spline;
 pub(crate) mod strain;
 pub(crate) mod upsample;
 
@@ -28,7 +27,7 @@ pub(crate) const PLANES: usize = 8;
 pub(crate) const TAU: usize = 0;
 /// Plane of optical depth times luminance of a black body at the particle's temperature.
 pub(crate) const LUMINANCE: usize = 1;
-/// Plane of the same times temperature.
+/// Plane of that times temperature.
 pub(crate) const LUMINANCE_KELVIN: usize = 2;
 /// Three planes of optical depth times offset in the detail noise.
 pub(crate) const DETAIL_OFFSET: usize = 3;
@@ -39,10 +38,10 @@ pub(crate) const PATH: usize = 7;
 
 type Batch = [f32; LANES];
 
-/// Least optical depth that is divided by.
+/// Minimum of optical depths and luminances that are divided by.
 const MIN_DEPTH: f32 = 1e-30;
 
-/// Converts sums to light.
+/// Converts sums of sprites to light.
 pub(crate) struct GasResolver<'a> {
     pub(crate) grid: &'a Grid<'a>,
     pub(crate) camera: &'a Camera,
@@ -58,8 +57,8 @@ pub(crate) struct GasResolver<'a> {
     /// Spline weights for each pixel phase within a cell.
     pub(crate) weights: &'a [[f32; 4]],
     /// Interpolation along rows.
-    pub(crate) across: &'a RowInterpolator,
-    /// Least and greatest temperature of the gas, K.
+    pub(crate) row_interpolator: &'a RowInterpolator,
+    /// Minimum and maximum temperature of the gas, K.
     pub(crate) temperatures: [f32; 2],
 }
 
@@ -82,8 +81,8 @@ pub(crate) struct RowBuffer {
 /// Sums of one layer at sixteen pixels.
 pub(crate) struct LayerSums {
     pub(crate) tau: Batch,
-    pub(crate) glow: Batch,
-    pub(crate) heat: Batch,
+    pub(crate) luminance: Batch,
+    pub(crate) luminance_kelvin: Batch,
     blue: Batch,
 }
 
@@ -93,7 +92,7 @@ impl GasResolver<'_> {
         RowBuffer { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
     }
 
-    /// Fills the buffer with the sums of a layer along row `y` of the picture; returns the range of pixels that may hold anything.
+    /// Fills the buffer with the sums of a layer along row `y` of the picture; returns the range of pixels that may not be empty.
     #[inline(always)]
     pub(crate) fn fill(
         &self,
@@ -108,7 +107,7 @@ impl GasResolver<'_> {
         let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
         // Support of cubic interpolation.
         let pixels = [pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)];
-        // Whole batches of sixteen pixels are filled: cells that earlier rows left there would depend on where a strip begins.
+        // Whole batches of sixteen pixels are filled, since remains of earlier rows would depend on where a strip starts.
         let [begin, end] = [pixels[0] / LANES * LANES, pixels[1].next_multiple_of(LANES)];
         let from = self.grid.first_of_four(cells.cell_before(0, begin).0);
         let to = self.grid.first_of_four(cells.cell_before(0, end.saturating_sub(1)).0) + 4;
@@ -126,17 +125,17 @@ impl GasResolver<'_> {
         Some(pixels)
     }
 
-    /// The gas at sixteen pixels; `None` where there is none.
+    /// Sums of a layer at sixteen pixels; `None` if none is visible.
     #[inline(always)]
     pub(crate) fn sums(&self, row: &RowBuffer, layer: usize, x: usize) -> Option<LayerSums> {
         let mut planes = self.planes(row, layer, x, [TAU, LUMINANCE, LUMINANCE_KELVIN, BLUE]);
-        // Less is visible neither as light nor as opacity.
-        let (mut most_tau, mut most_blue) = (1e-6_f32, 1e-3_f32);
+        // Smaller values are visible neither as light nor as opacity.
+        let (mut max_tau, mut max_blue) = (1e-6_f32, 1e-3_f32);
         for lane in 0..LANES {
-            most_tau = most_tau.max(planes[0][lane]);
-            most_blue = most_blue.max(planes[3][lane]);
+            max_tau = max_tau.max(planes[0][lane]);
+            max_blue = max_blue.max(planes[3][lane]);
         }
-        if most_tau <= 1e-6 && most_blue <= 1e-3 {
+        if max_tau <= 1e-6 && max_blue <= 1e-3 {
             return None;
         }
         for plane in &mut planes {
@@ -145,8 +144,8 @@ impl GasResolver<'_> {
                 plane[lane] = plane[lane].max(0.0);
             }
         }
-        let [tau, glow, heat, blue] = planes;
-        Some(LayerSums { tau, glow, heat, blue })
+        let [tau, luminance, luminance_kelvin, blue] = planes;
+        Some(LayerSums { tau, luminance, luminance_kelvin, blue })
     }
 
     /// Planes of a layer at sixteen pixels.
@@ -155,13 +154,13 @@ impl GasResolver<'_> {
         for plane in &mut planes {
             *plane += layer * PLANES;
         }
-        self.across.at(&row.sums, self.grid.depth, x, planes)
+        self.row_interpolator.at(&row.sums, self.grid.depth, x, planes)
     }
 
-    /// Fraction of its detail that the gas at sixteen pixels shows.
+    /// Fraction of the detail that is visible at sixteen pixels.
     #[inline(always)]
     fn visible_fraction(&self, row: &RowBuffer, x: usize) -> Batch {
-        let [strain] = self.across.at(&row.strain, 1, x, [0]);
+        let [strain] = self.row_interpolator.at(&row.strain, 1, x, [0]);
         strain::visible_fraction(&strain)
     }
 
@@ -194,7 +193,7 @@ impl GasResolver<'_> {
         Some(noise_positions)
     }
 
-    /// Composites a layer behind what `rect` of a strip holds.
+    /// Composites a layer behind the contents of `rect` of a strip.
     #[inline(always)]
     pub(crate) fn draw_layer(
         &self,
@@ -206,7 +205,7 @@ impl GasResolver<'_> {
     ) {
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
-            // Batches begin at multiples of sixteen columns of the whole picture, so that crops change nothing.
+            // Batches start at multiples of sixteen columns of the whole picture, so that pixels do not depend on crops.
             let from = first.max(rect.x) / LANES * LANES;
             for x in (from..last.min(rect.right())).step_by(LANES) {
                 if let Some(sums) = self.sums(row, layer.index, x) {
@@ -235,8 +234,8 @@ impl GasResolver<'_> {
         let mut visible_fraction = [1.0; LANES];
         if strip.has_plate() {
             for pixel in from..to {
-                let ahead = (f64::from(strip.plate_depth(start + pixel - from)) - layer.depth) / layer.thickness;
-                visible_fraction[pixel - x] = (ahead + 0.5).clamp(0.0, 1.0) as f32;
+                let distance = (f64::from(strip.plate_depth(start + pixel - from)) - layer.depth) / layer.thickness;
+                visible_fraction[pixel - x] = (distance + 0.5).clamp(0.0, 1.0) as f32;
             }
         }
         let mut light = self.light(sums, row, layer, x, y);
@@ -259,14 +258,14 @@ impl GasResolver<'_> {
     /// Red, green, blue and opacity of sixteen pixels of a layer.
     #[inline(always)]
     fn light(&self, sums: &LayerSums, row: &RowBuffer, layer: &DepthLayer, x: usize, y: usize) -> PixelLight {
-        let LayerSums { tau, glow, heat, .. } = sums;
-        let (mut depth_factor, mut heat_factor) = ([1.0; LANES], [1.0; LANES]);
+        let LayerSums { tau, luminance, luminance_kelvin, .. } = sums;
+        let (mut depth_factor, mut temperature_factor) = ([1.0; LANES], [1.0; LANES]);
         if let Some((detail, _)) = self.detail
             && !detail.is_negligible(tau)
             && let Some(noise_positions) = self.noise_positions(sums, row, detail, layer, [x, y])
         {
-            DetailFactors { depth: depth_factor, heat: heat_factor } =
-                detail.burning(&noise_positions, tau, &self.visible_fraction(row, x));
+            DetailFactors { depth: depth_factor, temperature: temperature_factor } =
+                detail.factors(&noise_positions, tau, &self.visible_fraction(row, x));
         }
         let mut planes = [[0.0; LANES]; 4];
         let mut emission = [0.0; LANES];
@@ -275,24 +274,24 @@ impl GasResolver<'_> {
             planes[3][lane] = 1.0 - approximations::exp(-depth);
             emission[lane] = if self.self_absorption { planes[3][lane] } else { depth };
         }
-        // Where nothing glows both denominators are clamped and luminance is 0, so that no lane branches.
-        let (mut luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
+        // Both denominators are clamped instead of branching per lane. Where they are clamped, the luminance is 0.
+        let (mut emitted_luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            luminance[lane] = emission[lane] * glow[lane] / tau[lane].max(MIN_DEPTH);
-            kelvin[lane] = self.temperature(heat[lane], glow[lane].max(MIN_DEPTH)) * heat_factor[lane];
+            emitted_luminance[lane] = emission[lane] * luminance[lane] / tau[lane].max(MIN_DEPTH);
+            kelvin[lane] =
+                self.temperature(luminance_kelvin[lane], luminance[lane].max(MIN_DEPTH)) * temperature_factor[lane];
         }
         let table = color::black_body();
         for lane in 0..LANES {
-            let hue = table.radiance(kelvin[lane]);
+            let color = table.radiance(kelvin[lane]);
             for c in 0..3 {
-                planes[c][lane] = hue[c];
+                planes[c][lane] = color[c];
             }
         }
         for lane in 0..LANES {
-            // The luminance is that of the sum; the color is that of the mean temperature, slightly hotter where the gas burns
-            // most.
-            let own = color::luminance([planes[0][lane], planes[1][lane], planes[2][lane]]);
-            let factor = luminance[lane] / own.max(1e-20);
+            // The luminance is that of the sum. The color is that of a black body at the mean temperature, which detail makes slightly higher where gas burns.
+            let unscaled = color::luminance([planes[0][lane], planes[1][lane], planes[2][lane]]);
+            let factor = emitted_luminance[lane] / unscaled.max(1e-20);
             for c in 0..3 {
                 planes[c][lane] *= factor;
             }
@@ -309,15 +308,15 @@ impl GasResolver<'_> {
 }
 
 impl GasResolver<'_> {
-    /// Mean temperature, K, clamped to the range of the particles: where hardly anything glows it is a ratio of rounding errors.
+    /// Mean temperature, K, clamped to the range of the particles: at very low luminance it is a quotient of rounding errors.
     #[inline(always)]
-    pub(crate) fn temperature(&self, heat: f32, glow: f32) -> f32 {
+    pub(crate) fn temperature(&self, luminance_kelvin: f32, luminance: f32) -> f32 {
         let [coldest, hottest] = self.temperatures;
-        (heat / glow).max(coldest).min(hottest)
+        (luminance_kelvin / luminance).max(coldest).min(hottest)
     }
 }
 
-/// Weighted sum of four cells' values of a layer, found at `starts` in `rows`.
+/// Weighted sum of the values of four cells of a layer, which start at `starts` in `rows`.
 #[inline(always)]
 fn weighted_cells(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> [f32; PLANES] {
     let mut sums = [0.0; PLANES];
@@ -349,9 +348,9 @@ impl ColumnExtents {
             let (row, layer) = (index / layers, index % layers);
             let cells = grid.row(row as i32);
             let value = |column: usize, plane: usize| cells[column * grid.depth + layer * PLANES + plane];
-            let holds = |column: &usize| value(*column, TAU) > 0.0 || value(*column, BLUE) > 0.0;
-            let first = (0..columns).find(holds);
-            let last = (0..columns).rfind(holds);
+            let is_occupied = |column: &usize| value(*column, TAU) > 0.0 || value(*column, BLUE) > 0.0;
+            let first = (0..columns).find(is_occupied);
+            let last = (0..columns).rfind(is_occupied);
             first.zip(last).map_or([u32::MAX, 0], |(first, last)| [first as u32, last as u32])
         };
         let rows = (0..grid.cells.rows * layers).into_par_iter().with_min_len(64).map(extent).collect();

@@ -1,8 +1,8 @@
-//! Strain of the detail coordinates: where it is large, detail is too fine to be shown.
+//! Strain of the detail coordinates: where it is large, detail would be too fine and is faded out.
 //!
-//! Detail coordinates are mean Lagrangian coordinates along the line of sight. Where streams of different origin meet, or gas was
-//! compressed, they cross many noise cells within one support radius, which would alias. There detail fades, and the smooth sum
-//! alone is drawn.
+//! Detail coordinates are mean Lagrangian coordinates along the line of sight. Where streams of different origin meet, or gas has been
+//! compressed, they change by many noise cells within one support radius, which would alias. There detail is faded out, so that only the smooth sum is
+//! drawn.
 
 use bansho_base::math::simd::LANES;
 use fearless_simd::{Level, dispatch};
@@ -13,11 +13,11 @@ use crate::particles::render::{
     splat::grid::Grid,
 };
 
-/// Strain, relative to undeformed detail, at which detail begins to fade, and at which it has faded out.
+/// Strain, relative to undeformed detail, at which the fade-out of detail starts and ends.
 const FADE_RANGE: [f32; 2] = [1.0, 3.0];
 /// Optical depth below which a cell is empty.
 const MIN_DEPTH: f32 = 1e-6;
-/// Least optical depth of a neighboring cell, relative to the cell's own, to be compared with.
+/// Minimum optical depth of a neighboring cell, relative to the cell's own, for it to be considered.
 const MIN_NEIGHBOR_DEPTH: f32 = 0.02;
 
 /// Gradient of the detail coordinates in each cell of each layer, relative to that of undeformed detail.
@@ -29,7 +29,7 @@ pub(crate) struct Strain {
 }
 
 impl Strain {
-    /// `cell` is the size of an undeformed noise cell, pixels.
+    /// The strain of all cells; `cell` is the size of an undeformed noise cell, pixels.
     pub(crate) fn new(grid: &Grid, extents: &ColumnExtents, layers: usize, cell: f32) -> Self {
         let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, Level::new());
         let scale = cell / grid.cells.size as f32;
@@ -41,7 +41,7 @@ impl Strain {
                 let range = first.max(1) as usize..(last as usize + 1).min(columns - 1);
                 dispatch!(level, _simd => {
                     for column in range {
-                        let at = |row: usize, column: usize| DetailCoordinates::of(&rows[row][column * grid.depth + layer * PLANES..]);
+                        let at = |row: usize, column: usize| DetailCoordinates::from_sums(&rows[row][column * grid.depth + layer * PLANES..]);
                         let own = at(1, column);
                         if own.tau > MIN_DEPTH {
                             let neighbors = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
@@ -61,14 +61,14 @@ impl Strain {
     }
 }
 
-/// Fraction of detail that is shown at a strain.
+/// Fraction of the detail that is visible at a strain.
 #[inline(always)]
 pub(crate) fn visible_fraction(strain: &[f32; LANES]) -> [f32; LANES] {
-    let [begins, gone] = FADE_RANGE;
+    let [start, end] = FADE_RANGE;
     let mut visible_fraction = [0.0; LANES];
     for lane in 0..LANES {
-        let left = ((gone - strain[lane]) * (1.0 / (gone - begins))).clamp(0.0, 1.0);
-        visible_fraction[lane] = left * left * 2.0_f32.mul_add(-left, 3.0);
+        let t = ((end - strain[lane]) * (1.0 / (end - start))).clamp(0.0, 1.0);
+        visible_fraction[lane] = t * t * 2.0_f32.mul_add(-t, 3.0);
     }
     visible_fraction
 }
@@ -81,16 +81,16 @@ struct DetailCoordinates {
 
 impl DetailCoordinates {
     #[inline(always)]
-    fn of(sums: &[f32]) -> Self {
+    fn from_sums(sums: &[f32]) -> Self {
         let tau = sums[TAU];
         let inverse_depth = 1.0 / tau.max(MIN_DEPTH);
         Self { tau, position: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * inverse_depth) }
     }
 
-    /// Greatest distance in the noise to a neighboring cell.
+    /// Maximum distance in the noise to a neighboring cell.
     #[inline(always)]
     fn max_distance(&self, neighbors: &[Self; 4]) -> f32 {
-        let mut greatest = 0.0_f32;
+        let mut max_squared = 0.0_f32;
         for other in neighbors {
             let mut square = 0.0;
             for axis in 0..3 {
@@ -98,9 +98,9 @@ impl DetailCoordinates {
                 square = step.mul_add(step, square);
             }
             if other.tau > MIN_NEIGHBOR_DEPTH * self.tau {
-                greatest = greatest.max(square);
+                max_squared = max_squared.max(square);
             }
         }
-        greatest.sqrt()
+        max_squared.sqrt()
     }
 }

@@ -1,7 +1,7 @@
 //! Interpolation along a row, sixteen pixels at a time.
 //!
-//! Each cell's value is broadcast and multiplied by its weights at the sixteen pixels. That needs no shuffles or gathers, as it
-//! would if each pixel fetched its own four cells.
+//! The value of each cell is broadcast and multiplied by its weights at the sixteen pixels. This needs no shuffles or gathers, unlike fetching the four cells
+//! of each pixel.
 
 use std::ops::Range;
 
@@ -24,26 +24,25 @@ pub(crate) struct RowInterpolator {
 }
 
 impl RowInterpolator {
-    /// For rows of `width` pixels; `weights_of` are the weights of the four surrounding cells for each pixel phase.
-    pub(crate) fn new(grid: &Grid, width: usize, weights_of: &[[f32; 4]]) -> Self {
+    /// An interpolator for rows of `width` pixels; `phase_weights` are the weights of the four surrounding cells for each pixel phase.
+    pub(crate) fn new(grid: &Grid, width: usize, phase_weights: &[[f32; 4]]) -> Self {
         let columns = grid.columns(0, width);
-        let mut across = Self { spans: Vec::with_capacity(columns.len().div_ceil(LANES)), weights: Vec::new() };
+        let mut interpolator = Self { spans: Vec::with_capacity(columns.len().div_ceil(LANES)), weights: Vec::new() };
         for batch in columns.chunks(LANES) {
             let [first, last] = [batch[0].0, batch[batch.len() - 1].0];
-            let begin = across.weights.len();
-            across.weights.resize(begin + last + 4 - first, [0.0; LANES]);
+            let begin = interpolator.weights.len();
+            interpolator.weights.resize(begin + last + 4 - first, [0.0; LANES]);
             for (lane, (column, phase)) in batch.iter().enumerate() {
-                for (k, weight) in weights_of[*phase].iter().enumerate() {
-                    across.weights[begin + column - first + k][lane] = *weight;
+                for (k, weight) in phase_weights[*phase].iter().enumerate() {
+                    interpolator.weights[begin + column - first + k][lane] = *weight;
                 }
             }
-            across.spans.push(Span { first, weights: begin..across.weights.len() });
+            interpolator.spans.push(Span { first, weights: begin..interpolator.weights.len() });
         }
-        across
+        interpolator
     }
 
-    /// Values at the sixteen pixels from `x` on, a multiple of sixteen: `planes` are the planes wanted of cells that are `stride`
-    /// values apart in `row`. 0 beyond the picture.
+    /// Values of `planes` at the sixteen pixels from `x` on, a multiple of sixteen, from a row of cells with `stride` values each; 0 outside the picture.
     #[inline(always)]
     pub(crate) fn at<const N: usize>(
         &self,
@@ -71,20 +70,20 @@ impl RowInterpolator {
 mod tests {
     use bansho_base::image::Rect;
 
-    use super::{super::spline, *};
-    use crate::particles::render::splat::{grid::Raster, scratch_pool::ScratchPool};
+    use super::*;
+    use crate::particles::render::{buffer_pool::BufferPool, splat::grid::Raster};
 
     #[test]
     fn sixteen_pixels_are_what_each_of_them_is() {
         const DEPTH: usize = 3;
-        let scratch = ScratchPool::default();
+        let buffers = BufferPool::default();
         for (size, width) in [(1, 64), (2, 50), (3, 47), (4, 64), (6, 130), (8, 17), (32, 99)] {
             let cells = Raster::around(Rect { x: 5, y: 0, width: width - 9, height: 4 }, size, false);
-            let mut grid = Grid::new(cells, DEPTH, &scratch);
+            let mut grid = Grid::new(cells, DEPTH, &buffers);
             for (index, value) in grid.values_mut().iter_mut().enumerate() {
                 *value = (index * index % 17) as f32;
             }
-            let weights = spline::weights(&grid.cells);
+            let weights = grid.cells.spline_weights();
             let (across, columns, row) =
                 (RowInterpolator::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
             for x in (0..width).step_by(LANES) {

@@ -1,8 +1,7 @@
 //! Line integral of the poly6 kernel, and its gradient.
 //!
-//! Splatting evaluates powers of 7/2 millions of times per frame. `s^(7/2) = s^3 sqrt(s)`, and since s^3 is small where a
-//! polynomial fits a square root badly, a cubic suffices: errors are below 1e-4 of the peak, at a quarter of the cost of a square
-//! root.
+//! Splatting evaluates the power 7/2 millions of times per frame. In `s^(7/2) = s^3 sqrt(s)` the square root is replaced by a cubic polynomial: it fits badly
+//! only near s = 0, where s^3 is small. The error is below 1e-4 of the peak, at a quarter of the cost of a square root.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Splatting: sums of sprites on a grid. Each band of rows belongs to one task, which adds sprites in order.
+//! Splatting: sums of sprites on a grid. Each band of rows is filled by one task, which adds sprites in order.
 //!
 //! A sprite is smooth, so that a grid of a few cells per radius represents it, and the cost hardly depends on the resolution or on
 //! the size of sprites. Sprites of different sizes go to grids of different cell size; coarse grids are added to finer ones by
@@ -11,27 +11,40 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use crate::particles::render::{
-    project::sprite::Ellipse,
-    resolve::spline,
+    buffer_pool::{BufferPool, PooledVec},
     splat::{
         grid::{Grid, Raster},
         kernel::Profile,
         rasterize::{COLUMNS, ROWS, RasterizedSprite},
-        scratch_pool::{PooledVec, ScratchPool},
     },
 };
 
 pub(crate) mod grid;
 pub(crate) mod kernel;
 pub(crate) mod rasterize;
-pub(crate) mod scratch_pool;
+pub(crate) mod spline;
 
-/// Least radius of a sprite in cells, at which splines are accurate to a few percent of a single sprite's peak.
+/// Minimum radius of a sprite in cells, at which splines are accurate to a few percent of a single sprite's peak.
 pub(crate) const MIN_RADIUS_CELLS: f32 = 2.75;
 /// Rows per task.
 const ROWS_PER_TASK: usize = 32;
-/// Coarsest grid: cells of 4096 pixels, twelve octaves.
+/// Level of the coarsest grid: cells of 4096 pixels, twelve octaves.
 const MAX_LEVEL: usize = 24;
+
+/// An ellipse in the picture: `q = a u^2 + 2 b u v + c v^2` is 1 at its edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ellipse {
+    /// Center, pixels from the picture's top left corner.
+    pub(crate) center: [f32; 2],
+    /// a, b and c, 1/pixel^2.
+    pub(crate) shape: [f32; 3],
+    /// Half of the width and height of its bounding box, pixels.
+    pub(crate) half_size: [f32; 2],
+    /// Semi-minor axis, pixels.
+    pub(crate) radius: f32,
+    /// Line integral through the center, for a particle of 1 m^3 with an absorption coefficient of 1/m.
+    pub(crate) peak: f32,
+}
 
 /// One sprite: `P` values, weighted by its profile, for layer `layer` and, with the weight `next_layer_weight`, the next.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +59,7 @@ pub(crate) struct Sprite<const P: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SplatSettings {
     pub(crate) profile: Profile,
-    /// Least radius of a sprite in cells; smaller sprites are widened to it on the finest grid.
+    /// Minimum radius of a sprite in cells; smaller sprites are widened to it on the finest grid.
     pub(crate) min_radius_cells: f32,
     pub(crate) layers: usize,
     /// Size of the whole picture, pixels.
@@ -73,39 +86,41 @@ impl<'a> SplatResult<'a> {
     }
 }
 
-/// Sums all sprites, task by task, on the finest grid that any of them needs, as spline coefficients.
+/// Sums all sprites on grids of decreasing cell size, each of which is added to the next finer one, and returns the finest as spline coefficients.
 ///
-/// Cells coincide with those of the whole picture, so that a window shows the same of sprites at its edge.
+/// Cells coincide with those of the whole picture, so that pixels do not depend on the window.
 pub(crate) fn splat<'a, const P: usize>(
     settings: &SplatSettings,
     tasks: &[PooledVec<Sprite<P>>],
-    scratch: &'a ScratchPool,
+    buffers: &'a BufferPool,
 ) -> SplatResult<'a> {
     let statistics = SpriteStatistics::new(settings, tasks);
     let Some(rect) = statistics.covered(settings.picture) else { return SplatResult::Empty };
     let finest = statistics.finest();
     let nested = statistics.counts.iter().skip(finest + 2).any(|count| *count > 0);
-    let cells_of_whole = |fineness| Raster::around(rect, cell_size(fineness), nested);
-    let shown = cells_of_whole(finest).covered().intersection(&settings.window);
-    if shown.is_empty() {
+    let whole_picture_cells = |grid_level| Raster::around(rect, cell_size(grid_level), nested);
+    let drawn = whole_picture_cells(finest).covered().intersection(&settings.window);
+    if drawn.is_empty() {
         return SplatResult::OutsideWindow;
     }
-    let shown = aligned_to_lanes(shown);
-    let cells = |fineness| Raster::around(shown, cell_size(fineness), nested).within(&cells_of_whole(fineness));
-    let whole_picture_columns = |fineness| cells_of_whole(fineness).picture_columns();
+    let drawn = aligned_to_lanes(drawn);
+    let cells = |grid_level| {
+        Raster::around(drawn, cell_size(grid_level), nested).intersection(&whole_picture_cells(grid_level))
+    };
+    let whole_picture_columns = |grid_level| whole_picture_cells(grid_level).picture_columns();
     let mut coarser: Option<Grid> = None;
-    for fineness in (finest..MAX_LEVEL + 1).step_by(2).rev() {
-        let any = statistics.counts[fineness..].iter().take(2).any(|count| *count > 0);
-        if !any && fineness != finest && coarser.is_none() {
+    for grid_level in (finest..MAX_LEVEL + 1).step_by(2).rev() {
+        let any = statistics.counts[grid_level..].iter().take(2).any(|count| *count > 0);
+        if !any && grid_level != finest && coarser.is_none() {
             continue;
         }
-        let mut grid = Grid::new(cells(fineness), settings.layers * P, scratch);
-        let is_on_this_grid = |radius: f32| settings.fineness(radius).max(finest).wrapping_sub(fineness) < 2;
-        add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(fineness), &mut grid);
+        let mut grid = Grid::new(cells(grid_level), settings.layers * P, buffers);
+        let is_on_this_grid = |radius: f32| settings.grid_level(radius).max(finest).wrapping_sub(grid_level) < 2;
+        add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(grid_level), &mut grid);
         if let Some(coarser) = coarser {
             grid.add_coarser(&coarser);
         }
-        coarser = Some(spline::sharpened(&grid));
+        coarser = Some(grid.prefiltered());
     }
     coarser.map_or(SplatResult::Empty, SplatResult::Sums)
 }
@@ -116,17 +131,17 @@ fn aligned_to_lanes(rect: Rect) -> Rect {
     Rect { x, width: end - x, ..rect }
 }
 
-/// Cell size of a fineness, pixels: two per octave, 1, 2, 3, 4, 6, 8, 12... (1.5 does not exist).
-fn cell_size(fineness: usize) -> usize {
-    if fineness.is_multiple_of(2) { 1 << (fineness / 2) } else { 3 << (fineness / 2 - 1) }
+/// Cell size of a grid level, pixels: two levels per octave, 1, 2, 3, 4, 6, 8, 12... Level 1, which would be 1.5, is not used.
+fn cell_size(grid_level: usize) -> usize {
+    if grid_level.is_multiple_of(2) { 1 << (grid_level / 2) } else { 3 << (grid_level / 2 - 1) }
 }
 
 impl SplatSettings {
-    /// The fineness of the largest cells that are small enough for a sprite.
-    fn fineness(&self, radius: f32) -> usize {
-        // The exponent of a float counts octaves; its first mantissa bit tells the upper from the lower half of an octave.
-        let octaves = ((radius / self.min_radius_cells).max(1.0).to_bits() >> 22) as usize - (127 << 1);
-        if octaves == 1 { 0 } else { octaves.min(MAX_LEVEL) }
+    /// The level of the largest cells that are small enough for a sprite.
+    fn grid_level(&self, radius: f32) -> usize {
+        // The exponent of a float counts octaves; its first mantissa bit distinguishes the upper from the lower half of an octave.
+        let half_octaves = ((radius / self.min_radius_cells).max(1.0).to_bits() >> 22) as usize - (127 << 1);
+        if half_octaves == 1 { 0 } else { half_octaves.min(MAX_LEVEL) }
     }
 }
 
@@ -134,7 +149,7 @@ impl SplatSettings {
 struct SpriteStatistics {
     low: [f32; 2],
     high: [f32; 2],
-    /// Number of sprites for each fineness.
+    /// Number of sprites for each grid level.
     counts: [usize; MAX_LEVEL + 1],
 }
 
@@ -146,10 +161,10 @@ impl SpriteStatistics {
             let mut statistics = Self::EMPTY;
             for Sprite { ellipse, .. } in task.iter() {
                 for axis in 0..2 {
-                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.reach[axis]);
-                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.reach[axis]);
+                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.half_size[axis]);
+                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.half_size[axis]);
                 }
-                statistics.counts[settings.fineness(ellipse.radius)] += 1;
+                statistics.counts[settings.grid_level(ellipse.radius)] += 1;
             }
             statistics
         };
@@ -165,19 +180,18 @@ impl SpriteStatistics {
         self
     }
 
-    /// The fineness that suits all but the smallest sprites, which are widened to it.
-    ///
-    /// A few distant particles would otherwise require a fine grid of the whole flame.
+    /// The finest grid level that is used. It suits all but the smallest 2 % of the sprites, which are widened to it: otherwise a few distant particles would
+    /// require a fine grid of the whole flame.
     fn finest(&self) -> usize {
-        /// 1 / fraction of the sprites that may be smaller.
+        /// 1 / maximum fraction of the sprites that would need a finer level.
         const MAX_FINER_INVERSE: usize = 50;
         let total: usize = self.counts.iter().sum();
         let mut finer = 0;
-        let suits = |count: &usize| {
+        let exceeds_limit = |count: &usize| {
             finer += count;
             finer * MAX_FINER_INVERSE > total
         };
-        self.counts.iter().position(suits).unwrap_or(0)
+        self.counts.iter().position(exceeds_limit).unwrap_or(0)
     }
 
     /// The pixels of the picture that sprites touch, extended to whole batches.
@@ -191,7 +205,7 @@ impl SpriteStatistics {
     }
 }
 
-/// Adds the sprites whose radius belongs to this grid.
+/// Fills a grid with the sums of the sprites whose radius belongs to it.
 fn add_sprites<'a, const P: usize>(
     settings: &SplatSettings,
     tasks: &[PooledVec<'a, Sprite<P>>],
@@ -231,24 +245,24 @@ impl RowBand<'_> {
         let sums = self.values.as_chunks_mut::<P>().0;
         let row_length = self.columns.len() * self.layers;
         let end = self.first + (sums.len() / row_length) as i32;
-        for &member in task.of(index) {
-            let sprites = &task.sprites[usize::from(member)];
-            let (from, to) = (sprites.rows[0].max(self.first), sprites.rows[1].min(end));
+        for &member in task.members_of_band(index) {
+            let sprite = &task.sprites[usize::from(member)];
+            let (from, to) = (sprite.rows[0].max(self.first), sprite.rows[1].min(end));
             for start in (from..to).step_by(ROWS) {
-                let chords = sprites.chords(start, &self.whole_picture_columns);
+                let chords = sprite.chords(start, &self.whole_picture_columns);
                 for y in start..to.min(start + ROWS as i32) {
                     let row = &mut sums[(y - self.first) as usize * row_length..][..row_length];
                     let index = (y - start) as usize;
-                    // Runs of eight cells begin where they do in the whole picture: the last of a row extends beyond the sprite.
-                    let cut = (self.columns.start - chords.first[index]).max(0) / COLUMNS as i32 * COLUMNS as i32;
+                    // Runs of eight cells start at the same cells as for the whole picture; the last one may extend beyond the sprite.
+                    let skipped = (self.columns.start - chords.first[index]).max(0) / COLUMNS as i32 * COLUMNS as i32;
                     let end = chords.end[index].min(self.columns.end);
-                    for x in (chords.first[index] + cut..end).step_by(COLUMNS) {
-                        let weights = chords.weights(profile, sprites.falloff, index, x);
+                    for x in (chords.first[index] + skipped..end).step_by(COLUMNS) {
+                        let weights = chords.weights(profile, sprite.falloff, index, x);
                         match usize::try_from(x - self.columns.start) {
-                            Ok(column) => sprites.add(row, column, self.layers, &weights),
+                            Ok(column) => sprite.add(row, column, self.layers, &weights),
                             Err(_) => {
                                 let before = (self.columns.start - x) as usize;
-                                sprites.add(row, 0, self.layers, &skip_first(&weights, before));
+                                sprite.add(row, 0, self.layers, &skip_first(&weights, before));
                             }
                         }
                     }
@@ -258,7 +272,7 @@ impl RowBand<'_> {
     }
 }
 
-/// Weights without the first `count`.
+/// The weights without the first `count`, padded with zeros.
 fn skip_first(weights: &[f32; COLUMNS], count: usize) -> [f32; COLUMNS] {
     std::array::from_fn(|lane| weights.get(lane + count).copied().unwrap_or(0.0))
 }
@@ -278,21 +292,21 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         cells: &Raster,
         is_on_this_grid: impl Fn(f32) -> bool,
     ) -> Self {
-        let mut sprites = task.scratch().take(task.len());
+        let mut sprites = task.pool().take(task.len());
         sprites.clear();
         for sprite in task.iter() {
             if is_on_this_grid(sprite.ellipse.radius) {
                 sprites.push(RasterizedSprite::new(settings, sprite, cells));
             }
         }
-        let bands_of = |sprites: &RasterizedSprite<P>| {
-            let [from, to] = sprites.rows.map(|row| (row - cells.first[1]) as usize);
+        let bands_of = |sprite: &RasterizedSprite<P>| {
+            let [from, to] = sprite.rows.map(|row| (row - cells.first[1]) as usize);
             if from < to { from / ROWS_PER_TASK..to.div_ceil(ROWS_PER_TASK) } else { 0..0 }
         };
         let bands = cells.rows.div_ceil(ROWS_PER_TASK);
         let mut starts = vec![0_u32; bands + 1];
-        for sprites in sprites.iter() {
-            for row_band in bands_of(sprites) {
+        for sprite in sprites.iter() {
+            for row_band in bands_of(sprite) {
                 starts[row_band + 1] += 1;
             }
         }
@@ -301,8 +315,8 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         }
         let mut ends = starts.clone();
         let mut members = vec![0; starts[bands] as usize];
-        for (index, sprites) in sprites.iter().enumerate() {
-            for row_band in bands_of(sprites) {
+        for (index, sprite) in sprites.iter().enumerate() {
+            for row_band in bands_of(sprite) {
                 members[ends[row_band] as usize] = index as u16;
                 ends[row_band] += 1;
             }
@@ -310,7 +324,8 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         Self { sprites, starts, members }
     }
 
-    fn of(&self, row_band: usize) -> &[u16] {
+    /// Indices of the sprites that touch a row band.
+    fn members_of_band(&self, row_band: usize) -> &[u16] {
         &self.members[self.starts[row_band] as usize..self.starts[row_band + 1] as usize]
     }
 }
@@ -332,7 +347,7 @@ mod tests {
         assert_eq!((cell_size(0), sizes), (1, vec![2, 3, 4, 6, 8, 12, 16, 24]));
         for step in 0..4000 {
             let radius = 0.5 + 0.25 * step as f32;
-            let size = cell_size(settings.fineness(radius));
+            let size = cell_size(settings.grid_level(radius));
             let next =
                 [1, 2, 3, 4].into_iter().chain((1..).flat_map(|k| [6 << (k - 1), 8 << (k - 1)])).find(|s| *s > size);
             assert!(size == 1 || size as f32 * 2.75 <= radius, "{radius} {size}");

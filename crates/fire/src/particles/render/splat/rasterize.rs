@@ -12,10 +12,10 @@ use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kerne
 pub(crate) const COLUMNS: usize = 8;
 /// Rows per batch of chords: about one sprite.
 pub(crate) const ROWS: usize = 16;
-/// Offsets of cells and rows from the one before the first. (Without a zero, which compilers would treat as a special case.)
+/// Offsets of cells and rows from the one before the first. (They start at 1, since compilers would treat a zero as a special case.)
 const LANE_OFFSETS: [f32; ROWS] =
     [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
-/// Least `s = 1 - b^2/d^2` that is drawn: there a sprite has 1e-4 of its peak.
+/// Minimum `s = 1 - b^2/d^2` that is drawn: there a sprite has 1e-4 of its peak.
 const MIN_S: f32 = 0.045;
 
 /// A sprite in cell coordinates.
@@ -30,10 +30,11 @@ pub(crate) struct RasterizedSprite<const P: usize> {
     row_falloff: f32,
     /// First row of the grid that it touches, and one past the last.
     pub(crate) rows: [i32; 2],
-    /// Its layer, and the values for that layer and the next.
     layer: usize,
-    own: [f32; P],
-    next: [f32; P],
+    /// Values for that layer.
+    values: [f32; P],
+    /// Values for the next layer.
+    next_values: [f32; P],
     spans_two_layers: bool,
 }
 
@@ -45,22 +46,22 @@ impl<const P: usize> RasterizedSprite<P> {
         let widening = (settings.min_radius_cells * cell / ellipse.radius.max(1e-3)).max(1.0);
         let scale = cell * cell / (widening * widening);
         let center = cells.cell_coordinates(ellipse.center);
-        let reach = ellipse.reach[1] * widening / cell * (1.0 - MIN_S).sqrt();
+        let half_height = ellipse.half_size[1] * widening / cell * (1.0 - MIN_S).sqrt();
         let (first, last) = (cells.first[1], cells.first[1] + cells.rows as i32);
-        let rows = [(center[1] - reach).ceil(), (center[1] + reach).floor() + 1.0];
+        let rows = [(center[1] - half_height).ceil(), (center[1] + half_height).floor() + 1.0];
         let rows = rows.map(|row| (row as i32).clamp(first, last));
         let [a, b, c] = ellipse.shape.map(|value| value * scale);
         let shear = b / a;
         let row_falloff = c - b * shear;
         // Widened sprites are attenuated.
         let attenuation = 1.0 / (widening * widening);
-        let (mut own, mut next) = (sprite.values, sprite.values);
+        let (mut values, mut next_values) = (sprite.values, sprite.values);
         for i in 0..P {
-            own[i] *= attenuation * (1.0 - sprite.next_layer_weight);
-            next[i] *= attenuation * sprite.next_layer_weight;
+            values[i] *= attenuation * (1.0 - sprite.next_layer_weight);
+            next_values[i] *= attenuation * sprite.next_layer_weight;
         }
         let (layer, spans_two_layers) = (sprite.layer, sprite.next_layer_weight > 0.0);
-        Self { center, falloff: a, shear, row_falloff, rows, layer, own, next, spans_two_layers }
+        Self { center, falloff: a, shear, row_falloff, rows, layer, values, next_values, spans_two_layers }
     }
 
     /// Chords of the sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)` is large enough.
@@ -83,11 +84,11 @@ impl<const P: usize> RasterizedSprite<P> {
         chords
     }
 
-    /// Accumulates a run of cells that begins at column `x` of the grid. (Weights beyond the sprite are 0.)
+    /// Accumulates a run of cells that starts at column `x` of the grid. (Weights outside the sprite are 0.)
     #[inline(always)]
     pub(crate) fn add(&self, row: &mut [[f32; P]], x: usize, layers: usize, weights: &[f32; COLUMNS]) {
         match (P == 1 && layers == 1, self.spans_two_layers) {
-            (true, _) => self.add_lone(&mut row.as_flattened_mut()[x..], weights),
+            (true, _) => self.add_single_value(&mut row.as_flattened_mut()[x..], weights),
             (_, true) => self.add_run::<true>(&mut row[x * layers + self.layer..], layers, weights),
             (_, false) => self.add_run::<false>(&mut row[x * layers + self.layer..], layers, weights),
         }
@@ -99,11 +100,11 @@ impl<const P: usize> RasterizedSprite<P> {
         for weight in weights {
             let Some((own, next)) = rest.split_first_mut() else { return };
             for i in 0..P {
-                own[i] = self.own[i].mul_add(*weight, own[i]);
+                own[i] = self.values[i].mul_add(*weight, own[i]);
             }
             if TWO_LAYERS && let Some(next) = next.first_mut() {
                 for i in 0..P {
-                    next[i] = self.next[i].mul_add(*weight, next[i]);
+                    next[i] = self.next_values[i].mul_add(*weight, next[i]);
                 }
             }
             let Some((_, after)) = rest.split_at_mut_checked(layers) else { return };
@@ -111,10 +112,10 @@ impl<const P: usize> RasterizedSprite<P> {
         }
     }
 
-    /// The same for one value per cell: a SIMD vector holds consecutive cells.
+    /// Accumulates a run of cells with one value each: a SIMD vector holds consecutive cells.
     #[inline(always)]
-    fn add_lone(&self, cells: &mut [f32], weights: &[f32; COLUMNS]) {
-        let value = self.own[0];
+    fn add_single_value(&self, cells: &mut [f32], weights: &[f32; COLUMNS]) {
+        let value = self.values[0];
         match cells.first_chunk_mut::<COLUMNS>() {
             Some(cells) => {
                 for lane in 0..COLUMNS {
@@ -132,7 +133,7 @@ impl<const P: usize> RasterizedSprite<P> {
 
 /// Chords of a sprite in sixteen rows.
 pub(crate) struct Chords {
-    /// Column of the greatest `s`, and `s` there.
+    /// Column of the maximum of `s`, and `s` there.
     middle: [f32; ROWS],
     s_max: [f32; ROWS],
     /// First cell covered, and one past the last.

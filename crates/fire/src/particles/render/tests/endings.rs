@@ -8,12 +8,12 @@ const ENDING: FadeOut = FadeOut { seconds: 0.1, domain: [Vec3::splat(-1.0), Vec3
 
 /// Optical depth in the middle of a lone ball of smoke that lives for a second, and by how much it bends the light beside.
 fn seen(particle: Particle) -> [f64; 2] {
-    let (scratch, wind, air) = (ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
+    let (buffers, wind, air) = (BufferPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let particles = cloud([particle]);
-    let gas = Gas { fade_out: ENDING, ..gas(&particles, &scratch) };
-    let (view, look) = (view(camera()), smooth());
-    let prepared = PreparedGas::new(gas, &look, &view, &surroundings, &Unobserved).unwrap();
+    let gas = Gas { fade_out: ENDING, ..gas(&particles, &buffers) };
+    let (view, rendering) = (view(camera()), smooth());
+    let prepared = PreparedGas::new(gas, &rendering, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
     strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, AOVS.len());
     prepared.draw(&DepthInterval::ALL, &mut strip);

@@ -75,7 +75,7 @@ fn glowing_cloud(count: u64) -> Particles {
     }))
 }
 
-fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
+fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles,
         time: 1.0,
@@ -85,7 +85,7 @@ fn gas<'a>(particles: &'a Particles, scratch: &'a ScratchPool) -> Gas<'a> {
         size: DVec2::ONE,
         key: Key::new(1, "flame"),
         fade_out: FadeOut::NEVER,
-        scratch,
+        buffers,
     }
 }
 
@@ -96,18 +96,24 @@ fn smooth() -> RenderingParameters {
 /// Prepares the gas and hands it to `each`.
 fn prepared<T>(
     particles: &Particles,
-    look: &RenderingParameters,
+    rendering: &RenderingParameters,
     view: &View,
     each: impl FnOnce(&PreparedGas) -> T,
 ) -> T {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
-    let scratch = ScratchPool::default();
-    each(&PreparedGas::new(gas(particles, &scratch), look, view, &surroundings, &Unobserved).unwrap())
+    let buffers = BufferPool::default();
+    each(&PreparedGas::new(gas(particles, &buffers), rendering, view, &surroundings, &Unobserved).unwrap())
 }
 
 /// The whole picture drawn as one strip, with AOVs where wanted and a plate at `plate` m.
-fn drawn(particles: &Particles, look: &RenderingParameters, view: &View, aovs: usize, plate: Option<f32>) -> Strip {
+fn drawn(
+    particles: &Particles,
+    rendering: &RenderingParameters,
+    view: &View,
+    aovs: usize,
+    plate: Option<f32>,
+) -> Strip {
     let depths = plate.map(|depth| vec![depth; SIZE[0]]);
     let mut strip = Strip::default();
     let rect = Rect::from_size(SIZE[0], SIZE[1]);
@@ -115,7 +121,7 @@ fn drawn(particles: &Particles, look: &RenderingParameters, view: &View, aovs: u
         Some(depths) => strip.reset(rect, Some(&|_| depths.as_slice()), aovs),
         None => strip.reset(rect, None, aovs),
     }
-    prepared(particles, look, view, |prepared| prepared.draw(&DepthInterval::ALL, &mut strip));
+    prepared(particles, rendering, view, |prepared| prepared.draw(&DepthInterval::ALL, &mut strip));
     strip
 }
 
@@ -186,8 +192,8 @@ fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_color() {
 fn detail_keeps_the_mean_light() {
     let view = view(camera());
     let particles = glowing_cloud(400);
-    let mean = |look: &RenderingParameters| {
-        let strip = drawn(&particles, look, &view, 0, None);
+    let mean = |rendering: &RenderingParameters| {
+        let strip = drawn(&particles, rendering, &view, 0, None);
         strip.radiance[1].iter().map(|value| f64::from(*value)).sum::<f64>()
     };
     let (plain, fine) = (
@@ -217,9 +223,9 @@ fn no_sprite_is_a_disc() {
 fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
     let view = view(camera());
     let particles = cloud([ball(0, [0.0; 3], 1500.0, 0.0)]);
-    let look = RenderingParameters { heat_haze_gain: 3.0, ..smooth() };
+    let rendering = RenderingParameters { heat_haze_gain: 3.0, ..smooth() };
     let scale = view.camera.focal_pixels / DISTANCE;
-    prepared(&particles, &look, &view, |prepared| {
+    prepared(&particles, &rendering, &view, |prepared| {
         let bend = prepared.deflection().unwrap();
         let at = |x: usize, y: usize| bend.angle.at(x - bend.rect.x, y - bend.rect.y);
         let weight = 3.0 * (refractivity(1500.0) - refractivity(293.15)) * 0.001;
@@ -254,7 +260,7 @@ fn lights_carry_the_light_of_the_picture() {
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&thin, &smooth(), &view, 0, None);
     let seen: f64 = strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>() / (scale * scale);
-    let lights = point_lights_of_gas(&gas(&thin, &ScratchPool::default()), &RenderingParameters::default(), 1.0);
+    let lights = point_lights_of_gas(&gas(&thin, &BufferPool::default()), &RenderingParameters::default(), 1.0);
     assert_eq!(lights.len(), 3);
     let sum: f64 = lights.iter().map(|light| f64::from(light.intensity[0])).sum();
     assert!((sum / seen - 1.0).abs() < 0.02, "{sum} {seen}");
@@ -275,14 +281,14 @@ fn no_lens_and_no_place_of_the_camera_is_too_much() {
         for position in [[0.0, 0.0, 0.0], [0.05, -0.2, 0.3], [0.0, 0.0, 3.0], [0.0, 5.0, 0.001]] {
             let camera = CameraParameters { lens, position: Animated::from(position), ..camera() };
             for sprite in [SpriteStyle::LineIntegral, SpriteStyle::Poly6, SpriteStyle::Squares] {
-                let look = RenderingParameters { sprite, ..RenderingParameters::default() };
+                let rendering = RenderingParameters { sprite, ..RenderingParameters::default() };
                 let view = view(camera.clone());
-                let strip = drawn(&particles, &look, &view, AOVS.len(), None);
+                let strip = drawn(&particles, &rendering, &view, AOVS.len(), None);
                 let finite = strip.radiance.iter().flatten().all(|value| value.is_finite());
                 let dark = (0..strip.len()).map(|i| luminance(&strip, i % SIZE[0], i / SIZE[0])).fold(0.0, f64::min);
                 assert!(finite && dark >= 0.0, "{lens:?} {position:?} {sprite:?}: {dark}");
                 assert!(strip.radiance[0].iter().any(|value| *value > 0.0), "{lens:?} {position:?} {sprite:?}");
-                prepared(&particles, &look, &view, |prepared| {
+                prepared(&particles, &rendering, &view, |prepared| {
                     let finite = prepared
                         .deflection()
                         .is_none_or(|bend| bend.angle.pixels().iter().flatten().all(|value| value.is_finite()));
@@ -298,13 +304,13 @@ fn strips_crops_and_threads_change_no_bit() {
     // So many, and so small, that there are several tasks of particles and of rows.
     let mut particles = glowing_cloud(10_000);
     particles.support_radius.fill(0.08);
-    let look = RenderingParameters::default();
+    let rendering = RenderingParameters::default();
     let view = view(camera());
-    let whole = drawn(&particles, &look, &view, 0, None);
+    let whole = drawn(&particles, &rendering, &view, 0, None);
     for threads in [1, 2, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            prepared(&particles, &look, &view, |prepared| {
+            prepared(&particles, &rendering, &view, |prepared| {
                 for rect in [Rect { x: 0, y: 40, width: 160, height: 8 }, Rect { x: 67, y: 51, width: 31, height: 23 }]
                 {
                     let mut strip = Strip::default();
@@ -326,12 +332,12 @@ fn a_part_of_the_picture_alone_is_the_same_to_the_bit() {
     let mut particles = glowing_cloud(500);
     particles.support_radius.iter_mut().step_by(3).for_each(|radius| *radius *= 0.12);
     particles.support_radius.iter_mut().step_by(7).for_each(|radius| *radius *= 3.0);
-    let look = RenderingParameters::default();
+    let rendering = RenderingParameters::default();
     let whole_view = view(camera());
     let part = Rect { x: 67, y: 51, width: 31, height: 23 };
     let part_view = View { window: part, ..view(camera()) };
     let seen = |view: &View| {
-        prepared(&particles, &look, view, |prepared| {
+        prepared(&particles, &rendering, view, |prepared| {
             let mut strip = Strip::default();
             strip.reset(part, None, 0);
             prepared.draw(&DepthInterval::ALL, &mut strip);
@@ -432,14 +438,14 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
 }
 
 /// Light and opacity in the middle of a ball of gas among lights of so much illuminance.
-fn lit_ball(ball: Particle, look: &RenderingParameters, illuminance: f32) -> ([f64; 3], f64) {
-    let (view, scratch, wind, air) =
-        (view(camera()), ScratchPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
+fn lit_ball(ball: Particle, rendering: &RenderingParameters, illuminance: f32) -> ([f64; 3], f64) {
+    let (view, buffers, wind, air) =
+        (view(camera()), BufferPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
     let others = Publication { lights: vec![sun], ..Publication::default() };
     let surroundings = Surroundings { air: &air, others, ..Surroundings::from_wind(&wind) };
     let particles = cloud([ball]);
-    let prepared = PreparedGas::new(gas(&particles, &scratch), look, &view, &surroundings, &Unobserved).unwrap();
+    let prepared = PreparedGas::new(gas(&particles, &buffers), rendering, &view, &surroundings, &Unobserved).unwrap();
     let mut strip = Strip::default();
     strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
     prepared.draw(&DepthInterval::ALL, &mut strip);
@@ -453,10 +459,10 @@ fn cold_soot_is_smoke_that_hides_and_shows_the_light_of_others_alone() {
     let (dark, opacity) = lit_ball(smoke, &smooth(), 0.0);
     assert!(opacity > 0.5 && dark.iter().all(|value| *value < 1e-6), "{dark:?} {opacity}");
     for albedo in [0.15, 0.3] {
-        let look = RenderingParameters { smoke_albedo: albedo, ..smooth() };
+        let rendering = RenderingParameters { smoke_albedo: albedo, ..smooth() };
         // Alike in all directions: albedo E / 4 pi where it hides everything.
         let expected = albedo * 1000.0 / (4.0 * std::f64::consts::PI) * opacity;
-        let (lit, as_opaque) = lit_ball(smoke, &look, 1000.0);
+        let (lit, as_opaque) = lit_ball(smoke, &rendering, 1000.0);
         assert!((as_opaque - opacity).abs() < 1e-6);
         assert!(lit.iter().all(|value| (value / expected - 1.0).abs() < 1e-3), "{lit:?} for {expected}");
     }
@@ -484,5 +490,5 @@ fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
 
 /// Luminance per meter of a particle's gas in blue light.
 fn gas_blue(ball: Particle) -> f64 {
-    gas(&cloud([ball]), &ScratchPool::default()).blue_luminance(0, &smooth())
+    gas(&cloud([ball]), &BufferPool::default()).blue_luminance(0, &smooth())
 }

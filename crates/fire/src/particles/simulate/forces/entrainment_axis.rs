@@ -1,6 +1,6 @@
 //! Entrainment toward the plume axis: why flames narrow upward.
 //!
-//! Rising gas accelerates and its volume is conserved, so it must contract. Where gas on the axis gains speed at the rate `du/dh`,
+//! Rising gas accelerates and its volume is conserved, so that the plume contracts. Where gas on the axis gains speed at the rate `du/dh`,
 //! continuity moves the surrounding gas inward at `-(r/2) du/dh`. The inflow is limited to a fraction of the speed on the axis (the
 //! entrainment), plus about a fifth of `sqrt(g D)` at the base. The axis is the mean position of the gas in each layer of height,
 //! so it leans with the wind.
@@ -16,9 +16,9 @@ use fearless_simd::{Simd, prelude::*};
 
 use crate::particles::simulate::burner::Burner;
 
-/// Layers of height.
+/// Number of layers of height.
 const LAYERS: usize = 24;
-/// Greatest inflow velocity as a fraction of the speed on the axis.
+/// Maximum inflow velocity as a fraction of the speed on the axis.
 const MAX_INFLOW_FRACTION: f32 = 0.2;
 
 /// Additional inflow velocity at the base, in `sqrt(g D)`.
@@ -38,7 +38,7 @@ pub(crate) struct PlumeAxis {
     inflow: f32,
     strength: f32,
     /// The burner's diameter, m. The inflow fades out between one and two of them from the axis.
-    reach: f32,
+    diameter: f32,
 }
 
 /// The plume axes of all burners at `t`; `burner_indices` are the burners that the particles at `positions` came from.
@@ -50,6 +50,7 @@ pub(crate) fn plume_axes(
     t: f64,
 ) -> Vec<PlumeAxis> {
     let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.bounding_radius);
+    // Height of the base and layers per meter of each burner.
     let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.position(t).y, scale(b))).collect();
     let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
     for (index, &number) in burner_indices.iter().enumerate() {
@@ -76,17 +77,17 @@ impl PlumeAxis {
             acceleration: burner.acceleration as f32,
             inflow: (INFLOW_FROUDE * math::sqrt(STANDARD_GRAVITY * burner.diameter)) as f32,
             strength: strength as f32,
-            reach: burner.diameter as f32,
+            diameter: burner.diameter as f32,
         };
         axis.smooth(sums);
         axis
     }
 
-    /// Mean position of each layer and its two neighbors; an empty layer takes the mean below.
+    /// Sets the center of each layer to the mean position of the gas in it and its two neighbors; if they are empty, to the center below.
     fn smooth(&mut self, sums: &[[f64; 3]; LAYERS + 1]) {
         for layer in 0..=LAYERS {
-            let beside = layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1);
-            let total = |k: usize| sums[beside.clone()].iter().map(|sum| sum[k]).sum::<f64>();
+            let neighbors = layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1);
+            let total = |k: usize| sums[neighbors.clone()].iter().map(|sum| sum[k]).sum::<f64>();
             let count = total(2);
             if count > 0.0 {
                 self.centers[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
@@ -114,13 +115,14 @@ impl PlumeAxis {
         let distance = offset[0].fma(offset[0], offset[1] * offset[1]).simd_sqrt();
         let speed_squared = height.fma(splat(2.0 * self.acceleration), splat(self.speed_squared));
         let speed = speed_squared.simd_sqrt().simd_max(splat(1e-6));
-        // A large burner has several plumes: the inflow toward one axis ends at two diameters.
-        let attenuation = (splat(2.0) - distance * splat(1.0 / self.reach)).simd_clamp01();
-        let greatest = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
-        let inward =
-            (distance * splat(0.5 * self.acceleration) / speed).simd_min(greatest) * attenuation * splat(self.strength);
-        let pull = (splat(0.0) - inward) / distance.simd_max(splat(f32::MIN_POSITIVE));
-        [offset[0] * pull, splat(0.0), offset[1] * pull]
+        // A large burner has several plumes: the inflow toward one axis vanishes at a distance of two diameters.
+        let attenuation = (splat(2.0) - distance * splat(1.0 / self.diameter)).simd_clamp01();
+        let max_inflow = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
+        let inward = (distance * splat(0.5 * self.acceleration) / speed).simd_min(max_inflow)
+            * attenuation
+            * splat(self.strength);
+        let scale = (splat(0.0) - inward) / distance.simd_max(splat(f32::MIN_POSITIVE));
+        [offset[0] * scale, splat(0.0), offset[1] * scale]
     }
 
     /// Position of the axis at heights above the burner: x and z, m.

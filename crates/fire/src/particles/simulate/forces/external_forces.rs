@@ -8,7 +8,7 @@ use bansho_base::{
         simd::{Lanes, Real},
     },
     phenomenon::surroundings::{Occluder, Surroundings},
-    world::{air::Air, gravity::STANDARD_GRAVITY},
+    world::gravity::STANDARD_GRAVITY,
 };
 use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
@@ -23,15 +23,15 @@ use crate::particles::{
     parameters::{FlameParticlesParameters, WindForce},
     simulate::{
         derived::DerivedConstants,
-        particle_lanes::{add_scaled, length, subtract},
         particles::Particles,
+        vectors::{add_scaled, length, subtract},
     },
 };
 
 /// Age at which turbulence has grown to half its strength, as a fraction of the rise time.
 const TURBULENT_AGE: f32 = 0.1;
 
-/// Drift velocity of eddies as a fraction of the wind's: the gas that holds them takes up the wind as it rises.
+/// Drift velocity of eddies as a fraction of the wind's, since the gas around them takes on the velocity of the wind only gradually.
 const EDDY_DRIFT: f64 = 0.5;
 
 /// Drag coefficient of a fire in cross wind.
@@ -44,7 +44,7 @@ const BURNED_PER_RISE_TIME: f64 = 0.25;
 /// Particles per task of the thread pool.
 const PARTICLES_PER_TASK: usize = 8192;
 
-/// What does not change while a fire burns.
+/// Inputs of a step that do not change over time.
 #[derive(Clone, Copy)]
 pub(crate) struct StepConstants<'a> {
     pub(crate) parameters: &'a FlameParticlesParameters,
@@ -79,7 +79,7 @@ impl<'a> ExternalForces<'a> {
         let bounds = bounds(particles, constants.burners.len());
         let burner_forces = plume_axes.into_iter().zip(bounds).enumerate().map(|(index, (axis, bounds))| {
             let wind_field = WindField::new(surroundings.wind, particles.origin, bounds, t);
-            step.burner(index, axis, wind_field, surroundings, t)
+            step.burner_forces(index, axis, wind_field, surroundings, t)
         });
         Self {
             burner_forces: burner_forces.collect(),
@@ -91,12 +91,12 @@ impl<'a> ExternalForces<'a> {
             buoyancy: (STANDARD_GRAVITY * flame.forces.buoyancy) as f32,
             wind: flame.forces.wind_model,
             wind_response: flame.forces.wind_response as f32,
-            density_at_1_k: density_at_1_k(surroundings.air),
+            density_at_1_k: surroundings.air.density_at(1.0) as f32,
         }
     }
 
-    /// Advances vortex rings and eddies to `t`; plume axes and wind are kept for the whole step.
-    pub(crate) fn advance_vortex_rings(&mut self, t: f64) {
+    /// Advances vortex rings and eddies to `t`; plume axes and wind stay the same for the whole step.
+    pub(crate) fn advance_rings_and_eddies(&mut self, t: f64) {
         for (index, burner) in self.burner_forces.iter_mut().enumerate() {
             burner.rings = self.step.rings(index, &burner.axis, t);
             burner.eddies = self.step.eddies(index, self.surroundings, t);
@@ -105,7 +105,7 @@ impl<'a> ExternalForces<'a> {
 }
 
 impl<'a> StepConstants<'a> {
-    fn burner(
+    fn burner_forces(
         self,
         index: usize,
         axis: PlumeAxis,
@@ -113,17 +113,18 @@ impl<'a> StepConstants<'a> {
         surroundings: &Surroundings,
         t: f64,
     ) -> BurnerForces<'a> {
-        let (burner, motion) = (&self.constants.burners[index], &self.parameters.forces);
+        let (burner, forces) = (&self.constants.burners[index], &self.parameters.forces);
         BurnerForces {
             wind_field,
             rings: self.rings(index, &axis, t),
             axis,
             eddies: self.eddies(index, surroundings, t),
-            turbulence: motion.turbulence as f32,
+            turbulence: forces.turbulence as f32,
             turbulent_age: TURBULENT_AGE * burner.rise_time() as f32,
-            entrainment: (motion.entrainment / (0.5 * burner.diameter)) as f32,
-            drag: (CROSS_DRAG * motion.wind_response / (0.5 * burner.diameter)) as f32,
-            burning: [(BURNED_PER_HEIGHT / burner.height) as f32, (BURNED_PER_RISE_TIME / burner.rise_time()) as f32],
+            entrainment: (forces.entrainment / (0.5 * burner.diameter)) as f32,
+            drag: (CROSS_DRAG * forces.wind_response / (0.5 * burner.diameter)) as f32,
+            burned_per_meter: (BURNED_PER_HEIGHT / burner.height) as f32,
+            burned_per_second: (BURNED_PER_RISE_TIME / burner.rise_time()) as f32,
         }
     }
 
@@ -132,14 +133,10 @@ impl<'a> StepConstants<'a> {
     }
 
     fn eddies(self, index: usize, surroundings: &Surroundings, t: f64) -> EddyField<'a> {
-        let (burner, motion) = (&self.constants.burners[index], &self.parameters.forces);
-        let drift = surroundings.wind.travel(0.0, t) * (EDDY_DRIFT * motion.wind_response);
-        self.turbulence.at(t, motion.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
+        let (burner, forces) = (&self.constants.burners[index], &self.parameters.forces);
+        let drift = surroundings.wind.travel(0.0, t) * (EDDY_DRIFT * forces.wind_response);
+        self.turbulence.at(t, forces.eddy_size * burner.diameter, burner.axis_speed(0.5 * burner.height), drift)
     }
-}
-
-fn density_at_1_k(air: &Air) -> f32 {
-    air.density_at(1.0) as f32
 }
 
 /// Bounding box of the particles of each burner.
@@ -155,11 +152,11 @@ fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
         }
         bounds
     };
-    let merge = |mut one: Vec<[Vec3; 2]>, other: Vec<[Vec3; 2]>| {
-        for ([low, high], [other_low, other_high]) in one.iter_mut().zip(other) {
+    let merge = |mut bounds: Vec<[Vec3; 2]>, others: Vec<[Vec3; 2]>| {
+        for ([low, high], [other_low, other_high]) in bounds.iter_mut().zip(others) {
             (*low, *high) = (low.min(other_low), high.max(other_high));
         }
-        one
+        bounds
     };
     let tasks = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
     let bounds = tasks.map(of_task).reduce(|| vec![EMPTY; burners], merge);
@@ -181,37 +178,39 @@ pub(crate) struct BurnerForces<'a> {
     pub(crate) entrainment: f32,
     /// Drag coefficient of cross wind divided by the radius of the fire, 1/m.
     pub(crate) drag: f32,
-    /// Fraction of its fuel that gas burns per meter of travel, and per second.
-    pub(crate) burning: [f32; 2],
+    /// Fraction of its fuel that gas burns per meter of travel.
+    pub(crate) burned_per_meter: f32,
+    /// Fraction of its fuel that gas burns per second.
+    pub(crate) burned_per_second: f32,
 }
 
 /// Velocity of the air at the positions of particles, m/s.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AirVelocity<R> {
-    /// That of vortex rings and of the inflow toward the axis.
+    /// Velocity of vortex rings and of the inflow toward the axis.
     pub(crate) steady: [R; 3],
-    /// That of eddies of unit strength.
+    /// Velocity of eddies of unit strength.
     pub(crate) eddies: [R; 3],
 }
 
 impl BurnerForces<'_> {
-    /// Entrainment rate, mass of air per own mass, 1/s: `alpha |u - w| / (D / 2)`, half of it for enclosed gas.
+    /// Entrainment rate, mass of entrained air per mass of gas, 1/s: `alpha |u - w| / (D / 2)`, half of that for enclosed gas.
     #[inline(always)]
     pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
         let splat = |value: f32| air_exposure.broadcast(value);
         length(&subtract(velocity, wind)) * air_exposure.fma(splat(self.entrainment), splat(0.5 * self.entrainment))
     }
 
-    /// Velocity with which the air advects gas of `speed` and `age`, m/s.
+    /// Velocity by which the air advects gas of that speed and age, m/s. Turbulence grows with age and is proportional to the speed.
     #[inline(always)]
-    pub(crate) fn velocity<R: Real>(&self, flow: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
-        let grown = age / (age + age.broadcast(self.turbulent_age));
-        add_scaled(&flow.steady, &flow.eddies, speed * grown * age.broadcast(self.turbulence))
+    pub(crate) fn advection_velocity<R: Real>(&self, air: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
+        let growth = age / (age + age.broadcast(self.turbulent_age));
+        add_scaled(&air.steady, &air.eddies, speed * growth * age.broadcast(self.turbulence))
     }
 
     /// Velocity of the air at sixteen positions.
     #[inline(always)]
-    pub(crate) fn flow<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
+    pub(crate) fn air_velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> AirVelocity<Lanes<S>> {
         let mut steady = self.axis.velocity(simd, position);
         for ring in &self.rings {
             ring.add_velocity(position, &mut steady);

@@ -16,6 +16,8 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*, u32x16};
 
+use crate::particles::simulate::vectors::lerp4;
+
 /// Grid points along each side of the tile.
 const SIDE: usize = 32;
 /// Eddies along each side of the tile.
@@ -37,8 +39,15 @@ pub(crate) struct TurbulenceTile {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EddyField<'a> {
     tile: &'a [[f32; 4]],
-    /// Grid points per meter, and the origin on the grid, of each layer.
-    layers: [(f32, [f32; 3]); 2],
+    layers: [EddyLayer; 2],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct EddyLayer {
+    /// Grid points per meter.
+    scale: f32,
+    /// Grid position of the flame's position.
+    origin: [f32; 3],
 }
 
 impl TurbulenceTile {
@@ -46,32 +55,32 @@ impl TurbulenceTile {
         Self { key, tile: OnceLock::new() }
     }
 
-    /// The tile, computed when a step first needs it: a flame that is only checked does without.
+    /// The tile, computed at the first step, since a flame that is only built for checks does not need it.
     fn tile(&self) -> &[[f32; 4]] {
-        get_or_compute(&self.tile, || tile(self.key)).as_slice()
+        get_or_compute(&self.tile, || compute_tile(self.key)).as_slice()
     }
 
-    /// Noise of mean 0 and standard deviation 1 that varies over a unit of `position`.
+    /// Noise of mean 0 and standard deviation 1 with eddies of unit size.
     pub(crate) fn noise(&self, position: DVec3) -> f32 {
         let position = (position * (SIDE as f64 / f64::from(EDDIES))).rem_euclid(DVec3::splat(SIDE as f64));
         sample(self.tile(), position.as_vec3())[0]
     }
 
-    /// The eddies at `t`, the largest `eddy_size` m wide, in gas that rises at `speed`, displaced by the wind's `drift` since time
-    /// 0.
+    /// The eddies at `t` in gas that rises at `speed` m/s, displaced by `drift` m by the wind since time 0; the largest are `eddy_size` m wide.
     pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> EddyField<'_> {
         let layer = |index: usize| {
             let scale = SIDE as f64 / (f64::from(EDDIES) * eddy_size) * (index + 1) as f64;
             let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
-            // Offset so that the layers do not share their zeros; reduced in f64, so that hours of time lose no precision.
+            // The offset keeps the zeros of the layers from coinciding. Reduced in f64, so that no precision is lost even after hours.
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
-            (scale as f32, origin.as_vec3().to_array())
+            EddyLayer { scale: scale as f32, origin: origin.as_vec3().to_array() }
         };
         EddyField { tile: self.tile(), layers: [layer(0), layer(1)] }
     }
 }
 
-fn tile(key: Key) -> Vec<[f32; 4]> {
+/// The normalized velocities of the tile.
+fn compute_tile(key: Key) -> Vec<[f32; 4]> {
     let words = key.words(0, 0, Purpose::named("turbulence"));
     let potentials = [0, 1, 2].map(|axis| potential(words[axis]));
     let mut tile: Vec<Vec3> = (0..SIDE * SIDE * SIDE).map(|index| curl(&potentials, index)).collect();
@@ -89,7 +98,7 @@ impl EddyField<'_> {
         let mut sum = [Lanes::splat(simd, 0.0); 3];
         let Ok(tile) = <&[[f32; 4]; SIDE * SIDE * SIDE]>::try_from(self.tile) else { return sum };
         for (layer, weight) in LAYER_WEIGHT.into_iter().enumerate() {
-            let (scale, origin) = &self.layers[layer];
+            let EddyLayer { scale, origin } = &self.layers[layer];
             let mut grid_position = *position;
             for c in 0..3 {
                 grid_position[c] = position[c].fma(position[c].broadcast(*scale), position[c].broadcast(origin[c]));
@@ -134,16 +143,6 @@ impl<S: Simd> Row<'_, S> {
     }
 }
 
-/// Linear interpolation of four components.
-#[inline(always)]
-pub(crate) fn lerp4<R: Real>(one: &[R; 4], other: &[R; 4], weight: R) -> [R; 4] {
-    let mut lerp4 = *one;
-    for c in 0..4 {
-        lerp4[c] = weight.fma(other[c] - one[c], one[c]);
-    }
-    lerp4
-}
-
 /// Trilinear interpolation of the tile at one position in grid points.
 fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
     let floor = position.floor();
@@ -162,10 +161,10 @@ fn potential(seed: u32) -> Vec<f32> {
     // The fractal and the period are constants within their bounds.
     let Ok(noise) = Noise::<3>::new(seed, Fractal::SINGLE, [EDDIES; 3]) else { return vec![0.0; SIDE * SIDE * SIDE] };
     let coordinate = |step: usize| Coordinate::from_f64((step * EDDIES as usize) as f64 / SIDE as f64);
-    let at = |index: usize| {
+    let value_at = |index: usize| {
         noise.at([coordinate(index % SIDE), coordinate(index / SIDE % SIDE), coordinate(index / (SIDE * SIDE))])
     };
-    (0..SIDE * SIDE * SIDE).map(at).collect()
+    (0..SIDE * SIDE * SIDE).map(value_at).collect()
 }
 
 /// Curl of the potentials at a grid point, by central differences.

@@ -1,8 +1,8 @@
 //! Puffing: vortex rings that roll up around the base of a fire and rise with it.
 //!
 //! Puffing is prescribed, not emergent: air is not simulated, so the instability that sheds the rings cannot appear. Each burner
-//! sheds a ring per period of the frequency measured by Cetegen and Ahmed (1993), with jitter of time and strength. Gas is drawn in
-//! below a ring (the neck) and pushed out above it (the bulge), as in their photographs. The flow has the Stokes stream function
+//! sheds a ring per period of the frequency measured by Cetegen and Ahmed (1993), with random variation of time and strength. Gas moves
+//! inward below a ring (the neck) and outward above it (the bulge), as in their photographs. The flow has the Stokes stream function
 //! `psi = C r^2 (1 - s^2/c^2)^4` within the distance c of the ring's center and vanishes beyond, so it is divergence-free.
 
 use bansho_base::math::{
@@ -15,15 +15,15 @@ use fearless_simd::Simd;
 use super::entrainment_axis::PlumeAxis;
 use crate::particles::{
     parameters::FlameParticlesParameters,
-    simulate::{burner::Burner, particle_lanes::dot},
+    simulate::{burner::Burner, vectors::dot},
 };
 
-/// Most rings that a burner sheds side by side.
+/// Maximum number of rings that a burner sheds side by side.
 const MAX_STREAMS: f64 = 6.0;
-/// Most rings of a stream that are alive.
+/// Maximum number of active rings of a stream.
 const MAX_RINGS: i64 = 9;
-/// Age at which a ring has faded out, in periods; the last ring that is counted is always older.
-const MAX_AGE_BEATS: f64 = MAX_RINGS as f64 - 2.2;
+/// Age at which a ring has faded out, in periods; the oldest of [`MAX_RINGS`] rings is always older.
+const MAX_AGE_PERIODS: f64 = MAX_RINGS as f64 - 2.2;
 /// Speed of a ring relative to the gas on the axis.
 const RING_SPEED: f64 = 0.7;
 /// Speed at a ring's center relative to the gas on the axis at its height.
@@ -77,7 +77,7 @@ impl VortexRing {
     }
 }
 
-/// The rings of `burner` that are alive at `t`; they follow the plume `axis`.
+/// The rings of `burner` that are active at `t`; they follow the plume `axis`.
 pub(crate) fn active_rings(
     burner: &Burner,
     flame: &FlameParticlesParameters,
@@ -90,8 +90,8 @@ pub(crate) fn active_rings(
         return Vec::new();
     }
     let hz = burner.puffing_hz(flame);
-    let side = std::f64::consts::FRAC_PI_4 * burner.diameter * burner.diameter;
-    let streams = (burner.area_m2 / side).round().clamp(1.0, MAX_STREAMS) as u32;
+    let disk_area = std::f64::consts::FRAC_PI_4 * burner.diameter * burner.diameter;
+    let streams = (burner.area_m2 / disk_area).round().clamp(1.0, MAX_STREAMS) as u32;
     let latest = (t * hz).floor() as i64 + 1;
     let stream_rings = |stream: u32| {
         let shedding =
@@ -101,6 +101,7 @@ pub(crate) fn active_rings(
     (0..streams).flat_map(stream_rings).collect()
 }
 
+/// Inputs of the rings of one stream.
 struct VortexShedding<'a> {
     burner: &'a Burner,
     key: Key,
@@ -112,45 +113,46 @@ struct VortexShedding<'a> {
 }
 
 impl VortexShedding<'_> {
-    /// The ring shed in period `beat`, if it is alive.
-    fn ring(&self, beat: i64, puffing: f64) -> Option<VortexRing> {
-        let words = self.key.words(beat as u64, 1, self.purpose);
-        let [early, strong, tilt_x, tilt_z] = words.map(|word| f64::from(uniform(word)));
+    /// The ring shed in period `period`, if it is active.
+    fn ring(&self, period: i64, puffing: f64) -> Option<VortexRing> {
+        let words = self.key.words(period as u64, 1, self.purpose);
+        let [timing, strength, tilt_x, tilt_z] = words.map(|word| f64::from(uniform(word)));
         let phase = f64::from(self.purpose.0 % 64) * 0.618;
-        let age = self.t - (beat as f64 + phase.fract() + 0.25 * (early - 0.5)) / self.hz;
+        let age = self.t - (period as f64 + phase.fract() + 0.25 * (timing - 0.5)) / self.hz;
         let burner = self.burner;
         let height = RING_SPEED * (burner.speed + 0.5 * burner.acceleration * age) * age;
         if age <= 0.0 || height > 1.6 * burner.height + burner.diameter {
             return None;
         }
-        let beats = age * self.hz;
+        let age_periods = age * self.hz;
         let extent = RING_EXTENT
             * burner.diameter
-            * (1.0 + RING_GROWTH * beats)
+            * (1.0 + RING_GROWTH * age_periods)
             * cbrt(height / burner.diameter).clamp(0.6, 1.2);
         // A ring rolls up within a period and fades as it leaves the flame.
-        let rolled = beats / (beats + 0.35);
-        let fade = (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (MAX_AGE_BEATS - beats).clamp(0.0, 1.0);
-        let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strong) * rolled * fade * puffing;
+        let roll_up = age_periods / (age_periods + 0.35);
+        let fade =
+            (1.6 - height / burner.height).clamp(0.0, 0.6) / 0.6 * (MAX_AGE_PERIODS - age_periods).clamp(0.0, 1.0);
+        let speed = burner.axis_speed(height) * RING_STRENGTH * (0.75 + 0.5 * strength) * roll_up * fade * puffing;
         let [above, base] = [height, 0.0].map(|height| self.axis.at(height as f32).map(f64::from));
         let lean = DVec3::new(above[0] - base[0], height, above[1] - base[1]);
         let axis = DVec3::new(0.5 * (tilt_x - 0.5), 1.0, 0.5 * (tilt_z - 0.5)).normalize();
         Some(VortexRing {
-            center: (self.middle(beat, [tilt_x, tilt_z]) + lean).as_vec3(),
+            center: (self.shedding_position(period, [tilt_x, tilt_z]) + lean).as_vec3(),
             axis: axis.as_vec3(),
             inverse_extent: (1.0 / extent) as f32,
             strength: (0.5 * speed) as f32,
         })
     }
 
-    /// Where a ring is shed: near the center of a small burner, at a random point of a long one.
-    fn middle(&self, beat: i64, [x, z]: [f64; 2]) -> DVec3 {
+    /// Position at which a ring is shed: near the center of a burner with one stream, otherwise a random point of the burner.
+    fn shedding_position(&self, period: i64, [x, z]: [f64; 2]) -> DVec3 {
         let burner = self.burner;
         if self.streams == 1 {
             let offset = DVec3::new(z - 0.5, 0.0, x - 0.5) * (0.4 * burner.diameter);
             return burner.position(self.t) + offset;
         }
-        burner.spawn_point(self.key, beat as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
+        burner.spawn_point(self.key, period as u64 ^ u64::from(self.purpose.0) << 48, self.t).position
     }
 }
 

@@ -1,4 +1,4 @@
-//! The scene's wind sampled on a coarse grid around the gas: gusts are larger than flames.
+//! The scene's wind sampled on a coarse grid around the gas, which suffices since gusts are larger than flames.
 
 use bansho_base::{
     math::{
@@ -9,12 +9,12 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use crate::particles::simulate::forces::turbulence::lerp4;
+use crate::particles::simulate::vectors::lerp4;
 
 /// Grid points along each side of the box around the gas.
 const POINTS: usize = 4;
 
-/// Grid points of the box.
+/// Number of grid points of the box.
 const ALL_POINTS: usize = POINTS * POINTS * POINTS;
 
 /// The wind at one time within a box.

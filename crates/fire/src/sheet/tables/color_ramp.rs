@@ -6,7 +6,7 @@ use bansho_base::{
         self,
         simd::{Lanes, Real, gather, round_to_u32},
     },
-    parameters::parameter_error::ParameterError,
+    parameters::ParameterError,
 };
 use fearless_simd::Simd;
 
@@ -14,23 +14,23 @@ use crate::{
     chemiluminescence_color,
     sheet::{
         parameters::{ColorParameters, Coloring, Stage, TextureParameters},
-        render::curve_tables::{CurvePair, from_origin},
+        tables::{curve_pair::CurvePair, shape_tables::from_origin},
     },
 };
 
-/// Entries over T1: finer than a display can show, so that nearest-neighbor lookup suffices.
-const LEVELS: usize = 4096;
+/// Entries over T1: finer than a display can resolve, so that nearest-neighbor lookup suffices.
+const ENTRIES: usize = 4096;
 
 /// Light, opacity and temperature over T1.
 #[derive(Clone, Debug)]
 pub(crate) struct ColorRamp {
-    /// Red, green, blue (ACEScg, the brightest of luminance 1) and opacity over T1; nearest neighbor.
-    light: Box<[[f32; 4]; LEVELS]>,
+    /// Red, green, blue (ACEScg, normalized to a maximum luminance of 1) and opacity over T1.
+    light: Box<[[f32; 4]; ENTRIES]>,
     /// Soot temperature in K over T1.
     pub(crate) temperature: CurvePair,
-    /// Whether soot hides what is behind.
+    /// Whether it absorbs light from behind.
     pub(crate) absorbs: bool,
-    /// Light of the blue zone at the base: ACEScg of luminance 1, times the parameter.
+    /// Color of the blue zone at the base: ACEScg of luminance 1, times the parameter `base_blue`.
     pub(crate) base_blue: [f32; 3],
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn temperature(color: &ColorParameters, t2: f64) -> f64 {
     math::lerp(color.edge_temperature_k, color.core_temperature_k, t2)
 }
 
-/// Opacity, and emissivity, of soot of the optical depth of T2.
+/// Opacity, which is also the emissivity, of soot at T2.
 fn opacity(color: &ColorParameters, t2: f64) -> f64 {
     -math::exp_m1(-color.soot_optical_depth * t2)
 }
@@ -60,7 +60,7 @@ fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
     }
 }
 
-/// The value shown for a stage before color.
+/// Gray value of a stage before coloring.
 fn stage_value(stage: Stage, t1: f64, t2: f64) -> f64 {
     if stage == Stage::Sharpened { t2 } else { t1 }
 }
@@ -69,7 +69,7 @@ impl ColorRamp {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// The sharpening curve does not begin at the origin.
+    /// The sharpening curve does not start at the origin.
     pub(crate) fn check(texture: &TextureParameters) -> Result<(), ParameterError> {
         from_origin(&texture.sharpen, "texture.sharpen").map(drop)
     }
@@ -78,8 +78,9 @@ impl ColorRamp {
     pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: Stage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
-        let brightest = (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
-        let scale = if brightest > 0.0 { 1.0 / brightest } else { 0.0 };
+        let max_luminance =
+            (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
+        let scale = if max_luminance > 0.0 { 1.0 / max_luminance } else { 0.0 };
         let light = |t1: f64| {
             let t2 = sharpen.eval(t1);
             match stage {
@@ -95,7 +96,7 @@ impl ColorRamp {
             }
         };
         Self {
-            light: levels(light),
+            light: tabulate(light),
             temperature: CurvePair::new(|t1| [temperature(color, sharpen.eval(t1)), 0.0]),
             absorbs: color.soot_optical_depth > 0.0 || stage != Stage::Flame,
             base_blue: chemiluminescence_color().map(|value| value * color.base_blue as f32),
@@ -103,19 +104,19 @@ impl ColorRamp {
     }
 }
 
-fn levels(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; LEVELS]> {
-    let mut levels = Box::new([[0.0; 4]; LEVELS]);
-    for (i, level) in levels.iter_mut().enumerate() {
-        *level = light(i as f64 / (LEVELS - 1) as f64).map(|value| value as f32);
+fn tabulate(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; ENTRIES]> {
+    let mut entries = Box::new([[0.0; 4]; ENTRIES]);
+    for (i, entry) in entries.iter_mut().enumerate() {
+        *entry = light(i as f64 / (ENTRIES - 1) as f64).map(|value| value as f32);
     }
-    levels
+    entries
 }
 
 impl ColorRamp {
-    /// Red, green, blue of luminance up to 1, and opacity, at T1.
+    /// Red, green and blue, of luminance up to 1, and opacity at T1.
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, t1: Lanes<S>) -> [Lanes<S>; 4] {
-        let scaled = t1.simd_clamp01() * t1.broadcast((LEVELS - 1) as f32);
+        let scaled = t1.simd_clamp01() * t1.broadcast((ENTRIES - 1) as f32);
         gather(t1.simd, &self.light, round_to_u32(scaled))
     }
 }

@@ -7,9 +7,10 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-/// Buffers that are not in use. A clone begins empty.
+/// Vectors of any element type that are not in use, for large buffers of various sizes. ([`bansho_base::host::scratch_pool::ScratchPool`] holds small
+/// objects of one type, one per concurrent task.) A clone begins empty.
 #[derive(Default)]
-pub struct ScratchPool(Mutex<Vec<FreeVec>>);
+pub struct BufferPool(Mutex<Vec<FreeVec>>);
 
 /// An unused vector of some type, and its capacity.
 struct FreeVec {
@@ -17,23 +18,23 @@ struct FreeVec {
     list: Box<dyn Any + Send>,
 }
 
-impl Clone for ScratchPool {
+impl Clone for BufferPool {
     fn clone(&self) -> Self {
         Self::default()
     }
 }
 
-impl fmt::Debug for ScratchPool {
+impl fmt::Debug for BufferPool {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Memory").finish_non_exhaustive()
+        f.debug_struct("BufferPool").finish_non_exhaustive()
     }
 }
 
-impl ScratchPool {
-    /// Takes a vector with a capacity of at least `count`. Its contents are those of its last use, or empty.
+impl BufferPool {
+    /// Takes a vector with a capacity of at least `count`. It contains what its last user left in it, or nothing.
     pub(crate) fn take<T: Send + 'static>(&self, count: usize) -> PooledVec<'_, T> {
         let list = self.find_free(count).unwrap_or_else(|| Vec::with_capacity(count + count / 4));
-        PooledVec { list, scratch: self }
+        PooledVec { list, pool: self }
     }
 
     /// The smallest unused vector with enough capacity. Where there is none the largest is dropped, so that there are never more
@@ -52,12 +53,12 @@ impl ScratchPool {
 /// A vector that returns to the pool when it is dropped.
 pub(crate) struct PooledVec<'a, T: Send + 'static> {
     list: Vec<T>,
-    scratch: &'a ScratchPool,
+    pool: &'a BufferPool,
 }
 
 impl<'a, T: Send + 'static> PooledVec<'a, T> {
-    pub(crate) fn scratch(&self) -> &'a ScratchPool {
-        self.scratch
+    pub(crate) fn pool(&self) -> &'a BufferPool {
+        self.pool
     }
 }
 
@@ -65,7 +66,7 @@ impl<T: Send + 'static> Drop for PooledVec<'_, T> {
     fn drop(&mut self) {
         let list = std::mem::take(&mut self.list);
         let unused = FreeVec { capacity: list.capacity(), list: Box::new(list) };
-        self.scratch.0.lock().unwrap_or_else(PoisonError::into_inner).push(unused);
+        self.pool.0.lock().unwrap_or_else(PoisonError::into_inner).push(unused);
     }
 }
 
@@ -95,17 +96,17 @@ mod tests {
 
     #[test]
     fn what_is_dropped_is_taken_again_and_no_more_is_kept_than_was_in_use() {
-        let scratch = ScratchPool::default();
+        let buffers = BufferPool::default();
         let capacity = |list: PooledVec<f32>| list.capacity();
-        let (small, large) = (scratch.take::<f32>(100), scratch.take::<f32>(1000));
+        let (small, large) = (buffers.take::<f32>(100), buffers.take::<f32>(1000));
         let addresses = [small.as_ptr(), large.as_ptr()];
         drop((large, small));
-        let (large, small) = (scratch.take::<f32>(900), scratch.take::<f32>(110));
+        let (large, small) = (buffers.take::<f32>(900), buffers.take::<f32>(110));
         assert_eq!(addresses, [small.as_ptr(), large.as_ptr()]);
         drop((small, large));
-        assert!(scratch.take::<u8>(7).is_empty(), "lists of other types are other lists");
-        assert!(capacity(scratch.take(5000)) >= 5000);
-        let free = scratch.0.lock().unwrap();
+        assert!(buffers.take::<u8>(7).is_empty(), "lists of other types are other lists");
+        assert!(capacity(buffers.take(5000)) >= 5000);
+        let free = buffers.0.lock().unwrap();
         assert_eq!(free.iter().filter(|vec| vec.list.is::<Vec<f32>>()).count(), 2);
     }
 }

@@ -1,4 +1,4 @@
-//! The paper's figure 7: each particle as a square, the redder the denser the gas.
+//! The paper's figure 7: each particle as a square, colored from blue to red by the density of its gas.
 
 use bansho_base::{
     color,
@@ -11,11 +11,11 @@ use crate::particles::{
     parameters::RenderingParameters,
     render::{
         gas::Gas,
-        project::sprite::{ProjectedParticle, SpriteKind, project_particles},
+        project::{ProjectedParticle, SpriteKind, project_particles},
     },
 };
 
-/// Luminance of a square, cd/m^2: as bright as the flame, so that one exposure serves both.
+/// Luminance of a square, cd/m^2: about that of the flame, so that the same exposure suits both.
 const LUMINANCE: f32 = 6000.0;
 
 /// A square in the picture.
@@ -41,12 +41,12 @@ impl SpriteKind for SquareSprites<'_> {
         true
     }
 
-    fn record(&self, seen: &ProjectedParticle) -> Option<Square> {
-        let radius = self.gas.particles.support_radius[seen.index];
-        let side = (self.side * radius * seen.scale).max(1.0);
-        let rect = square_rect(seen.ellipse.center, side, self.window)?;
-        let density = f64::from(self.gas.particles.density[seen.index]) / self.densest;
-        Some(Square { rect, depth: seen.depth, color: color(density) })
+    fn record(&self, projected: &ProjectedParticle) -> Option<Square> {
+        let radius = self.gas.particles.support_radius[projected.index];
+        let side = (self.side * radius * projected.scale).max(1.0);
+        let rect = square_rect(projected.ellipse.center, side, self.window)?;
+        let density = f64::from(self.gas.particles.density[projected.index]) / self.densest;
+        Some(Square { rect, depth: projected.depth, color: color(density) })
     }
 }
 
@@ -54,10 +54,10 @@ impl SpriteKind for SquareSprites<'_> {
 pub(crate) struct Squares(Vec<Square>);
 
 impl Squares {
-    pub(crate) fn new(gas: &Gas, look: &RenderingParameters, view: &View) -> Self {
+    pub(crate) fn new(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Self {
         let kind = SquareSprites {
             gas,
-            side: look.square_size as f32,
+            side: rendering.square_size as f32,
             window: view.window,
             densest: density_percentile_95(gas),
         };
@@ -69,8 +69,8 @@ impl Squares {
     }
 
     pub(crate) fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let shown = self.0.iter().filter(|square| slice.contains(square.depth));
-        shown.fold(Rect::default(), |all, square| all.union(&square.rect))
+        let in_slice = self.0.iter().filter(|square| slice.contains(square.depth));
+        in_slice.fold(Rect::default(), |all, square| all.union(&square.rect))
     }
 
     pub(crate) fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

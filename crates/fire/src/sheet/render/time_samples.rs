@@ -1,0 +1,98 @@
+//! Time samples of a flame over the exposure, as a view sees them.
+
+use bansho_base::{
+    camera::{Camera, upright_quad::UprightQuad},
+    image::Rect,
+    math::DVec3,
+    parameters::Auto,
+    phenomenon::strip::{Shutter, View},
+    world::wind::Wind,
+};
+
+use super::{
+    projection::{PixelToSheet, bounds},
+    shade::{SheetContent, SheetState, TimeSample},
+};
+use crate::sheet::{
+    animate::warp::{WarpState, WindLean},
+    model::{FlameInstance, FlameSheet},
+    parameters::Stage,
+    texture::FilteredTexture,
+};
+
+impl FlameSheet {
+    /// A flame at `t` with its sheet facing along `right x up`: its quad, which leans with the wind, and its warp.
+    pub(crate) fn evaluate_at(
+        &self,
+        flame: &FlameInstance,
+        right: DVec3,
+        wind: &Wind,
+        t: f64,
+    ) -> (UprightQuad, WarpState) {
+        let (base, size) = (self.base(flame, t), self.sheet_size(flame));
+        let middle = base + DVec3::Y * (0.5 * size.y);
+        let lean = WindLean::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
+        let quad = UprightQuad::new(base, right, size, lean.toward);
+        let time = self.flame_time(flame, t);
+        (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, lean))
+    }
+
+    /// Number of time samples of the exposure; by default the gas moves by 8 pixels between them.
+    pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_meter: f64) -> usize {
+        const PIXELS_PER_SAMPLE: f64 = 8.0;
+        const MAX_SAMPLES: f64 = 8.0;
+        match self.parameters.time_samples {
+            Auto::Set(count) => count as usize,
+            Auto::Auto => {
+                let scrolled = self.rise_speed(flame, shutter.middle()) * shutter.duration() * pixels_per_meter;
+                (scrolled / PIXELS_PER_SAMPLE).ceil().clamp(1.0, MAX_SAMPLES) as usize
+            }
+        }
+    }
+
+    /// What is drawn: the flame, or the texture square at a stage.
+    pub(crate) fn content(&self) -> SheetContent {
+        match self.parameters.stage {
+            Stage::Flame => SheetContent::Flame,
+            Stage::Texture => SheetContent::FlatTexture,
+            Stage::Thresholded | Stage::Sharpened | Stage::Colored => SheetContent::FlatThresholded,
+        }
+    }
+
+    /// A flame's time samples over the exposure, and the bounding rectangle of its pixels.
+    pub(crate) fn samples(
+        &self,
+        flame: &FlameInstance,
+        texture_source: &FilteredTexture,
+        view: &View,
+        wind: &Wind,
+        count: usize,
+    ) -> (Vec<TimeSample>, Rect) {
+        let mut samples = Vec::with_capacity(count);
+        let mut rect = Rect::default();
+        for index in 0..count {
+            let t = view.shutter.instant(index, count);
+            let camera = if count == 1 { view.camera } else { view.camera_at(t) };
+            let right = self.right(flame, &camera, self.base(flame, t));
+            let (quad, warp) = self.evaluate_at(flame, right, wind, t);
+            let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
+            let [low, high] = warp.center_range;
+            rect = rect.union(&bounds(&camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
+            let pixels_per_meter = pixels_per_meter(&camera, &quad);
+            let state = SheetState {
+                texture: texture_source.texture(warp.scroll),
+                pixel: [2.0 / (pixels_per_meter * quad.size.x) as f32, 1.0 / (pixels_per_meter * quad.size.y) as f32],
+                warp,
+            };
+            let luminance = self.luminance_at(t) as f32 / count as f32;
+            samples.push(TimeSample { pixel_to_sheet, quad, state, luminance, smoke: None });
+        }
+        (samples, rect)
+    }
+}
+
+/// Pixels per meter at the sheet's center.
+pub(crate) fn pixels_per_meter(camera: &Camera, quad: &UprightQuad) -> f64 {
+    let depth = camera.depth(quad.point(0.5, 0.5)).abs().max(camera.near);
+    camera.focal_pixels / depth
+}
