@@ -9,7 +9,7 @@ use bansho::{
         parameters::{Problem, ProblemKind},
     },
     job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksError},
-    media::{MediaError, assets::limits::TEXT_BYTES, input::InputError},
+    media::{MediaError, assets::limits::TEXT_BYTES, files::input::InputError},
 };
 
 /// An error as the user of the program reads it.

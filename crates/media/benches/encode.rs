@@ -8,8 +8,9 @@ use bansho_base::{
 };
 use bansho_media::{
     exr,
+    files::naming::OutputPattern,
+    format::OutputKind,
     output::{
-        naming::OutputPattern,
         resume,
         sink::{FrameSlot, Picture, Sink, SinkOptions},
     },
@@ -148,7 +149,9 @@ fn png_frame(criterion: &mut Criterion) {
     group.bench_function("fast", |bencher| bencher.iter(|| black_box(encode())));
     group.bench_function("plain", |bencher| bencher.iter(|| black_box(plain_png(pixels))));
     let file = encode();
-    group.bench_function("is it whole", |bencher| bencher.iter(|| black_box(resume::fingerprint(&file))));
+    group.bench_function("is it whole", |bencher| {
+        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Png)))
+    });
     group.finish();
 }
 
@@ -159,7 +162,9 @@ fn exr_frame(criterion: &mut Criterion) {
     group.bench_function("blocks in parallel", |bencher| bencher.iter(|| black_box(encode())));
     group.bench_function("plain", |bencher| bencher.iter(|| black_box(plain_exr(&frame))));
     let file = encode();
-    group.bench_function("is it whole", |bencher| bencher.iter(|| black_box(resume::fingerprint(&file))));
+    group.bench_function("is it whole", |bencher| {
+        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Exr)))
+    });
     group.finish();
 }
 

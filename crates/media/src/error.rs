@@ -4,15 +4,12 @@ use std::{io, path::PathBuf};
 
 use bansho_base::host::plural::counted;
 
-use crate::output::naming::NamingError;
+use crate::format::{PictureFormat, extensions_without_ffmpeg};
 
 /// Why a picture or a film could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MediaError {
-    /// The name given for the output cannot be used.
-    #[error(transparent)]
-    Naming(#[from] NamingError),
     /// No room is left where the file should go.
     #[error(
         "{path}: the disk is full; nothing half-written was left there. Free some space or choose another folder",
@@ -110,7 +107,7 @@ pub enum MediaError {
         /// The file that was to be written.
         path: PathBuf,
         /// What it takes.
-        wanted: crate::output::sink::PictureFormat,
+        wanted: PictureFormat,
     },
     /// A frame of a film came too early, twice, or beyond the end.
     #[error(
@@ -164,8 +161,8 @@ pub enum MediaError {
     /// There is no `ffmpeg` to make the film.
     #[error(
         "{path}: needs the program `{program}`, which is not installed. Get it with `apt install ffmpeg`, `brew install \
-         ffmpeg` or `winget install ffmpeg`, or from https://ffmpeg.org; without it choose .png, .exr, .apng or .gif",
-        path = .path.display(), program = .program.display()
+         ffmpeg` or `winget install ffmpeg`, or from https://ffmpeg.org; without it choose {}",
+        extensions_without_ffmpeg(), path = .path.display(), program = .program.display()
     )]
     NoFfmpeg {
         /// The film.

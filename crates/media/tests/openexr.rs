@@ -6,7 +6,7 @@ use bansho_base::{
     camera::Lens,
     image::{CameraHeader, Channel, Frame, FrameHeader, Image, Precision, Rect},
 };
-use bansho_media::{exr, output::atomic};
+use bansho_media::{exr, files::atomic};
 use half::f16;
 
 fn frame() -> Frame {

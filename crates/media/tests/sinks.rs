@@ -12,11 +12,12 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
+    files::naming::OutputPattern,
     film::ffmpeg::{VideoOptions, WebmCodec},
+    format::{OutputKind, PictureFormat},
     output::{
-        naming::OutputPattern,
         resume::existing_fingerprint,
-        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
+        sink::{FrameSlot, Picture, Sink, SinkOptions},
     },
 };
 
@@ -31,7 +32,7 @@ fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
 }
 
 fn open(folder: &Path, name: &str, frames: usize, options: impl FnOnce(&mut SinkOptions)) -> Result<Sink, MediaError> {
-    let pattern = OutputPattern::parse(&folder.join(name), frames)?;
+    let pattern = OutputPattern::parse(&folder.join(name), frames).unwrap();
     let mut chosen = SinkOptions::new([65, 67], [24000, 1001], frames);
     options(&mut chosen);
     Sink::open(pattern, chosen)
@@ -63,7 +64,7 @@ fn a_sequence_is_written_from_many_threads_and_found_again() {
         }
     });
     for index in 0..6 {
-        assert_eq!(existing_fingerprint(&sink.path(index + 1001)), Some([index as u8; 32]));
+        assert_eq!(existing_fingerprint(&sink.path(index + 1001), sink.kind()), Some([index as u8; 32]));
     }
     sink.finish().unwrap();
     assert_eq!(names(&folder.path().join("new")).len(), 6);
@@ -212,7 +213,7 @@ fn films_carry_their_frames_colors_and_tags() {
 
 fn check_colors(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
     let original = picture(65, 67, 0);
-    let expected = if has_alpha { original } else { bansho_media::output::flatten::over_black(&original) };
+    let expected = if has_alpha { original } else { bansho_media::imageops::flatten::over_black(&original) };
     let DisplayPixels::Eight(expected) = expected.pixels else { unreachable!() };
     let mut worst = 0;
     for (i, wanted) in expected.iter().enumerate() {
@@ -268,7 +269,7 @@ fn a_full_disk_is_said_and_leaves_whole_frames_only() {
         assert!(left.iter().all(|name| name.ends_with(".png")), "{left:?}");
         for name in left {
             let path = disk.0.path().join(name);
-            assert_eq!(existing_fingerprint(&path), Some([1; 32]), "{}", path.display());
+            assert_eq!(existing_fingerprint(&path, OutputKind::Png), Some([1; 32]), "{}", path.display());
             fs::remove_file(path).unwrap();
         }
     }

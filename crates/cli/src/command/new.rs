@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bansho::{
     KINDS,
     base::{host::printable::printable, parameters::nearest, phenomenon::kind::PhenomenonKind},
-    media::{MediaError, output::atomic},
+    media::{MediaError, files::atomic},
     scene::template,
 };
 

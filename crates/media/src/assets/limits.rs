@@ -2,8 +2,6 @@
 
 use bansho_base::host::{assets::AssetProblem, memory};
 
-use crate::exr::attribute::Window;
-
 /// Largest side, pixels.
 pub const SIDE: u64 = 16384;
 /// Largest number of pixels: half of the largest square, 2 GiB as floats.
@@ -75,10 +73,4 @@ pub(crate) fn check_expansion(
         return Err(AssetProblem::Damaged(reason));
     }
     Ok(())
-}
-
-/// Width and height of a window; 0 where it is turned inside out.
-pub(crate) fn window_size(window: Window) -> [u64; 2] {
-    let side = |axis: usize| i64::from(window.max[axis]) - i64::from(window.min[axis]) + 1;
-    [side(0).max(0) as u64, side(1).max(0) as u64]
 }

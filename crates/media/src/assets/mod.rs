@@ -5,6 +5,8 @@ mod exif;
 pub mod gltf;
 mod image;
 pub mod limits;
+mod openexr;
+mod primaries;
 pub mod svg;
 
 use std::{
@@ -23,10 +25,9 @@ use self::{
     cache::PictureCache,
     limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
 };
-use crate::{
-    exr,
+use crate::files::{
     input::{self, InputError},
-    output::naming::FrameTemplate,
+    naming::FrameTemplate,
 };
 use gltf::{decode_mesh, files_beside};
 use svg::decode_drawing;
@@ -248,7 +249,7 @@ pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Resu
     match extension.to_ascii_lowercase().as_str() {
         "png" => image::png(bytes, limit),
         "jpg" | "jpeg" => image::jpeg(bytes, limit),
-        "exr" => exr::decode(bytes, limit),
+        "exr" => openexr::decode(bytes, limit),
         _ => Err(AssetProblem::UnknownKind),
     }
 }

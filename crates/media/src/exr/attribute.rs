@@ -9,7 +9,7 @@ use super::{
     KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION,
     plane::ChannelPlane,
 };
-use crate::{film::timing, output::fingerprint};
+use crate::{fingerprint, frame_rate};
 
 /// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
 pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
@@ -31,13 +31,21 @@ pub(crate) struct Window {
     pub(crate) max: [i32; 2],
 }
 
+impl Window {
+    /// Width and height, pixels; 0 where an upper end is below the lower one.
+    pub(crate) fn size(self) -> [u64; 2] {
+        let side = |axis: usize| i64::from(self.max[axis]) - i64::from(self.min[axis]) + 1;
+        [side(0).max(0) as u64, side(1).max(0) as u64]
+    }
+}
+
 /// A header being written.
 pub(crate) struct HeaderBytes(Vec<u8>);
 
 /// A frame rate as the format holds it: its numerator has a sign.
 fn rational(fps: [u32; 2]) -> [u32; 2] {
     const MAX: u32 = i32::MAX.cast_unsigned();
-    if fps[0] <= MAX { fps } else { timing::approximate(fps, MAX).unwrap_or(fps) }
+    if fps[0] <= MAX { fps } else { frame_rate::approximate(fps, MAX).unwrap_or(fps) }
 }
 
 /// The header of a frame and where in it the 64 digits of the digest go, which are zeros here.

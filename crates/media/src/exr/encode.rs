@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     error::{MediaError, SizeRule},
-    output::fingerprint,
+    fingerprint,
 };
 use rayon::prelude::*;
 

@@ -9,7 +9,8 @@ use bansho_base::image::DisplayImage;
 use super::{ordered::FilmEncoder, timing};
 use crate::{
     error::MediaError,
-    output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy},
+    files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
+    imageops::flatten,
     png::{self, chunk},
 };
 

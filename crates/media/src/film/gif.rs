@@ -20,7 +20,8 @@ use super::{
 };
 use crate::{
     error::{MediaError, SizeRule},
-    output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy, provenance},
+    files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy, provenance},
+    imageops::flatten,
     png,
 };
 use rayon::prelude::*;

@@ -1,33 +1,6 @@
 //! Frame times of animations, in the units of their formats.
 
-/// Greatest common divisor.
-fn greatest_common_divisor(a: u32, b: u32) -> u32 {
-    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
-}
-
-/// `fps` in lowest terms; `None` for a rate of zero or without end.
-pub(crate) fn reduce([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
-    let common = greatest_common_divisor(frames, seconds);
-    (frames > 0 && seconds > 0).then(|| [frames / common, seconds / common])
-}
-
-/// The rate nearest to `fps` among the convergents of its continued fraction whose numbers are `most` at the most: `fps` itself in lowest terms
-/// where they are, else less than 1 part in `most` away. `None` for a rate that is zero, without end, or beyond what such numbers hold.
-pub(crate) fn approximate(fps: [u32; 2], limit: u32) -> Option<[u32; 2]> {
-    let [mut rest, mut greatest_common_divisor] = reduce(fps)?.map(u64::from);
-    let (mut before, mut found) = ([0_u64, 1], [1_u64, 0]);
-    while greatest_common_divisor > 0 {
-        let whole = rest / greatest_common_divisor;
-        let next = [0, 1].map(|term| whole * found[term] + before[term]);
-        if next.iter().any(|term| *term > u64::from(limit)) {
-            break;
-        }
-        (before, found) = (found, next);
-        (rest, greatest_common_divisor) = (greatest_common_divisor, rest % greatest_common_divisor);
-    }
-    let [frames, seconds] = found.map(|term| u32::try_from(term).unwrap_or(limit));
-    (frames > 0 && seconds > 0).then_some([frames, seconds])
-}
+use crate::frame_rate::{approximate, reduce};
 
 /// Length of a frame for APNG, seconds as a fraction of 16-bit numbers. Rates whose fraction is longer become the nearest that fits, less than
 /// 1 part in 65,535 away.
@@ -86,6 +59,7 @@ impl GifTiming {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame_rate::tests::irregular_rates;
 
     #[test]
     fn gif_time_does_not_drift() {
@@ -129,19 +103,11 @@ mod tests {
     #[test]
     fn rates_whose_fraction_does_not_fit_become_the_nearest_that_does() {
         let rates = [[999_999, 1000], [700_001, 1000], [333_333, 1000], [100_001, 1_000_000], [u32::MAX, 4_294_968]];
-        let more = (1..4000_u32).map(|i| [i.wrapping_mul(0x9E37_79B9) % 1_000_000 + 1000, 1000 + i * 77]);
-        for fps in rates.into_iter().chain(more) {
-            let exact = f64::from(fps[0]) / f64::from(fps[1]);
-            let rate = |[frames, seconds]: [u32; 2]| f64::from(frames) / f64::from(seconds);
-            let [seconds, frames] = apng_delay(fps).unwrap().map(u32::from);
-            let error = (rate([frames, seconds]) / exact - 1.0).abs();
-            assert!(error < 1.0 / 65_535.0, "{fps:?}: {frames}/{seconds}, wrong by {error}");
-            let signed = approximate(fps, i32::MAX as u32).unwrap();
-            assert!((rate(signed) / exact - 1.0).abs() < 1.0 / 2_147_483_647.0, "{fps:?}: {signed:?}");
+        for fps in rates.into_iter().chain(irregular_rates()) {
+            let [seconds, frames] = apng_delay(fps).unwrap().map(f64::from);
+            let error = (frames / seconds * f64::from(fps[1]) / f64::from(fps[0]) - 1.0).abs();
+            assert!(error < 1.0 / 65_535.0, "{fps:?}: {frames}/{seconds}, relative error {error}");
         }
-        assert_eq!(approximate([60_000, 2000], u32::MAX), Some([30, 1]));
-        assert_eq!(approximate([u32::MAX, u32::MAX - 1], u32::MAX), Some([u32::MAX, u32::MAX - 1]));
-        assert_eq!((approximate([1, 100_000], 65_535), approximate([100_000, 1], 65_535)), (None, None));
     }
 
     #[test]

@@ -7,37 +7,24 @@ use bansho_base::{
     image::{DisplayImage, DisplayPixels, Frame},
 };
 
-use super::{
-    atomic::{self, AtomicFile},
-    naming::{OutputKind, OutputPattern},
-    overwrite_policy::OverwritePolicy,
-};
 use crate::{
     error::{MediaError, SizeRule},
     exr,
+    files::{
+        atomic::{self, AtomicFile},
+        naming::OutputPattern,
+        overwrite_policy::OverwritePolicy,
+    },
     film::{
         apng::{self, ApngFilm, ApngFormat},
-        ffmpeg::{self, FfmpegFilm, VideoFormat, VideoOptions},
+        ffmpeg::{self, FfmpegFilm, VideoContainer, VideoFormat, VideoOptions},
         gif::{self, GifFilm, GifFormat},
-        ordered::ReorderBuffer,
+        ordered::{FilmEncoder, ReorderBuffer},
         timing::GifTiming,
     },
+    format::{OutputKind, PictureFormat},
     png::{self, PngEffort},
 };
-
-/// The pixel data that a format takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PictureFormat {
-    /// Scene-linear frames.
-    #[error("a scene-linear frame")]
-    Frame,
-    /// Display pixels, with alpha unless a plate fills the picture.
-    #[error("display pixels")]
-    Display,
-    /// Display pixels over black or over a plate: the format has no alpha. Others are laid over black.
-    #[error("opaque display pixels")]
-    OpaqueDisplay,
-}
 
 /// How frames are written. Begin with [`SinkOptions::new`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,14 +73,15 @@ impl SinkOptions {
 
     /// The pixel data that a sink of `kind` with these options takes.
     pub fn picture_format(&self, kind: OutputKind) -> PictureFormat {
-        match kind {
-            OutputKind::Exr => PictureFormat::Frame,
-            OutputKind::Png | OutputKind::Apng => PictureFormat::Display,
-            OutputKind::Gif if self.gif_transparent => PictureFormat::Display,
-            OutputKind::Gif => PictureFormat::OpaqueDisplay,
-            film if ffmpeg::carries_alpha(film, &self.video) => PictureFormat::Display,
-            _ => PictureFormat::OpaqueDisplay,
-        }
+        let has_alpha = match kind {
+            OutputKind::Exr => return PictureFormat::Frame,
+            OutputKind::Png | OutputKind::Apng => true,
+            OutputKind::Gif => self.gif_transparent,
+            OutputKind::Mp4 => ffmpeg::carries_alpha(VideoContainer::Mp4, &self.video),
+            OutputKind::Mov => ffmpeg::carries_alpha(VideoContainer::Mov, &self.video),
+            OutputKind::Webm => ffmpeg::carries_alpha(VideoContainer::Webm, &self.video),
+        };
+        if has_alpha { PictureFormat::Display } else { PictureFormat::OpaqueDisplay }
     }
 }
 
@@ -146,26 +134,26 @@ impl Sink {
         if !kind.is_sequence() {
             check_film(&path, &options)?;
         }
-        let ordered_end = (path.clone(), options.frame_count, options.window);
-        let overwrite = &options.overwrite;
         let target = match kind {
-            OutputKind::Png | OutputKind::Exr => {
-                // Better to fail now than after the first frame has been rendered.
-                drop(AtomicFile::create(&path)?);
-                if kind == OutputKind::Png { Target::Png } else { Target::Exr }
-            }
+            OutputKind::Png => Target::Png,
+            OutputKind::Exr => Target::Exr,
             OutputKind::Apng => {
-                Target::Apng(ordered(ApngFilm::create(&path, apng_format(&options), overwrite)?, ordered_end))
+                let film = ApngFilm::create(&path, apng_format(&options), &options.overwrite)?;
+                Target::Apng(in_order(film, &path, &options))
             }
             OutputKind::Gif => {
                 let format = gif_format(&path, &options)?;
-                Target::Gif(ordered(GifFilm::create(&path, format.clone(), overwrite)?, ordered_end), format)
+                let film = GifFilm::create(&path, format.clone(), &options.overwrite)?;
+                Target::Gif(in_order(film, &path, &options), format)
             }
-            OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => {
-                let format = video_format(kind, &options);
-                Target::Video(ordered(FfmpegFilm::create(&path, &format, overwrite)?, ordered_end), format)
-            }
+            OutputKind::Mp4 => open_video(VideoContainer::Mp4, &path, &options)?,
+            OutputKind::Mov => open_video(VideoContainer::Mov, &path, &options)?,
+            OutputKind::Webm => open_video(VideoContainer::Webm, &path, &options)?,
         };
+        if kind.is_sequence() {
+            // Better to fail now than after the first frame has been rendered.
+            drop(AtomicFile::create(&path)?);
+        }
         Ok(Self { pattern, options, target })
     }
 
@@ -211,7 +199,10 @@ impl Sink {
                 self.check_frame(image, &path)?;
                 film.push(slot.index, ffmpeg::prepare(image, format))
             }
-            _ => Err(MediaError::WrongPicture { path, wanted: self.picture_format() }),
+            (Target::Exr, Picture::Display(..))
+            | (Target::Png | Target::Apng(_) | Target::Gif(..) | Target::Video(..), Picture::Linear(_)) => {
+                Err(MediaError::WrongPicture { path, wanted: self.picture_format() })
+            }
         }
     }
 
@@ -251,11 +242,14 @@ impl Sink {
     }
 }
 
-fn ordered<F: crate::film::ordered::FilmEncoder>(
-    film: F,
-    (path, count, window): (PathBuf, usize, usize),
-) -> ReorderBuffer<F> {
-    ReorderBuffer::new(film, path, count, window)
+fn in_order<F: FilmEncoder>(film: F, path: &Path, options: &SinkOptions) -> ReorderBuffer<F> {
+    ReorderBuffer::new(film, path.to_path_buf(), options.frame_count, options.window)
+}
+
+fn open_video(container: VideoContainer, path: &Path, options: &SinkOptions) -> Result<Target, MediaError> {
+    let format = video_format(container, options);
+    let film = FfmpegFilm::create(path, &format, &options.overwrite)?;
+    Ok(Target::Video(in_order(film, path, options), format))
 }
 
 /// Largest side of a film, pixels.
@@ -285,7 +279,7 @@ fn gif_format(path: &Path, options: &SinkOptions) -> Result<GifFormat, MediaErro
     Ok(GifFormat { frame_count: options.frame_count, size: options.size, timing, transparent })
 }
 
-fn video_format(kind: OutputKind, options: &SinkOptions) -> VideoFormat {
+fn video_format(container: VideoContainer, options: &SinkOptions) -> VideoFormat {
     let SinkOptions { size, fps, opaque, alpha, sixteen_bits, .. } = *options;
-    VideoFormat { kind, size, fps, opaque, alpha, sixteen_bits, options: options.video.clone() }
+    VideoFormat { container, size, fps, opaque, alpha, sixteen_bits, options: options.video.clone() }
 }

@@ -11,7 +11,7 @@ use bansho_base::image::{DisplayImage, DisplayPixels};
 use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{
     error::{MediaError, SizeRule},
-    output::fingerprint,
+    fingerprint,
 };
 
 /// Compression effort.

@@ -7,7 +7,7 @@ use ::png::{BitDepth, ColorType, Encoder, EncodingError, ScaledFloat};
 use super::{KEY_FINGERPRINT, KEY_SCALE, KEY_VERSION, PngEffort, encode::set_effort};
 use crate::{
     error::{MediaError, SizeRule},
-    output::fingerprint,
+    fingerprint,
 };
 
 /// Samples of a measured picture, pixel after pixel, rows from the top; of three channels red, green and blue in turn.

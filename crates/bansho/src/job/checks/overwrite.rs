@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bansho_media::{
     assets::FileAssets,
-    output::{
+    files::{
         file_identity::resolved,
         overwrite_policy::{InputFiles, OverwriteError, OverwritePolicy},
     },

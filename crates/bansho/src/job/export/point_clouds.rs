@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::host::observer::{Stage, StageGuard, check};
 use bansho_media::{
-    output::{atomic, naming::NumberedPath, overwrite_policy::OverwritePolicy},
+    files::{atomic, naming::NumberedPath, overwrite_policy::OverwritePolicy},
     ply,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};

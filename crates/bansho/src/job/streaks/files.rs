@@ -12,7 +12,7 @@ use bansho_base::{
 };
 use bansho_media::{
     exr,
-    output::{atomic, overwrite_policy::OverwritePolicy},
+    files::{atomic, overwrite_policy::OverwritePolicy},
     png::{self, MeasuredImage, PngEffort},
 };
 use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;

@@ -13,7 +13,7 @@ use std::{
 use bansho_base::host::observer::check;
 use bansho_media::{
     MediaError,
-    output::overwrite_policy::{InputFiles, OverwritePolicy},
+    files::overwrite_policy::{InputFiles, OverwritePolicy},
 };
 use bansho_rain::{
     billboards::texture::StreakCube,

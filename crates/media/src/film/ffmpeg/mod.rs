@@ -14,7 +14,7 @@ use bansho_base::{
     image::{DisplayImage, DisplayPixels},
 };
 
-use crate::output::{flatten, naming::OutputKind};
+use crate::imageops::flatten;
 
 pub(crate) use self::process::FfmpegFilm;
 
@@ -43,10 +43,21 @@ pub enum WebmCodec {
     Av1,
 }
 
+/// Containers that `ffmpeg` writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum VideoContainer {
+    /// H.264.
+    Mp4,
+    /// QuickTime, with ProRes 4444.
+    Mov,
+    /// VP9 or AV1, by [`VideoOptions::webm`].
+    Webm,
+}
+
 /// The format of all frames of a film.
 #[derive(Clone, Debug)]
 pub(crate) struct VideoFormat {
-    pub(crate) kind: OutputKind,
+    pub(crate) container: VideoContainer,
     pub(crate) size: [usize; 2],
     pub(crate) fps: [u32; 2],
     pub(crate) opaque: bool,
@@ -58,22 +69,23 @@ pub(crate) struct VideoFormat {
 impl VideoFormat {
     /// Whether the film has no alpha.
     fn is_flat(&self) -> bool {
-        self.opaque || !carries_alpha(self.kind, &self.options)
+        self.opaque || !carries_alpha(self.container, &self.options)
     }
 
     /// The encoded size: 4:2:0 without alpha needs even sides, so an odd one repeats its last pixels.
     fn coded_size(&self) -> [usize; 2] {
-        let odd_is_fine = self.kind == OutputKind::Mov;
-        if odd_is_fine { self.size } else { self.size.map(|side| side.next_multiple_of(2)) }
+        match self.container {
+            VideoContainer::Mov => self.size,
+            VideoContainer::Mp4 | VideoContainer::Webm => self.size.map(|side| side.next_multiple_of(2)),
+        }
     }
 }
 
-/// Whether a film of this kind has alpha.
-pub(crate) fn carries_alpha(kind: OutputKind, options: &VideoOptions) -> bool {
-    match kind {
-        OutputKind::Mov => true,
-        OutputKind::Webm => options.webm == WebmCodec::Vp9,
-        _ => false,
+/// Whether a film in this container has alpha.
+pub(crate) fn carries_alpha(container: VideoContainer, options: &VideoOptions) -> bool {
+    match (container, options.webm) {
+        (VideoContainer::Mov, _) | (VideoContainer::Webm, WebmCodec::Vp9) => true,
+        (VideoContainer::Mp4, _) | (VideoContainer::Webm, WebmCodec::Av1) => false,
     }
 }
 

@@ -10,8 +10,8 @@ use std::{
 use super::{VideoFormat, arguments};
 use crate::{
     error::MediaError,
+    files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
     film::ordered::FilmEncoder,
-    output::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
 };
 
 /// Bytes of the end of its standard error that are kept.

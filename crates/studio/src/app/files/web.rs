@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bansho::{
-    media::{output::naming, zip::ZipWriter},
+    media::{files::naming, zip::ZipWriter},
     scene::ValuePath,
 };
 

@@ -2,7 +2,7 @@
 
 use bansho_base::host::assets::Encoding;
 
-use super::attribute::AP1;
+use crate::exr::attribute::AP1;
 
 /// The encoding after the matrix, if there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]

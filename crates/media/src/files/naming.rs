@@ -1,75 +1,20 @@
-//! Output file names with frame numbers: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
+//! Names of output files, with frame numbers: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
 
 use std::path::{Path, PathBuf};
 
-/// Output formats, by extension.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum OutputKind {
-    /// One PNG for each frame: display pixels.
-    Png,
-    /// One OpenEXR for each frame: scene-linear.
-    Exr,
-    /// Animated PNG.
-    Apng,
-    /// Animated GIF.
-    Gif,
-    /// H.264 in MP4, by ffmpeg.
-    Mp4,
-    /// ProRes 4444 in QuickTime, by ffmpeg.
-    Mov,
-    /// VP9 or AV1 in WebM, by ffmpeg.
-    Webm,
-}
-
-impl OutputKind {
-    /// Every kind.
-    pub const ALL: [Self; 7] = [Self::Png, Self::Exr, Self::Apng, Self::Gif, Self::Mp4, Self::Mov, Self::Webm];
-
-    /// Its extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Png => "png",
-            Self::Exr => "exr",
-            Self::Apng => "apng",
-            Self::Gif => "gif",
-            Self::Mp4 => "mp4",
-            Self::Mov => "mov",
-            Self::Webm => "webm",
-        }
-    }
-
-    /// The format with this extension, case-insensitive.
-    pub fn from_extension(extension: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.extension().eq_ignore_ascii_case(extension))
-    }
-
-    /// Whether every frame is a file of its own.
-    pub fn is_sequence(self) -> bool {
-        matches!(self, Self::Png | Self::Exr)
-    }
-
-    /// Whether it holds scene-linear pixels.
-    pub fn is_scene_linear(self) -> bool {
-        self == Self::Exr
-    }
-
-    /// Whether it is made by the program `ffmpeg`.
-    pub fn needs_ffmpeg(self) -> bool {
-        matches!(self, Self::Mp4 | Self::Mov | Self::Webm)
-    }
-}
+use crate::format::{OutputKind, extensions};
 
 /// Why a name cannot be used for output.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NamingError {
     /// Nothing after the last dot, or no dot.
-    #[error("{path}: has no extension; allowed: {ALLOWED}", path = .path.display())]
+    #[error("{path}: has no extension; allowed: {}", extensions(OutputKind::ALL), path = .path.display())]
     NoExtension {
         /// The name.
         path: PathBuf,
     },
     /// An extension that Bansho does not write.
-    #[error("{path}: `.{extension}` is not written; allowed: {ALLOWED}", path = .path.display())]
+    #[error("{path}: `.{extension}` is not written; allowed: {}", extensions(OutputKind::ALL), path = .path.display())]
     UnknownExtension {
         /// The name.
         path: PathBuf,
@@ -121,8 +66,6 @@ pub enum NamingError {
         path: PathBuf,
     },
 }
-
-const ALLOWED: &str = ".png, .exr, .apng, .gif, .mp4, .mov, .webm";
 
 /// Largest width of a placeholder.
 const MAX_DIGITS: usize = 20;
@@ -429,7 +372,7 @@ mod tests {
             assert!(matches!(error(bare), NamingError::NoExtension { .. }), "{bare}");
         }
         let text = error("frame.tiff").to_string();
-        for extension in OutputKind::ALL.map(OutputKind::extension) {
+        for extension in OutputKind::ALL.iter().map(|kind| kind.extension()) {
             assert!(text.contains(&format!(".{extension}")), "{text}");
         }
     }

@@ -199,7 +199,7 @@ mod tests {
     fn no_link_that_is_made_on_the_way_leads_to_an_input() {
         use std::os::unix::fs::symlink;
 
-        use crate::output::overwrite_policy::InputFiles;
+        use crate::files::overwrite_policy::InputFiles;
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("plate.png"), "plate").unwrap();

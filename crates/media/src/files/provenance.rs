@@ -184,11 +184,9 @@ mod tests {
 
     use super::*;
     use crate::{
-        output::{
-            naming::OutputPattern,
-            overwrite_policy::OverwritePolicy,
-            sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
-        },
+        files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
+        format::PictureFormat,
+        output::sink::{FrameSlot, Picture, Sink, SinkOptions},
         ply, testing,
     };
 

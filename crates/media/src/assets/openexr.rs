@@ -1,6 +1,6 @@
 //! OpenEXR plates: color and depth of any part, any sample type, lines or tiles.
 //!
-//! The header is first read by [`super::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
+//! The header is first read by [`crate::exr::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
 //! memory than it could ever fill.
 
 use std::{io::Cursor, ops::Range, panic::catch_unwind};
@@ -22,11 +22,14 @@ use bansho_base::{
 };
 
 use super::{
-    KEY_EXPOSURE,
-    parse::{self, FileHeader, PartHeader},
+    limits::{self, MemoryLimit},
     primaries,
 };
-use crate::assets::limits::{self, MemoryLimit};
+use crate::exr::{
+    KEY_EXPOSURE,
+    attribute::Window,
+    parse::{self, FileHeader, PartHeader},
+};
 
 use rayon::prelude::*;
 
@@ -47,7 +50,7 @@ pub(crate) fn decode(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetPr
     let selection = ChannelSelection::choose(&header)
         .ok_or_else(|| AssetProblem::NoChannel(format!("R, Y or Z (it has {})", all_names(&header))))?;
     let display = header.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
-    let size = limits::window_size(display);
+    let size = display.size();
     let (width, height) = (size[0] as usize, size[1] as usize);
     let batch = ChunkBatch::new(&header, &selection);
     limit.check(file.len() as u64 + selection.bytes(size[0] * size[1]) + batch.bytes)?;
@@ -74,8 +77,8 @@ fn check(header: &FileHeader, file: &[u8]) -> Result<(), AssetProblem> {
         let (Some(data), Some(display)) = (part.data, part.display) else {
             return Err(damaged("its header lacks a window"));
         };
-        limits::check_size(limits::window_size(display))?;
-        let [width, height] = limits::check_size(limits::window_size(data))?;
+        limits::check_size(display.size())?;
+        let [width, height] = limits::check_size(data.size())?;
         if part.tile.is_some_and(|tile| tile.iter().any(|side| !(1..=limits::SIDE as u32).contains(side))) {
             return Err(damaged("its tiles have no possible size"));
         }
@@ -186,7 +189,7 @@ impl ChunkBatch {
 
 /// Bytes of a part's pixels.
 fn part_bytes(part: &PartHeader) -> u64 {
-    let [width, height] = part.data.map_or([0, 0], limits::window_size);
+    let [width, height] = part.data.map_or([0, 0], Window::size);
     width * height * pixel_bytes(part)
 }
 
@@ -196,7 +199,7 @@ fn pixel_bytes(part: &PartHeader) -> u64 {
 
 /// Bytes of the pixels of a part's chunk.
 fn chunk_bytes(part: &PartHeader) -> u64 {
-    let [width, height] = part.data.map_or([0, 0], limits::window_size);
+    let [width, height] = part.data.map_or([0, 0], Window::size);
     let rows = match part.compression {
         Some(0..=2) => 1,
         Some(3 | 5) => 16,
