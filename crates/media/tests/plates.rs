@@ -295,7 +295,7 @@ fn files_are_found_numbered_digested_and_remembered() {
     assert_eq!(assets.digest("p/street.####.png", 12).unwrap(), *blake3::hash(&fs::read(&path).unwrap()).as_bytes());
     fs::write(&path, png_bytes(&display(5, 2))).unwrap();
     assert_eq!(assets.picture("p/street.0012.png", 0).unwrap(), first);
-    assets.forget();
+    assets.clear_cache();
     assert_eq!(assets.picture("p/street.####.png", 12).unwrap().color.width(), 5);
     assert_eq!(&*assets.text("note.txt").unwrap(), "火");
     assert_eq!(assets.picture(path.to_str().unwrap(), 0).unwrap().color.width(), 5);
@@ -443,7 +443,7 @@ fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
     write("a.bin", "one");
     let assets = FileAssets::new(folder.path());
     let digest = || {
-        assets.forget();
+        assets.clear_cache();
         assets.digest("a.gltf", 0)
     };
     let before = digest().unwrap();

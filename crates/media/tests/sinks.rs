@@ -105,7 +105,7 @@ fn pictures_of_the_wrong_kind_or_size_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let sink = open(folder.path(), "a.####.exr", 2, |_| {}).unwrap();
     assert_eq!(sink.picture_format(), PictureFormat::Frame);
-    assert!(matches!(write(&sink, 0), Err(MediaError::WrongPicture { wanted: PictureFormat::Frame, .. })));
+    assert!(matches!(write(&sink, 0), Err(MediaError::WrongPicture { expected: PictureFormat::Frame, .. })));
     let sink = open(folder.path(), "a.gif", 2, |options| options.size = [64, 67]).unwrap();
     assert_eq!(sink.picture_format(), PictureFormat::OpaqueDisplay);
     assert!(matches!(write(&sink, 0), Err(MediaError::Size { width: 65, .. })));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::{exr, files::input, fingerprint, format::OutputKind, png};
 
-/// Largest frame file that is read, bytes: a larger one is not Bansho's.
+/// Largest frame file that is read, bytes. Bansho writes no larger ones.
 const FRAME_BYTES: u64 = 8 << 30;
 
 /// The fingerprint of the frame at `path`, a file of format `kind`, if Bansho wrote it and it is complete: every checksum of a PNG is right
@@ -42,9 +42,9 @@ fn of_png(file: &[u8]) -> Option<[u8; 32]> {
 }
 
 fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
-    let outline = exr::parse::parse_header(file).ok()?;
-    let [part] = &outline.parts[..] else { return None };
-    let digest_at = part.string(exr::KEY_DIGEST).filter(|place| place.len() == 64)?;
+    let header = exr::parse::parse_header(file).ok()?;
+    let [part] = &header.parts[..] else { return None };
+    let digest_at = part.string(exr::KEY_DIGEST).filter(|range| range.len() == 64)?;
     let digest = fingerprint::from_hex(file.get(digest_at.clone())?)?;
     let mut hasher = blake3::Hasher::new();
     hasher.update(file.get(..digest_at.start)?).update(&[b'0'; 64]).update(file.get(digest_at.end..)?);
@@ -100,10 +100,10 @@ mod tests {
     #[test]
     fn any_changed_byte_makes_a_file_count_as_absent() {
         for (file, kind) in [(a_png(), OutputKind::Png), (an_exr(), OutputKind::Exr)] {
-            for place in 0..file.len() {
+            for index in 0..file.len() {
                 let mut damaged = file.clone();
-                damaged[place] ^= 0x10;
-                assert_eq!(fingerprint(&damaged, kind), None, "byte {place} of {}", file.len());
+                damaged[index] ^= 0x10;
+                assert_eq!(fingerprint(&damaged, kind), None, "byte {index} of {}", file.len());
             }
         }
     }
@@ -114,7 +114,7 @@ mod tests {
             assert_eq!(fingerprint(&[&file[..], b"x"].concat(), kind), None);
         }
         assert_eq!(existing_fingerprint(Path::new("no such folder/a.png"), OutputKind::Png), None);
-        // A device without end.
+        // An endless device.
         #[cfg(unix)]
         assert_eq!(existing_fingerprint(Path::new("/dev/zero"), OutputKind::Png), None);
     }

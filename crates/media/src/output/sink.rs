@@ -1,4 +1,4 @@
-//! The sink of finished frames: a sequence of files, or one film.
+//! The sink of finished frames: a sequence of files, or a film.
 
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub struct SinkOptions {
     pub size: [usize; 2],
     /// Frames per second, as a fraction.
     pub fps: [u32; 2],
-    /// How many frames there will be.
+    /// Number of frames.
     pub frame_count: usize,
     /// Whether a plate fills the picture, so that films need no alpha.
     pub opaque: bool,
@@ -45,9 +45,9 @@ pub struct SinkOptions {
     pub png_effort: PngEffort,
     /// GIF: transparency by an alpha threshold, instead of compositing over black.
     pub gif_transparent: bool,
-    /// How `ffmpeg` is used.
+    /// Options of films by `ffmpeg`.
     pub video: VideoOptions,
-    /// How many frames of a film may wait for an earlier one; at least 1.
+    /// Number of frames of a film that may wait for an earlier one; at least 1.
     pub window: usize,
     /// Which existing files may be overwritten.
     pub overwrite: OverwritePolicy,
@@ -88,9 +88,9 @@ impl SinkOptions {
 /// Position and number of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameSlot {
-    /// Position among the frames of the job, from 0; orders a film.
+    /// Position among the frames of the job, from 0. Determines the order in a film.
     pub index: usize,
-    /// Frame number; names a file of a sequence.
+    /// Frame number. Determines the file name in a sequence.
     pub number: i64,
 }
 
@@ -103,11 +103,10 @@ pub enum Picture<'a> {
     Display(&'a DisplayImage, &'a [u8; 32]),
 }
 
-/// Takes finished frames. May be used from several threads at once.
+/// Writes finished frames. May be used from several threads at once.
 ///
-/// Files of a sequence may come in any order, each whole or not at all. Frames of a film may come in any order within
-/// [`SinkOptions::window`] positions of the one that is due. A film bears its name only after [`Sink::finish`]; a sink
-/// that is dropped before leaves no film behind.
+/// Frames of a sequence may be written in any order; each file is complete or does not exist. Frames of a film may be written in any order within
+/// [`SinkOptions::window`] positions of the next one. A film gets its name in [`Sink::finish`]; a sink that is dropped before leaves no film behind.
 pub struct Sink {
     pattern: OutputPattern,
     options: SinkOptions,
@@ -123,11 +122,11 @@ enum Target {
 }
 
 impl Sink {
-    /// Makes the folder, tries whether it can be written, and for a film begins it.
+    /// Creates the folder, checks that files can be written there, and starts a film.
     ///
     /// # Errors
-    /// The place cannot be written, the disk is full, a film would take the place of a file that must stay, a size or frame rate the format
-    /// cannot hold, no `ffmpeg`.
+    /// The folder cannot be written, the disk is full, a film would replace a file that must stay, the format does not allow the size or frame rate, or
+    /// `ffmpeg` is not installed.
     pub fn open(pattern: OutputPattern, options: SinkOptions) -> Result<Self, MediaError> {
         let path = pattern.path(0);
         let kind = pattern.kind();
@@ -157,7 +156,7 @@ impl Sink {
         Ok(Self { pattern, options, target })
     }
 
-    /// What kind of file it makes.
+    /// The format of its files.
     pub fn kind(&self) -> OutputKind {
         self.pattern.kind()
     }
@@ -172,11 +171,10 @@ impl Sink {
         self.pattern.path(number)
     }
 
-    /// Takes a frame. A picture with alpha is laid over black where the format has none.
+    /// Writes a frame. A picture with alpha is composited over black if the format has none.
     ///
     /// # Errors
-    /// The frame cannot be written or would take the place of a file that must stay, is not of the kind or size that is wanted, or comes out
-    /// of turn.
+    /// The frame cannot be written or would replace a file that must stay, has the wrong pixel format or size, or is out of order.
     pub fn write(&self, slot: FrameSlot, picture: Picture<'_>) -> Result<(), MediaError> {
         let path = self.path(slot.number);
         match (&self.target, picture) {
@@ -201,12 +199,12 @@ impl Sink {
             }
             (Target::Exr, Picture::Display(..))
             | (Target::Png | Target::Apng(_) | Target::Gif(..) | Target::Video(..), Picture::Linear(_)) => {
-                Err(MediaError::WrongPicture { path, wanted: self.picture_format() })
+                Err(MediaError::WrongPicture { path, expected: self.picture_format() })
             }
         }
     }
 
-    /// Ends a film and gives it its name; a sequence is already there.
+    /// Completes a film and renames it to its final name. A sequence needs no completion.
     ///
     /// # Errors
     /// Frames are missing, an earlier frame failed, or the film cannot be written.
@@ -219,7 +217,7 @@ impl Sink {
         }
     }
 
-    /// All frames of a film have one size.
+    /// Checks that a frame of a film has the size of the film.
     fn check_frame(&self, image: &DisplayImage, path: &Path) -> Result<(), MediaError> {
         let [width, height] = self.options.size;
         if [image.width, image.height] != [width, height] {

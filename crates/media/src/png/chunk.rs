@@ -13,7 +13,7 @@ pub(crate) struct Chunk<'a> {
 /// Iterator over the chunks of a file; ends with `Err` at a truncated chunk or a wrong CRC.
 pub(crate) struct Chunks<'a>(&'a [u8]);
 
-/// A chunk that is cut off or damaged.
+/// A chunk that is truncated or damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BrokenChunk;
 
@@ -75,10 +75,10 @@ mod tests {
                 assert!(chunks(&file[..cut]).unwrap().any(|chunk| chunk.is_err()), "cut at {cut}");
             }
         }
-        for place in 8..file.len() {
+        for index in 8..file.len() {
             let mut damaged = file.clone();
-            damaged[place] ^= 4;
-            assert!(chunks(&damaged).unwrap().any(|chunk| chunk.is_err()), "damaged at {place}");
+            damaged[index] ^= 4;
+            assert!(chunks(&damaged).unwrap().any(|chunk| chunk.is_err()), "damaged at {index}");
         }
         assert!(chunks(b"GIF89a").is_none());
     }

@@ -76,7 +76,7 @@ fn lay_over(frame: &mut Frame, background: ContactBackground, view: &View) {
 
 /// A tile that bears the number of its frame.
 fn numbered(mut tile: DisplayImage, number: i64) -> DisplayImage {
-    label::number(&mut tile, number);
+    label::draw_number(&mut tile, number);
     tile
 }
 

@@ -162,7 +162,8 @@ impl Job {
 
     fn output_path(&self) -> PathBuf {
         let stem = &self.scene.stem;
-        let name = if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::pictures(stem) };
+        let name =
+            if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::default_sequence(stem) };
         self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
     }
 

@@ -33,7 +33,7 @@ impl PreparedJob {
             !files.all(|file| finished.is_untouched(&file)) && !self.is_whole(number)
         };
         let frames: Vec<i64> = self.frames.par_iter().filter(is_lost).copied().collect();
-        let lost = || JobError::FramesLost { frames: frames.clone(), files: self.format.pattern.of_all() };
+        let lost = || JobError::FramesLost { frames: frames.clone(), files: self.format.pattern.template_path() };
         if frames.is_empty() { Ok(()) } else { Err(lost()) }
     }
 

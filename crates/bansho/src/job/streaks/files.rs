@@ -111,7 +111,7 @@ impl Writer {
 
     fn write_measured(&self, file: &str, channels: usize, image: &Image<1>, values: &[f32]) -> Result<f32, JobError> {
         let size = [image.width(), image.height()];
-        let picture = MeasuredImage::of_values(size, channels, values, self.bits == BitDepth::Sixteen);
+        let picture = MeasuredImage::from_values(size, channels, values, self.bits == BitDepth::Sixteen);
         let path = self.folder.join(file);
         let bytes = png::encode_measured(&picture, &self.fingerprint(file), PngEffort::Fast, &path)?;
         self.keep(&path, &bytes)?;

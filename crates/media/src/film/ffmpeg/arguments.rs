@@ -6,14 +6,14 @@ use super::{VideoContainer, VideoFormat, WebmCodec};
 use crate::{files::provenance, png::KEY_ALPHA};
 
 /// All arguments for a film at `output`, which exists and is empty.
-pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
-    let [width, height] = format.coded_size();
+pub(super) fn arguments(format: &VideoFormat, output: &Path) -> Vec<OsString> {
+    let [width, height] = format.encoded_size();
     let [frames, seconds] = format.fps;
     let (size, rate) = (format!("{width}x{height}"), format!("{frames}/{seconds}"));
     let input = if format.sixteen_bits { "rgba64le" } else { "rgba" };
     let pixels = pixel_format(format);
-    // The scaler must be told the matrix, which it otherwise guesses. The frames must carry the tags, because ProRes
-    // takes them from there. The options after it are for the container.
+    // The scaler needs the matrix, which it otherwise guesses. The frames need the tags (`setparams`), because ProRes takes them from there. The options in
+    // `tags` are for the container.
     let filter = format!(
         "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp+bitexact,\
          format={pixels},setparams=range=tv:color_primaries=bt709:color_trc=iec61966-2-1:colorspace=bt709"
@@ -29,7 +29,7 @@ pub(super) fn of(format: &VideoFormat, output: &Path) -> Vec<OsString> {
         ["-map_metadata", "-1"],
     ];
     let (convention, tag) = (format!("{KEY_ALPHA}={}", format.alpha.name()), provenance_tag(format.container));
-    let alpha = ["-metadata", &convention].into_iter().filter(|_| !format.is_flat());
+    let alpha = ["-metadata", &convention].into_iter().filter(|_| !format.is_opaque());
     let start = ["-y", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "error", "-xerror"];
     let words = start.into_iter().chain(input).chain(["-an", "-vf", &filter]).chain(codec(format).iter().copied());
     let words = words.chain(tags.into_iter().flatten()).chain(alpha).chain(["-metadata", &tag]);
@@ -46,7 +46,7 @@ fn provenance_tag(container: VideoContainer) -> String {
 }
 
 fn pixel_format(format: &VideoFormat) -> &'static str {
-    match (format.container, format.options.webm, format.is_flat()) {
+    match (format.container, format.options.webm, format.is_opaque()) {
         (VideoContainer::Mov, _, false) => "yuva444p10le",
         (VideoContainer::Mov, _, true) => "yuv444p10le",
         (VideoContainer::Webm, WebmCodec::Av1, _) => "yuv420p10le",
@@ -57,7 +57,7 @@ fn pixel_format(format: &VideoFormat) -> &'static str {
 
 fn codec(format: &VideoFormat) -> &'static [&'static str] {
     match (format.container, format.options.webm) {
-        // Straight alpha of 16 bits, and the vendor code that other programs expect.
+        // 16 bits of straight alpha, and the vendor code that other programs expect.
         (VideoContainer::Mov, _) => &[
             "-c:v",
             "prores_ks",
@@ -103,7 +103,7 @@ mod tests {
         let (size, fps, alpha) = ([65, 48], [24000, 1001], AlphaConvention::Encoded);
         let format = VideoFormat { container, size, fps, opaque, alpha, sixteen_bits: false, options };
         let words: Vec<_> =
-            of(&format, Path::new("t.part")).into_iter().map(|word| word.into_string().unwrap()).collect();
+            arguments(&format, Path::new("t.part")).into_iter().map(|word| word.into_string().unwrap()).collect();
         words.join(" ")
     }
 
