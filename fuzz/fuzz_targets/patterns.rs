@@ -5,7 +5,10 @@
 
 use std::path::Path;
 
-use bansho_media::{assets::FileAssets, files::naming::{NumberedPath, OutputPattern}};
+use bansho_media::{
+    assets::FileAssets,
+    files::naming::{NumberedPath, OutputPattern},
+};
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
     let mut lines = text.splitn(3, '\n');

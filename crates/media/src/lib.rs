@@ -2,7 +2,7 @@
 //!
 //! - [`output`]: the sink that takes frames from any thread, and resuming.
 //! - [`film`]: animations that are encoded in this process (APNG, GIF), and films by `ffmpeg`.
-//! - [`format`]: the list of output formats, and the pixels that each takes.
+//! - [`format`](mod@format): the list of output formats, and the pixels that each takes.
 //! - [`png`], [`exr`], [`ply`], [`zip`]: encoders of single files.
 //! - [`imageops`]: flattening, labels and sprite sheets.
 //! - [`files`]: names, reading of regular files only, atomic writing, protection of other files, provenance.

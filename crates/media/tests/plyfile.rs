@@ -1,4 +1,4 @@
-//! What an independent reader finds in exported particles.
+//! An independent reader reads exported particles.
 
 use std::{path::PathBuf, process::Command};
 

@@ -1,4 +1,4 @@
-//! Frames through the door that the program uses.
+//! Sinks, as the program uses them.
 
 use std::{
     fs,
@@ -143,7 +143,7 @@ fn what_the_program_says_last_stands_in_the_error() {
     fs::write(&program, "#!/bin/sh\necho 'Unknown encoder libx264' >&2\nexit 7\n").unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
     let sink = open(folder.path(), "a.mp4", 1, |options| options.video.program = program).unwrap();
-    // The pipe may or may not break before the first frame is through.
+    // The pipe may or may not break before the first frame is written.
     let error = write(&sink, 0).and_then(|()| sink.finish()).unwrap_err().to_string();
     assert!(error.contains("Unknown encoder libx264") && error.contains('7'), "{error}");
     assert_eq!(names(folder.path()), ["ffmpeg"]);
@@ -166,7 +166,7 @@ fn a_program_that_complains_has_failed_though_its_status_is_good() {
     }
 }
 
-/// What ffprobe says of the first stream.
+/// Properties of the first stream, by ffprobe.
 fn probe(path: &Path) -> String {
     let entries = "stream=codec_name,width,height,pix_fmt,color_range,color_space,color_transfer,color_primaries,\
                    r_frame_rate,nb_read_frames:stream_tags=alpha_mode";
@@ -220,7 +220,7 @@ fn check_colors(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
         let pixel = found[i / 65 * width + i % 65];
         worst = pixel.iter().zip(wanted).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0).max(worst);
     }
-    // A wrong matrix would be wrong by more than 20 codes in saturated red.
+    // With a wrong matrix, saturated red differs by more than 20 codes.
     assert!(worst <= 12, "{name}: wrong by {worst} codes");
 }
 
@@ -234,7 +234,7 @@ fn a_film_that_is_dropped_leaves_nothing() {
     assert!(names(folder.path()).is_empty());
 }
 
-/// A file system of 64 KiB, taken away when dropped.
+/// A file system of 64 KiB, unmounted when dropped.
 struct TinyDisk(tempfile::TempDir);
 
 impl TinyDisk {

@@ -249,7 +249,7 @@ impl Plan {
     }
 
     /// The view transform of display formats, with the camera's white balance.
-    pub fn view_transform(&self) -> color::View {
+    pub(crate) fn view_transform(&self) -> color::View {
         self.display.with_white_balance(self.scene.picture.white_balance_k)
     }
 }

@@ -25,7 +25,8 @@ fn damaged(reason: impl ToString) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Decodes a PNG of any color type and bit depth. Its values are sRGB, or linear if it has a gAMA of 1 and no sRGB chunk; color profiles are ignored.
+/// Decodes a PNG of any color type and bit depth. Its values are sRGB, or linear if it has a gAMA of 1 and no sRGB chunk; color profiles
+/// are ignored.
 pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     // The limit for text and profiles.
     let metadata = Limits { bytes: 64 << 20 };

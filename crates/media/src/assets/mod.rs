@@ -32,8 +32,8 @@ use crate::files::{
 use gltf::{decode_mesh, external_buffer_uris};
 use svg::decode_drawing;
 
-/// Default size of the picture cache, bytes.
-pub const CACHE_BYTES: usize = 512 << 20;
+/// Largest size of the picture cache, bytes. The last picture is always kept.
+const CACHE_BYTES: usize = 512 << 20;
 
 /// Limits on the files that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,16 +50,16 @@ impl Default for InputLimits {
     }
 }
 
-/// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file name is replaced by the frame number. Files are
-/// cached, so a change of a file is only seen after [`FileAssets::clear_cache`].
+/// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file name is replaced by the frame
+/// number. Files are cached, so a change of a file is only seen after [`FileAssets::clear_cache`].
 ///
-/// A file is rejected before memory is allocated if it is not a regular file, is outside [`InputLimits::root`], claims more than [`limits::SIDE`] pixels on a
-/// side or more than its bytes could contain, or would exceed [`InputLimits::memory_bytes`] together with the files in use.
+/// A file is rejected before memory is allocated if it is not a regular file, is outside [`InputLimits::root`], claims more than
+/// [`limits::SIDE`] pixels on a side or more than its bytes could contain, or would exceed [`InputLimits::memory_bytes`] together with the
+/// files in use.
 #[derive(Debug)]
 pub struct FileAssets {
     folder: PathBuf,
     limits: InputLimits,
-    cache_bytes: usize,
     cache: Mutex<AssetCache>,
 }
 
@@ -95,12 +95,7 @@ impl FileAssets {
 
     /// As [`FileAssets::new`], within `limits`.
     pub fn with_limits(folder: impl Into<PathBuf>, limits: InputLimits) -> Self {
-        Self { folder: folder.into(), limits, cache_bytes: CACHE_BYTES, cache: Mutex::new(AssetCache::default()) }
-    }
-
-    /// As [`FileAssets::new`], with a cache of at most `cache_bytes` of pictures; the last one is always kept.
-    pub fn with_cache(folder: impl Into<PathBuf>, cache_bytes: usize) -> Self {
-        Self { cache_bytes, ..Self::new(folder) }
+        Self { folder: folder.into(), limits, cache: Mutex::new(AssetCache::default()) }
     }
 
     /// Clears the cache, because files may have changed.
@@ -241,7 +236,8 @@ fn extension(path: &Path) -> &str {
 /// Decodes a picture from the bytes of a file with this `extension` (without the dot): `png`, `jpg`, `jpeg` or `exr`.
 ///
 /// # Errors
-/// Another extension, a size beyond the [`limits`] or beyond `limit`, or damage. Never panics, and never allocates memory that the bytes could not fill.
+/// Another extension, a size beyond the [`limits`] or beyond `limit`, or damage. Never panics, and never allocates memory that the bytes
+/// could not fill.
 pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     match extension.to_ascii_lowercase().as_str() {
         "png" => image::png(bytes, limit),
@@ -262,7 +258,7 @@ impl Assets for FileAssets {
             decode_picture(&file, extension(&path), limit)
         });
         let picture = Arc::new(picture.map_err(|problem| error(&path, problem))?);
-        self.lock_cache().pictures.insert(path, picture.clone(), self.cache_bytes);
+        self.lock_cache().pictures.insert(path, picture.clone(), CACHE_BYTES);
         Ok(picture)
     }
 

@@ -39,9 +39,9 @@ const BATCH_BYTES: u64 = 64 << 20;
 /// Memory of a chunk during decompression, in multiples of its pixels: compressed, intermediate, and decompressed.
 const CHUNK_COPIES: u64 = 4;
 
-/// Decodes a plate: the first part and layer with `R`, `G` and `B` (or a gray `Y`), and `A` if it exists; and depth from `Z`, `depth.Z`, or the only
-/// channel of a file. The result covers the display window; pixels outside the data window are transparent and infinitely far. Alpha becomes straight,
-/// and NaN becomes 0.
+/// Decodes a plate: the first part and layer with `R`, `G` and `B` (or a gray `Y`), and `A` if it exists; and depth from `Z`, `depth.Z`, or
+/// the only channel of a file. The result covers the display window; pixels outside the data window are transparent and infinitely far.
+/// Alpha becomes straight, and NaN becomes 0.
 pub(crate) fn decode(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let header = parse::parse_header(file).map_err(damaged)?;
     check(&header, file)?;
@@ -252,8 +252,8 @@ fn read_chunks(
     }
 }
 
-/// Decompresses a chunk. The PIZ and B44 decoders of the crate panic on some damaged chunks (exr 1.74: an empty list in `piz/huffman.rs`, overflow in
-/// `b44/mod.rs`). They own all their data, so catching the panic is safe.
+/// Decompresses a chunk. The PIZ and B44 decoders of the crate panic on some damaged chunks (exr 1.74: an empty list in `piz/huffman.rs`,
+/// overflow in `b44/mod.rs`). They own all their data, so catching the panic is safe.
 fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, AssetProblem> {
     check_dwa(&chunk, meta)?;
     catch_unwind(|| UncompressedBlock::decompress_chunk(chunk, meta, false))

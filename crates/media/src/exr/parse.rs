@@ -41,7 +41,7 @@ pub(crate) struct FileHeader {
 pub(crate) enum HeaderError {
     #[error("it does not begin as an OpenEXR file")]
     NotExr,
-    #[error("its header is cut off or damaged")]
+    #[error("its header is truncated or damaged")]
     Damaged,
     #[error("its header has more than {MAX_PARTS} parts or {MAX_CHANNELS} channels")]
     TooManyParts,

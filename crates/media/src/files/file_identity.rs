@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(resolved(Path::new("x/../no such file")), fs::canonicalize(".").unwrap().join("no such file"));
         #[cfg(unix)]
         {
-            // What lies above a link is above what it leads to.
+            // `..` after a link leads to the parent of its target.
             fs::create_dir_all(root.join("far/deep")).unwrap();
             std::os::unix::fs::symlink("far/deep", root.join("link")).unwrap();
             assert_eq!(resolved(&root.join("link/../a.png")), root.join("far/a.png"));

@@ -91,17 +91,17 @@ mod tests {
         let mut inputs = InputFiles::default();
         inputs.insert(&at("plate.ply"));
         inputs.insert(&at("gone"));
-        let (usual, all) = (OverwritePolicy::new(inputs.clone(), false), OverwritePolicy::new(inputs, true));
+        let (default, all) = (OverwritePolicy::new(inputs.clone(), false), OverwritePolicy::new(inputs, true));
         let check = |policy: &OverwritePolicy, name: &str| policy.check(&at(name));
         for name in ["ours.ply", "empty.png", "new.png", "gone", ""] {
-            assert_eq!((check(&usual, name), check(&all, name)), (Ok(()), Ok(())), "{name}");
+            assert_eq!((check(&default, name), check(&all, name)), (Ok(()), Ok(())), "{name}");
         }
         assert_eq!(
-            (check(&usual, "theirs.png"), check(&all, "theirs.png")),
+            (check(&default, "theirs.png"), check(&all, "theirs.png")),
             (Err(OverwriteError::NotMadeByBansho), Ok(()))
         );
-        assert_eq!([&usual, &all].map(|policy| check(policy, "plate.ply")), [Err(OverwriteError::Input); 2]);
-        // Saved anew, as editors do.
+        assert_eq!([&default, &all].map(|policy| check(policy, "plate.ply")), [Err(OverwriteError::Input); 2]);
+        // Saved to a new inode, as editors do.
         fs::copy(at("plate.ply"), at("saved")).unwrap();
         fs::rename(at("saved"), at("plate.ply")).unwrap();
         assert_eq!(check(&all, "plate.ply"), Err(OverwriteError::Input));

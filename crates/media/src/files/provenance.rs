@@ -12,8 +12,8 @@
 //! | PLY | a comment that begins with `Bansho:` | header |
 //! | snapshot | its first eight bytes | start |
 //!
-//! A file that was truncated after its mark, for example by a power failure, still has it. Without a mark are a truncated MOV, a file truncated within its
-//! first bytes, and GIF, MP4, JSON and films without alpha from before marks were introduced.
+//! A file that was truncated after its mark, for example by a power failure, still has it. Without a mark are a truncated MOV, a file
+//! truncated within its first bytes, and GIF, MP4, JSON and films without alpha from before marks were introduced.
 
 use std::{
     fs::{self, File},
@@ -292,7 +292,7 @@ mod tests {
         let file = exr::encode(&frame, Path::new("a.exr")).unwrap();
         assert!(file.windows(9).position(|bytes| bytes == b"bansho:ve").unwrap() > HEAD_BYTES as usize);
         assert!(is_marked_with(&file));
-        // A film of 1 TB whose index stands behind the pictures: a sparse file.
+        // A film of 1 TB with its index after the pictures: a sparse file.
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mov");
         let mut file = File::create(&path).unwrap();

@@ -1,7 +1,8 @@
-//! Animated GIF: one palette for the whole film, made from all frames, and ordered dithering that is constant in time, so that flames do not shimmer.
+//! Animated GIF: one palette for the whole film, made from all frames, and ordered dithering that is constant in time, so that flames do
+//! not shimmer.
 //!
-//! Frames are kept compressed in an unnamed temporary file until the last one is added; then the palette is made and they are written. Memory is that of a
-//! few pictures, whatever the number of frames.
+//! Frames are kept compressed in an unnamed temporary file until the last one is added; then the palette is made and they are written.
+//! Memory is that of a few pictures, whatever the number of frames.
 
 use std::{
     fs::File,

@@ -1,8 +1,8 @@
 //! One palette for a whole animation, from the colors of all its frames.
 //!
-//! Boxes of a color histogram are split along the axis of largest variance (after X. Wu, "Efficient statistical computations for optimal color
-//! quantization", 1991); then the entries are refined by k-means (Lloyd). All sums start from integer counts, so that the result depends neither on threads
-//! nor on the order of frames.
+//! Boxes of a color histogram are split along the axis of largest variance (after X. Wu, "Efficient statistical computations for optimal
+//! color quantization", 1991); then the entries are refined by k-means (Lloyd). All sums start from integer counts, so that the result
+//! depends neither on threads nor on the order of frames.
 
 use rayon::prelude::*;
 
@@ -25,8 +25,8 @@ struct Bin<N> {
 }
 
 impl Bin<u64> {
-    /// Mean of the colors of a nonempty bin. The center of the bin would not suffice: night skies have colors of few bins, and would become darker or
-    /// brighter as a whole.
+    /// Mean of the colors of a nonempty bin. The center of the bin would not suffice: night skies have colors of few bins, and would become
+    /// darker or brighter as a whole.
     fn mean(&self, index: usize) -> [f32; 3] {
         std::array::from_fn(|axis| {
             (f64::from(bin_min_code(index, axis)) + self.offset_sums[axis] as f64 / self.count as f64) as f32
@@ -260,8 +260,8 @@ fn pair(color: [f32; 3], entries: &[[f32; 3]]) -> EntryPair {
         let t = far_fraction(color, start, end);
         let mixed = std::array::from_fn(|axis| (end[axis] - start[axis]).mul_add(t, start[axis]));
         let length = distance(start, end);
-        // If the center were equal to an entry, any second entry would have the same error, even the brightest. But other colors of the octant would get
-        // dots of it.
+        // If the center were equal to an entry, any second entry would have the same error, even the brightest. But other colors of the
+        // octant would get dots of it.
         let dots = (t + OCTANT_RADIUS / length.sqrt().max(1.0)).min(0.5);
         let error = distance(color, mixed) + DOT_PENALTY * dots * (1.0 - dots) * length;
         if error < best.1 {

@@ -2,7 +2,8 @@
 
 use crate::frame_rate::{approximate, reduce};
 
-/// Duration of a frame for APNG, `[numerator, denominator]` of seconds in 16 bits. Other rates are approximated with a relative error below 1 / 65,535.
+/// Duration of a frame for APNG, `[numerator, denominator]` of seconds in 16 bits. Other rates are approximated with a relative error below
+/// 1 / 65,535.
 pub(crate) fn apng_delay(fps: [u32; 2]) -> Option<[u16; 2]> {
     let [frames, seconds] = approximate(fps, u32::from(u16::MAX))?;
     Some([u16::try_from(seconds).ok()?, u16::try_from(frames).ok()?])

@@ -19,7 +19,7 @@ pub fn fingerprint(file: &[u8], kind: OutputKind) -> Option<[u8; 32]> {
     match kind {
         OutputKind::Png => of_png(file),
         OutputKind::Exr => of_exr(file),
-        // A film holds many frames, and is written anew.
+        // A film contains many frames, and is always written from the start.
         OutputKind::Apng | OutputKind::Gif | OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => None,
     }
 }

@@ -105,8 +105,9 @@ pub enum Picture<'a> {
 
 /// Writes finished frames. May be used from several threads at once.
 ///
-/// Frames of a sequence may be written in any order; each file is complete or does not exist. Frames of a film may be written in any order within
-/// [`SinkOptions::window`] positions of the next one. A film gets its name in [`Sink::finish`]; a sink that is dropped before leaves no film behind.
+/// Frames of a sequence may be written in any order; each file is complete or does not exist. Frames of a film may be written in any order
+/// within [`SinkOptions::window`] positions of the next one. A film gets its name in [`Sink::finish`]; a sink that is dropped before leaves
+/// no film behind.
 pub struct Sink {
     pattern: OutputPattern,
     options: SinkOptions,
@@ -125,8 +126,8 @@ impl Sink {
     /// Creates the folder, checks that files can be written there, and starts a film.
     ///
     /// # Errors
-    /// The folder cannot be written, the disk is full, a film would replace a file that must stay, the format does not allow the size or frame rate, or
-    /// `ffmpeg` is not installed.
+    /// The folder cannot be written, the disk is full, a film would replace a file that must stay, the format does not allow the size or
+    /// frame rate, or `ffmpeg` is not installed.
     pub fn open(pattern: OutputPattern, options: SinkOptions) -> Result<Self, MediaError> {
         let path = pattern.path(0);
         let kind = pattern.kind();

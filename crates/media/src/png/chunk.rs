@@ -47,13 +47,13 @@ fn split(bytes: &[u8]) -> Option<(Chunk<'_>, &[u8])> {
     (u32::from_be_bytes(*checksum) == hasher.finalize()).then_some((chunk, rest))
 }
 
-/// Appends a chunk whose data are the concatenated `parts`, at most 2^31 - 1 bytes.
-pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], parts: &[&[u8]]) {
-    let length: usize = parts.iter().map(|part| part.len()).sum();
+/// Appends a chunk with the concatenated `slices` as its data, at most 2^31 - 1 bytes.
+pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], slices: &[&[u8]]) {
+    let length: usize = slices.iter().map(|slice| slice.len()).sum();
     file.extend((length as u32).to_be_bytes());
     let start = file.len();
     file.extend(kind);
-    parts.iter().for_each(|part| file.extend_from_slice(part));
+    slices.iter().for_each(|slice| file.extend_from_slice(slice));
     let checksum = crc32fast::hash(&file[start..]);
     file.extend(checksum.to_be_bytes());
 }

@@ -107,8 +107,8 @@ fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
 
 pub(super) fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort: PngEffort) {
     match effort {
-        // Measured on a dithered flame of 1280 x 720: `Sub` is a fifth smaller than `Up`, and the adaptive choice of filters takes 50 % more time for the
-        // same size.
+        // Measured on a dithered flame of 1280 x 720: `Sub` is a fifth smaller than `Up`, and the adaptive choice of filters takes 50 %
+        // more time for the same size.
         PngEffort::Fast => {
             encoder.set_deflate_compression(DeflateCompression::FdeflateUltraFast);
             encoder.set_filter(Filter::Sub);

@@ -48,7 +48,8 @@ impl MeasuredImage {
     }
 }
 
-/// The bytes of a PNG of measured quantities: marked as linear (gAMA 1), with the scale and a fingerprint as text. The same values give the same bytes.
+/// The bytes of a PNG of measured quantities: marked as linear (gAMA 1), with the scale and a fingerprint as text. The same values give the
+/// same bytes.
 ///
 /// # Errors
 /// A side of 0 or above the limit of PNG files, or a number of samples other than pixels times channels. `path` is only used in errors.

@@ -1,7 +1,7 @@
-//! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside or beside it.
+//! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside it or in external files.
 //!
-//! [`glb`] splits a binary file, [`json`] reads values and knows their paths for error messages, [`buffers`] reads each file once, [`nodes`] finds the meshes of
-//! a scene and their transforms. The total memory is computed before the first vertex is read.
+//! `glb` splits a binary file, `json` reads values and knows their paths for error messages, `buffers` reads each file once, and
+//! `nodes` finds the meshes of a scene and their transforms. The total memory is computed before the first vertex is read.
 
 mod accessor;
 mod buffers;
@@ -23,7 +23,8 @@ use super::limits::MemoryLimit;
 /// Reads an external buffer of a glTF by its URI, up to a number of bytes.
 pub type ReadResource<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
 
-/// Memory of a vertex and of a triangle while a mesh is built: growing lists take up to twice their size, and triangles also need the list of indices.
+/// Memory of a vertex and of a triangle while a mesh is built: growing lists take up to twice their size, and triangles also need the list
+/// of indices.
 const VERTEX_BYTES: usize = 2 * size_of::<[f32; 3]>();
 const TRIANGLE_BYTES: usize = 2 * size_of::<[u32; 3]>() + 2 * size_of::<[u32; 3]>();
 
@@ -31,10 +32,11 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Decodes all triangles of the default scene, with the transforms of their nodes. Without a default scene it is the first one; without scenes, all nodes.
+/// Decodes all triangles of the default scene, with the transforms of their nodes. Without a default scene it is the first one; without
+/// scenes, all nodes.
 ///
-/// `file` are the bytes of a file with this `extension`; `read_resource` reads external buffers. Morph targets, skins, required extensions, and sparse or
-/// compressed accessors are not supported.
+/// `file` are the bytes of a file with this `extension`; `read_resource` reads external buffers. Morph targets, skins, required extensions, and
+/// sparse or compressed accessors are not supported.
 ///
 /// # Errors
 /// Another extension, damage, an unsupported feature, more memory than `limit`, or no triangles. Never panics.
@@ -73,7 +75,7 @@ pub fn decode_mesh(
 }
 
 /// URIs of the external buffers of a glTF, each once; of a damaged file, those that can be found. `file` and `extension` are as in [`decode_mesh`].
-pub fn external_buffer_uris(file: &[u8], extension: &str) -> Vec<String> {
+pub(crate) fn external_buffer_uris(file: &[u8], extension: &str) -> Vec<String> {
     let json = match extension.to_ascii_lowercase().as_str() {
         "glb" => glb::split(file).map(|glb| glb.json).unwrap_or_default(),
         "gltf" => file,

@@ -113,7 +113,7 @@ fn changed(from: &str, to: &str) -> Vec<u8> {
 
 #[test]
 fn a_fault_says_where_it_is_and_what_is_allowed() {
-    let faults = [
+    let errors = [
         (r#""version":"2.0""#, r#""version":"1.0""#, r#"asset.version is "1.0"; allowed: "2.0""#),
         (r#""scene":0"#, r#""scene":3"#, "scene is 3; allowed: 0 to 0"),
         (r#""mesh":0"#, r#""mesh":-1"#, "nodes[0].mesh is invalid; allowed: a whole number from 0 on"),
@@ -141,7 +141,7 @@ fn a_fault_says_where_it_is_and_what_is_allowed() {
         ),
         (r#""buffers":[{"#, r#""buffers":[7,{"#, "buffers[0] is invalid; allowed: an object"),
     ];
-    for (from, to, message) in faults {
+    for (from, to, message) in errors {
         let found = reason(&changed(from, to), "glb");
         assert!(found.contains(message), "{to}: {found}");
     }

@@ -31,8 +31,8 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Decodes the strokes of an SVG file in drawing order. Each curve becomes 16 segments. Fills, widths, style sheets, `use` and nested coordinate systems
-/// are ignored.
+/// Decodes the strokes of an SVG file in drawing order. Each curve becomes 16 segments. Fills, widths, style sheets, `use` and nested
+/// coordinate systems are ignored.
 ///
 /// # Errors
 /// A text that is not an SVG, an invalid path, no strokes, or more than a million points. Never panics.
@@ -210,14 +210,14 @@ mod tests {
 
     #[test]
     fn faults_name_their_path() {
-        let fault = |text: &str| decode_drawing(text).unwrap_err().to_string();
-        assert!(fault("<svg><path id='arc' d='M0 0L1'/></svg>").contains("path `arc`: "));
-        assert!(fault("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes: "));
+        let error = |text: &str| decode_drawing(text).unwrap_err().to_string();
+        assert!(error("<svg><path id='arc' d='M0 0L1'/></svg>").contains("path `arc`: "));
+        assert!(error("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes: "));
         assert!(
-            fault("<svg><g id='all' transform='turn(3)'/></svg>").contains("g `all`: its transform cannot be read")
+            error("<svg><g id='all' transform='turn(3)'/></svg>").contains("g `all`: its transform cannot be read")
         );
         for view in ["", "0 0 10", "0 0 10 0", "0 0 -3 4", "0 0 wide 3", "0 0 1 2 3"] {
-            let shown = fault(&format!("<svg viewBox='{view}'><path d='M0 0L1 1'/></svg>"));
+            let shown = error(&format!("<svg viewBox='{view}'><path d='M0 0L1 1'/></svg>"));
             assert!(shown.contains(&format!("its viewBox is `{view}`")), "{shown}");
         }
     }

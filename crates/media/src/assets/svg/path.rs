@@ -241,7 +241,7 @@ mod tests {
             assert!(line.iter().all(|point| (point.distance(center.into()) - 1.0).abs() < 1e-12), "{data}");
             assert!(line.len().abs_diff(pieces + 1) <= 1, "{data}: {}", line.len());
         }
-        // Too small a radius grows to half of the way; a turned ellipse keeps its ends.
+        // A radius that is too small grows to half of the distance; a rotated ellipse keeps its end points.
         let grown = subpaths("M0 0A1 1 0 0 1 4 0", 1000).unwrap().remove(0);
         assert!(grown.iter().all(|point| (point.distance(DVec2::new(2.0, 0.0)) - 2.0).abs() < 1e-12));
         let turned = subpaths("M0 0A3 1 30 0 1 4 1", 1000).unwrap().remove(0);

@@ -12,8 +12,9 @@ pub(super) fn arguments(format: &VideoFormat, output: &Path) -> Vec<OsString> {
     let (size, rate) = (format!("{width}x{height}"), format!("{frames}/{seconds}"));
     let input = if format.sixteen_bits { "rgba64le" } else { "rgba" };
     let pixels = pixel_format(format);
-    // The scaler needs the matrix, which it otherwise guesses. The frames need the tags (`setparams`), because ProRes takes them from there. The options in
-    // `tags` are for the container.
+    // The scaler needs the matrix, which it otherwise guesses. The frames need the tags (`setparams`), because ProRes takes them from
+    // there. The
+    // options in `tags` are for the container.
     let filter = format!(
         "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp+bitexact,\
          format={pixels},setparams=range=tv:color_primaries=bt709:color_trc=iec61966-2-1:colorspace=bt709"

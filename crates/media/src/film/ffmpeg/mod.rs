@@ -1,7 +1,7 @@
 //! Films by `ffmpeg`: H.264, ProRes 4444 with alpha, VP9 with alpha, AV1.
 //!
-//! Raw frames go through a pipe; the film has a temporary name until `ffmpeg` has exited successfully. It is tagged with Rec. 709 primaries and matrix, sRGB
-//! transfer and limited range. Films of different versions of `ffmpeg` look the same, but their bytes may differ.
+//! Raw frames go through a pipe; the film has a temporary name until `ffmpeg` has exited successfully. It is tagged with Rec. 709 primaries
+//! and matrix, sRGB transfer and limited range. Films of different versions of `ffmpeg` look the same, but their bytes may differ.
 
 mod arguments;
 mod process;

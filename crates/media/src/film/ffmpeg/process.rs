@@ -74,8 +74,8 @@ fn tail(mut stream: impl Read) -> Vec<u8> {
 }
 
 impl FfmpegProcess {
-    /// Waits for the process and checks its result. The exit status alone is not enough: `ffmpeg` (at least 5.1) exits with 0 if only writing the trailer or
-    /// closing the file failed. Since only errors are logged, success means an empty log.
+    /// Waits for the process and checks its result. The exit status alone is not enough: `ffmpeg` (at least 5.1) exits with 0 if only
+    /// writing the trailer or closing the file failed. Since only errors are logged, success means an empty log.
     fn wait(&mut self, path: &Path) -> Result<(), MediaError> {
         drop(self.frames.take());
         let status = self.child.wait().map_err(|source| MediaError::from_io(path, source))?;
