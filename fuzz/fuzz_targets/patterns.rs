@@ -7,7 +7,7 @@ use std::path::Path;
 
 use bansho_media::{
     assets::FileAssets,
-    output::naming::{NumberedPath, OutputPattern},
+    files::naming::{NumberedPath, OutputPattern},
 };
 
 libfuzzer_sys::fuzz_target!(|text: &str| {

@@ -9,7 +9,7 @@ use bansho::{
         parameters::{Problem, ProblemKind},
     },
     job::{Channels, Conflict, JobError, ListKind, Note, SheetKind, StreaksError},
-    media::{MediaError, assets::limits::TEXT_BYTES, input::InputError},
+    media::{MediaError, assets::limits::TEXT_BYTES, files::input::InputError},
 };
 
 /// An error as the user of the program reads it.
@@ -20,7 +20,7 @@ pub(crate) fn error(error: &JobError) -> String {
         {
             format!("{error}; `bansho new {}` writes a new scene", path.display())
         }
-        JobError::Conflict(Conflict::Unmarked { .. }) | JobError::Media(MediaError::Unmarked { .. }) => {
+        JobError::Conflict(Conflict::Unmarked { .. }) | JobError::Media(MediaError::NotMadeByBansho { .. }) => {
             format!("{error}, or --overwrite to replace what is there")
         }
         JobError::FramesLost { .. } => format!("{error}; --frames asks for them again"),

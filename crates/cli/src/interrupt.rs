@@ -14,7 +14,7 @@ use std::{
     time::Duration,
 };
 
-use bansho::media::output::temporary_files;
+use bansho::media::files::temporary_files;
 use signal_hook::{
     consts::{SIGINT, SIGTERM},
     flag, low_level,

@@ -1,78 +1,75 @@
-//! What can go wrong while pictures are written.
+//! Errors of encoding and writing.
 
 use std::{io, path::PathBuf};
 
 use bansho_base::host::plural::counted;
 
-use crate::output::naming::NamingError;
+use crate::format::{PictureFormat, extensions_without_ffmpeg};
 
 /// Why a picture or a film could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MediaError {
-    /// The name given for the output cannot be used.
-    #[error(transparent)]
-    Naming(#[from] NamingError),
-    /// No room is left where the file should go.
+    /// The disk is full.
     #[error(
-        "{path}: the disk is full; nothing half-written was left there. Free some space or choose another folder",
+        "{path}: the disk is full; no incomplete file was left there. Free some space or choose another folder",
         path = .path.display()
     )]
     DiskFull {
         /// The file that was to be written.
         path: PathBuf,
     },
-    /// The user may not write there.
+    /// No permission to write there.
     #[error("{path}: not allowed to write there; choose a folder you may write to", path = .path.display())]
     NotAllowed {
         /// The file that was to be written.
         path: PathBuf,
     },
-    /// A folder stands where the file should go.
+    /// The path is a folder.
     #[error("{path}: is a folder; give the name of a file in it", path = .path.display())]
     IsFolder {
         /// The folder.
         path: PathBuf,
     },
-    /// What bears the name is a device or a pipe.
+    /// The path is a device, a pipe or a socket.
     #[error("{path}: is no ordinary file; give another name", path = .path.display())]
     NotAFile {
-        /// What was to be written.
+        /// The file that was to be written.
         path: PathBuf,
     },
-    /// A file that may hold somebody's work.
+    /// The file exists, and was to be created.
     #[error("{path}: is there already; choose another name", path = .path.display())]
-    IsThere {
+    AlreadyExists {
         /// The file.
         path: PathBuf,
     },
-    /// The work is made from the file that bears the name.
+    /// The path is an input of the job.
     #[error("{path}: is a file that the scene is read from; allowed: any other name", path = .path.display())]
-    OverInput {
+    IsInput {
         /// The file.
         path: PathBuf,
     },
-    /// A file that Bansho did not make bears the name.
-    #[error("{path}: is there and bears no mark of Bansho; allowed: another name", path = .path.display())]
-    Unmarked {
+    /// The file exists, and Bansho did not make it.
+    #[error("{path}: is there already and was not made by Bansho; allowed: another name", path = .path.display())]
+    NotMadeByBansho {
         /// The file.
         path: PathBuf,
     },
-    /// A file stands where a folder should be made.
+    /// A parent folder is a file.
     #[error("{path}: a part of this path is a file, not a folder", path = .path.display())]
     NotAFolder {
         /// The file that was to be written.
         path: PathBuf,
     },
-    /// Any other refusal by the system.
+    /// Another error of the operating system.
     #[error("{path}: cannot be written: {source}", path = .path.display())]
     Io {
         /// The file that was to be written.
         path: PathBuf,
-        /// What the system said.
+        /// The error.
         source: io::Error,
     },
-    /// The picture's size is not what the format or the film allows.
+    /// The format or the film does not allow a picture of this size.
     #[error("{path}: a picture of {width} x {height} pixels; {allowed}", path = .path.display())]
     Size {
         /// The file that was to be written.
@@ -81,7 +78,7 @@ pub enum MediaError {
         width: usize,
         /// Height of the picture, pixels.
         height: usize,
-        /// Which sizes are possible.
+        /// The sizes that are allowed.
         allowed: SizeRule,
     },
     /// The number of pixels is not width times height, or a channel is longer or shorter than the picture.
@@ -96,55 +93,55 @@ pub enum MediaError {
         /// The number of pixels.
         expected: usize,
     },
-    /// Two channels of one name, or a name that EXR cannot hold.
-    #[error("{path}: channel name `{name}` has an empty part, is longer than 255 bytes or used twice", path = .path.display())]
+    /// Two channels with the same name, or a name that EXR does not allow.
+    #[error("{path}: channel name `{name}` has an empty component, is longer than 255 bytes or used twice", path = .path.display())]
     ChannelName {
         /// The file that was to be written.
         path: PathBuf,
         /// The name.
         name: String,
     },
-    /// A format for looking at was given scene-linear pixels, or the other way about.
-    #[error("{path}: this format takes {wanted}", path = .path.display())]
+    /// A display format was given scene-linear pixels, or a scene-linear format display pixels.
+    #[error("{path}: this format takes {expected}", path = .path.display())]
     WrongPicture {
         /// The file that was to be written.
         path: PathBuf,
-        /// What it takes.
-        wanted: crate::output::sink::PictureFormat,
+        /// The pixels that it takes.
+        expected: PictureFormat,
     },
-    /// A frame of a film came too early, twice, or beyond the end.
+    /// A frame of a film was added too early, twice, or beyond the end.
     #[error(
-        "{path}: frame at position {index} does not fit: the next to be written is {next} and at most {window} may wait",
+        "{path}: the frame at position {index} is out of order: the next to be written is {next}, and up to {window} may wait",
         path = .path.display()
     )]
     OutOfOrder {
         /// The film.
         path: PathBuf,
-        /// Position of the frame that was given.
+        /// Position of the frame.
         index: usize,
-        /// Position of the frame that is due.
+        /// Position of the next frame to be written.
         next: usize,
-        /// How many may wait for an earlier one.
+        /// How many frames may wait for an earlier one.
         window: usize,
     },
-    /// A film was closed before all its frames had come.
-    #[error("{path}: {got} of {} came; the film was not written", counted(*.expected, "frame"), path = .path.display())]
+    /// A film was finished before all its frames were added.
+    #[error("{path}: {got} of {} were added; the film was not written", counted(*.expected, "frame"), path = .path.display())]
     FramesMissing {
         /// The film.
         path: PathBuf,
-        /// Frames that came without a gap.
+        /// Frames that were added without a gap.
         got: usize,
-        /// Frames that were announced.
+        /// Frames of the film.
         expected: usize,
     },
-    /// A film that an earlier error has already spoiled.
+    /// An earlier frame of the film failed.
     #[error("{path}: not written, because an earlier frame failed", path = .path.display())]
     AlreadyFailed {
         /// The film.
         path: PathBuf,
     },
-    /// Frame rate of zero, or one that the format cannot say.
-    #[error("{path}: {numerator}/{denominator} frames a second cannot be written in this format", path = .path.display())]
+    /// A frame rate of zero, or one that the format cannot represent.
+    #[error("{path}: {numerator}/{denominator} frames per second cannot be written in this format", path = .path.display())]
     FrameRate {
         /// The film.
         path: PathBuf,
@@ -153,19 +150,19 @@ pub enum MediaError {
         /// Seconds.
         denominator: u32,
     },
-    /// The PNG or GIF encoder refused.
+    /// The encoder failed.
     #[error("{path}: cannot be encoded: {reason}", path = .path.display())]
     Encode {
         /// The file that was to be written.
         path: PathBuf,
-        /// What the encoder said.
+        /// Its message.
         reason: String,
     },
-    /// There is no `ffmpeg` to make the film.
+    /// `ffmpeg` was not found.
     #[error(
         "{path}: needs the program `{program}`, which is not installed. Get it with `apt install ffmpeg`, `brew install \
-         ffmpeg` or `winget install ffmpeg`, or from https://ffmpeg.org; without it choose .png, .exr, .apng or .gif",
-        path = .path.display(), program = .program.display()
+         ffmpeg` or `winget install ffmpeg`, or from https://ffmpeg.org; without it choose {}",
+        extensions_without_ffmpeg(), path = .path.display(), program = .program.display()
     )]
     NoFfmpeg {
         /// The film.
@@ -173,31 +170,31 @@ pub enum MediaError {
         /// The program that was tried.
         program: PathBuf,
     },
-    /// `ffmpeg` gave up.
+    /// `ffmpeg` failed.
     #[error("{path}: ffmpeg failed ({status}): {}", .tail.replace('\n', "; "), path = .path.display())]
     FfmpegFailed {
         /// The film.
         path: PathBuf,
-        /// How it ended.
+        /// Its exit status.
         status: String,
-        /// The last lines it said.
+        /// The last lines of its standard error.
         tail: String,
     },
 }
 
-/// Which sizes a format can hold.
+/// The sizes that a format or a film allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SizeRule {
     /// From 1 to this many pixels on a side.
-    #[error("1 to {0} on a side are possible")]
+    #[error("allowed: 1 to {0} on a side")]
     UpTo(usize),
-    /// Every frame of a film is as large as the first was said to be.
-    #[error("this film is {0} x {1}")]
+    /// All frames of a film have the same width and height, pixels.
+    #[error("allowed: {0} x {1}, the size of this film")]
     Exactly(usize, usize),
 }
 
 impl MediaError {
-    /// Sorts a system error on `path` into what a user can act on.
+    /// Classifies an error of the operating system on `path`.
     pub fn from_io(path: impl Into<PathBuf>, source: io::Error) -> Self {
         let path = path.into();
         match source.kind() {

@@ -1,11 +1,12 @@
 //! Reading and writing of pictures, films and other assets.
 //!
-//! - [`output`]: file names, the sink that takes frames from any thread, atomic writing, protection of other files,
-//!   fingerprints and resuming, and the preparation of display pictures (flattening, labels, sprite sheets).
-//! - [`film`]: animations that encode in this process (APNG, GIF), and films by `ffmpeg`.
-//! - [`png`], [`exr`], [`ply`], [`zip`]: formats.
+//! - [`output`]: the sink that takes frames from any thread, and resuming.
+//! - [`film`]: animations that are encoded in this process (APNG, GIF), and films by `ffmpeg`.
+//! - [`format`](mod@format): the list of output formats, and the pixels that each takes.
+//! - [`png`], [`exr`], [`ply`], [`zip`]: encoders of single files.
+//! - [`imageops`]: flattening, labels and sprite sheets.
+//! - [`files`]: names, reading of regular files only, atomic writing, protection of other files, provenance.
 //! - [`assets`]: a scene's plates, meshes and drawings from files, with limits that no hostile file can exceed.
-//! - [`input`]: bytes of regular files only.
 //!
 //! PNG, EXR, APNG and GIF output is deterministic: the same frames give the same bytes on every machine and with any
 //! number of threads. Nothing here reads the clock, the environment or the host. Work runs in the caller's rayon pool.
@@ -13,8 +14,12 @@
 pub mod assets;
 mod error;
 pub mod exr;
+pub mod files;
 pub mod film;
-pub mod input;
+mod fingerprint;
+pub mod format;
+mod frame_rate;
+pub mod imageops;
 pub mod output;
 pub mod ply;
 pub mod png;

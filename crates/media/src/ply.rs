@@ -2,10 +2,10 @@
 
 use bansho_base::geometry::point_cloud::PointCloud;
 
-/// Properties that every particle has, in order: m, m/s.
+/// The properties of every particle, in order: position in m, velocity in m/s.
 const PROPERTIES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
 
-/// A whole file: places, velocities, then the cloud's quantities. The same particles give the same bytes.
+/// The bytes of a file: positions, velocities, then the quantities of the cloud. The same particles give the same bytes.
 ///
 /// ```
 /// let file = bansho_media::ply::encode(&bansho_base::geometry::point_cloud::PointCloud::default());
@@ -23,9 +23,9 @@ pub fn encode(points: &PointCloud) -> Vec<u8> {
     header.push_str("end_header\n");
     let mut bytes = header.into_bytes();
     bytes.reserve(points.len() * (PROPERTIES.len() + points.quantities.len()) * size_of::<f32>());
-    for (index, (place, velocity)) in points.positions.iter().zip(&points.velocities).enumerate() {
+    for (index, (position, velocity)) in points.positions.iter().zip(&points.velocities).enumerate() {
         let scalars = points.quantities.values().map(|values| values.get(index).unwrap_or(&0.0));
-        bytes.extend(place.iter().chain(velocity).chain(scalars).flat_map(|value| value.to_le_bytes()));
+        bytes.extend(position.iter().chain(velocity).chain(scalars).flat_map(|value| value.to_le_bytes()));
     }
     bytes
 }

@@ -1,15 +1,14 @@
-//! A ZIP writer for stored files, without compression: pictures are compressed already (APPNOTE 6.3, sections 4.3.7 to
+//! A ZIP writer for stored files, without compression since pictures are already compressed (APPNOTE 6.3, sections 4.3.7 to
 //! 4.3.16).
 //!
-//! Not a crate, because this is short and streams without seeking. The crate `zip` (9.4), when streaming, writes each
-//! checksum after its file, which streaming readers cannot take for stored files, and it depends on random numbers and
-//! system calls.
+//! Not the crate `zip`, because this is short and streams without seeking. When streaming, that crate (9.4) writes each checksum after its file,
+//! which streaming readers do not support for stored files, and it depends on random numbers and system calls.
 
 use std::io::{self, Write};
 
-/// Common part of local headers and central directory entries: version 1.0, UTF-8 names, stored, 1 January 1980. The
-/// output is deterministic.
-const SHARED: [u8; 10] = [10, 0, 0, 8, 0, 0, 0, 0, 0x21, 0];
+/// Fields at the start of local headers and central directory entries: version 1.0, UTF-8 names, stored, the constant date 1 January 1980 so
+/// that the output is deterministic.
+const COMMON_FIELDS: [u8; 10] = [10, 0, 0, 8, 0, 0, 0, 0, 0x21, 0];
 
 /// A ZIP in progress.
 #[derive(Debug)]
@@ -27,55 +26,55 @@ impl<W: Write> ZipWriter<W> {
         Self { out, length: 0, directory: Vec::new(), count: 0 }
     }
 
-    /// Adds the file `name`; folders in it are divided by `/`.
+    /// Adds the file `name`; folders in it are separated by `/`.
     ///
     /// # Errors
-    /// `out` refuses, or the ZIP would have 65,536 files or 4 GiB, which this kind cannot hold.
+    /// Writing fails, or the ZIP would exceed 65,535 files or 4 GiB, the limits of the format without ZIP64.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
-        let start = small(self.length)?;
-        small(self.length + bytes.len() as u64)?;
-        let head = head(name, bytes)?;
+        let start = checked_u32(self.length)?;
+        checked_u32(self.length + bytes.len() as u64)?;
+        let fields = header_fields(name, bytes)?;
         let count = self.count.checked_add(1).ok_or_else(too_large)?;
-        self.put(&[b"PK\x03\x04", head.as_slice(), name.as_bytes(), bytes])?;
-        // Made by version 1.0 too; no comment, first disk, no attributes.
-        let entry: [&[u8]; 6] = [b"PK\x01\x02", &[10, 0], &head, &[0; 10], &start.to_le_bytes(), name.as_bytes()];
+        self.write_all(&[b"PK\x03\x04", fields.as_slice(), name.as_bytes(), bytes])?;
+        // Also made by version 1.0; no comment, first disk, no attributes.
+        let entry: [&[u8]; 6] = [b"PK\x01\x02", &[10, 0], &fields, &[0; 10], &start.to_le_bytes(), name.as_bytes()];
         self.directory.extend(entry.concat());
         self.count = count;
         Ok(())
     }
 
-    /// Ends it; what it was written to.
+    /// Writes the central directory; returns the writer.
     ///
     /// # Errors
-    /// `out` refuses, or the whole is larger than this kind can be.
+    /// Writing fails, or the ZIP exceeds 4 GiB.
     pub fn finish(mut self) -> io::Result<W> {
-        let (start, size) = (small(self.length)?, small(self.directory.len() as u64)?);
+        let (start, size) = (checked_u32(self.length)?, checked_u32(self.directory.len() as u64)?);
         let directory = std::mem::take(&mut self.directory);
         let counts = [self.count.to_le_bytes(); 2].concat();
         let end: [&[u8]; 6] = [b"PK\x05\x06", &[0; 4], &counts, &size.to_le_bytes(), &start.to_le_bytes(), &[0; 2]];
-        self.put(&[&directory, &end.concat()])?;
+        self.write_all(&[&directory, &end.concat()])?;
         self.out.flush()?;
         Ok(self.out)
     }
 
-    fn put(&mut self, parts: &[&[u8]]) -> io::Result<()> {
-        for part in parts {
-            self.out.write_all(part)?;
-            self.length += part.len() as u64;
+    fn write_all(&mut self, slices: &[&[u8]]) -> io::Result<()> {
+        for slice in slices {
+            self.out.write_all(slice)?;
+            self.length += slice.len() as u64;
         }
         Ok(())
     }
 }
 
-/// The common part of a file's local header and its directory entry.
-fn head(name: &str, bytes: &[u8]) -> io::Result<Vec<u8>> {
-    let size = small(bytes.len() as u64)?.to_le_bytes();
+/// The fields that the local header of a file and its directory entry have in common.
+fn header_fields(name: &str, bytes: &[u8]) -> io::Result<Vec<u8>> {
+    let size = checked_u32(bytes.len() as u64)?.to_le_bytes();
     let name = u16::try_from(name.len()).map_err(|_| too_large())?.to_le_bytes();
-    let parts: [&[u8]; 6] = [&SHARED, &crc32fast::hash(bytes).to_le_bytes(), &size, &size, &name, &[0; 2]];
-    Ok(parts.concat())
+    let fields: [&[u8]; 6] = [&COMMON_FIELDS, &crc32fast::hash(bytes).to_le_bytes(), &size, &size, &name, &[0; 2]];
+    Ok(fields.concat())
 }
 
-fn small(length: u64) -> io::Result<u32> {
+fn checked_u32(length: u64) -> io::Result<u32> {
     u32::try_from(length).map_err(|_| too_large())
 }
 

@@ -1,4 +1,4 @@
-//! Blender, an independent reader, finds in our files every layer and AOV with its type, and the right colors.
+//! Blender, an independent reader, reads every layer and AOV of our EXR files with its type, and the right colors.
 
 use std::{collections::BTreeMap, path::Path, process::Command};
 
@@ -8,7 +8,7 @@ use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     image::{Image, Rect},
 };
-use bansho_media::{exr, output::atomic};
+use bansho_media::{exr, files::atomic};
 use half::f16;
 
 const SIZE: [usize; 2] = [37, 41];
@@ -61,7 +61,7 @@ fn frame() -> Frame {
     }
 }
 
-/// What Blender says of a pass: its type, how many of its pixels are infinite, and a sum for each component.
+/// A pass as Blender reads it: its type, the number of infinite pixels, and the sum of each component.
 #[derive(Debug)]
 struct Pass {
     kind: String,
@@ -95,7 +95,7 @@ fn passes_by_blender(path: &Path) -> (BTreeMap<String, String>, BTreeMap<String,
     (facts, passes)
 }
 
-/// The sums that the Python program prints of pixels.
+/// Sums of pixels, as the Python program prints them.
 fn sums(pixels: impl Iterator<Item = [f32; 4]>) -> [f64; 4] {
     let mut sums = [0.0; 4];
     for (index, pixel) in pixels.enumerate() {
@@ -106,7 +106,7 @@ fn sums(pixels: impl Iterator<Item = [f32; 4]>) -> [f64; 4] {
     sums
 }
 
-/// A premultiplied ACEScg pixel as the file holds it and Blender works with it: linear, with the primaries of Rec. 709.
+/// A premultiplied ACEScg pixel of the file as Blender converts it: linear, with the primaries of Rec. 709.
 fn in_blender(pixel: [f32; 4]) -> [f32; 4] {
     let [r, g, b, a] = pixel.map(|value| f16::from_f32(value).to_f32());
     let [r, g, b] = color::srgb_from_acescg([r, g, b]);
@@ -129,7 +129,7 @@ fn bpy_reads_every_pass_with_its_type_and_its_colors() {
         let planes = ["R", "G", "B", "A"].map(|component| plane(&format!("{name}.{component}")));
         sums((0..planes[0].len()).map(|index| in_blender(planes.map(|plane| plane[index]))))
     };
-    // The compositor's picture of a number is gray and opaque.
+    // The compositor shows a scalar as opaque gray.
     let number = |values: &[f32]| sums(values.iter().map(|&value| [value, value, value, 1.0]));
     let [x, y] = ["X", "Y"].map(|axis| plane(&format!("{LAYER}.motion.{axis}")));
     let depth = frame.depth.as_deref().unwrap();

@@ -1,4 +1,4 @@
-//! An independent reader, OpenEXR's Python package, finds in our files what we wrote.
+//! OpenEXR's Python package, an independent reader, reads the values that we wrote.
 
 use std::{collections::BTreeMap, path::Path, process::Command};
 
@@ -7,7 +7,7 @@ use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     image::{Image, Rect},
 };
-use bansho_media::{exr, output::atomic};
+use bansho_media::{exr, files::atomic};
 use half::f16;
 
 fn frame() -> Frame {
@@ -51,7 +51,7 @@ fn frame() -> Frame {
     }
 }
 
-/// The same number that the Python program prints of a channel.
+/// The number that the Python program prints for a channel.
 fn fact(values: impl Iterator<Item = f32>) -> f64 {
     let finite = values.map(|value| if value.is_finite() { f64::from(value) } else { 0.0 });
     finite.enumerate().map(|(i, value)| value * (i + 1) as f64).sum()

@@ -1,4 +1,4 @@
-//! Plates of every kind are read, and no hostile file does harm.
+//! Plates of every format are read, and hostile files are rejected.
 
 use std::{fs, path::Path};
 
@@ -61,7 +61,7 @@ fn exr_bytes(frame: &Frame) -> Vec<u8> {
     exr::encode(frame, Path::new("a.exr")).unwrap()
 }
 
-/// A PNG of any color type, by the plain encoder.
+/// A PNG of any color type, by the encoder of the `png` crate.
 fn raw_png(width: u32, height: u32, kind: ::png::ColorType, depth: ::png::BitDepth, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
@@ -118,7 +118,7 @@ fn an_exr_with_another_data_window_is_laid_into_its_display_window() {
     assert_eq!(picture.depth.unwrap()[0], f32::INFINITY);
 }
 
-/// A tiled file of 70 x 50 floats a channel, by the plain writer.
+/// A tiled file with 70 x 50 floats per channel, by the writer of the `exr` crate.
 fn tiled_exr(names: &[&str], compression: ::exr::compression::Compression) -> Vec<u8> {
     use ::exr::prelude::{
         AnyChannel, AnyChannels, Blocks, Encoding as ExrEncoding, FlatSamples, Image as ExrImage, Layer,
@@ -163,7 +163,7 @@ fn tiled_float_and_depth_only_exr_files_are_read() {
     assert!(matches!(useless, Err(AssetProblem::NoChannel(_))));
 }
 
-/// A gray JPEG of 8 x 8 pixels, all 128: the smallest baseline file there can be.
+/// A gray JPEG of 8 x 8 pixels, all 128: the smallest possible baseline file.
 fn grey_jpeg() -> Vec<u8> {
     let mut file = vec![0xFF, 0xD8, 0xFF, 0xDB, 0, 67, 0];
     file.extend([1; 64]);
@@ -186,7 +186,7 @@ fn a_jpeg_is_read() {
     assert!((r - 128.0 / 255.0).abs() < 0.01 && r == g && g == b && alpha == 1.0);
 }
 
-/// CRC of the part of a PNG that was changed, by bits, as the standard's annex D gives it.
+/// CRC of a changed chunk of a PNG, bit by bit, as in annex D of the standard.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc: u32, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 })
@@ -279,7 +279,7 @@ fn damaged_files_never_panic() {
                     damaged[random() % reach] = random() as u8;
                 }
             }
-            // Either is right; what matters is that it comes back.
+            // Any result will do, as long as it returns.
             let _ = decode_picture(&damaged, extension);
         }
     }
@@ -297,7 +297,7 @@ fn files_are_found_numbered_digested_and_remembered() {
     assert_eq!(assets.digest("p/street.####.png", 12).unwrap(), *blake3::hash(&fs::read(&path).unwrap()).as_bytes());
     fs::write(&path, png_bytes(&display(5, 2))).unwrap();
     assert_eq!(assets.picture("p/street.0012.png", 0).unwrap(), first);
-    assets.forget();
+    assets.clear_cache();
     assert_eq!(assets.picture("p/street.####.png", 12).unwrap().color.width(), 5);
     assert_eq!(&*assets.text("note.txt").unwrap(), "火");
     assert_eq!(assets.picture(path.to_str().unwrap(), 0).unwrap().color.width(), 5);
@@ -321,7 +321,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_path() {
     }
 }
 
-/// An Exif block that says 1/250 s, f/4 and ISO 400.
+/// An Exif block with 1/250 s, f/4 and ISO 400.
 fn exif_block() -> Vec<u8> {
     use ::exif::{Field, In, Rational, Tag, Value, experimental::Writer};
     let rational = |num, denom| Value::Rational(vec![Rational { num, denom }]);
@@ -362,7 +362,7 @@ fn plates_of_every_kind_say_with_which_exposure_they_were_taken() {
     assert_eq!(decode_picture(&exr_bytes(&frame), "exr").unwrap().exposure_ev100, Some(9.5));
 }
 
-/// The least memory with which `bytes` are read, and what is said of one byte less.
+/// The smallest memory limit with which `bytes` are decoded, and the error with one byte less.
 fn least_memory(bytes: &[u8], extension: &str) -> u64 {
     let read = |total| assets::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
     let AssetProblem::Memory { bytes: least, limit: 0, others: 0 } = read(0).unwrap_err() else {
@@ -432,7 +432,7 @@ fn what_lies_outside_the_root_is_refused_whatever_its_name() {
         assert!(refused(assets.find(name, 0).unwrap_err().problem), "{name}");
     }
     assert_eq!(assets.picture("gone.png", 0).unwrap_err().problem, AssetProblem::Missing);
-    // Without a root a scene may name what it likes.
+    // Without a root, a scene may name any file.
     FileAssets::new(path("job")).picture("../secret.png", 0).unwrap();
 }
 
@@ -445,7 +445,7 @@ fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
     write("a.bin", "one");
     let assets = FileAssets::new(folder.path());
     let digest = || {
-        assets.forget();
+        assets.clear_cache();
         assets.digest("a.gltf", 0)
     };
     let before = digest().unwrap();
@@ -455,7 +455,7 @@ fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
     assert_eq!(assets.files("a.gltf", 0).unwrap(), ["a.gltf", "a.bin"].map(|name| folder.path().join(name)));
     fs::remove_file(folder.path().join("a.bin")).unwrap();
     assert!(digest().is_err());
-    // What is damaged names nothing.
+    // A damaged file names no buffers.
     write("a.gltf", "{");
     assert_eq!(assets.files("a.gltf", 0).unwrap().len(), 1);
 }

@@ -1,9 +1,9 @@
-//! What an independent reader finds in exported particles.
+//! An independent reader reads exported particles.
 
 use std::{path::PathBuf, process::Command};
 
 use bansho_base::geometry::point_cloud::{PointCloud, Quantity};
-use bansho_media::{output::atomic, ply};
+use bansho_media::{files::atomic, ply};
 
 #[test]
 #[ignore = "needs python3 with the package plyfile"]

@@ -1,4 +1,4 @@
-//! Frames through the door that the program uses.
+//! Sinks, as the program uses them.
 
 use std::{
     fs,
@@ -12,11 +12,12 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
+    files::naming::OutputPattern,
     film::ffmpeg::{VideoOptions, WebmCodec},
+    format::{OutputKind, PictureFormat},
     output::{
-        naming::OutputPattern,
         resume::existing_fingerprint,
-        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
+        sink::{FrameSlot, Picture, Sink, SinkOptions},
     },
 };
 
@@ -31,7 +32,7 @@ fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
 }
 
 fn open(folder: &Path, name: &str, frames: usize, options: impl FnOnce(&mut SinkOptions)) -> Result<Sink, MediaError> {
-    let pattern = OutputPattern::parse(&folder.join(name), frames)?;
+    let pattern = OutputPattern::parse(&folder.join(name), frames).unwrap();
     let mut chosen = SinkOptions::new([65, 67], [24000, 1001], frames);
     options(&mut chosen);
     Sink::open(pattern, chosen)
@@ -63,7 +64,7 @@ fn a_sequence_is_written_from_many_threads_and_found_again() {
         }
     });
     for index in 0..6 {
-        assert_eq!(existing_fingerprint(&sink.path(index + 1001)), Some([index as u8; 32]));
+        assert_eq!(existing_fingerprint(&sink.path(index + 1001), sink.kind()), Some([index as u8; 32]));
     }
     sink.finish().unwrap();
     assert_eq!(names(&folder.path().join("new")).len(), 6);
@@ -104,7 +105,7 @@ fn pictures_of_the_wrong_kind_or_size_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let sink = open(folder.path(), "a.####.exr", 2, |_| {}).unwrap();
     assert_eq!(sink.picture_format(), PictureFormat::Frame);
-    assert!(matches!(write(&sink, 0), Err(MediaError::WrongPicture { wanted: PictureFormat::Frame, .. })));
+    assert!(matches!(write(&sink, 0), Err(MediaError::WrongPicture { expected: PictureFormat::Frame, .. })));
     let sink = open(folder.path(), "a.gif", 2, |options| options.size = [64, 67]).unwrap();
     assert_eq!(sink.picture_format(), PictureFormat::OpaqueDisplay);
     assert!(matches!(write(&sink, 0), Err(MediaError::Size { width: 65, .. })));
@@ -142,7 +143,7 @@ fn what_the_program_says_last_stands_in_the_error() {
     fs::write(&program, "#!/bin/sh\necho 'Unknown encoder libx264' >&2\nexit 7\n").unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
     let sink = open(folder.path(), "a.mp4", 1, |options| options.video.program = program).unwrap();
-    // The pipe may or may not break before the first frame is through.
+    // The pipe may or may not break before the first frame is written.
     let error = write(&sink, 0).and_then(|()| sink.finish()).unwrap_err().to_string();
     assert!(error.contains("Unknown encoder libx264") && error.contains('7'), "{error}");
     assert_eq!(names(folder.path()), ["ffmpeg"]);
@@ -165,7 +166,7 @@ fn a_program_that_complains_has_failed_though_its_status_is_good() {
     }
 }
 
-/// What ffprobe says of the first stream.
+/// Properties of the first stream, by ffprobe.
 fn probe(path: &Path) -> String {
     let entries = "stream=codec_name,width,height,pix_fmt,color_range,color_space,color_transfer,color_primaries,\
                    r_frame_rate,nb_read_frames:stream_tags=alpha_mode";
@@ -212,14 +213,14 @@ fn films_carry_their_frames_colors_and_tags() {
 
 fn check_colors(name: &str, found: &[[u8; 4]], width: usize, has_alpha: bool) {
     let original = picture(65, 67, 0);
-    let expected = if has_alpha { original } else { bansho_media::output::flatten::over_black(&original) };
+    let expected = if has_alpha { original } else { bansho_media::imageops::flatten::over_black(&original) };
     let DisplayPixels::Eight(expected) = expected.pixels else { unreachable!() };
     let mut worst = 0;
     for (i, wanted) in expected.iter().enumerate() {
         let pixel = found[i / 65 * width + i % 65];
         worst = pixel.iter().zip(wanted).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0).max(worst);
     }
-    // A wrong matrix would be wrong by more than 20 codes in saturated red.
+    // With a wrong matrix, saturated red differs by more than 20 codes.
     assert!(worst <= 12, "{name}: wrong by {worst} codes");
 }
 
@@ -233,7 +234,7 @@ fn a_film_that_is_dropped_leaves_nothing() {
     assert!(names(folder.path()).is_empty());
 }
 
-/// A file system of 64 KiB, taken away when dropped.
+/// A file system of 64 KiB, unmounted when dropped.
 struct TinyDisk(tempfile::TempDir);
 
 impl TinyDisk {
@@ -268,7 +269,7 @@ fn a_full_disk_is_said_and_leaves_whole_frames_only() {
         assert!(left.iter().all(|name| name.ends_with(".png")), "{left:?}");
         for name in left {
             let path = disk.0.path().join(name);
-            assert_eq!(existing_fingerprint(&path), Some([1; 32]), "{}", path.display());
+            assert_eq!(existing_fingerprint(&path, OutputKind::Png), Some([1; 32]), "{}", path.display());
             fs::remove_file(path).unwrap();
         }
     }

@@ -1,4 +1,4 @@
-//! A compiled scene: everything that is slow to build, built once and shared by checks, remarks, exposure, fingerprints and shots.
+//! A compiled scene: everything that is slow to build, built once and shared by checks, remarks, planning and shots.
 
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
@@ -29,20 +29,20 @@ pub struct CompiledScene {
     assets: Arc<dyn Assets>,
     wind: Wind,
     obstacles: Vec<(Fingerprint, Occluder)>,
-    /// Every phenomenon of the scene, those that are not drawn too, by what it was built from.
+    /// Every phenomenon of the scene, including disabled ones, by the fingerprint of what it was built from.
     built: BTreeMap<Fingerprint, Arc<dyn Phenomenon>>,
-    /// What is drawn, in the order of the scene, then its own lamps, ground and sky.
-    participants: Vec<Participant>,
+    /// The enabled phenomena in the order of the scene, then its lamps, ground and sky.
+    enabled: Vec<BuiltPhenomenon>,
 }
 
-/// A phenomenon that a scene shows, with the fingerprint of all that it was built from.
+/// A phenomenon, with the fingerprint of all that it was built from.
 #[derive(Clone)]
-pub(crate) struct Participant {
+pub(crate) struct BuiltPhenomenon {
     pub(crate) fingerprint: Fingerprint,
     pub(crate) phenomenon: Arc<dyn Phenomenon>,
 }
 
-/// Faults that only building shows, each with the dotted path of the table that it is about.
+/// Errors that only building finds, each with the dotted path of the table that it is about.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub struct BuildErrors(pub Vec<(String, BuildError)>);
 
@@ -56,7 +56,7 @@ impl fmt::Display for BuildErrors {
 }
 
 impl BuildErrors {
-    /// The faults at their places in the text that the scene was read from; `file` is what errors call it.
+    /// The errors with their positions in `text`, from which the scene was read. `file` is the file's name in messages.
     pub fn located(self, file: &str, text: &str) -> SceneError {
         let root = bansho_scene::values(text).unwrap_or_default();
         let mut reader = Reader::new();
@@ -74,11 +74,11 @@ impl BuildErrors {
 }
 
 impl CompiledScene {
-    /// Builds everything in `scene`. What `previous` has of equal parameters and assets is taken from it, so that an edit builds only what it
-    /// changed; it must have been built with the same `assets`.
+    /// Builds everything in `scene`. Objects with equal fingerprints (parameters and files) are taken from `previous`, so that after an edit
+    /// only what changed is built. A `previous` with other `assets` is ignored.
     ///
     /// # Errors
-    /// Every fault that only building shows: parameters that do not go together, assets that cannot be had.
+    /// Every error that only building finds: parameters that contradict each other, assets that cannot be read.
     pub fn build(scene: Arc<Scene>, assets: Arc<dyn Assets>, previous: Option<&Self>) -> Result<Self, BuildErrors> {
         let mut errors = Vec::new();
         let previous = previous.filter(|previous| Arc::ptr_eq(&previous.assets, &assets));
@@ -91,16 +91,16 @@ impl CompiledScene {
             errors.push(("plate".to_owned(), error));
         }
         let obstacles = build_obstacles(&scene, assets.as_ref(), previous, &mut errors);
-        let (built, enabled) = build_instances(&scene, assets.as_ref(), previous, &mut errors);
+        let (built, fingerprints) = build_instances(&scene, assets.as_ref(), previous, &mut errors);
         if !errors.is_empty() {
             return Err(BuildErrors(errors));
         }
-        let shown = enabled
-            .into_iter()
-            .filter_map(|fingerprint| Some(Participant { fingerprint, phenomenon: built.get(&fingerprint)?.clone() }));
-        let participants = shown.chain(backdrop(&scene, previous)).collect();
+        let phenomena = fingerprints.into_iter().filter_map(|fingerprint| {
+            Some(BuiltPhenomenon { fingerprint, phenomenon: built.get(&fingerprint)?.clone() })
+        });
+        let enabled = phenomena.chain(backdrop(&scene, previous)).collect();
         let wind = Wind::new(scene.wind.clone(), scene.seed, scene.loop_s);
-        Ok(Self { wind, obstacles, built, participants, scene, assets })
+        Ok(Self { wind, obstacles, built, enabled, scene, assets })
     }
 
     /// The scene.
@@ -108,12 +108,12 @@ impl CompiledScene {
         &self.scene
     }
 
-    /// Where its pictures come from.
+    /// The pictures, meshes, drawings and texts that the scene names.
     pub fn assets(&self) -> &Arc<dyn Assets> {
         &self.assets
     }
 
-    /// The one wind.
+    /// The wind, gusts included.
     pub fn wind(&self) -> &Wind {
         &self.wind
     }
@@ -123,9 +123,9 @@ impl CompiledScene {
         self.obstacles.iter().map(|(_, obstacle)| obstacle)
     }
 
-    /// Everything that it shows: its phenomena, then its own lamps, ground and sky.
+    /// Its enabled phenomena, then its lamps, ground and sky.
     pub fn phenomena(&self) -> impl Iterator<Item = &Arc<dyn Phenomenon>> {
-        self.participants.iter().map(|participant| &participant.phenomenon)
+        self.enabled.iter().map(|built| &built.phenomenon)
     }
 
     /// Whether any of them is simulated in steps.
@@ -133,57 +133,65 @@ impl CompiledScene {
         self.phenomena().any(|phenomenon| phenomenon.info().stepping.is_some())
     }
 
-    pub(crate) fn participants(&self) -> &[Participant] {
-        &self.participants
+    /// A fingerprint of all that the state of stepped phenomena depends on: not the camera, the size or the exposure.
+    pub fn state_fingerprint(&self) -> Fingerprint {
+        let mut hasher = blake3::Hasher::new();
+        fingerprint::hash_state(&self.scene, self.assets.as_ref(), &mut hasher);
+        *hasher.finalize().as_bytes()
+    }
+
+    /// As [`phenomena`](Self::phenomena), with fingerprints.
+    pub(crate) fn enabled(&self) -> &[BuiltPhenomenon] {
+        &self.enabled
     }
 
     /// The same scene without some of its phenomena.
     pub(crate) fn without(&self, names: &[&str]) -> Self {
-        let stays = |own: &&Participant| !names.contains(&own.phenomenon.info().name);
-        Self { participants: self.participants.iter().filter(stays).cloned().collect(), ..self.clone() }
+        let is_kept = |built: &&BuiltPhenomenon| !names.contains(&built.phenomenon.info().name);
+        Self { enabled: self.enabled.iter().filter(is_kept).cloned().collect(), ..self.clone() }
     }
 
-    /// Runs of everything that it shows, at their beginnings; in a loop one run of what is stepped passes into the next.
+    /// Runs of all enabled phenomena in their initial states. In a loop, stepped phenomena get a [`CrossfadeRun`].
     pub(crate) fn start(&self) -> Vec<ActiveRun> {
-        self.participants.iter().map(|participant| ActiveRun::start(participant, self.scene.loop_s)).collect()
+        self.enabled.iter().map(|built| ActiveRun::start(built, self.scene.loop_s)).collect()
     }
 }
 
-/// A phenomenon in the course of a shot.
+/// A phenomenon with its run in a shot.
 pub(crate) struct ActiveRun {
-    pub(crate) participant: Participant,
+    pub(crate) built: BuiltPhenomenon,
     pub(crate) run: Box<dyn Run>,
-    /// How it steps; in a loop otherwise than the phenomenon itself.
+    /// How the run steps. In a loop its preroll is longer than the phenomenon's own.
     pub(crate) stepping: Option<Stepping>,
-    /// Steps taken; 0 at its beginning, before the preroll.
-    pub(crate) taken: u64,
+    /// Steps taken; 0 in the initial state, before the preroll.
+    pub(crate) steps_taken: u64,
 }
 
 impl ActiveRun {
-    pub(crate) fn start(participant: &Participant, loop_s: Option<f64>) -> Self {
-        let phenomenon = &participant.phenomenon;
+    pub(crate) fn start(built: &BuiltPhenomenon, loop_s: Option<f64>) -> Self {
+        let phenomenon = &built.phenomenon;
         let start = || phenomenon.clone().start();
         let stepping = phenomenon.info().stepping;
         let (run, stepping): (Box<dyn Run>, _) = match (loop_s, stepping) {
-            (Some(turn), Some(stepping)) => {
-                let crossfade = CrossfadeRun::new(turn, stepping, phenomenon.info().aovs, [start(), start()]);
+            (Some(loop_s), Some(stepping)) => {
+                let crossfade = CrossfadeRun::new(loop_s, stepping, phenomenon.info().aovs, [start(), start()]);
                 let stepping = crossfade.stepping();
                 (Box::new(crossfade), Some(stepping))
             }
             _ => (start(), stepping),
         };
-        Self { participant: participant.clone(), run, stepping, taken: 0 }
+        Self { built: built.clone(), run, stepping, steps_taken: 0 }
     }
 
     pub(crate) fn info(&self) -> PhenomenonInfo<'_> {
-        self.participant.phenomenon.info()
+        self.built.phenomenon.info()
     }
 
     pub(crate) fn as_stepped(&self) -> Option<&dyn Stepped> {
         self.run.as_stepped()
     }
 
-    /// Steps after which its state is the last one not after that which an exposure is drawn from; none for closed forms.
+    /// Number of steps to the last state that is not after the time from which this exposure is drawn; 0 for closed forms.
     pub(crate) fn steps_until(&self, shutter: Shutter) -> u64 {
         match (self.stepping, self.as_stepped()) {
             (Some(stepping), Some(stepped)) => stepping.steps_until(stepped.time_for(shutter)),
@@ -200,13 +208,13 @@ fn build_obstacles(
 ) -> Vec<(Fingerprint, Occluder)> {
     let mut obstacles = Vec::new();
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
-        // A fingerprint reads every file that a mesh names, however many bytes they have together; building refuses too many. So it is
-        // taken only of what has been built, now or before.
+        // Fingerprinting reads every file that a mesh names, whatever their total size, whereas building refuses too many bytes. So only
+        // what has been built, now or in `previous`, is fingerprinted.
         let fingerprint = || fingerprint::of_obstacle(obstacle, scene, assets);
-        let same = previous.filter(|previous| previous.scene.obstacles.contains(obstacle));
-        let known = same.and_then(|previous| {
+        let candidate = previous.filter(|previous| previous.scene.obstacles.contains(obstacle));
+        let known = candidate.and_then(|previous| {
             let fingerprint = fingerprint();
-            previous.obstacles.iter().find(|(own, _)| *own == fingerprint).cloned()
+            previous.obstacles.iter().find(|(known, _)| *known == fingerprint).cloned()
         });
         match known.map_or_else(|| obstacle.build(assets).map(|occluder| (fingerprint(), occluder)), Ok) {
             Ok(obstacle) => obstacles.push(obstacle),
@@ -216,7 +224,7 @@ fn build_obstacles(
     obstacles
 }
 
-/// Every phenomenon by its fingerprint, and the fingerprints of those that are enabled.
+/// Every phenomenon by its fingerprint, and the fingerprints of the enabled ones in the order of the scene.
 fn build_instances(
     scene: &Scene,
     assets: &dyn Assets,
@@ -224,16 +232,16 @@ fn build_instances(
     errors: &mut Vec<(String, BuildError)>,
 ) -> (BTreeMap<Fingerprint, Arc<dyn Phenomenon>>, Vec<Fingerprint>) {
     let (mut built, mut enabled) = (BTreeMap::new(), Vec::new());
-    let mut positions: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut indices: BTreeMap<&str, usize> = BTreeMap::new();
     let mut particles = 0;
     for instance in &scene.instances {
-        let index = positions.entry(instance.kind.key).or_default();
+        let index = indices.entry(instance.kind.key).or_default();
         let path = format!("{}.{index}", instance.kind.key);
         *index += 1;
         // Memory is estimated before anything is built.
         if instance.enabled {
             match instance.parameters.check_particle_budget(particles) {
-                Ok(together) => particles = together,
+                Ok(total) => particles = total,
                 Err(error) => {
                     errors.push((path, error));
                     continue;
@@ -262,13 +270,13 @@ fn build_instance(instance: &Instance, scene: &Scene, assets: &dyn Assets) -> Re
     instance.parameters.build(&context)
 }
 
-/// The scene's own lamps that are seen, its ground, and its sky where there is no plate.
-fn backdrop(scene: &Scene, previous: Option<&CompiledScene>) -> Vec<Participant> {
+/// The scene's visible lamps, its ground, and its visible sky unless there is a plate.
+fn backdrop(scene: &Scene, previous: Option<&CompiledScene>) -> Vec<BuiltPhenomenon> {
     let mut backdrop = Vec::new();
     let mut add = |fingerprint: Fingerprint, build: &dyn Fn() -> Arc<dyn Phenomenon>| {
         let known = previous
-            .and_then(|previous| previous.participants.iter().find(|own| own.fingerprint == fingerprint).cloned());
-        backdrop.push(known.unwrap_or_else(|| Participant { fingerprint, phenomenon: build() }));
+            .and_then(|previous| previous.enabled.iter().find(|built| built.fingerprint == fingerprint).cloned());
+        backdrop.push(known.unwrap_or_else(|| BuiltPhenomenon { fingerprint, phenomenon: build() }));
     };
     let visible: Vec<_> = scene.lights.iter().filter(|light| light.visible).cloned().collect();
     if !visible.is_empty() {

@@ -1,4 +1,4 @@
-//! What a shot draws from: the compiled scene, the plan, and what follows from both.
+//! What a shot draws from: the compiled scene, the plan, and values that follow from both.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,14 +8,14 @@ use bansho_base::{
     world::sky::{ElevationProfile, Sky},
 };
 
-use crate::{compiled::CompiledScene, composite::plate_light, fingerprint, plan::Plan};
+use crate::{compiled::CompiledScene, composite::plate_light, plan::Plan};
 use bansho_scene::Scene;
 
-/// A compiled scene under a plan.
+/// A compiled scene with the plan of a shot.
 pub(crate) struct ShotContext {
     pub(crate) compiled: Arc<CompiledScene>,
     pub(crate) plan: Arc<Plan>,
-    /// The light that the plate shows, beside its display white; measured when it is first asked for.
+    /// The light that the plate shows, relative to display white; computed on first use.
     plate_light: OnceLock<Option<ElevationProfile>>,
 }
 
@@ -28,18 +28,18 @@ impl ShotContext {
         &self.plan.scene
     }
 
-    /// The light of the sky at time `t`: the scene's own, or where there is a plate in its place what that plate shows, which is as bright
-    /// as the plate looks at the shot's exposure.
+    /// The light of the sky at time `t`: the scene's own sky; without one, the light that the plate shows, which is as bright as the plate
+    /// looks at the shot's exposure.
     pub(crate) fn sky(&self, t: f64) -> Sky {
         if let Some(sky) = &self.scene().sky {
             return sky.at(t);
         }
-        let light = get_or_compute(&self.plate_light, || plate_light(self));
+        let light = get_or_compute(&self.plate_light, || plate_light(&self.compiled, &self.plan));
         light.map_or(Sky::DARK, |light| Sky::measured(light.scaled(1.0 / self.plan.exposure_scale())))
     }
 
     /// The header of frame `number`.
     pub(crate) fn header(&self, number: i64) -> FrameHeader {
-        self.plan.header(number, fingerprint::of_frame(&self.compiled, &self.plan, number))
+        self.plan.header(number, self.plan.frame_fingerprint(number, self.compiled.assets().as_ref()))
     }
 }

@@ -1,4 +1,4 @@
-//! Seamless loops of what is stepped: the end of one run dissolves into the beginning of the next.
+//! Seamless loops of stepped phenomena: the end of one run is crossfaded into the beginning of the next.
 
 use bansho_base::{
     frame::Figure,
@@ -12,49 +12,51 @@ use bansho_base::{
     },
 };
 
-/// A stepped phenomenon in a loop: two runs of it, mixed about the moment where the loop closes.
+/// A stepped phenomenon in a loop: two runs of it, crossfaded around the moment at which the loop closes.
 ///
-/// Every turn has a run of its own, all runs are the same, and each outlasts its turn by half a dissolve on both sides. So at time
-/// t of a turn one run stands at t, and another at t + turn, on its way out, or at t - turn, on its way in. Where a turn
-/// ends both count alike and change places, so that no picture jumps, and two that differ move less than one.
+/// Each period has its own run, all runs are equal, and each exceeds its period by half a crossfade on both sides. At time t of a period,
+/// the current run is at t, and the adjacent run at t + period (the previous one, fading out) or at t - period (the next one, fading in).
+/// Where a period ends, both have the weight 1/2 and exchange their roles, so that the picture does not jump. The mean of two runs also
+/// changes less from frame to frame than a single run.
 pub(crate) struct CrossfadeRun {
-    turn: f64,
+    /// Length of the loop, s.
+    period: f64,
     stepping: Stepping,
     aovs: &'static [AovDescriptor],
-    /// The run of this turn.
-    present: SegmentRun,
-    /// That of the last turn in the first half of this one, then that of the next.
-    passing: SegmentRun,
-    /// Whether `passing` is on its way in.
-    comes: bool,
-    /// State of every run where its dissolve begins.
-    beginning: Vec<u8>,
+    /// The run of this period.
+    current: SegmentRun,
+    /// The run of the previous period in the first half of this one, then that of the next period.
+    adjacent: SegmentRun,
+    /// Whether `adjacent` is the run of the next period.
+    adjacent_is_next: bool,
+    /// State of every run at the beginning of its crossfade.
+    crossfade_start: Vec<u8>,
 }
 
-/// A run, and the steps it has taken.
+/// A run, and the number of steps that it has taken.
 struct SegmentRun {
     run: Box<dyn Run>,
-    taken: u64,
+    steps_taken: u64,
 }
 
 impl SegmentRun {
     fn step(&mut self, stepping: Stepping, surroundings: &Surroundings) {
         if let Some(stepped) = self.run.as_stepped_mut() {
-            stepped.step(stepping.time_after(self.taken), surroundings);
+            stepped.step(stepping.time_after(self.steps_taken), surroundings);
         }
-        self.taken += 1;
+        self.steps_taken += 1;
     }
 
-    fn advance(&mut self, taken: u64, stepping: Stepping, surroundings: &Surroundings) {
-        while self.taken < taken {
+    fn advance(&mut self, steps: u64, stepping: Stepping, surroundings: &Surroundings) {
+        while self.steps_taken < steps {
             self.step(stepping, surroundings);
         }
     }
 
-    /// Goes to a state, which another run of the same phenomenon gave.
-    fn go_to(&mut self, state: &[u8], taken: u64) -> Result<(), SnapshotError> {
+    /// Restores a state of another run of the same phenomenon.
+    fn restore(&mut self, state: &[u8], steps_taken: u64) -> Result<(), SnapshotError> {
         self.run.as_stepped_mut().ok_or(SnapshotError::NoState)?.restore(state)?;
-        self.taken = taken;
+        self.steps_taken = steps_taken;
         Ok(())
     }
 
@@ -64,83 +66,90 @@ impl SegmentRun {
 }
 
 impl CrossfadeRun {
-    /// A loop of `turn` seconds of what steps as said, of which two runs are given at their beginning.
-    pub(crate) fn new(turn: f64, stepping: Stepping, aovs: &'static [AovDescriptor], runs: [Box<dyn Run>; 2]) -> Self {
-        let [present, passing] = runs.map(|run| SegmentRun { run, taken: 0 });
-        Self { beginning: present.snapshot(), turn, stepping, aovs, present, passing, comes: false }
+    /// A loop of `period` seconds from two runs in their initial states, which step as `stepping` says.
+    pub(crate) fn new(
+        period: f64,
+        stepping: Stepping,
+        aovs: &'static [AovDescriptor],
+        runs: [Box<dyn Run>; 2],
+    ) -> Self {
+        let [current, adjacent] = runs.map(|run| SegmentRun { run, steps_taken: 0 });
+        let crossfade_start = current.snapshot();
+        Self { period, stepping, aovs, current, adjacent, adjacent_is_next: false, crossfade_start }
     }
 
-    /// How it steps: every run goes on for half a crossfade beyond its turn.
+    /// How the loop steps: the preroll includes the run of the period before time 0.
     pub(crate) fn stepping(&self) -> Stepping {
-        Stepping { preroll: self.stepping.preroll + self.turn, ..self.stepping }
+        Stepping { preroll: self.stepping.preroll + self.period, ..self.stepping }
     }
 
-    /// Steps after which runs begin to come in.
-    fn begun(&self) -> u64 {
+    /// Number of steps after which a run begins to fade in.
+    fn steps_before_fade_in(&self) -> u64 {
         self.stepping.steps_until(-0.5 * self.stepping.crossfade)
     }
 
-    /// The run before the first turn: leaves its state where later ones begin, and where the first turn's does.
-    fn run_up(&mut self, until: u64, surroundings: &Surroundings) -> Result<(), SnapshotError> {
-        let (begun, first) = (self.begun(), self.stepping.steps_until(0.0));
-        while self.passing.taken < until {
-            self.passing.step(self.stepping, surroundings);
-            if self.passing.taken == begun {
-                self.beginning = self.passing.snapshot();
+    /// Steps the run before the first period to `steps`. On the way its state is kept for the later runs, which begin from there, and given to
+    /// the run of the first period.
+    fn step_first_run(&mut self, steps: u64, surroundings: &Surroundings) -> Result<(), SnapshotError> {
+        let (fade_in, first) = (self.steps_before_fade_in(), self.stepping.steps_until(0.0));
+        while self.adjacent.steps_taken < steps {
+            self.adjacent.step(self.stepping, surroundings);
+            if self.adjacent.steps_taken == fade_in {
+                self.crossfade_start = self.adjacent.snapshot();
             }
-            if self.passing.taken == first {
-                self.present.go_to(&self.passing.snapshot(), first)?;
+            if self.adjacent.steps_taken == first {
+                self.current.restore(&self.adjacent.snapshot(), first)?;
             }
         }
         Ok(())
     }
 
-    /// Brings both runs to time `t` of the turn; before 0 only the one that then leaves.
-    fn go_on(&mut self, t: f64, surroundings: &Surroundings) -> Result<(), SnapshotError> {
+    /// Steps both runs to time `t` of the period. Before time 0 there is only the run that later fades out.
+    fn advance_to(&mut self, t: f64, surroundings: &Surroundings) -> Result<(), SnapshotError> {
         let stepping = self.stepping;
         if t < 0.5 * stepping.step {
-            return self.run_up(stepping.steps_until(t + self.turn), surroundings);
+            return self.step_first_run(stepping.steps_until(t + self.period), surroundings);
         }
-        self.present.advance(stepping.steps_until(t), stepping, surroundings);
-        if t >= 0.5 * self.turn {
-            if !self.comes {
-                self.passing.go_to(&self.beginning, self.begun())?;
-                self.comes = true;
+        self.current.advance(stepping.steps_until(t), stepping, surroundings);
+        if t >= 0.5 * self.period {
+            if !self.adjacent_is_next {
+                self.adjacent.restore(&self.crossfade_start, self.steps_before_fade_in())?;
+                self.adjacent_is_next = true;
             }
-            self.passing.advance(stepping.steps_until(t - self.turn), stepping, surroundings);
+            self.adjacent.advance(stepping.steps_until(t - self.period), stepping, surroundings);
         } else if t <= 0.5 * stepping.crossfade {
-            self.passing.advance(stepping.steps_until(t + self.turn), stepping, surroundings);
+            self.adjacent.advance(stepping.steps_until(t + self.period), stepping, surroundings);
         }
         Ok(())
     }
 
-    /// How much the present run counts at time `t` of the turn, in [1/2, 1].
-    fn share(&self, t: f64) -> f32 {
-        // States lag behind by up to two steps.
+    /// Weight of the current run at time `t` of the period, 1/2 to 1.
+    fn current_weight(&self, t: f64) -> f32 {
+        // States are up to two steps behind the time.
         let half = 0.5 * self.stepping.crossfade - 2.0 * self.stepping.step;
-        let way = t.min(self.turn - t);
-        if way < half { (0.5 + 0.5 * way / half).max(0.5) as f32 } else { 1.0 }
+        let distance = t.min(self.period - t);
+        if distance < half { (0.5 + 0.5 * distance / half).max(0.5) as f32 } else { 1.0 }
     }
 }
 
 impl Run for CrossfadeRun {
     fn publish(&self, shutter: Shutter) -> Publication {
-        let share = self.share(shutter.middle());
-        let present = self.present.run.publish(shutter);
-        if share == 1.0 {
-            return present;
+        let weight = self.current_weight(shutter.middle());
+        let current = self.current.run.publish(shutter);
+        if weight == 1.0 {
+            return current;
         }
-        let by = if shutter.middle() < 0.5 * self.turn { self.turn } else { -self.turn };
-        let other = Shutter { open: shutter.open + by, close: shutter.close + by };
-        let mut both = shared(present, share);
-        both.extend(&shared(self.passing.run.publish(other), 1.0 - share));
+        let offset = if shutter.middle() < 0.5 * self.period { self.period } else { -self.period };
+        let adjacent_shutter = Shutter { open: shutter.open + offset, close: shutter.close + offset };
+        let mut both = scaled(current, weight);
+        both.extend(&scaled(self.adjacent.run.publish(adjacent_shutter), 1.0 - weight));
         both
     }
 
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
-        let mut intervals = self.present.run.depth_intervals(view, surroundings);
-        if let Some(other) = self.other_view(view) {
-            intervals.extend(self.passing.run.depth_intervals(other, surroundings));
+        let mut intervals = self.current.run.depth_intervals(view, surroundings);
+        if let Some(adjacent_view) = self.adjacent_view(view) {
+            intervals.extend(self.adjacent.run.depth_intervals(adjacent_view, surroundings));
         }
         intervals
     }
@@ -151,15 +160,16 @@ impl Run for CrossfadeRun {
         surroundings: &'a Surroundings<'a>,
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        let present = self.present.run.prepare(view, surroundings, observer)?;
-        let Some(other) = self.other_view(view) else { return Ok(present) };
-        let passing = self.passing.run.prepare(other, surroundings, observer)?;
-        let share = self.share(view.shutter.middle());
-        Ok(Box::new(Mixed { bend: Bend::new(&*present, &*passing, share), aovs: self.aovs, present, passing, share }))
+        let current = self.current.run.prepare(view, surroundings, observer)?;
+        let Some(adjacent_view) = self.adjacent_view(view) else { return Ok(current) };
+        let adjacent = self.adjacent.run.prepare(adjacent_view, surroundings, observer)?;
+        let weight = self.current_weight(view.shutter.middle());
+        let deflection = MixedDeflection::new(&*current, &*adjacent, weight);
+        Ok(Box::new(PreparedCrossfade { deflection, aovs: self.aovs, current, adjacent, current_weight: weight }))
     }
 
     fn export(&self, t: f64) -> Option<PointCloud> {
-        self.present.run.export(t)
+        self.current.run.export(t)
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {
@@ -173,15 +183,15 @@ impl Run for CrossfadeRun {
 
 impl Stepped for CrossfadeRun {
     fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        let done = self.go_on(time + self.stepping.step, surroundings);
-        debug_assert_eq!(done, Ok(()), "runs of one phenomenon take up each other's states");
+        let done = self.advance_to(time + self.stepping.step, surroundings);
+        debug_assert_eq!(done, Ok(()), "a run restores the states of other runs of its phenomenon");
     }
 
     fn snapshot(&self) -> Vec<u8> {
-        let (present, passing) = (self.present.snapshot(), self.passing.snapshot());
-        let mut bytes = vec![u8::from(self.comes)];
-        bytes.extend([self.present.taken, self.passing.taken].into_iter().flat_map(u64::to_le_bytes));
-        for state in [&present, &passing, &self.beginning] {
+        let (current, adjacent) = (self.current.snapshot(), self.adjacent.snapshot());
+        let mut bytes = vec![u8::from(self.adjacent_is_next)];
+        bytes.extend([self.current.steps_taken, self.adjacent.steps_taken].into_iter().flat_map(u64::to_le_bytes));
+        for state in [&current, &adjacent, &self.crossfade_start] {
             bytes.extend((state.len() as u64).to_le_bytes());
             bytes.extend(state);
         }
@@ -189,51 +199,54 @@ impl Stepped for CrossfadeRun {
     }
 
     fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
-        let saved = Saved::read(state).ok_or(SnapshotError::Damaged)?;
-        let before = (self.present.snapshot(), self.present.taken);
-        self.present.go_to(saved.present, saved.taken[0])?;
-        if let Err(error) = self.passing.go_to(saved.passing, saved.taken[1]) {
-            self.present.go_to(&before.0, before.1)?;
+        let saved = CrossfadeSnapshot::read(state).ok_or(SnapshotError::Damaged)?;
+        let (state_before, steps_before) = (self.current.snapshot(), self.current.steps_taken);
+        self.current.restore(saved.current, saved.current_steps)?;
+        if let Err(error) = self.adjacent.restore(saved.adjacent, saved.adjacent_steps) {
+            self.current.restore(&state_before, steps_before)?;
             return Err(error);
         }
-        (self.comes, self.beginning) = (saved.comes, saved.beginning.to_vec());
+        self.adjacent_is_next = saved.adjacent_is_next;
+        self.crossfade_start = saved.crossfade_start.to_vec();
         Ok(())
     }
 }
 
 impl CrossfadeRun {
-    /// The view that the passing run is seen in, where it counts.
-    fn other_view<'a>(&self, view: &'a View) -> Option<&'a View> {
-        view.adjacent_loop_view.as_deref().filter(|_| self.share(view.shutter.middle()) < 1.0)
+    /// The view of the adjacent run; `None` where its weight is 0.
+    fn adjacent_view<'a>(&self, view: &'a View) -> Option<&'a View> {
+        view.adjacent_loop_view.as_deref().filter(|_| self.current_weight(view.shutter.middle()) < 1.0)
     }
 }
 
-/// What counts `share` of what is published.
-fn shared(mut publication: Publication, share: f32) -> Publication {
-    publication.lights.iter_mut().for_each(|light| light.intensity = light.intensity.map(|value| value * share));
-    publication.extinction *= f64::from(share);
+/// What is published, scaled by the weight of its run.
+fn scaled(mut publication: Publication, weight: f32) -> Publication {
+    publication.lights.iter_mut().for_each(|light| light.intensity = light.intensity.map(|value| value * weight));
+    publication.extinction *= f64::from(weight);
     publication
 }
 
-/// A snapshot's parts.
-struct Saved<'a> {
-    comes: bool,
-    taken: [u64; 2],
-    present: &'a [u8],
-    passing: &'a [u8],
-    beginning: &'a [u8],
+/// The contents of a snapshot.
+struct CrossfadeSnapshot<'a> {
+    adjacent_is_next: bool,
+    current_steps: u64,
+    adjacent_steps: u64,
+    current: &'a [u8],
+    adjacent: &'a [u8],
+    crossfade_start: &'a [u8],
 }
 
-impl<'a> Saved<'a> {
+impl<'a> CrossfadeSnapshot<'a> {
     fn read(bytes: &'a [u8]) -> Option<Self> {
-        let (comes, rest) = bytes.split_first()?;
-        let (present_taken, rest) = word(rest)?;
-        let (passing_taken, rest) = word(rest)?;
-        let (present, rest) = state(rest)?;
-        let (passing, rest) = state(rest)?;
-        let (beginning, rest) = state(rest)?;
-        let taken = [present_taken, passing_taken];
-        rest.is_empty().then_some(Self { comes: *comes == 1, taken, present, passing, beginning })
+        let (adjacent_is_next, rest) = bytes.split_first()?;
+        let adjacent_is_next = *adjacent_is_next == 1;
+        let (current_steps, rest) = word(rest)?;
+        let (adjacent_steps, rest) = word(rest)?;
+        let (current, rest) = state(rest)?;
+        let (adjacent, rest) = state(rest)?;
+        let (crossfade_start, rest) = state(rest)?;
+        let snapshot = Self { adjacent_is_next, current_steps, adjacent_steps, current, adjacent, crossfade_start };
+        rest.is_empty().then_some(snapshot)
     }
 }
 
@@ -247,63 +260,65 @@ fn state(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 }
 
 /// One frame of two runs.
-struct Mixed<'a> {
-    present: Box<dyn Prepared + 'a>,
-    passing: Box<dyn Prepared + 'a>,
-    share: f32,
+struct PreparedCrossfade<'a> {
+    current: Box<dyn Prepared + 'a>,
+    adjacent: Box<dyn Prepared + 'a>,
+    current_weight: f32,
     aovs: &'static [AovDescriptor],
-    bend: Option<Bend>,
+    deflection: Option<MixedDeflection>,
 }
 
-impl Prepared for Mixed<'_> {
+impl Prepared for PreparedCrossfade<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        self.present.bounds(slice).union(&self.passing.bounds(slice))
+        self.current.bounds(slice).union(&self.adjacent.bounds(slice))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let mut other = strip.empty_like();
-        self.present.draw(slice, strip);
-        self.passing.draw(slice, &mut other);
-        strip.crossfade(other, self.share, self.aovs);
+        let mut adjacent = strip.empty_like();
+        self.current.draw(slice, strip);
+        self.adjacent.draw(slice, &mut adjacent);
+        strip.crossfade(adjacent, self.current_weight, self.aovs);
     }
 
     fn figures(&self) -> Vec<Figure> {
-        let mix = |(present, passing): (Figure, Figure)| {
-            let value = f64::from(self.share).mul_add(present.value - passing.value, passing.value);
-            Figure { value, ..present }
+        let mix = |(current, adjacent): (Figure, Figure)| {
+            let value = f64::from(self.current_weight).mul_add(current.value - adjacent.value, adjacent.value);
+            Figure { value, ..current }
         };
-        self.present.figures().into_iter().zip(self.passing.figures()).map(mix).collect()
+        self.current.figures().into_iter().zip(self.adjacent.figures()).map(mix).collect()
     }
 
     fn may_refract(&self) -> bool {
-        self.present.may_refract() || self.passing.may_refract()
+        self.current.may_refract() || self.adjacent.may_refract()
     }
 
     fn deflection(&self) -> Option<Deflection<'_>> {
-        self.bend.as_ref().map(|bend| Deflection { depth: bend.depth, rect: bend.rect, angle: &bend.angle })
+        let mixed = self.deflection.as_ref()?;
+        Some(Deflection { depth: mixed.depth, rect: mixed.rect, angle: &mixed.angle })
     }
 }
 
-/// The angles of two runs together.
-struct Bend {
+/// The weighted mean of the deflections of two runs, at the smaller of their depths.
+struct MixedDeflection {
     depth: f64,
     rect: Rect,
     angle: Image<2>,
 }
 
-impl Bend {
-    fn new(present: &dyn Prepared, passing: &dyn Prepared, share: f32) -> Option<Self> {
-        let parts = [(present.deflection(), share), (passing.deflection(), 1.0 - share)];
-        let parts: Vec<_> = parts.into_iter().filter_map(|(part, share)| Some((part?, share))).collect();
-        let depth = parts.iter().map(|(part, _)| part.depth).reduce(f64::min)?;
-        let rect = parts.iter().fold(Rect::default(), |all, (part, _)| all.union(&part.rect));
+impl MixedDeflection {
+    fn new(current: &dyn Prepared, adjacent: &dyn Prepared, current_weight: f32) -> Option<Self> {
+        let weighted = [(current.deflection(), current_weight), (adjacent.deflection(), 1.0 - current_weight)];
+        let weighted: Vec<_> =
+            weighted.into_iter().filter_map(|(deflection, weight)| Some((deflection?, weight))).collect();
+        let depth = weighted.iter().map(|(deflection, _)| deflection.depth).reduce(f64::min)?;
+        let rect = weighted.iter().fold(Rect::default(), |all, (deflection, _)| all.union(&deflection.rect));
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
-        for (part, share) in &parts {
-            for y in 0..part.rect.height {
-                let row = &mut angle.row_mut(part.rect.y - rect.y + y)[part.rect.x - rect.x..][..part.rect.width];
+        for (Deflection { rect: own, angle: own_angle, .. }, weight) in &weighted {
+            for y in 0..own.height {
+                let row = &mut angle.row_mut(own.y - rect.y + y)[own.x - rect.x..][..own.width];
                 row.iter_mut()
-                    .zip(part.angle.row(y))
-                    .for_each(|(sum, own)| *sum = [0, 1].map(|i| own[i].mul_add(*share, sum[i])));
+                    .zip(own_angle.row(y))
+                    .for_each(|(sum, own)| *sum = [0, 1].map(|i| own[i].mul_add(*weight, sum[i])));
             }
         }
         Some(Self { depth, rect, angle })

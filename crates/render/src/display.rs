@@ -1,4 +1,4 @@
-//! The view transform of whole frames, for formats that are made to be looked at.
+//! The view transform of whole frames, for display formats.
 
 use bansho_base::{
     color::{AlphaConvention, DisplayCode, View},
@@ -18,12 +18,12 @@ bansho_base::choice! {
     }
 }
 
-/// Rows that one task turns to display pixels.
+/// Rows that one parallel task converts.
 const TASK_ROWS: usize = 16;
 
-/// The frame's beauty as display pixels: the camera's white balance, view, straight alpha of the given convention, sRGB encoding, dither.
-/// The view `raw` encodes nothing: its alpha is linear. What is below 0 or not a number counts as 0, in alpha too; what is infinite, as the
-/// brightest light.
+/// The frame's beauty as display pixels: white balance of the camera, view transform, straight alpha in the convention `alpha`, sRGB
+/// encoding, dither. The view `raw` encodes nothing, so its alpha is linear. Values below 0 and NaN become 0, in alpha too; infinity becomes
+/// the brightest value.
 pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConvention) -> DisplayImage {
     let alpha = if *view == View::RAW { AlphaConvention::Linear } else { alpha };
     let pixels = match depth {
@@ -33,7 +33,7 @@ pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConventi
     DisplayImage { width: frame.beauty.width(), height: frame.beauty.height(), opaque: frame.opaque, alpha, pixels }
 }
 
-/// Pixels as display codes, row after row. Dither goes by the place in the whole picture, so that a crop shows the same pixels.
+/// Display codes of the pixels, in rows. Dither depends on the position in the whole picture, so that a crop has the same pixels.
 pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View, alpha: AlphaConvention) -> Vec<[C; 4]> {
     let alpha = (!frame.opaque).then_some(alpha);
     let (level, view) = (Level::new(), view.with_white_balance(frame.header.white_balance_k.map(f64::from)));

@@ -1,4 +1,4 @@
-//! Whether a phenomenon is seen before its plate at all.
+//! Remarks on phenomena that hardly change their plate.
 
 use std::{collections::HashSet, sync::Arc};
 
@@ -6,37 +6,42 @@ use bansho_base::phenomenon::{Phenomenon, Remark};
 
 use crate::{
     compiled::CompiledScene,
-    loop_start::{picture, small},
     plan::Plan,
+    planning::loop_start::{draw_thumbnail, thumbnail_plan},
     shot::{RenderError, Shot},
 };
 
-/// Mean change of the picture beside its mean, of display values, below which nobody sees a phenomenon at once.
-const FAINT: f64 = 0.02;
-/// Change of display values that is seen also where it is small in extent, and the share of the picture that must change so much.
-const SEEN: f64 = 0.1;
-const SEEN_SHARE: f64 = 0.001;
+/// Mean change of display values, relative to their mean, below which a phenomenon is easily overlooked.
+const FAINT_MEAN: f64 = 0.02;
+/// Change of display values that is seen even if few pixels have it, and the fraction of the values that must change so much.
+const VISIBLE_CHANGE: f64 = 0.1;
+const VISIBLE_FRACTION: f64 = 0.001;
 
-/// Most phenomena of which each is looked at: a picture without it is drawn for every one, which holds all others.
-const MOST: usize = 16;
+/// Largest number of phenomena that are measured: for each, a picture of all the others is drawn.
+const MAX_MEASURED: usize = 16;
 
-/// Remarks on those phenomena that change the plate so little that they are hardly seen; on none of them without a plate.
+/// Remarks on those phenomena that change the plate so little that they are hardly seen; none without a plate.
 ///
-/// Measured in small pictures of one frame, and of two more where it shows none; what is simulated in steps is left out of it. Nothing is
-/// measured of more phenomena than are looked at one by one.
+/// Measured in a thumbnail of the middle frame, and where that shows no change in those of the first and last frame. Phenomena that are
+/// simulated in steps are left out. With more than [`MAX_MEASURED`] phenomena nothing is measured.
 pub(crate) fn faint(compiled: &CompiledScene, plan: &Plan) -> Vec<(String, Remark)> {
     if !plan.scene.has_plate() {
         return Vec::new();
     }
     let infos = || compiled.phenomena().map(|phenomenon| phenomenon.info());
     let stepped: Vec<&str> = infos().filter(|info| info.stepping.is_some()).map(|info| info.name).collect();
-    let own: HashSet<&str> =
-        plan.scene.instances.iter().filter(|own| own.enabled).map(|own| own.name.as_str()).collect();
-    let closed = Arc::new(compiled.without(&stepped));
+    let enabled: HashSet<&str> = plan
+        .scene
+        .instances
+        .iter()
+        .filter(|instance| instance.enabled)
+        .map(|instance| instance.name.as_str())
+        .collect();
+    let closed_forms = Arc::new(compiled.without(&stepped));
     let remark = |phenomenon: &&Arc<dyn Phenomenon>| {
         let info = phenomenon.info();
-        // What cannot be drawn will say so when it is.
-        let change = greatest_change(&closed, plan, info.name).ok()?;
+        // What cannot be drawn is reported when it is drawn for output.
+        let change = greatest_change(&closed_forms, plan, info.name).ok()?;
         let message = format!(
             "it changes the picture by {:.1} %, which is hardly seen; to show it, {}, or lower `exposure_ev100` in [plate]",
             100.0 * change.mean,
@@ -44,44 +49,44 @@ pub(crate) fn faint(compiled: &CompiledScene, plan: &Plan) -> Vec<(String, Remar
         );
         change.is_faint().then(|| (info.name.to_owned(), Remark::new(message)))
     };
-    let looked_at: Vec<_> = closed.phenomena().filter(|each| own.contains(each.info().name)).collect();
-    if looked_at.len() > MOST { Vec::new() } else { looked_at.iter().filter_map(remark).collect() }
+    let measured: Vec<_> = closed_forms.phenomena().filter(|each| enabled.contains(each.info().name)).collect();
+    if measured.len() > MAX_MEASURED { Vec::new() } else { measured.iter().filter_map(remark).collect() }
 }
 
 /// How much a picture differs from the one without a phenomenon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Change {
-    /// Mean, beside the mean of the picture without.
+    /// Mean absolute difference, relative to the mean of the picture without the phenomenon.
     mean: f64,
-    /// What is exceeded in the part that changes most.
-    most: f64,
+    /// Absolute difference that [`VISIBLE_FRACTION`] of the values exceed.
+    peak: f64,
 }
 
 impl Change {
     fn is_faint(&self) -> bool {
-        self.mean < FAINT && self.most < SEEN
+        self.mean < FAINT_MEAN && self.peak < VISIBLE_CHANGE
     }
 
     fn between(with: &[f64], without: &[f64]) -> Self {
         let mut each: Vec<f64> = with.iter().zip(without).map(|(a, b)| (a - b).abs()).collect();
         let (sum, all) = (each.iter().sum::<f64>(), without.iter().sum::<f64>());
         each.sort_by(f64::total_cmp);
-        let most = each.get(((1.0 - SEEN_SHARE) * each.len() as f64) as usize).copied().unwrap_or_default();
-        Self { mean: sum / all.max(f64::MIN_POSITIVE), most }
+        let peak = each.get(((1.0 - VISIBLE_FRACTION) * each.len() as f64) as usize).copied().unwrap_or_default();
+        Self { mean: sum / all.max(f64::MIN_POSITIVE), peak }
     }
 }
 
-/// The change in the middle frame, or if that is faint the greatest of the first's and the last's too.
+/// The change in the middle frame; if that is faint, the largest of the middle, first and last frame.
 fn greatest_change(compiled: &Arc<CompiledScene>, plan: &Plan, name: &str) -> Result<Change, RenderError> {
-    let small = Arc::new(small(plan));
+    let thumbnail = Arc::new(thumbnail_plan(plan));
     let without = Arc::new(compiled.without(&[name]));
-    let mut shots = [compiled.clone(), without].map(|compiled| Shot::open(compiled, small.clone()));
+    let mut shots = [compiled.clone(), without].map(|compiled| Shot::open(compiled, thumbnail.clone()));
     let frames = plan.frames();
-    let mut greatest = Change { mean: 0.0, most: 0.0 };
+    let mut greatest = Change { mean: 0.0, peak: 0.0 };
     for number in [(frames.start + frames.end) / 2, frames.start, frames.end - 1] {
-        let [with, without] = shots.each_mut().map(|shot| picture(shot, number));
+        let [with, without] = shots.each_mut().map(|shot| draw_thumbnail(shot, number));
         let change = Change::between(&with?, &without?);
-        greatest = Change { mean: greatest.mean.max(change.mean), most: greatest.most.max(change.most) };
+        greatest = Change { mean: greatest.mean.max(change.mean), peak: greatest.peak.max(change.peak) };
         if !greatest.is_faint() {
             break;
         }

@@ -1,19 +1,20 @@
-//! From a scene file to frames: the scene, what is compiled of it, the plan of a shot, and the shot itself.
+//! From a scene to frames: compiling, planning, drawing a shot.
+//!
+//! [`CompiledScene`] builds what the scene contains, once; [`Plan`] fixes everything before the first frame; [`Shot`] steps simulations and
+//! draws frames; [`display`](mod@display) applies the view transform for display formats.
 
 pub mod compiled;
 mod composite;
 mod context;
 mod crossfade;
 pub mod display;
-mod exposure;
 mod faint;
 pub mod fingerprint;
-mod loop_start;
 pub mod plan;
+mod planning;
 pub mod remarks;
 pub mod shot;
 
 pub use compiled::{BuildErrors, CompiledScene};
-pub use composite::slices;
 pub use plan::{Plan, PlanError, PlanOptions};
 pub use shot::{RenderError, Shot};

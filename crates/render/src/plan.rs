@@ -5,21 +5,23 @@ use std::sync::Arc;
 use bansho_base::{
     color,
     frame::FrameHeader,
+    host::assets::Assets,
     image::Rect,
+    parameters::{Parameters, Value},
     phenomenon::strip::{Shutter, View},
 };
 
-use crate::{compiled::CompiledScene, exposure, fingerprint::Fingerprint, loop_start};
+use crate::fingerprint::{self, Fingerprint};
 use bansho_scene::{FrameRate, Scene};
 
-/// What a job may ask of a shot beside its scene.
+/// Options of a shot that its scene does not state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanOptions {
     /// Another picture size, pixels.
     pub size: Option<[usize; 2]>,
-    /// Whether the scene's overscan is drawn, which only EXR has room for.
+    /// Whether the scene's overscan is drawn, which only EXR can hold.
     pub overscan: bool,
-    /// Only this part of the picture.
+    /// The region of the picture that is drawn; `None` for all of it.
     pub crop: Option<Rect>,
     /// Whether each phenomenon gets a layer of its own.
     pub layers: bool,
@@ -27,14 +29,14 @@ pub struct PlanOptions {
     pub aovs: bool,
     /// Whether frames carry the phenomena's figures.
     pub figures: bool,
-    /// How display formats will show the picture; a plate made for display is taken back through it.
+    /// The view transform of display formats. Its inverse is applied to a plate that is made for display.
     pub display: color::View,
 }
 
 /// Why a shot cannot be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// The part lies outside the picture.
+    /// The crop is not inside the picture.
     #[error("the crop {crop:?} reaches outside the picture of {size:?} pixels")]
     CropOutside {
         /// x, y, width, height.
@@ -42,19 +44,19 @@ pub enum PlanError {
         /// Width and height.
         size: [usize; 2],
     },
-    /// The picture has more pixels than are drawn.
-    #[error("{width} x {height} pixels are too many; allowed: 1 to {most} on a side")]
+    /// The picture is empty or too large.
+    #[error("{width} x {height} pixels: this size is not possible; allowed: 1 to {limit} on a side")]
     Size {
         /// Width.
         width: usize,
         /// Height.
         height: usize,
         /// Largest side.
-        most: usize,
+        limit: usize,
     },
 }
 
-/// A shot: the scene, and all that the frames have in common. Plain data: it holds no assets, and nothing that is built.
+/// Everything that is fixed before the first frame of a shot. Plain data: it holds no assets and nothing that is built.
 #[derive(Clone)]
 pub struct Plan {
     pub(crate) scene: Arc<Scene>,
@@ -62,7 +64,7 @@ pub struct Plan {
     /// Pixels around the picture on every side.
     pub(crate) overscan: usize,
     pub(crate) window: Rect,
-    /// Frames from the beginning of the loop's turn to the first one.
+    /// Offset of the first frame from the beginning of the loop, frames.
     pub loop_start: i64,
     /// Exposure, chosen once for the shot.
     pub exposure_ev100: f32,
@@ -72,27 +74,17 @@ pub struct Plan {
     pub aovs: bool,
     /// Whether frames carry the phenomena's figures.
     pub figures: bool,
-    /// How display formats show the picture.
+    /// The view transform of display formats, without the camera's white balance.
     pub display: color::View,
 }
 
 impl Plan {
-    /// Plans a shot of `compiled`, whose exposure and loop are measured where the scene leaves them open.
+    /// Plans a shot whose exposure and loop start are already known, for example from another plan of the same scene. [`Plan::new`] chooses
+    /// both.
     ///
     /// # Errors
     /// The options do not fit the scene.
-    pub fn new(compiled: &Arc<CompiledScene>, options: &PlanOptions) -> Result<Self, PlanError> {
-        let mut plan = Self::given(compiled.scene().clone(), options, 0.0, 0)?;
-        plan.exposure_ev100 = exposure::measure(compiled, &plan);
-        plan.loop_start = loop_start::search(compiled, &plan);
-        Ok(plan)
-    }
-
-    /// Plans a shot whose exposure and loop start are known, as from measuring them elsewhere.
-    ///
-    /// # Errors
-    /// The options do not fit the scene.
-    pub fn given(
+    pub fn with_exposure_and_loop_start(
         scene: Arc<Scene>,
         options: &PlanOptions,
         exposure_ev100: f32,
@@ -114,17 +106,17 @@ impl Plan {
         })
     }
 
-    /// The same shot in another size, whole and without overscan.
+    /// The same shot in another size, without crop and overscan.
     #[must_use]
     pub fn at_size(&self, size: [usize; 2]) -> Self {
         let window = Rect::from_size(size[0], size[1]);
         Self { size, window, overscan: 0, ..self.clone() }
     }
 
-    /// The same shot in another size and without overscan, of which only `crop` is drawn.
+    /// The same shot in another size and without overscan, cropped to `crop`.
     ///
     /// # Errors
-    /// A size that no picture has, or a crop that reaches outside it.
+    /// A size that is not possible, or a crop that is not inside the picture.
     pub fn cropped(&self, size: [usize; 2], crop: Rect) -> Result<Self, PlanError> {
         Ok(Self { window: window(size, 0, Some(crop))?, ..self.at_size(size) })
     }
@@ -144,7 +136,7 @@ impl Plan {
         self.overscan
     }
 
-    /// The part to draw, within the picture with its overscan.
+    /// The region to draw, in pixels of the picture with its overscan.
     pub fn window(&self) -> Rect {
         self.window
     }
@@ -159,12 +151,12 @@ impl Plan {
         self.scene.loop_s
     }
 
-    /// Frames a second.
+    /// Frames per second.
     pub fn fps(&self) -> FrameRate {
         self.scene.picture.fps
     }
 
-    /// The numbers of the whole shot's frames; of one turn where it is a loop.
+    /// The numbers of the shot's frames; of a loop, those of one period.
     pub fn frames(&self) -> std::ops::Range<i64> {
         let count = match self.loop_s() {
             Some(seconds) => (seconds / self.fps().frame_s()).round() as i64,
@@ -174,7 +166,7 @@ impl Plan {
         first..first + count
     }
 
-    /// When frame `number` begins, s; a loop begins again, at a calm moment of its turn.
+    /// Time at which frame `number` begins, s. Time is periodic in a loop, and the first frame is [`Plan::loop_start`] frames after time 0.
     pub fn time(&self, number: i64) -> f64 {
         let index = number - self.scene.picture.first_frame;
         let fps = self.fps();
@@ -185,14 +177,14 @@ impl Plan {
         index as f64 * f64::from(fps.seconds) / f64::from(fps.frames)
     }
 
-    /// When the shutter is open for frame `number`.
+    /// The interval of time in which the shutter is open for frame `number`.
     pub fn shutter(&self, number: i64) -> Shutter {
         let camera = &self.scene.camera;
         let open = self.time(number) + camera.shutter_offset_s;
         Shutter { open, close: open + camera.shutter_s.unwrap_or(0.5 * self.fps().frame_s()) }
     }
 
-    /// What frame `number` shows.
+    /// Camera, shutter and window of frame `number`.
     pub fn view(&self, number: i64) -> View {
         let shutter = self.shutter(number);
         let overscan = self.overscan;
@@ -202,12 +194,40 @@ impl Plan {
         view.aovs_requested = self.aovs;
         let view = view.with_window(self.window);
         match self.loop_s() {
-            Some(turn) => view.in_loop(turn),
+            Some(seconds) => view.in_loop(seconds),
             None => view,
         }
     }
 
-    /// The header of frame `number`, whose pixels have that fingerprint.
+    /// A fingerprint of all that the pixels of frame `number` depend on, files in `assets` included.
+    pub fn frame_fingerprint(&self, number: i64, assets: &dyn Assets) -> Fingerprint {
+        let mut hasher = blake3::Hasher::new();
+        fingerprint::hash_state(&self.scene, assets, &mut hasher);
+        let mut text = |label: &str, value: &dyn std::fmt::Display| {
+            hasher.update(format!("{label} {value}\n").as_bytes());
+        };
+        text("time", &self.time(number));
+        text("number", &number);
+        text("size", &format_args!("{:?} {:?}", self.size, self.window));
+        text("exposure", &self.exposure_ev100);
+        text("outputs", &format_args!("{} {}", self.layers, self.aovs));
+        text("view", &self.display.name());
+        if let Some(kelvin) = self.scene.picture.white_balance_k {
+            text("white balance", &kelvin);
+        }
+        text("fps", &format_args!("{:?}", self.fps()));
+        text("camera", &Value::Table(self.scene.camera.to_table()));
+        text("plate", &Value::Table(self.scene.plate.to_table()));
+        let plate = &self.scene.plate;
+        for path in [&plate.image, &plate.depth].into_iter().flatten() {
+            fingerprint::hash_asset(assets, &path.0, number, &mut hasher);
+        }
+        // The light of the plate of the first frame is used in all frames.
+        plate.image.iter().for_each(|path| fingerprint::hash_shared_asset(&self.scene, assets, &path.0, &mut hasher));
+        *hasher.finalize().as_bytes()
+    }
+
+    /// The header of frame `number`, whose pixels have the fingerprint `fingerprint`.
     pub fn header(&self, number: i64, fingerprint: Fingerprint) -> FrameHeader {
         let view = self.view(number);
         let overscan = self.overscan as i64;
@@ -224,23 +244,23 @@ impl Plan {
         }
     }
 
-    /// What absolute radiance is multiplied by, so that 1.0 is display white.
+    /// Factor from absolute radiance to exposed values, of which 1.0 is display white.
     pub fn exposure_scale(&self) -> f32 {
         color::exposure_scale(f64::from(self.exposure_ev100)) as f32
     }
 
-    /// How display formats show the picture, with the camera's white balance.
-    pub fn shown(&self) -> color::View {
+    /// The view transform of display formats, with the camera's white balance.
+    pub(crate) fn view_transform(&self) -> color::View {
         self.display.with_white_balance(self.scene.picture.white_balance_k)
     }
 }
 
-/// The drawn part within the picture with its overscan; crops count from the picture's own corner.
+/// The region to draw, in pixels of the picture with its overscan. `crop` is in pixels of the picture without it.
 fn window(size: [usize; 2], overscan: usize, crop: Option<Rect>) -> Result<Rect, PlanError> {
-    let most = bansho_scene::picture::LARGEST_SIDE as usize;
+    let limit = bansho_scene::picture::LARGEST_SIDE as usize;
     let [width, height] = size;
-    if !(1..=most).contains(&width) || !(1..=most).contains(&height) {
-        return Err(PlanError::Size { width, height, most });
+    if !(1..=limit).contains(&width) || !(1..=limit).contains(&height) {
+        return Err(PlanError::Size { width, height, limit });
     }
     let Some(crop) = crop else {
         return Ok(Rect::from_size(width + 2 * overscan, height + 2 * overscan));

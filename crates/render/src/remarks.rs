@@ -1,4 +1,4 @@
-//! Remarks: what users should know of how a scene will look.
+//! Remarks: what users should know about how a scene will look, and that is no error.
 
 use std::sync::{Arc, OnceLock};
 
@@ -16,29 +16,29 @@ use bansho_base::{
 use crate::{
     compiled::{ActiveRun, CompiledScene},
     context::ShotContext,
-    exposure::assumed_of_plate,
     faint::faint,
     plan::Plan,
-    shot::stepping::of_scene,
+    planning::exposure::assumed_of_plate,
+    shot::stepping::scene_publication,
 };
 use bansho_scene::PLATE_LAYER;
 
-/// What there is in a scene at one moment.
-struct Moment<'a> {
+/// A scene during one exposure.
+struct ExposedScene<'a> {
     shutter: Shutter,
     runs: &'a [ActiveRun],
     scene: Publication,
-    /// What phenomena publish, as far as anybody has asked.
+    /// What each phenomenon publishes, computed on first use.
     published: Vec<OnceLock<Publication>>,
     sky: Sky,
 }
 
-impl<'a> Moment<'a> {
+impl<'a> ExposedScene<'a> {
     fn new(context: &ShotContext, runs: &'a [ActiveRun], shutter: Shutter) -> Self {
         Self {
             shutter,
             runs,
-            scene: of_scene(context, shutter),
+            scene: scene_publication(context, shutter),
             published: runs.iter().map(|_| OnceLock::new()).collect(),
             sky: context.sky(shutter.middle()),
         }
@@ -50,23 +50,23 @@ impl<'a> Moment<'a> {
         let count = self.runs.len();
         let neighbors =
             OtherPhenomena { scene: &self.scene, count, published: &published, own_index: index, sky: &self.sky };
-        self.runs[index].participant.phenomenon.remark(&neighbors)
+        self.runs[index].built.phenomenon.remark(&neighbors)
     }
 }
 
-/// What users should know of how phenomena will look, each with its phenomenon's name.
+/// What users should know about how phenomena will look: the name of each phenomenon, and the remark.
 ///
-/// Said only of what is so in the first, the middle and the last frame; that nothing lights it, only where nothing is simulated that may
-/// shine later.
+/// Only what holds in the first, the middle and the last frame is reported. That nothing lights a phenomenon is reported only where nothing
+/// is simulated, since a simulated fire may light it later.
 pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remark)> {
     let context = ShotContext::new(compiled.clone(), Arc::new(plan.clone()));
     let runs = compiled.start();
     let may_shine_later = compiled.is_stepped();
     let frames = plan.frames();
     let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
-    let moments = shutters.map(|shutter| Moment::new(&context, &runs, shutter));
+    let exposures = shutters.map(|shutter| ExposedScene::new(&context, &runs, shutter));
     let remark = |index: usize| {
-        let [first, middle, last] = moments.each_ref().map(|moment| moment.remark(index));
+        let [first, middle, last] = exposures.each_ref().map(|exposure| exposure.remark(index));
         let always = first.filter(|remark| Some(remark) == middle.as_ref() && middle == last)?;
         let holds = !(may_shine_later && always.unless_lit_later);
         holds.then(|| (runs[index].info().name.to_owned(), always))
@@ -79,6 +79,6 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
         );
         (PLATE_LAYER.to_owned(), Remark::new(message))
     });
-    let looks = (0..runs.len()).filter_map(remark);
-    plate.into_iter().chain(looks).chain(faint(compiled, plan)).collect()
+    let of_phenomena = (0..runs.len()).filter_map(remark);
+    plate.into_iter().chain(of_phenomena).chain(faint(compiled, plan)).collect()
 }

@@ -32,9 +32,9 @@ def cases() -> list[Case]:
     external = '<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
     return [
         _drawing("whole", _svg(LINE), 0),
-        _drawing("empty", "", words="no SVG"),
-        _drawing("text", "no drawing", words="no SVG"),
-        _drawing("HTML", "<html><body/></html>", words="no SVG"),
+        _drawing("empty", "", words="not an SVG"),
+        _drawing("text", "no drawing", words="not an SVG"),
+        _drawing("HTML", "<html><body/></html>", words="not an SVG"),
         _drawing("no strokes", _svg(""), words="no strokes"),
         _drawing("only what is no stroke", _svg('<rect/><use href="#a"/><text>a</text>'), words="only rect, use, text"),
         _drawing("no UTF-8", b"<svg>\xff\xfe</svg>", words="UTF-8"),

@@ -21,9 +21,9 @@ def _names() -> list[Case]:
         _out("only an extension", ".png", 2, r"^error: \.png: has no extension"),
         _out("a folder's name", "out/", 2, r"^error: out/?: has no extension"),
         _out("the folder above", "..", 2, r"^error: \.\.: has no extension"),
-        _out("an unknown extension", "a.tiff", 2, r"^error: a\.tiff: `\.tiff` is not written"),
+        _out("an unknown extension", "a.tiff", 2, r"^error: a\.tiff: `\.tiff` is not supported"),
         _out("an extension of a megabyte's tenth", "a." + "b" * 100_000, 2, r"^error: "),
-        _out("two numbers", "a.##.##.png", 2, r"^error: a\.##\.##\.png: more than one place"),
+        _out("two numbers", "a.##.##.png", 2, r"^error: a\.##\.##\.png: more than one placeholder"),
         _out("a numbered film", "a.####.gif", 2, r"^error: a\.####\.gif: a \.gif file holds all frames"),
         _out("printf with a string", "a.%s.png", 2, r"^error: a\.%s\.png: `%`"),
         _out("printf with 99 digits", "a.%099d.png", 2, r"^error: a\.%099d\.png: `%`"),
@@ -35,7 +35,7 @@ def _names() -> list[Case]:
         _out("a newline", "a\nb.png", 0, ""),
         _out("a newline and an unknown extension", "a\nerror: b.tiff", 2, r"^error: "),
         _out("an escape sequence and an unknown extension", "\x1b[2J.tiff", 2, r"^error: "),
-        _out("a name of a scene", "scene.toml", 2, r"^error: scene\.toml: `\.toml` is not written"),
+        _out("a name of a scene", "scene.toml", 2, r"^error: scene\.toml: `\.toml` is not supported"),
     ]
 
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use bansho_base::host::{observer::Cancelled, plural::counted};
 use bansho_media::{
     MediaError,
-    input::InputError,
-    output::{naming::NamingError, sprite_sheet::SheetError},
+    files::{input::InputError, naming::NamingError},
+    imageops::sprite_sheet::SheetError,
 };
 use bansho_render::{PlanError, RenderError};
 use bansho_scene::{LoopError, SceneError, edit::EditError};
@@ -320,7 +320,6 @@ impl JobError {
             Self::ParticlesCancelled => Cause::Cancelled,
             #[cfg(feature = "rain")]
             Self::StreaksCancelled => Cause::Cancelled,
-            Self::Media(MediaError::Naming(_)) => Cause::Usage,
             Self::Render(_) | Self::Media(_) | Self::Tiles(_) => Cause::Work,
             Self::FramesLost { .. } | Self::FilesLost { .. } => Cause::Work,
         }

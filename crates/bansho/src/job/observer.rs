@@ -9,7 +9,7 @@ use bansho_base::{
     },
     phenomenon::Remark,
 };
-use bansho_media::output::naming::OutputKind;
+use bansho_media::format::OutputKind;
 use bansho_render::RenderError;
 
 /// Watches a job. Called from several threads.

@@ -13,7 +13,7 @@ use bansho_base::{
 };
 use bansho_media::{
     assets::InputLimits,
-    input::{self, InputError},
+    files::input::{self, InputError},
 };
 use bansho_render::CompiledScene;
 use bansho_scene::{

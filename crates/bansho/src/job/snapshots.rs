@@ -6,7 +6,7 @@ use std::{
 };
 
 use bansho_base::host::observer::{Observer, Stage, StageGuard};
-use bansho_media::output::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
+use bansho_media::files::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
 use bansho_render::Plan;
 
 use super::{
@@ -266,7 +266,7 @@ mod tests {
     #[cfg(feature = "fire")]
     fn states_of_the_renderer_bear_the_mark() {
         use bansho_base::host::assets::MemoryAssets;
-        use bansho_media::output::provenance;
+        use bansho_media::files::provenance;
         use bansho_render::{PlanOptions, Shot};
 
         let assets = Arc::new(MemoryAssets::default());

@@ -14,7 +14,7 @@ use bansho_base::{
     image::{Image, Rect},
     phenomenon::SnapshotError,
 };
-use bansho_media::output::provenance;
+use bansho_media::files::provenance;
 use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
 
 use super::{

@@ -17,9 +17,10 @@ use bansho::{
         color::{AlphaConvention, View},
         frame::{DisplayImage, Frame},
     },
-    media::output::{
-        naming::OutputPattern,
-        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
+    media::{
+        files::naming::OutputPattern,
+        format::PictureFormat,
+        output::sink::{FrameSlot, Picture, Sink, SinkOptions},
     },
     render::display::BitDepth,
 };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bansho::{
     KINDS,
     base::{host::printable::printable, parameters::nearest, phenomenon::kind::PhenomenonKind},
-    media::{MediaError, output::atomic},
+    media::{MediaError, files::atomic},
     scene::template,
 };
 
@@ -84,7 +84,7 @@ fn with_extension(name: &Path) -> PathBuf {
 fn copy_assets(example: &ExampleScene, folder: &Path) -> anyhow::Result<()> {
     for (path, bytes) in example.assets() {
         match atomic::write_new(&folder.join(path), bytes) {
-            Err(MediaError::IsThere { .. }) => {}
+            Err(MediaError::AlreadyExists { .. }) => {}
             written => written?,
         }
     }

@@ -3,7 +3,7 @@
 use bansho::{
     base::host::printable::printable,
     job::SceneFile,
-    media::output::atomic,
+    media::files::atomic,
     scene::{FORMAT, edit},
 };
 

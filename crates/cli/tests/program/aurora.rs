@@ -34,7 +34,7 @@ fn a_drawing_without_strokes_or_that_is_none_is_a_located_error() {
     for (file, expected) in [
         ("empty.svg", "contains no strokes (allowed"),
         ("text.svg", "contains no strokes, only use, text (allowed"),
-        ("words.svg", "it is no SVG"),
+        ("words.svg", "it is not an SVG"),
         ("gone.svg", "no such file"),
     ] {
         folder.write("scene.toml", &format!("{AURORA}[[aurora.shapes]]\nsheets = [{{ svg_file = \"{file}\" }}]\n"));

@@ -169,7 +169,7 @@ fn sizes_crops_and_loops_out_of_range_are_refused() {
 #[test]
 fn names_that_cannot_be_written_are_refused() {
     misused(&["--out", "a.tiff"], &["a.tiff", ".png, .exr, .apng, .gif, .mp4"]);
-    misused(&["--out", "a.##.##.png"], &["more than one place"]);
+    misused(&["--out", "a.##.##.png"], &["more than one placeholder"]);
     misused(&["--out", "frame"], &["no extension"]);
 }
 

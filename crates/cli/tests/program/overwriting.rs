@@ -215,7 +215,7 @@ fn what_comes_on_the_way_and_is_not_ours_stays() {
     fs::write(folder.path("f/f.0399.png"), "a photograph").unwrap();
     let run = crate::support::Run::of(child.wait_with_output().unwrap());
     assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
-    let said = "f.0399.png: is there and bears no mark of Bansho; allowed: another name, or --overwrite";
+    let said = "f.0399.png: is there already and was not made by Bansho; allowed: another name, or --overwrite";
     assert!(run.stderr.contains(said), "{}", run.stderr);
     assert_eq!(fs::read(folder.path("f/f.0399.png")).unwrap(), b"a photograph");
     assert!(folder.path("f/f.0100.png").exists() && !has_parts(&folder.path("f")));

@@ -76,7 +76,7 @@ fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written()
     let folder = Folder::with_scene(GAS);
     let name = folder.run(&["simulate", "scene.toml", "--particles", "gas.obj"]);
     assert_eq!((name.code, name.errors()), (Some(2), 1));
-    assert!(name.stderr.contains("`.obj` is not written here; allowed: .ply"), "{}", name.stderr);
+    assert!(name.stderr.contains("`.obj` is not supported here; allowed: .ply"), "{}", name.stderr);
     folder.write("sheet.toml", "bansho = 2\n[[flame_sheet]]\n");
     let sheet = folder.run(&["simulate", "sheet.toml", "--particles", "gas.ply"]);
     assert_eq!((sheet.code, sheet.errors()), (Some(2), 1));

@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::host::assets::Picture;
 
-/// Pictures by last use, the latest last.
+/// Pictures in the order of their last use, the latest at the end.
 #[derive(Debug, Default)]
 pub(crate) struct PictureCache {
     pictures: Vec<(PathBuf, Arc<Picture>)>,
@@ -17,8 +17,8 @@ fn bytes(picture: &Picture) -> usize {
 
 impl PictureCache {
     pub(crate) fn get(&mut self, path: &PathBuf) -> Option<Arc<Picture>> {
-        let place = self.pictures.iter().position(|(key, _)| key == path)?;
-        let entry = self.pictures.remove(place);
+        let index = self.pictures.iter().position(|(key, _)| key == path)?;
+        let entry = self.pictures.remove(index);
         let picture = entry.1.clone();
         self.pictures.push(entry);
         Some(picture)
@@ -69,7 +69,7 @@ mod tests {
         cache.insert(path("c"), picture(), budget);
         assert!(cache.get(&path("b")).is_none());
         assert!(cache.get(&path("a")).is_some() && cache.get(&path("c")).is_some());
-        // One that is larger than the budget is kept alone, since it is in use.
+        // A picture that exceeds the budget is kept alone, since it is in use.
         cache.insert(path("d"), picture(), 1);
         assert!(cache.get(&path("d")).is_some() && cache.get(&path("a")).is_none());
     }

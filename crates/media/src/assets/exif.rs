@@ -3,28 +3,28 @@
 use bansho_base::{color::ev100_of_camera, math};
 use exif::{Exif, In, Reader, Tag, Value};
 
-/// Exposure value at ISO 100 from an Exif block that begins with its TIFF header; `None` where it does not say, or is damaged.
+/// Exposure value at ISO 100 from an Exif block that begins with its TIFF header; `None` if a tag is missing or the block is damaged.
 ///
-/// From exposure time, f-number and sensitivity; time and f-number may be given in APEX units instead (CIPA DC-008, annex C).
+/// From exposure time, f-number and sensitivity. Time and f-number may be in APEX units instead (CIPA DC-008, annex C).
 pub(crate) fn exif_ev100(block: &[u8]) -> Option<f64> {
     let exif = Reader::new().continue_on_error(true).read_raw(block.to_vec());
     let exif = exif.or_else(|error| error.distill_partial_result(|_| {})).ok()?;
-    let stated = |tag| number(&exif, tag);
-    let time = stated(Tag::ExposureTime).or_else(|| stated(Tag::ShutterSpeedValue).map(|speed| math::exp2(-speed)));
-    let f_number = stated(Tag::FNumber).or_else(|| stated(Tag::ApertureValue).map(|value| math::exp2(0.5 * value)));
+    let value = |tag| number(&exif, tag);
+    let time = value(Tag::ExposureTime).or_else(|| value(Tag::ShutterSpeedValue).map(|speed| math::exp2(-speed)));
+    let f_number = value(Tag::FNumber).or_else(|| value(Tag::ApertureValue).map(|value| math::exp2(0.5 * value)));
     ev100_of_camera(f_number?, time?, sensitivity(&exif)?)
 }
 
-/// Largest value of the usual sensitivity tag, which refers to another tag.
-const FULL: f64 = 65_535.0;
+/// Largest value of `PhotographicSensitivity`; it means that the sensitivity is in another tag.
+const SENSITIVITY_OVERFLOW: f64 = 65_535.0;
 
 fn sensitivity(exif: &Exif) -> Option<f64> {
-    let usual = number(exif, Tag::PhotographicSensitivity).filter(|value| *value < FULL);
+    let photographic = number(exif, Tag::PhotographicSensitivity).filter(|value| *value < SENSITIVITY_OVERFLOW);
     let others = [Tag::RecommendedExposureIndex, Tag::StandardOutputSensitivity, Tag::ISOSpeed];
-    usual.or_else(|| others.into_iter().find_map(|tag| number(exif, tag)))
+    photographic.or_else(|| others.into_iter().find_map(|tag| number(exif, tag)))
 }
 
-/// The first value of a tag of the primary image: positive, or any in APEX units.
+/// The first value of a tag of the primary image. It must be positive unless it is in APEX units.
 fn number(exif: &Exif, tag: Tag) -> Option<f64> {
     let value = match &exif.get_field(tag, In::PRIMARY)?.value {
         Value::Rational(values) => values.first()?.to_f64(),
@@ -75,7 +75,7 @@ mod tests {
         assert_eq!(exif_ev100(&block(&[time, iso.clone()])), None);
         assert_eq!(exif_ev100(&block(&[(Tag::ExposureTime, rational(1, 0)), f_number, iso])), None);
         for end in 0..whole.len() {
-            // Cut off anywhere it gives what it has, or nothing.
+            // Truncated anywhere, it gives an exposure or none.
             let _ = exif_ev100(&whole[..end]);
         }
         assert_eq!(exif_ev100(b"no Exif at all"), None);

@@ -25,10 +25,10 @@ fn damaged(reason: impl ToString) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Reads a PNG of any kind: 1 to 16 bits, gray, palette, with alpha or without. Taken as sRGB, unless it says that its
-/// values are linear (a gAMA of 1 and no sRGB chunk); color profiles are not looked at.
+/// Decodes a PNG of any color type and bit depth. Its values are sRGB, or linear if it has a gAMA of 1 and no sRGB chunk; color profiles
+/// are ignored.
 pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
-    // For everything but pixels: text and profiles.
+    // The limit for text and profiles.
     let metadata = Limits { bytes: 64 << 20 };
     let mut decoder = Decoder::new_with_limits(Cursor::new(file), metadata);
     decoder.set_transformations(Transformations::EXPAND);
@@ -47,7 +47,7 @@ pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProbl
     let kept_rows = if is_interlaced { height } else { 1 };
     limit.check(file.len() as u64 + width * height * PIXEL_BYTES + kept_rows * row_bytes as u64)?;
     let mut pixels = Vec::with_capacity((width * height) as usize);
-    let decode = |row: &[u8], pixels: &mut Vec<[f32; 4]>| extend(pixels, row, color_type, bit_depth);
+    let decode = |row: &[u8], pixels: &mut Vec<[f32; 4]>| append_rows(pixels, row, color_type, bit_depth);
     if is_interlaced {
         let mut bytes = vec![0; height as usize * row_bytes];
         reader.next_frame(&mut bytes).map_err(damaged)?;
@@ -61,17 +61,17 @@ pub(crate) fn png(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProbl
 }
 
 /// Appends the pixels of whole rows.
-fn extend(pixels: &mut Vec<[f32; 4]>, bytes: &[u8], color_type: ColorType, bit_depth: BitDepth) {
+fn append_rows(pixels: &mut Vec<[f32; 4]>, bytes: &[u8], color_type: ColorType, bit_depth: BitDepth) {
     match bit_depth {
         BitDepth::Sixteen => {
             let value = |pair: &[u8; 2]| f32::from(u16::from_be_bytes(*pair)) / 65535.0;
-            extend_by(pixels, bytes.as_chunks().0.iter().map(value), color_type);
+            append_values(pixels, bytes.as_chunks().0.iter().map(value), color_type);
         }
-        _ => extend_by(pixels, bytes.iter().map(|code| f32::from(*code) / 255.0), color_type),
+        _ => append_values(pixels, bytes.iter().map(|code| f32::from(*code) / 255.0), color_type),
     }
 }
 
-fn extend_by(pixels: &mut Vec<[f32; 4]>, mut values: impl Iterator<Item = f32>, color_type: ColorType) {
+fn append_values(pixels: &mut Vec<[f32; 4]>, mut values: impl Iterator<Item = f32>, color_type: ColorType) {
     let mut next = || values.next();
     match color_type {
         ColorType::Grayscale => pixels.extend(std::iter::from_fn(|| next().map(|y| [y, y, y, 1.0]))),
@@ -86,7 +86,7 @@ fn extend_by(pixels: &mut Vec<[f32; 4]>, mut values: impl Iterator<Item = f32>, 
     }
 }
 
-/// Reads a JPEG, gray or colored, taken as sRGB.
+/// Decodes a JPEG, gray or colored. Its values are sRGB.
 pub(crate) fn jpeg(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))
@@ -97,9 +97,9 @@ pub(crate) fn jpeg(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProb
     decoder.decode_headers().map_err(damaged)?;
     let (width, height) = decoder.dimensions().ok_or_else(|| damaged("it has no size"))?;
     let [width, height] = limits::check_size([width as u64, height as u64])?;
-    // A block of 8 x 8 pixels takes at least 2 bits, but in a progressive file one code may stand for 2^15 empty ones.
+    // A block of 8 x 8 pixels takes at least 2 bits, but in a progressive file one code may represent 2^15 empty blocks.
     limits::check_expansion([width, height], width * height, file, 1 << 20)?;
-    // Three bytes of color, and in a progressive file two of each coefficient, also of those beyond the picture's edge.
+    // Three bytes of color, and in a progressive file two bytes for each coefficient, including those beyond the edge of the picture.
     let decoding_bytes = (width + 64) * (height + 64) * (3 + 3 * 2);
     limit.check(file.len() as u64 + decoding_bytes + width * height * PIXEL_BYTES)?;
     let exposure_ev100 = decoder.exif().and_then(|block| exif_ev100(block));

@@ -2,23 +2,21 @@
 
 use bansho_base::host::{assets::AssetProblem, memory};
 
-use crate::exr::attribute::Window;
-
 /// Largest side, pixels.
 pub const SIDE: u64 = 16384;
 /// Largest number of pixels: half of the largest square, 2 GiB as floats.
 pub const PIXELS: u64 = SIDE * SIDE / 2;
 /// Default memory limit of a scene's inputs, bytes.
 pub const MEMORY_BYTES: u64 = 2 << 30;
-/// Largest text file (a drawing, or another that a scene names), bytes.
+/// Largest text file (a drawing, or another file that a scene names), bytes.
 pub const TEXT_BYTES: u64 = 64 << 20;
-/// Largest compression ratio of DEFLATE: 258 bytes in two bits, and some margin for headers.
+/// Largest compression ratio of DEFLATE: 258 bytes in two bits, with a margin for headers.
 pub(crate) const DEFLATE_RATIO: u64 = 1040;
 
 /// Memory limit of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryLimit {
-    /// Bytes that all inputs together may take.
+    /// Bytes that all inputs may take in total.
     pub total: u64,
     /// Bytes that other inputs use already.
     pub used: u64,
@@ -36,10 +34,10 @@ impl MemoryLimit {
         self.total.saturating_sub(self.used)
     }
 
-    /// Whether an input may take so many `bytes`, those of its file included, and the system would give them.
+    /// Checks that an input that takes `bytes` bytes, including its file, is within the limit and that the system can allocate them.
     ///
     /// # Errors
-    /// It may not, or the system has no more.
+    /// It exceeds the limit, or the system has less memory.
     pub fn check(self, bytes: u64) -> Result<(), AssetProblem> {
         if bytes > self.available() {
             return Err(AssetProblem::Memory { bytes, limit: self.available(), others: self.used });
@@ -48,7 +46,7 @@ impl MemoryLimit {
     }
 }
 
-/// Refuses empty pictures and those beyond [`SIDE`] or [`PIXELS`].
+/// Rejects empty pictures and those beyond [`SIDE`] or [`PIXELS`].
 pub(crate) fn check_size([width, height]: [u64; 2]) -> Result<[u64; 2], AssetProblem> {
     if width == 0 || height == 0 {
         return Err(AssetProblem::Damaged(format!("it claims {width} x {height} pixels")));
@@ -62,7 +60,7 @@ pub(crate) fn check_size([width, height]: [u64; 2]) -> Result<[u64; 2], AssetPro
     Ok([width, height])
 }
 
-/// Refuses a picture of `claimed_bytes` that its file could not hold even at the format's largest compression ratio.
+/// Rejects a picture of `claimed_bytes` that its file could not hold even at the format's largest compression ratio.
 pub(crate) fn check_expansion(
     [width, height]: [u64; 2],
     claimed_bytes: u64,
@@ -75,10 +73,4 @@ pub(crate) fn check_expansion(
         return Err(AssetProblem::Damaged(reason));
     }
     Ok(())
-}
-
-/// Width and height of a window; 0 where it is turned inside out.
-pub(crate) fn window_size(window: Window) -> [u64; 2] {
-    let side = |axis: usize| i64::from(window.max[axis]) - i64::from(window.min[axis]) + 1;
-    [side(0).max(0) as u64, side(1).max(0) as u64]
 }

@@ -5,6 +5,8 @@ mod exif;
 pub mod gltf;
 mod image;
 pub mod limits;
+mod openexr;
+mod primaries;
 pub mod svg;
 
 use std::{
@@ -23,23 +25,22 @@ use self::{
     cache::PictureCache,
     limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
 };
-use crate::{
-    exr,
+use crate::files::{
     input::{self, InputError},
-    output::naming::FrameTemplate,
+    naming::FrameTemplate,
 };
-use gltf::{decode_mesh, files_beside};
+use gltf::{decode_mesh, external_buffer_uris};
 use svg::decode_drawing;
 
-/// Default size of the picture cache, bytes.
-pub const CACHE_BYTES: usize = 512 << 20;
+/// Largest size of the picture cache, bytes. The last picture is always kept.
+const CACHE_BYTES: usize = 512 << 20;
 
 /// Limits on the files that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputLimits {
-    /// Bytes of memory that they may take together while they are read and used.
+    /// Bytes of memory that they may take in total while they are read and used.
     pub memory_bytes: u64,
-    /// The folder that they must lie in when symbolic links are followed; without it they may lie anywhere.
+    /// The folder in which they must be after symbolic links are resolved; `None` allows any folder.
     pub root: Option<PathBuf>,
 }
 
@@ -49,18 +50,17 @@ impl Default for InputLimits {
     }
 }
 
-/// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file's name stands for the frame
-/// number. What was read is remembered, so a file that changes is seen after [`FileAssets::forget`].
+/// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file name is replaced by the frame
+/// number. Files are cached, so a change of a file is only seen after [`FileAssets::clear_cache`].
 ///
-/// A file is refused before memory is taken for it when it is no ordinary file, lies outside [`InputLimits::root`], claims more than
-/// [`limits::SIDE`] pixels on a side or more than its bytes could hold, or would take more than [`InputLimits::memory_bytes`] together
-/// with those that are in use.
+/// A file is rejected before memory is allocated if it is not a regular file, is outside [`InputLimits::root`], claims more than
+/// [`limits::SIDE`] pixels on a side or more than its bytes could contain, or would exceed [`InputLimits::memory_bytes`] together with the
+/// files in use.
 #[derive(Debug)]
 pub struct FileAssets {
     folder: PathBuf,
     limits: InputLimits,
-    cache_bytes: usize,
-    memory: Mutex<AssetCache>,
+    cache: Mutex<AssetCache>,
 }
 
 #[derive(Debug, Default)]
@@ -79,8 +79,8 @@ impl AssetCache {
         self.pictures.bytes() as u64 + meshes.chain(drawings).sum::<u64>()
     }
 
-    /// Evicts pictures, and meshes and drawings without other users.
-    fn make_room(&mut self) {
+    /// Evicts all pictures, and the meshes and drawings without other users.
+    fn evict_unused(&mut self) {
         self.pictures.clear();
         self.meshes.retain(|_, mesh| Arc::strong_count(mesh) > 1);
         self.drawings.retain(|_, drawing| Arc::strong_count(drawing) > 1);
@@ -88,30 +88,25 @@ impl AssetCache {
 }
 
 impl FileAssets {
-    /// Assets in `folder` and below, or wherever a path points, within the default limits.
+    /// Assets with paths relative to `folder`, within the default limits.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self::with_limits(folder, InputLimits::default())
     }
 
     /// As [`FileAssets::new`], within `limits`.
     pub fn with_limits(folder: impl Into<PathBuf>, limits: InputLimits) -> Self {
-        Self { folder: folder.into(), limits, cache_bytes: CACHE_BYTES, memory: Mutex::new(AssetCache::default()) }
+        Self { folder: folder.into(), limits, cache: Mutex::new(AssetCache::default()) }
     }
 
-    /// As [`FileAssets::new`], keeping at most `cache_bytes` of pictures, but always the last one.
-    pub fn with_cache(folder: impl Into<PathBuf>, cache_bytes: usize) -> Self {
-        Self { cache_bytes, ..Self::new(folder) }
+    /// Clears the cache, because files may have changed.
+    pub fn clear_cache(&self) {
+        *self.lock_cache() = AssetCache::default();
     }
 
-    /// Empties the cache, because files may have changed.
-    pub fn forget(&self) {
-        *self.cache() = AssetCache::default();
-    }
-
-    /// The file that `path` means for frame `frame`.
+    /// The file of `path` in frame `frame`.
     ///
     /// # Errors
-    /// More than one run of `#` in the name, or one of more than 20.
+    /// More than one run of `#` in the name, or a run of more than 20.
     pub fn resolve(&self, path: &str, frame: i64) -> Result<PathBuf, AssetError> {
         let (folder, name) = path.rsplit_once('/').map_or(("", path), |(folder, name)| (folder, name));
         let template = FrameTemplate::parse(name, false)
@@ -121,57 +116,56 @@ impl FileAssets {
         Ok(self.folder.join(folder).join(template.name(frame)))
     }
 
-    fn cache(&self) -> MutexGuard<'_, AssetCache> {
+    fn lock_cache(&self) -> MutexGuard<'_, AssetCache> {
         // The cache is only ever replaced as a whole, so a poisoned lock is usable.
-        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+        self.cache.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn limit(&self) -> MemoryLimit {
-        MemoryLimit { total: self.limits.memory_bytes, used: self.cache().used() }
+        MemoryLimit { total: self.limits.memory_bytes, used: self.lock_cache().used() }
     }
 
-    /// Reads within the remaining memory, and if that fails again after eviction.
+    /// Reads within the remaining memory; if that fails, once more after eviction.
     fn within_limit<T>(&self, read: impl Fn(MemoryLimit) -> Result<T, AssetProblem>) -> Result<T, AssetProblem> {
         match read(self.limit()) {
             Err(AssetProblem::Memory { .. } | AssetProblem::FileSize { .. } | AssetProblem::NoMemory { .. }) => {
-                self.cache().make_room();
+                self.lock_cache().evict_unused();
                 read(self.limit())
             }
             result => result,
         }
     }
 
-    /// The path that may be opened: the canonical path if all files must be in the root folder and it is.
-    fn allowed(&self, path: &Path) -> Result<PathBuf, AssetProblem> {
+    /// The path to open. With a root folder it is the canonical path, which must be inside the root.
+    fn checked_path(&self, path: &Path) -> Result<PathBuf, AssetProblem> {
         let Some(root) = &self.limits.root else { return Ok(path.to_path_buf()) };
         let outside = || AssetProblem::Outside { root: root.display().to_string() };
-        let within = fs::canonicalize(root).map_err(|error| AssetProblem::Unreadable(error.to_string()))?;
-        // For a missing file, the check is made on its existing ancestors, so that errors reveal nothing outside of the
-        // root.
-        let found = path.ancestors().find_map(|part| {
-            let part = if part.as_os_str().is_empty() { Path::new(".") } else { part };
-            fs::canonicalize(part).ok()
+        let canonical_root = fs::canonicalize(root).map_err(|error| AssetProblem::Unreadable(error.to_string()))?;
+        // For a missing file its nearest existing ancestor is checked, so that errors reveal nothing outside the root.
+        let found = path.ancestors().find_map(|ancestor| {
+            let ancestor = if ancestor.as_os_str().is_empty() { Path::new(".") } else { ancestor };
+            fs::canonicalize(ancestor).ok()
         });
-        let found = found.filter(|found| found.starts_with(&within)).ok_or_else(outside)?;
+        let found = found.filter(|found| found.starts_with(&canonical_root)).ok_or_else(outside)?;
         Ok(fs::canonicalize(path).map_or_else(|_| path.to_path_buf(), |_| found))
     }
 
-    /// The whole file, if it has at most `limit` bytes.
+    /// The bytes of a file of at most `limit` bytes.
     fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, AssetProblem> {
-        Ok(input::read(&self.allowed(path)?, limit)?)
+        Ok(input::read(&self.checked_path(path)?, limit)?)
     }
 
     fn read_mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetProblem> {
-        if let Some(mesh) = self.cache().meshes.get(path) {
+        if let Some(mesh) = self.lock_cache().meshes.get(path) {
             return Ok(mesh.clone());
         }
-        let beside = |name: &str, left: u64| self.read(&path.with_file_name(name), left);
+        let read_resource = |uri: &str, limit: u64| self.read(&path.with_file_name(uri), limit);
         let mesh = self.within_limit(|limit| {
             let file = self.read(path, limit.available())?;
-            decode_mesh(&file, extension(path), &beside, limit)
+            decode_mesh(&file, extension(path), &read_resource, limit)
         });
         let mesh = Arc::new(mesh?);
-        self.cache().meshes.insert(path.to_path_buf(), mesh.clone());
+        self.lock_cache().meshes.insert(path.to_path_buf(), mesh.clone());
         Ok(mesh)
     }
 
@@ -181,7 +175,7 @@ impl FileAssets {
     }
 
     fn read_drawing(&self, path: &Path) -> Result<Arc<Drawing>, AssetProblem> {
-        if let Some(drawing) = self.cache().drawings.get(path) {
+        if let Some(drawing) = self.lock_cache().drawings.get(path) {
             return Ok(drawing.clone());
         }
         let drawing = self.within_limit(|limit| {
@@ -189,46 +183,46 @@ impl FileAssets {
             limit.check(drawing.memory_bytes()).map(|()| drawing)
         });
         let drawing = Arc::new(drawing?);
-        self.cache().drawings.insert(path.to_path_buf(), drawing.clone());
+        self.lock_cache().drawings.insert(path.to_path_buf(), drawing.clone());
         Ok(drawing)
     }
 
-    /// All files that `path` leads to in frame `frame`: itself, and where it is a glTF those that its numbers lie in.
+    /// All files of `path` in frame `frame`: itself, and the buffers of a glTF.
     ///
     /// # Errors
-    /// As [`resolve`](Self::resolve). A file that cannot be read leads to no other.
+    /// As [`resolve`](Self::resolve). A glTF that cannot be read has no further files.
     pub fn files(&self, path: &str, frame: i64) -> Result<Vec<PathBuf>, AssetError> {
         let path = self.resolve(path, frame)?;
-        let beside = self.files_beside(&path);
-        Ok([vec![path], beside].concat())
+        let buffers = self.external_buffers(&path);
+        Ok([vec![path], buffers].concat())
     }
 
-    fn files_beside(&self, path: &Path) -> Vec<PathBuf> {
-        if !["gltf", "glb"].iter().any(|mesh| extension(path).eq_ignore_ascii_case(mesh)) {
+    fn external_buffers(&self, path: &Path) -> Vec<PathBuf> {
+        if !["gltf", "glb"].iter().any(|gltf| extension(path).eq_ignore_ascii_case(gltf)) {
             return Vec::new();
         }
         let file = self.read(path, self.limits.memory_bytes).unwrap_or_default();
-        let names = files_beside(&file, extension(path));
-        names.into_iter().map(|name| path.with_file_name(name)).collect()
+        let uris = external_buffer_uris(&file, extension(path));
+        uris.into_iter().map(|uri| path.with_file_name(uri)).collect()
     }
 
-    /// A digest of a file and of those that it names.
+    /// A digest of a file and of its external buffers.
     fn hash(&self, path: &Path) -> Result<[u8; 32], AssetProblem> {
         let own = self.hash_file(path)?;
-        let beside = self.files_beside(path);
-        if beside.is_empty() {
+        let buffers = self.external_buffers(path);
+        if buffers.is_empty() {
             return Ok(own);
         }
         let mut hasher = blake3::Hasher::new();
         hasher.update(&own);
-        for path in beside {
+        for path in buffers {
             hasher.update(&self.hash_file(&path)?);
         }
         Ok(*hasher.finalize().as_bytes())
     }
 
     fn hash_file(&self, path: &Path) -> Result<[u8; 32], AssetProblem> {
-        let (file, _) = input::open(&self.allowed(path)?, self.limits.memory_bytes)?;
+        let (file, _) = input::open(&self.checked_path(path)?, self.limits.memory_bytes)?;
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(file).map_err(InputError::from)?;
         Ok(*hasher.finalize().as_bytes())
@@ -239,16 +233,16 @@ fn extension(path: &Path) -> &str {
     path.extension().and_then(|extension| extension.to_str()).unwrap_or_default()
 }
 
-/// Reads a picture from the bytes of a file whose name ends in `extension` (without the dot): `png`, `jpg`, `jpeg`, `exr`.
+/// Decodes a picture from the bytes of a file with this `extension` (without the dot): `png`, `jpg`, `jpeg` or `exr`.
 ///
 /// # Errors
-/// Another extension, a claim beyond the [`limits`] or beyond `limit`, or damage. Never panics and never takes memory that the bytes could
-/// not fill.
+/// Another extension, a size beyond the [`limits`] or beyond `limit`, or damage. Never panics, and never allocates memory that the bytes
+/// could not fill.
 pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     match extension.to_ascii_lowercase().as_str() {
         "png" => image::png(bytes, limit),
         "jpg" | "jpeg" => image::jpeg(bytes, limit),
-        "exr" => exr::decode(bytes, limit),
+        "exr" => openexr::decode(bytes, limit),
         _ => Err(AssetProblem::UnknownKind),
     }
 }
@@ -256,7 +250,7 @@ pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Resu
 impl Assets for FileAssets {
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
         let path = self.resolve(path, frame)?;
-        if let Some(picture) = self.cache().pictures.get(&path) {
+        if let Some(picture) = self.lock_cache().pictures.get(&path) {
             return Ok(picture);
         }
         let picture = self.within_limit(|limit| {
@@ -264,7 +258,7 @@ impl Assets for FileAssets {
             decode_picture(&file, extension(&path), limit)
         });
         let picture = Arc::new(picture.map_err(|problem| error(&path, problem))?);
-        self.cache().pictures.insert(path, picture.clone(), self.cache_bytes);
+        self.lock_cache().pictures.insert(path, picture.clone(), CACHE_BYTES);
         Ok(picture)
     }
 
@@ -285,17 +279,17 @@ impl Assets for FileAssets {
 
     fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
         let path = self.resolve(path, frame)?;
-        let found = self.allowed(&path).and_then(|path| Ok(input::find(&path)?));
+        let found = self.checked_path(&path).and_then(|path| Ok(input::find(&path)?));
         found.map_err(|problem| error(&path, problem))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
         let path = self.resolve(path, frame)?;
-        if let Some(digest) = self.cache().digests.get(&path) {
+        if let Some(digest) = self.lock_cache().digests.get(&path) {
             return Ok(*digest);
         }
         let digest = self.hash(&path).map_err(|problem| error(&path, problem))?;
-        self.cache().digests.insert(path, digest);
+        self.lock_cache().digests.insert(path, digest);
         Ok(digest)
     }
 }

@@ -10,46 +10,54 @@ use super::{
     KEY_COLOR_SPACE, KEY_DIGEST, KEY_EXPOSURE, KEY_FINGERPRINT, KEY_FISHEYE_FOV, KEY_LENS, KEY_VERSION,
     plane::ChannelPlane,
 };
-use crate::{film::timing, output::fingerprint};
+use crate::{fingerprint, frame_rate};
 
 /// CIE xy of the ACEScg (AP1) red, green and blue and of its white, D60 (SMPTE ST 2065-4, S-2014-004).
 pub(crate) const AP1: [[f32; 2]; 4] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]];
 
-/// ACEScg as the Color Interop Forum calls it, for readers that look at no chromaticities, such as Blender.
+/// The name of ACEScg by the Color Interop Forum, for readers that ignore chromaticities, such as Blender.
 const COLOR_SPACE: &str = "lin_ap1_scene";
 
 /// First bytes of every file.
 pub(crate) const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Set in the version field where a name is longer than 31 bytes.
 pub(crate) const FLAG_LONG_NAMES: u32 = 0x400;
-/// Number of the compression by blocks of 16 lines.
+/// ZIP compression of blocks of 16 lines.
 const COMPRESSION_ZIP16: u8 = 3;
 
-/// A rectangle as OpenEXR stores it: both ends belong to it.
+/// A rectangle as OpenEXR stores it: both ends are inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
     pub(crate) min: [i32; 2],
     pub(crate) max: [i32; 2],
 }
 
+impl Window {
+    /// Width and height, pixels; 0 where an upper end is below the lower one.
+    pub(crate) fn size(self) -> [u64; 2] {
+        let side = |axis: usize| i64::from(self.max[axis]) - i64::from(self.min[axis]) + 1;
+        [side(0).max(0) as u64, side(1).max(0) as u64]
+    }
+}
+
 /// A header being written.
 pub(crate) struct HeaderBytes(Vec<u8>);
 
-/// A frame rate as the format holds it: its numerator has a sign.
+/// A frame rate for the format, whose numerator is a signed integer.
 fn rational(fps: [u32; 2]) -> [u32; 2] {
     const MAX: u32 = i32::MAX.cast_unsigned();
-    if fps[0] <= MAX { fps } else { timing::approximate(fps, MAX).unwrap_or(fps) }
+    if fps[0] <= MAX { fps } else { frame_rate::approximate(fps, MAX).unwrap_or(fps) }
 }
 
-/// The header of a frame and where in it the 64 digits of the digest go, which are zeros here.
-///
-/// No attribute depends on time, host or path, and their order is fixed.
-pub(crate) fn header(
-    frame: &FrameHeader,
-    planes: &[ChannelPlane<'_>],
-    data: Window,
-    display: Window,
-) -> (Vec<u8>, usize) {
+/// A header in which the 64 digits of the digest are zeros.
+pub(crate) struct Header {
+    pub(crate) bytes: Vec<u8>,
+    /// Offset of the digits of the digest.
+    pub(crate) digest_at: usize,
+}
+
+/// The header of a frame. No attribute depends on time, host or path, and their order is fixed.
+pub(crate) fn header(frame: &FrameHeader, planes: &[ChannelPlane<'_>], data: Window, display: Window) -> Header {
     let mut bytes = HeaderBytes::begin(planes.iter().any(|plane| plane.name.len() > 31));
     bytes.attribute("channels", "chlist", &channel_list(planes));
     bytes.attribute("compression", "compression", &[COMPRESSION_ZIP16]);
@@ -78,10 +86,10 @@ pub(crate) fn header(
     let HeaderBytes(mut bytes) = bytes;
     let digest_at = bytes.len() - 64;
     bytes.push(0);
-    (bytes, digest_at)
+    Header { bytes, digest_at }
 }
 
-/// What is known of the lens: a matrix and an angle of view say nothing true of a dome or a panorama.
+/// The lens. A projection matrix and a field of view are written only for perspective cameras, since they cannot describe a dome or a panorama.
 fn lens(camera: &CameraHeader, bytes: &mut HeaderBytes) {
     if let Some(matrix) = &camera.world_to_ndc {
         bytes.floats("worldToNDC", "m44f", matrix.as_flattened());

@@ -1,7 +1,7 @@
 //! Frames to OpenEXR bytes: one part, lines in increasing order, ZIP in blocks of 16 lines.
 //!
-//! The header is written here rather than by the `exr` crate, which keeps free attributes in a hash map and so writes
-//! them in another order every time; Bansho's files are the same bytes for the same frame. The compression is the crate's.
+//! The header is written here rather than by the `exr` crate, which keeps custom attributes in a hash map and so writes
+//! them in another order every time. Bansho writes the same bytes for the same frame. The compression is by the crate.
 
 use std::path::Path;
 
@@ -11,18 +11,18 @@ use ::exr::{
     meta::{
         BlockDescription,
         attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType, Text},
-        header::Header,
+        header::Header as CrateHeader,
     },
 };
 use bansho_base::frame::{Frame, Precision};
 
 use super::{
-    attribute::{self, Window},
-    plane::{ChannelPlane, Row, planes},
+    attribute::{self, Header, Window},
+    plane::{ChannelPlane, RowBuffer, planes},
 };
 use crate::{
     error::{MediaError, SizeRule},
-    output::fingerprint,
+    fingerprint,
 };
 use rayon::prelude::*;
 
@@ -32,20 +32,19 @@ const LINES_PER_BLOCK: usize = 16;
 const SIDE_LIMIT: usize = 1 << 20;
 
 /// The bytes of an OpenEXR file of `frame`: beauty as half `R,G,B,A`, depth as float `Z`, and every layer and AOV under
-/// its own name; a name that ends in no component (`torch.temperature_k`) gets `.V`, without which readers lose the channel.
-/// Colors are ACEScg, premultiplied. Compressed in parallel in the caller's thread pool; the same frame
-/// gives the same bytes whatever the number of threads. Colors beyond the range of half are written as 65504, colors that are no numbers as 0,
-/// as display formats show them; depth and AOVs are written as they are.
+/// its own name. A name without a component (`torch.temperature_k`) gets the suffix `.V`, without which readers ignore the channel.
+/// Colors are ACEScg, premultiplied. Compressed in parallel in the caller's rayon pool; the same frame gives the same bytes with any number of
+/// threads. Colors beyond the range of half are clamped to 65504, and NaN becomes 0, as in display formats. Depth and AOVs are not changed.
 ///
 /// # Errors
-/// A size the format cannot hold, channels of another length than the picture, names that are empty, too long or
-/// double. `path` is only named in errors.
+/// A size that the format does not allow, channels of another length than the picture, names that are empty, too long or duplicate. `path` is only
+/// used in errors.
 pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
     let planes = planes(frame);
     check_planes(frame, &planes, path)?;
     let (data, display) = windows(frame, path)?;
     let blocks = compressed_blocks(frame, &planes, path)?;
-    let (mut file, digest_at) = attribute::header(&frame.header, &planes, data, display);
+    let Header { bytes: mut file, digest_at } = attribute::header(&frame.header, &planes, data, display);
     let mut offset = file.len() + 8 * blocks.len();
     file.reserve(8 * blocks.len() + blocks.iter().map(|block| block.len() + 8).sum::<usize>());
     for block in &blocks {
@@ -67,8 +66,8 @@ fn check_planes(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Resu
     let expected = frame.beauty.width() * frame.beauty.height();
     for (index, plane) in planes.iter().enumerate() {
         let name = &*plane.name;
-        let twice = index > 0 && planes[index - 1].name == name;
-        if name.split('.').any(str::is_empty) || name.len() > 255 || name.contains('\0') || twice {
+        let is_duplicate = index > 0 && planes[index - 1].name == name;
+        if name.split('.').any(str::is_empty) || name.len() > 255 || name.contains('\0') || is_duplicate {
             return Err(MediaError::ChannelName { path: path.to_path_buf(), name: name.to_owned() });
         }
         if plane.len() != expected {
@@ -107,7 +106,7 @@ fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) ->
     let bytes_per_line = width * planes.iter().map(ChannelPlane::bytes_per_value).sum::<usize>();
     let block = |index: usize| {
         let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
-        let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), Row::default());
+        let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), RowBuffer::default());
         for line in lines.clone() {
             planes.iter().for_each(|plane| plane.append(line * width..(line + 1) * width, &mut row, &mut bytes));
         }
@@ -121,17 +120,17 @@ fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) ->
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
-/// What the crate must know of the picture in order to compress a part of it.
-fn crate_header(planes: &[ChannelPlane<'_>], width: usize, height: usize) -> Header {
+/// The header that the crate needs to compress a block.
+fn crate_header(planes: &[ChannelPlane<'_>], width: usize, height: usize) -> CrateHeader {
     let channel = |plane: &ChannelPlane<'_>| {
         let kind = match plane.precision {
             Precision::Half => SampleType::F16,
             Precision::Single => SampleType::F32,
         };
-        // The crate looks at the type alone; a name of its own making cannot be refused.
+        // The crate uses only the type. A dummy name avoids its checks of names.
         ChannelDescription::new(Text::new_or_none("c").unwrap_or_default(), kind, false)
     };
-    Header::new(Text::default(), (width, height), planes.iter().map(channel).collect()).with_encoding(
+    CrateHeader::new(Text::default(), (width, height), planes.iter().map(channel).collect()).with_encoding(
         Compression::ZIP16,
         BlockDescription::ScanLines,
         LineOrder::Increasing,
@@ -207,17 +206,19 @@ mod tests {
 
     #[test]
     fn what_is_not_known_of_a_lens_does_not_stand_in_the_file() {
-        let says = |frame: &Frame, name: &str| {
+        let contains = |frame: &Frame, name: &str| {
             let file = encode(frame, Path::new("a.exr")).unwrap();
             file.windows(name.len() + 1).any(|part| part == [name.as_bytes(), b"\0"].concat())
         };
         let mut frame = testing::frame(8, 8);
-        assert!(says(&frame, "worldToNDC") && says(&frame, "verticalFovDeg") && !says(&frame, "bansho:lens"));
+        assert!(
+            contains(&frame, "worldToNDC") && contains(&frame, "verticalFovDeg") && !contains(&frame, "bansho:lens")
+        );
         let camera = &mut frame.header.camera;
         (camera.world_to_ndc, camera.vertical_fov_deg) = (None, None);
         (camera.lens, camera.fisheye_fov_deg) = (Some(Lens::Fisheye), Some(200.0));
-        assert!(!says(&frame, "worldToNDC") && !says(&frame, "verticalFovDeg"));
-        assert!(says(&frame, "bansho:lens") && says(&frame, "bansho:fisheyeFovDeg"));
+        assert!(!contains(&frame, "worldToNDC") && !contains(&frame, "verticalFovDeg"));
+        assert!(contains(&frame, "bansho:lens") && contains(&frame, "bansho:fisheyeFovDeg"));
     }
 
     #[test]

@@ -1,13 +1,10 @@
 //! OpenEXR: scene-linear frames with layers, AOVs, camera and exposure.
 
 pub(crate) mod attribute;
-mod decode;
 mod encode;
 pub(crate) mod parse;
 mod plane;
-mod primaries;
 
-pub(crate) use decode::decode;
 pub use encode::encode;
 
 /// Header attribute (string): the name of the color space ("Color Space Encodings", Color Interop Forum, 2024).

@@ -9,19 +9,23 @@ use super::attribute::{FLAG_LONG_NAMES, MAGIC, Window};
 pub(crate) struct PartHeader {
     pub(crate) channels: Vec<ChannelEntry>,
     pub(crate) compression: Option<u8>,
-    pub(crate) data: Option<Window>,
-    pub(crate) display: Option<Window>,
+    pub(crate) data_window: Option<Window>,
+    pub(crate) display_window: Option<Window>,
+    /// Width and height of a tile, pixels; `None` for scan lines.
     pub(crate) tile: Option<[u32; 2]>,
+    /// CIE xy of red, green, blue and white.
     pub(crate) chromaticities: Option<[[f32; 2]; 4]>,
+    /// String attributes: name, and range of bytes in the file.
     pub(crate) strings: Vec<(String, Range<usize>)>,
     pub(crate) floats: Vec<(String, f32)>,
 }
 
-/// A channel and its subsampling.
+/// A channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChannelEntry {
     pub(crate) name: String,
     pub(crate) bytes_per_sample: u64,
+    /// Subsampling in x and y.
     pub(crate) sampling: [i32; 2],
 }
 
@@ -35,9 +39,9 @@ pub(crate) struct FileHeader {
 /// Why a header is unreadable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum HeaderError {
-    #[error("does not begin as an OpenEXR file")]
+    #[error("it does not begin as an OpenEXR file")]
     NotExr,
-    #[error("its header is cut off or damaged")]
+    #[error("its header is truncated or damaged")]
     Damaged,
     #[error("its header has more than {MAX_PARTS} parts or {MAX_CHANNELS} channels")]
     TooManyParts,
@@ -56,7 +60,7 @@ impl PartHeader {
 
     /// Byte range of the string attribute `name` in the file.
     pub(crate) fn string(&self, name: &str) -> Option<Range<usize>> {
-        self.strings.iter().find(|(key, _)| key == name).map(|(_, place)| place.clone())
+        self.strings.iter().find(|(key, _)| key == name).map(|(_, range)| range.clone())
     }
 }
 
@@ -128,7 +132,7 @@ impl<'a> Reader<'a> {
             let start = self.at;
             let file = self.take(size).map(|_| &self.file[..start + size])?;
             let value = Reader { file, at: start };
-            part.set(&String::from_utf8_lossy(name), kind, value)?;
+            part.set_attribute(&String::from_utf8_lossy(name), kind, value)?;
         }
     }
 
@@ -160,12 +164,12 @@ impl<'a> Reader<'a> {
 }
 
 impl PartHeader {
-    fn set(&mut self, name: &str, kind: &[u8], mut value: Reader<'_>) -> Option<()> {
+    fn set_attribute(&mut self, name: &str, kind: &[u8], mut value: Reader<'_>) -> Option<()> {
         match (name, kind) {
             ("channels", b"chlist") => self.channels = value.channels()?,
             ("compression", b"compression") => self.compression = Some(value.array::<1>()?[0]),
-            ("dataWindow", b"box2i") => self.data = Some(value.window()?),
-            ("displayWindow", b"box2i") => self.display = Some(value.window()?),
+            ("dataWindow", b"box2i") => self.data_window = Some(value.window()?),
+            ("displayWindow", b"box2i") => self.display_window = Some(value.window()?),
             ("tiles", b"tiledesc") => {
                 self.tile = Some([value.array().map(u32::from_le_bytes)?, value.array().map(u32::from_le_bytes)?]);
             }

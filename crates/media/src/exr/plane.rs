@@ -5,10 +5,10 @@ use std::{borrow::Cow, ops::Range};
 use bansho_base::frame::{Frame, Precision};
 use half::slice::HalfFloatSliceExt;
 
-/// Largest finite half: brighter pixels are clamped to it, since infinities and NaN spoil every filter.
+/// Largest finite half, to which brighter pixels are clamped: infinities and NaN spread in every filter.
 const HALF_MAX: f32 = 65504.0;
 
-/// Component names that readers recognize. Blender drops channels that end in anything else.
+/// Component names that readers recognize. Blender ignores channels with other suffixes.
 const COMPONENTS: [&str; 10] = ["R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W"];
 
 /// One channel of the file.
@@ -24,7 +24,7 @@ enum ChannelSource<'a> {
     Values(&'a [f32]),
 }
 
-/// All channels of `frame`, sorted by name as the format demands.
+/// All channels of `frame`, sorted by name as the format requires.
 pub(crate) fn planes(frame: &Frame) -> Vec<ChannelPlane<'_>> {
     let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| ChannelPlane {
         name: name.into(),
@@ -46,14 +46,14 @@ pub(crate) fn planes(frame: &Frame) -> Vec<ChannelPlane<'_>> {
     planes
 }
 
-/// Channel name in the file: a plain quantity, `torch.temperature_k`, becomes the only component, `V`, of its layer.
+/// Channel name in the file. A scalar quantity such as `torch.temperature_k` becomes the single component `V` of a layer.
 fn exr_channel_name(name: &str) -> Cow<'_, str> {
     let is_component = name.rsplit('.').next().is_some_and(|last| COMPONENTS.contains(&last));
     if is_component { name.into() } else { format!("{name}.V").into() }
 }
 
 impl ChannelPlane<'_> {
-    /// Number of values: that of the frame's pixels.
+    /// Number of values.
     pub(crate) fn len(&self) -> usize {
         match self.source {
             ChannelSource::Beauty(pixels, _) => pixels.len(),
@@ -61,7 +61,7 @@ impl ChannelPlane<'_> {
         }
     }
 
-    /// Bytes a value takes in the file.
+    /// Bytes of a value in the file.
     pub(crate) fn bytes_per_value(&self) -> usize {
         match self.precision {
             Precision::Half => 2,
@@ -69,8 +69,8 @@ impl ChannelPlane<'_> {
         }
     }
 
-    /// Appends the values of the pixels `range`, in this machine's byte order.
-    pub(crate) fn append(&self, range: Range<usize>, row: &mut Row, bytes: &mut Vec<u8>) {
+    /// Appends the values of the pixels `range`, in native byte order.
+    pub(crate) fn append(&self, range: Range<usize>, row: &mut RowBuffer, bytes: &mut Vec<u8>) {
         row.floats.clear();
         match self.source {
             ChannelSource::Beauty(pixels, component) => {
@@ -90,15 +90,15 @@ impl ChannelPlane<'_> {
     }
 }
 
-/// A color that half can hold, and that spoils nothing it is mixed with.
+/// A finite color within the range of half.
 #[inline(always)]
 fn finite_half(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(-HALF_MAX, HALF_MAX) }
 }
 
-/// Room for one row while it is converted.
+/// Buffer for the conversion of a row.
 #[derive(Default)]
-pub(crate) struct Row {
+pub(crate) struct RowBuffer {
     floats: Vec<f32>,
     halves: Vec<half::f16>,
 }

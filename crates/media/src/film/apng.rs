@@ -1,6 +1,6 @@
 //! Animated PNG (PNG third edition, sections 4.9 and 11.3.6), in an endless loop.
 //!
-//! Each frame is compressed as a PNG of its own, on any thread; here its chunks are renumbered and appended.
+//! Each frame is compressed as a separate PNG, on any thread. Its chunks are then renumbered and appended.
 
 use std::{io::Write, path::Path};
 
@@ -9,7 +9,8 @@ use bansho_base::frame::DisplayImage;
 use super::{ordered::FilmEncoder, timing};
 use crate::{
     error::MediaError,
-    output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy},
+    files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
+    imageops::flatten,
     png::{self, chunk},
 };
 
@@ -55,7 +56,7 @@ impl ApngFilm {
     }
 }
 
-/// One frame as a PNG, with the color type that all frames share.
+/// One frame as a PNG, with the same color type for all frames.
 pub(crate) fn prepare(picture: &DisplayImage, opaque: bool, path: &Path) -> Result<Vec<u8>, MediaError> {
     match (opaque, picture.opaque) {
         (true, false) => png::encode_frame(&flatten::over_black(picture), path),
@@ -72,11 +73,11 @@ impl FilmEncoder for ApngFilm {
         if is_first {
             bytes.extend(chunk::SIGNATURE);
         }
-        let mut controlled = false;
+        let mut has_control = false;
         for chunk in chunk::chunks(&encoded).into_iter().flatten().flatten() {
             match &chunk.kind {
                 b"IDAT" => {
-                    if !std::mem::replace(&mut controlled, true) {
+                    if !std::mem::replace(&mut has_control, true) {
                         self.push_control(&mut bytes);
                     }
                     if is_first {

@@ -1,8 +1,8 @@
-//! Animated GIF: one palette for the whole film, found from all its frames, and a dither that stands still, so that flames
-//! do not shimmer.
+//! Animated GIF: one palette for the whole film, made from all frames, and ordered dithering that is constant in time, so that flames do
+//! not shimmer.
 //!
-//! Frames are kept compressed in an unnamed temporary file until the last has come; then the palette is known and they
-//! are written. Memory stays at a few pictures whatever the number of frames.
+//! Frames are kept compressed in an unnamed temporary file until the last one is added; then the palette is made and they are written.
+//! Memory is that of a few pictures, whatever the number of frames.
 
 use std::{
     fs::File,
@@ -20,7 +20,8 @@ use super::{
 };
 use crate::{
     error::{MediaError, SizeRule},
-    output::{atomic::AtomicFile, flatten, overwrite_policy::OverwritePolicy, provenance},
+    files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy, provenance},
+    imageops::flatten,
     png,
 };
 use rayon::prelude::*;
@@ -47,8 +48,8 @@ pub(crate) struct GifFrame(Option<(Vec<u8>, FrameHistogram)>);
 
 pub(crate) struct GifFilm {
     file: AtomicFile,
+    /// The temporary file: compressed frames one after another.
     spool: File,
-    /// Position of each frame in the temporary file, and its index.
     spooled: Vec<SpooledFrame>,
     histogram: Histogram,
     format: GifFormat,
@@ -58,6 +59,7 @@ pub(crate) struct GifFilm {
 #[derive(Clone, Copy)]
 struct SpooledFrame {
     index: usize,
+    /// Length in the temporary file, bytes.
     length: usize,
 }
 
@@ -177,7 +179,7 @@ impl Writer<'_> {
     /// One frame with its delay, dithered and compressed.
     fn frame(&self, index: usize, bytes: &[u8]) -> Result<::gif::Frame<'static>, MediaError> {
         let [width, height] = self.format.size;
-        let (pixels, channels) = unpack(bytes).ok_or_else(|| MediaError::Encode {
+        let (pixels, channels) = decode_frame(bytes).ok_or_else(|| MediaError::Encode {
             path: PathBuf::from(self.path),
             reason: "a frame kept in the temporary file was lost".to_owned(),
         })?;
@@ -192,7 +194,7 @@ impl Writer<'_> {
         let mut frame = ::gif::Frame {
             width: width as u16,
             height: height as u16,
-            delay: self.format.timing.length_cs(index, self.format.frame_count),
+            delay: self.format.timing.delay_cs(index, self.format.frame_count),
             dispose: if self.transparent.is_some() { DisposalMethod::Background } else { DisposalMethod::Keep },
             transparent: self.transparent,
             buffer: indices.into(),
@@ -210,8 +212,8 @@ impl Writer<'_> {
     }
 }
 
-/// The samples of a PNG of `prepare`, and the number of samples for each pixel.
-fn unpack(bytes: &[u8]) -> Option<(Vec<u8>, usize)> {
+/// The samples of a PNG, and the number of samples per pixel.
+fn decode_frame(bytes: &[u8]) -> Option<(Vec<u8>, usize)> {
     let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().ok()?;
     let mut pixels = vec![0; reader.output_buffer_size()?];
     let info = reader.next_frame(&mut pixels).ok()?;
@@ -272,8 +274,8 @@ mod tests {
     fn a_transparent_film_shows_pixels_by_half_their_alpha() {
         let frames = read_back(&film(2, [25, 1], true));
         for (_, pixels) in frames {
-            for (place, pixel) in pixels.as_chunks::<4>().0.iter().enumerate() {
-                assert_eq!(pixel[3], if place % 8 < 3 { 0 } else { 255 }, "pixel {place}");
+            for (index, pixel) in pixels.as_chunks::<4>().0.iter().enumerate() {
+                assert_eq!(pixel[3], if index % 8 < 3 { 0 } else { 255 }, "pixel {index}");
             }
         }
     }

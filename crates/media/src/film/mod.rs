@@ -1,4 +1,4 @@
-//! Films: APNG and GIF, encoded in this process, and other formats by `ffmpeg`. Frames may arrive out of order.
+//! Films: APNG and GIF, encoded in this process, and other formats by `ffmpeg`. Frames may be added out of order.
 
 pub(crate) mod apng;
 pub mod ffmpeg;

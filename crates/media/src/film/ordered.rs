@@ -10,7 +10,7 @@ use crate::error::MediaError;
 
 /// An encoder that appends frames to one file.
 pub(crate) trait FilmEncoder: Send {
-    /// A frame, encoded as far as it can be on its own.
+    /// A frame, encoded as far as possible without the other frames.
     type EncodedFrame: Send;
 
     /// Appends the next frame.
@@ -41,9 +41,9 @@ impl<F: FilmEncoder> ReorderBuffer<F> {
         Self { path, frame_count, window: window.max(1), state }
     }
 
-    /// Appends the frame at position `index`, at once or after those before it.
+    /// Appends the frame at position `index`, as soon as all frames before it have been appended.
     pub(crate) fn push(&self, index: usize, encoded: F::EncodedFrame) -> Result<(), MediaError> {
-        // After a panic of a lock's owner, `film` is unchanged; the file is never renamed.
+        // A poisoned lock is usable: a panic can at worst leave the film incomplete, and then it is never renamed.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let state = &mut *state;
         let Some(film) = &mut state.film else {
@@ -127,7 +127,7 @@ mod tests {
                 let film = &film;
                 scope.spawn(move || {
                     for index in (thread..200).step_by(4) {
-                        // A thread too far ahead is told so and may try again.
+                        // A thread too far ahead gets an error and tries again.
                         while film.push(index, index).is_err() {
                             std::thread::yield_now();
                         }

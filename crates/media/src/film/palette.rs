@@ -1,8 +1,8 @@
 //! One palette for a whole animation, from the colors of all its frames.
 //!
-//! Boxes of a color histogram are split where their spread is greatest (after X. Wu, "Efficient statistical computations
-//! for optimal color quantization", 1991), then moved to the means of the colors nearest to them (Lloyd). Everything
-//! begins from integer counts, so that neither threads nor the order of frames can change the outcome.
+//! Boxes of a color histogram are split along the axis of largest variance (after X. Wu, "Efficient statistical computations for optimal
+//! color quantization", 1991); then the entries are refined by k-means (Lloyd). All sums start from integer counts, so that the result
+//! depends neither on threads nor on the order of frames.
 
 use rayon::prelude::*;
 
@@ -10,26 +10,26 @@ use rayon::prelude::*;
 const BITS: usize = 6;
 /// Bins of the histogram.
 const BINS: usize = 1 << (3 * BITS);
-/// Codes of a channel that fall into a bin.
+/// Codes of a channel per bin.
 const BIN_WIDTH: u8 = 1 << (8 - BITS);
 /// Steps of k-means.
 const KMEANS_STEPS: usize = 3;
 /// Perceptual weights of errors in red, green and blue.
 const CHANNEL_WEIGHTS: [f32; 3] = [3.0, 4.0, 2.0];
 
-/// Number of colors in a bin, and sums of their channels relative to the bin's lowest codes.
+/// Number of colors in a bin, and sums of their channels relative to the lowest codes of the bin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bin<N> {
     count: N,
-    beyond: [N; 3],
+    offset_sums: [N; 3],
 }
 
 impl Bin<u64> {
-    /// Mean of the colors of a bin that has some. The bin's center would not do: night skies have colors of few bins,
-    /// and would all become darker or brighter.
+    /// Mean of the colors of a nonempty bin. The center of the bin would not suffice: night skies have colors of few bins, and would become
+    /// darker or brighter as a whole.
     fn mean(&self, index: usize) -> [f32; 3] {
         std::array::from_fn(|axis| {
-            (f64::from(bin_min_code(index, axis)) + self.beyond[axis] as f64 / self.count as f64) as f32
+            (f64::from(bin_min_code(index, axis)) + self.offset_sums[axis] as f64 / self.count as f64) as f32
         })
     }
 }
@@ -47,7 +47,7 @@ impl FrameHistogram {
     pub(crate) fn count(&mut self, color: [u8; 3]) {
         let bin = &mut self.0[histogram_bin(color)];
         bin.count = bin.count.saturating_add(1);
-        for (sum, code) in bin.beyond.iter_mut().zip(color) {
+        for (sum, code) in bin.offset_sums.iter_mut().zip(color) {
             *sum = sum.saturating_add(u32::from(code % BIN_WIDTH));
         }
     }
@@ -66,7 +66,7 @@ impl Histogram {
     pub(crate) fn add(&mut self, frame: &FrameHistogram) {
         for (sum, bin) in self.0.iter_mut().zip(&frame.0).filter(|(_, bin)| bin.count > 0) {
             sum.count += u64::from(bin.count);
-            (0..3).for_each(|axis| sum.beyond[axis] += u64::from(bin.beyond[axis]));
+            (0..3).for_each(|axis| sum.offset_sums[axis] += u64::from(bin.offset_sums[axis]));
         }
     }
 
@@ -83,8 +83,8 @@ impl Histogram {
 }
 
 fn histogram_bin([r, g, b]: [u8; 3]) -> usize {
-    let part = |channel: u8| usize::from(channel) >> (8 - BITS);
-    (part(r) << (2 * BITS)) | (part(g) << BITS) | part(b)
+    let quantized = |channel: u8| usize::from(channel) >> (8 - BITS);
+    (quantized(r) << (2 * BITS)) | (quantized(g) << BITS) | quantized(b)
 }
 
 /// The lowest code of a channel in the bin with this index.
@@ -98,12 +98,14 @@ struct WeightedColor {
     weight: f32,
 }
 
-/// A box of colors that share a palette entry while the palette is built.
+/// A box of colors that have a common palette entry while the palette is built.
 struct ColorBox {
     colors: Vec<WeightedColor>,
-    /// Axis of the greatest spread, mean along it, and spread times weight.
+    /// Axis of the largest weighted variance.
     axis: usize,
+    /// Mean along that axis.
     mean: f32,
+    /// Sum of weighted squared deviations along that axis.
     spread: f32,
 }
 
@@ -141,17 +143,17 @@ fn mean(colors: &[WeightedColor]) -> Option<[f32; 3]> {
 /// Up to `size` palette entries for all counted colors; at least one.
 pub(crate) fn palette(histogram: &Histogram, size: usize) -> Vec<[u8; 3]> {
     let colors = histogram.colors();
-    let mut cells = vec![ColorBox::new(colors.clone())];
-    while cells.len() < size {
+    let mut boxes = vec![ColorBox::new(colors.clone())];
+    while boxes.len() < size {
         let widest =
-            (0..cells.len()).fold(0, |best, next| if cells[next].spread > cells[best].spread { next } else { best });
-        if cells[widest].spread <= 0.0 {
+            (0..boxes.len()).fold(0, |best, next| if boxes[next].spread > boxes[best].spread { next } else { best });
+        if boxes[widest].spread <= 0.0 {
             break;
         }
-        let halves = cells.swap_remove(widest).split();
-        cells.extend(halves);
+        let halves = boxes.swap_remove(widest).split();
+        boxes.extend(halves);
     }
-    let mut entries: Vec<[f32; 3]> = cells.iter().map(ColorBox::centroid).collect();
+    let mut entries: Vec<[f32; 3]> = boxes.iter().map(ColorBox::centroid).collect();
     for _ in 0..KMEANS_STEPS {
         entries = kmeans_step(&colors, &entries);
     }
@@ -209,8 +211,7 @@ fn octant_center(index: usize, octant: usize) -> [f32; 3] {
     })
 }
 
-/// Penalty of pairs of unlike colors relative to pairs of like colors with the same mean: dither dots must not stand
-/// out.
+/// Penalty of pairs of different colors relative to pairs of similar colors with the same mean, so that dither dots are not conspicuous.
 const DOT_PENALTY: f32 = 0.15;
 /// Radius of an octant, as the root of [`distance`].
 const OCTANT_RADIUS: f32 = 1.5;
@@ -259,7 +260,7 @@ fn pair(color: [f32; 3], entries: &[[f32; 3]]) -> EntryPair {
         let t = far_fraction(color, start, end);
         let mixed = std::array::from_fn(|axis| (end[axis] - start[axis]).mul_add(t, start[axis]));
         let length = distance(start, end);
-        // If the center itself were an entry, any second entry would do, even the brightest; but other colors of the
+        // If the center were equal to an entry, any second entry would have the same error, even the brightest. But other colors of the
         // octant would get dots of it.
         let dots = (t + OCTANT_RADIUS / length.sqrt().max(1.0)).min(0.5);
         let error = distance(color, mixed) + DOT_PENALTY * dots * (1.0 - dots) * length;
@@ -303,7 +304,7 @@ mod tests {
         histogram
     }
 
-    /// A number from 0 to 1 that looks like chance (H. Mueller's integer hash).
+    /// A pseudorandom number from 0 to 1 (H. Mueller's integer hash).
     fn noise(number: usize) -> f32 {
         let mut bits = number as u32;
         for _ in 0..2 {

@@ -1,36 +1,9 @@
 //! Frame times of animations, in the units of their formats.
 
-/// Greatest common divisor.
-fn greatest_common_divisor(a: u32, b: u32) -> u32 {
-    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
-}
+use crate::frame_rate::{approximate, reduce};
 
-/// `fps` in lowest terms; `None` for a rate of zero or without end.
-pub(crate) fn reduce([frames, seconds]: [u32; 2]) -> Option<[u32; 2]> {
-    let common = greatest_common_divisor(frames, seconds);
-    (frames > 0 && seconds > 0).then(|| [frames / common, seconds / common])
-}
-
-/// The rate nearest to `fps` among the convergents of its continued fraction whose numbers are `most` at the most: `fps` itself in lowest terms
-/// where they are, else less than 1 part in `most` away. `None` for a rate that is zero, without end, or beyond what such numbers hold.
-pub(crate) fn approximate(fps: [u32; 2], limit: u32) -> Option<[u32; 2]> {
-    let [mut rest, mut greatest_common_divisor] = reduce(fps)?.map(u64::from);
-    let (mut before, mut found) = ([0_u64, 1], [1_u64, 0]);
-    while greatest_common_divisor > 0 {
-        let whole = rest / greatest_common_divisor;
-        let next = [0, 1].map(|term| whole * found[term] + before[term]);
-        if next.iter().any(|term| *term > u64::from(limit)) {
-            break;
-        }
-        (before, found) = (found, next);
-        (rest, greatest_common_divisor) = (greatest_common_divisor, rest % greatest_common_divisor);
-    }
-    let [frames, seconds] = found.map(|term| u32::try_from(term).unwrap_or(limit));
-    (frames > 0 && seconds > 0).then_some([frames, seconds])
-}
-
-/// Length of a frame for APNG, seconds as a fraction of 16-bit numbers. Rates whose fraction is longer become the nearest that fits, less than
-/// 1 part in 65,535 away.
+/// Duration of a frame for APNG, `[numerator, denominator]` of seconds in 16 bits. Other rates are approximated with a relative error below
+/// 1 / 65,535.
 pub(crate) fn apng_delay(fps: [u32; 2]) -> Option<[u16; 2]> {
     let [frames, seconds] = approximate(fps, u32::from(u16::MAX))?;
     Some([u16::try_from(seconds).ok()?, u16::try_from(frames).ok()?])
@@ -46,7 +19,7 @@ pub(crate) struct GifTiming {
 }
 
 impl GifTiming {
-    /// `None` for a rate of zero, or so slow that a frame's length does not fit.
+    /// `None` for a rate of zero, or one so slow that the delay of a frame does not fit into 16 bits.
     pub(crate) fn new(fps: [u32; 2]) -> Option<Self> {
         let fps = reduce(fps)?.map(u64::from);
         (fps[1] * 100 / fps[0] < u64::from(u16::MAX)).then_some(Self { fps })
@@ -56,27 +29,26 @@ impl GifTiming {
         self.fps[0] * MIN_DELAY_CS > self.fps[1] * 100
     }
 
-    /// The fiftieth of a second in which frame `index` begins.
-    fn slot(&self, index: usize) -> u64 {
+    /// The fiftieth of a second in which frame `index` begins, from 0.
+    fn fiftieth(&self, index: usize) -> u64 {
         index as u64 * self.fps[1] * (100 / MIN_DELAY_CS) / self.fps[0]
     }
 
-    /// Whether frame `index` is kept: all, up to 50 frames a second; of faster films the first in each fiftieth of a
-    /// second.
+    /// Whether frame `index` is kept: all frames up to 50 frames per second; of faster films the first one in each fiftieth of a second.
     pub(crate) fn is_kept(&self, index: usize) -> bool {
-        index == 0 || !self.is_too_fast() || self.slot(index) != self.slot(index - 1)
+        index == 0 || !self.is_too_fast() || self.fiftieth(index) != self.fiftieth(index - 1)
     }
 
     /// Start of frame `index`, hundredths of a second, rounded from the exact time so that errors do not accumulate.
     pub(crate) fn start_cs(&self, index: usize) -> u64 {
         if self.is_too_fast() {
-            return self.slot(index) * MIN_DELAY_CS;
+            return self.fiftieth(index) * MIN_DELAY_CS;
         }
         (index as u64 * self.fps[1] * 200 + self.fps[0]) / (2 * self.fps[0])
     }
 
-    /// Delay of frame `index` of `count` until the next that is kept, hundredths of a second.
-    pub(crate) fn length_cs(&self, index: usize, count: usize) -> u16 {
+    /// Delay of frame `index` of `count` until the next frame that is kept, hundredths of a second.
+    pub(crate) fn delay_cs(&self, index: usize, count: usize) -> u16 {
         let next = (index + 1..count).find(|&next| self.is_kept(next)).unwrap_or(count);
         let length = self.start_cs(next).saturating_sub(self.start_cs(index)).max(MIN_DELAY_CS);
         u16::try_from(length).unwrap_or(u16::MAX)
@@ -86,19 +58,20 @@ impl GifTiming {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame_rate::tests::irregular_rates;
 
     #[test]
     fn gif_time_does_not_drift() {
         for fps in [[24, 1], [30, 1], [24000, 1001], [12, 1], [50, 1], [1, 3]] {
             let timing = GifTiming::new(fps).unwrap();
             let exact = 24_000.0 * f64::from(fps[1]) / f64::from(fps[0]);
-            let total: u64 = (0..240).map(|index| u64::from(timing.length_cs(index, 240))).sum();
+            let total: u64 = (0..240).map(|index| u64::from(timing.delay_cs(index, 240))).sum();
             assert!((total as f64 - exact).abs() <= 0.5, "{fps:?}: {total} for {exact}");
             assert!((0..240).all(|index| timing.is_kept(index)));
         }
         // 30 frames a second: 3, 4 and 3 hundredths, again and again.
         let timing = GifTiming::new([30, 1]).unwrap();
-        assert_eq!([0, 1, 2, 3].map(|index| timing.length_cs(index, 30)), [3, 4, 3, 3]);
+        assert_eq!([0, 1, 2, 3].map(|index| timing.delay_cs(index, 30)), [3, 4, 3, 3]);
     }
 
     #[test]
@@ -108,7 +81,7 @@ mod tests {
             let frames = fps[0] as usize;
             let shown: Vec<usize> = (0..frames).filter(|&index| timing.is_kept(index)).collect();
             assert_eq!(shown.len(), kept, "{fps:?}");
-            assert!(shown.iter().all(|&index| timing.length_cs(index, frames) == 2));
+            assert!(shown.iter().all(|&index| timing.delay_cs(index, frames) == 2));
             let gaps: Vec<usize> = shown.windows(2).map(|pair| pair[1] - pair[0]).collect();
             assert!(gaps.iter().max().unwrap() - gaps.iter().min().unwrap() <= 1, "{gaps:?}");
         }
@@ -129,19 +102,11 @@ mod tests {
     #[test]
     fn rates_whose_fraction_does_not_fit_become_the_nearest_that_does() {
         let rates = [[999_999, 1000], [700_001, 1000], [333_333, 1000], [100_001, 1_000_000], [u32::MAX, 4_294_968]];
-        let more = (1..4000_u32).map(|i| [i.wrapping_mul(0x9E37_79B9) % 1_000_000 + 1000, 1000 + i * 77]);
-        for fps in rates.into_iter().chain(more) {
-            let exact = f64::from(fps[0]) / f64::from(fps[1]);
-            let rate = |[frames, seconds]: [u32; 2]| f64::from(frames) / f64::from(seconds);
-            let [seconds, frames] = apng_delay(fps).unwrap().map(u32::from);
-            let error = (rate([frames, seconds]) / exact - 1.0).abs();
-            assert!(error < 1.0 / 65_535.0, "{fps:?}: {frames}/{seconds}, wrong by {error}");
-            let signed = approximate(fps, i32::MAX as u32).unwrap();
-            assert!((rate(signed) / exact - 1.0).abs() < 1.0 / 2_147_483_647.0, "{fps:?}: {signed:?}");
+        for fps in rates.into_iter().chain(irregular_rates()) {
+            let [seconds, frames] = apng_delay(fps).unwrap().map(f64::from);
+            let error = (frames / seconds * f64::from(fps[1]) / f64::from(fps[0]) - 1.0).abs();
+            assert!(error < 1.0 / 65_535.0, "{fps:?}: {frames}/{seconds}, relative error {error}");
         }
-        assert_eq!(approximate([60_000, 2000], u32::MAX), Some([30, 1]));
-        assert_eq!(approximate([u32::MAX, u32::MAX - 1], u32::MAX), Some([u32::MAX, u32::MAX - 1]));
-        assert_eq!((approximate([1, 100_000], 65_535), approximate([100_000, 1], 65_535)), (None, None));
     }
 
     #[test]

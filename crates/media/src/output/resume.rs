@@ -2,22 +2,26 @@
 
 use std::path::Path;
 
-use super::fingerprint;
-use crate::{exr, input, png};
+use crate::{exr, files::input, fingerprint, format::OutputKind, png};
 
-/// Largest frame file that is read, bytes: a larger one is not Bansho's.
+/// Largest frame file that is read, bytes. Bansho writes no larger ones.
 const FRAME_BYTES: u64 = 8 << 30;
 
-/// The fingerprint of the PNG or OpenEXR file at `path` if it is one that Bansho wrote and is whole to the last byte:
-/// every checksum of a PNG is right up to its end, an OpenEXR file has the digest that its header names.
-/// `None` for a file that is missing, cut off, damaged or someone else's, and for what is no ordinary file.
-pub fn existing_fingerprint(path: &Path) -> Option<[u8; 32]> {
-    fingerprint(&input::read(path, FRAME_BYTES).ok()?)
+/// The fingerprint of the frame at `path`, a file of format `kind`, if Bansho wrote it and it is complete: every checksum of a PNG is right
+/// up to its end; the digest in the header of an OpenEXR file is that of its bytes. `None` for a file that is missing, truncated, damaged or
+/// made by another program, for what is not a regular file, and for films.
+pub fn existing_fingerprint(path: &Path, kind: OutputKind) -> Option<[u8; 32]> {
+    fingerprint(&input::read(path, FRAME_BYTES).ok()?, kind)
 }
 
 /// As [`existing_fingerprint`], of the bytes of a file.
-pub fn fingerprint(file: &[u8]) -> Option<[u8; 32]> {
-    if file.starts_with(&exr::attribute::MAGIC) { of_exr(file) } else { of_png(file) }
+pub fn fingerprint(file: &[u8], kind: OutputKind) -> Option<[u8; 32]> {
+    match kind {
+        OutputKind::Png => of_png(file),
+        OutputKind::Exr => of_exr(file),
+        // A film contains many frames, and is always written from the start.
+        OutputKind::Apng | OutputKind::Gif | OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => None,
+    }
 }
 
 fn of_png(file: &[u8]) -> Option<[u8; 32]> {
@@ -38,9 +42,9 @@ fn of_png(file: &[u8]) -> Option<[u8; 32]> {
 }
 
 fn of_exr(file: &[u8]) -> Option<[u8; 32]> {
-    let outline = exr::parse::parse_header(file).ok()?;
-    let [part] = &outline.parts[..] else { return None };
-    let digest_at = part.string(exr::KEY_DIGEST).filter(|place| place.len() == 64)?;
+    let header = exr::parse::parse_header(file).ok()?;
+    let [part] = &header.parts[..] else { return None };
+    let digest_at = part.string(exr::KEY_DIGEST).filter(|range| range.len() == 64)?;
     let digest = fingerprint::from_hex(file.get(digest_at.clone())?)?;
     let mut hasher = blake3::Hasher::new();
     hasher.update(file.get(..digest_at.start)?).update(&[b'0'; 64]).update(file.get(digest_at.end..)?);
@@ -77,38 +81,41 @@ mod tests {
 
     #[test]
     fn whole_files_give_their_fingerprint() {
-        assert_eq!(fingerprint(&a_png()), Some(FINGERPRINT));
-        assert_eq!(fingerprint(&an_exr()), Some(FINGERPRINT));
+        assert_eq!(fingerprint(&a_png(), OutputKind::Png), Some(FINGERPRINT));
+        assert_eq!(fingerprint(&an_exr(), OutputKind::Exr), Some(FINGERPRINT));
+        // A file of another format than its name says is not the frame that was to be written.
+        assert_eq!([fingerprint(&a_png(), OutputKind::Exr), fingerprint(&an_exr(), OutputKind::Png)], [None; 2]);
+        assert_eq!(fingerprint(&a_png(), OutputKind::Apng), None);
     }
 
     #[test]
     fn cut_off_files_count_as_absent() {
-        for file in [a_png(), an_exr()] {
+        for (file, kind) in [(a_png(), OutputKind::Png), (an_exr(), OutputKind::Exr)] {
             for length in 0..file.len() {
-                assert_eq!(fingerprint(&file[..length]), None, "cut to {length} of {}", file.len());
+                assert_eq!(fingerprint(&file[..length], kind), None, "cut to {length} of {}", file.len());
             }
         }
     }
 
     #[test]
     fn any_changed_byte_makes_a_file_count_as_absent() {
-        for file in [a_png(), an_exr()] {
-            for place in 0..file.len() {
+        for (file, kind) in [(a_png(), OutputKind::Png), (an_exr(), OutputKind::Exr)] {
+            for index in 0..file.len() {
                 let mut damaged = file.clone();
-                damaged[place] ^= 0x10;
-                assert_eq!(fingerprint(&damaged), None, "byte {place} of {}", file.len());
+                damaged[index] ^= 0x10;
+                assert_eq!(fingerprint(&damaged, kind), None, "byte {index} of {}", file.len());
             }
         }
     }
 
     #[test]
     fn files_with_more_behind_them_and_missing_files_count_as_absent() {
-        for file in [a_png(), an_exr()] {
-            assert_eq!(fingerprint(&[&file[..], b"x"].concat()), None);
+        for (file, kind) in [(a_png(), OutputKind::Png), (an_exr(), OutputKind::Exr)] {
+            assert_eq!(fingerprint(&[&file[..], b"x"].concat(), kind), None);
         }
-        assert_eq!(existing_fingerprint(Path::new("no such folder/a.png")), None);
-        // A device without end.
+        assert_eq!(existing_fingerprint(Path::new("no such folder/a.png"), OutputKind::Png), None);
+        // An endless device.
         #[cfg(unix)]
-        assert_eq!(existing_fingerprint(Path::new("/dev/zero")), None);
+        assert_eq!(existing_fingerprint(Path::new("/dev/zero"), OutputKind::Png), None);
     }
 }

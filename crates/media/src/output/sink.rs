@@ -1,4 +1,4 @@
-//! The sink of finished frames: a sequence of files, or one film.
+//! The sink of finished frames: a sequence of files, or a film.
 
 use std::path::{Path, PathBuf};
 
@@ -7,37 +7,24 @@ use bansho_base::{
     frame::{DisplayImage, DisplayPixels, Frame},
 };
 
-use super::{
-    atomic::{self, AtomicFile},
-    naming::{OutputKind, OutputPattern},
-    overwrite_policy::OverwritePolicy,
-};
 use crate::{
     error::{MediaError, SizeRule},
     exr,
+    files::{
+        atomic::{self, AtomicFile},
+        naming::OutputPattern,
+        overwrite_policy::OverwritePolicy,
+    },
     film::{
         apng::{self, ApngFilm, ApngFormat},
-        ffmpeg::{self, FfmpegFilm, VideoFormat, VideoOptions},
+        ffmpeg::{self, FfmpegFilm, VideoContainer, VideoFormat, VideoOptions},
         gif::{self, GifFilm, GifFormat},
-        ordered::ReorderBuffer,
+        ordered::{FilmEncoder, ReorderBuffer},
         timing::GifTiming,
     },
+    format::{OutputKind, PictureFormat},
     png::{self, PngEffort},
 };
-
-/// The pixel data that a format takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PictureFormat {
-    /// Scene-linear frames.
-    #[error("a scene-linear frame")]
-    Frame,
-    /// Display pixels, with alpha unless a plate fills the picture.
-    #[error("display pixels")]
-    Display,
-    /// Display pixels over black or over a plate: the format has no alpha. Others are laid over black.
-    #[error("opaque display pixels")]
-    OpaqueDisplay,
-}
 
 /// How frames are written. Begin with [`SinkOptions::new`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,7 +33,7 @@ pub struct SinkOptions {
     pub size: [usize; 2],
     /// Frames per second, as a fraction.
     pub fps: [u32; 2],
-    /// How many frames there will be.
+    /// Number of frames.
     pub frame_count: usize,
     /// Whether a plate fills the picture, so that films need no alpha.
     pub opaque: bool,
@@ -58,9 +45,9 @@ pub struct SinkOptions {
     pub png_effort: PngEffort,
     /// GIF: transparency by an alpha threshold, instead of compositing over black.
     pub gif_transparent: bool,
-    /// How `ffmpeg` is used.
+    /// Options of films by `ffmpeg`.
     pub video: VideoOptions,
-    /// How many frames of a film may wait for an earlier one; at least 1.
+    /// Number of frames of a film that may wait for an earlier one; at least 1.
     pub window: usize,
     /// Which existing files may be overwritten.
     pub overwrite: OverwritePolicy,
@@ -86,23 +73,24 @@ impl SinkOptions {
 
     /// The pixel data that a sink of `kind` with these options takes.
     pub fn picture_format(&self, kind: OutputKind) -> PictureFormat {
-        match kind {
-            OutputKind::Exr => PictureFormat::Frame,
-            OutputKind::Png | OutputKind::Apng => PictureFormat::Display,
-            OutputKind::Gif if self.gif_transparent => PictureFormat::Display,
-            OutputKind::Gif => PictureFormat::OpaqueDisplay,
-            film if ffmpeg::carries_alpha(film, &self.video) => PictureFormat::Display,
-            _ => PictureFormat::OpaqueDisplay,
-        }
+        let has_alpha = match kind {
+            OutputKind::Exr => return PictureFormat::Frame,
+            OutputKind::Png | OutputKind::Apng => true,
+            OutputKind::Gif => self.gif_transparent,
+            OutputKind::Mp4 => ffmpeg::carries_alpha(VideoContainer::Mp4, &self.video),
+            OutputKind::Mov => ffmpeg::carries_alpha(VideoContainer::Mov, &self.video),
+            OutputKind::Webm => ffmpeg::carries_alpha(VideoContainer::Webm, &self.video),
+        };
+        if has_alpha { PictureFormat::Display } else { PictureFormat::OpaqueDisplay }
     }
 }
 
 /// Position and number of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameSlot {
-    /// Position among the frames of the job, from 0; orders a film.
+    /// Position among the frames of the job, from 0. Determines the order in a film.
     pub index: usize,
-    /// Frame number; names a file of a sequence.
+    /// Frame number. Determines the file name in a sequence.
     pub number: i64,
 }
 
@@ -115,11 +103,11 @@ pub enum Picture<'a> {
     Display(&'a DisplayImage, &'a [u8; 32]),
 }
 
-/// Takes finished frames. May be used from several threads at once.
+/// Writes finished frames. May be used from several threads at once.
 ///
-/// Files of a sequence may come in any order, each whole or not at all. Frames of a film may come in any order within
-/// [`SinkOptions::window`] positions of the one that is due. A film bears its name only after [`Sink::finish`]; a sink
-/// that is dropped before leaves no film behind.
+/// Frames of a sequence may be written in any order; each file is complete or does not exist. Frames of a film may be written in any order
+/// within [`SinkOptions::window`] positions of the next one. A film gets its name in [`Sink::finish`]; a sink that is dropped before leaves
+/// no film behind.
 pub struct Sink {
     pattern: OutputPattern,
     options: SinkOptions,
@@ -135,41 +123,41 @@ enum Target {
 }
 
 impl Sink {
-    /// Makes the folder, tries whether it can be written, and for a film begins it.
+    /// Creates the folder, checks that files can be written there, and starts a film.
     ///
     /// # Errors
-    /// The place cannot be written, the disk is full, a film would take the place of a file that must stay, a size or frame rate the format
-    /// cannot hold, no `ffmpeg`.
+    /// The folder cannot be written, the disk is full, a film would replace a file that must stay, the format does not allow the size or
+    /// frame rate, or `ffmpeg` is not installed.
     pub fn open(pattern: OutputPattern, options: SinkOptions) -> Result<Self, MediaError> {
         let path = pattern.path(0);
         let kind = pattern.kind();
         if !kind.is_sequence() {
             check_film(&path, &options)?;
         }
-        let ordered_end = (path.clone(), options.frame_count, options.window);
-        let overwrite = &options.overwrite;
         let target = match kind {
-            OutputKind::Png | OutputKind::Exr => {
-                // Better to fail now than after the first frame has been rendered.
-                drop(AtomicFile::create(&path)?);
-                if kind == OutputKind::Png { Target::Png } else { Target::Exr }
-            }
+            OutputKind::Png => Target::Png,
+            OutputKind::Exr => Target::Exr,
             OutputKind::Apng => {
-                Target::Apng(ordered(ApngFilm::create(&path, apng_format(&options), overwrite)?, ordered_end))
+                let film = ApngFilm::create(&path, apng_format(&options), &options.overwrite)?;
+                Target::Apng(in_order(film, &path, &options))
             }
             OutputKind::Gif => {
                 let format = gif_format(&path, &options)?;
-                Target::Gif(ordered(GifFilm::create(&path, format.clone(), overwrite)?, ordered_end), format)
+                let film = GifFilm::create(&path, format.clone(), &options.overwrite)?;
+                Target::Gif(in_order(film, &path, &options), format)
             }
-            OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => {
-                let format = video_format(kind, &options);
-                Target::Video(ordered(FfmpegFilm::create(&path, &format, overwrite)?, ordered_end), format)
-            }
+            OutputKind::Mp4 => open_video(VideoContainer::Mp4, &path, &options)?,
+            OutputKind::Mov => open_video(VideoContainer::Mov, &path, &options)?,
+            OutputKind::Webm => open_video(VideoContainer::Webm, &path, &options)?,
         };
+        if kind.is_sequence() {
+            // Better to fail now than after the first frame has been rendered.
+            drop(AtomicFile::create(&path)?);
+        }
         Ok(Self { pattern, options, target })
     }
 
-    /// What kind of file it makes.
+    /// The format of its files.
     pub fn kind(&self) -> OutputKind {
         self.pattern.kind()
     }
@@ -184,11 +172,10 @@ impl Sink {
         self.pattern.path(number)
     }
 
-    /// Takes a frame. A picture with alpha is laid over black where the format has none.
+    /// Writes a frame. A picture with alpha is composited over black if the format has none.
     ///
     /// # Errors
-    /// The frame cannot be written or would take the place of a file that must stay, is not of the kind or size that is wanted, or comes out
-    /// of turn.
+    /// The frame cannot be written or would replace a file that must stay, has the wrong pixel format or size, or is out of order.
     pub fn write(&self, slot: FrameSlot, picture: Picture<'_>) -> Result<(), MediaError> {
         let path = self.path(slot.number);
         match (&self.target, picture) {
@@ -211,11 +198,14 @@ impl Sink {
                 self.check_frame(image, &path)?;
                 film.push(slot.index, ffmpeg::prepare(image, format))
             }
-            _ => Err(MediaError::WrongPicture { path, wanted: self.picture_format() }),
+            (Target::Exr, Picture::Display(..))
+            | (Target::Png | Target::Apng(_) | Target::Gif(..) | Target::Video(..), Picture::Linear(_)) => {
+                Err(MediaError::WrongPicture { path, expected: self.picture_format() })
+            }
         }
     }
 
-    /// Ends a film and gives it its name; a sequence is already there.
+    /// Completes a film and renames it to its final name. A sequence needs no completion.
     ///
     /// # Errors
     /// Frames are missing, an earlier frame failed, or the film cannot be written.
@@ -228,7 +218,7 @@ impl Sink {
         }
     }
 
-    /// All frames of a film have one size.
+    /// Checks that a frame of a film has the size of the film.
     fn check_frame(&self, image: &DisplayImage, path: &Path) -> Result<(), MediaError> {
         let [width, height] = self.options.size;
         if [image.width, image.height] != [width, height] {
@@ -251,11 +241,14 @@ impl Sink {
     }
 }
 
-fn ordered<F: crate::film::ordered::FilmEncoder>(
-    film: F,
-    (path, count, window): (PathBuf, usize, usize),
-) -> ReorderBuffer<F> {
-    ReorderBuffer::new(film, path, count, window)
+fn in_order<F: FilmEncoder>(film: F, path: &Path, options: &SinkOptions) -> ReorderBuffer<F> {
+    ReorderBuffer::new(film, path.to_path_buf(), options.frame_count, options.window)
+}
+
+fn open_video(container: VideoContainer, path: &Path, options: &SinkOptions) -> Result<Target, MediaError> {
+    let format = video_format(container, options);
+    let film = FfmpegFilm::create(path, &format, &options.overwrite)?;
+    Ok(Target::Video(in_order(film, path, options), format))
 }
 
 /// Largest side of a film, pixels.
@@ -285,7 +278,7 @@ fn gif_format(path: &Path, options: &SinkOptions) -> Result<GifFormat, MediaErro
     Ok(GifFormat { frame_count: options.frame_count, size: options.size, timing, transparent })
 }
 
-fn video_format(kind: OutputKind, options: &SinkOptions) -> VideoFormat {
+fn video_format(container: VideoContainer, options: &SinkOptions) -> VideoFormat {
     let SinkOptions { size, fps, opaque, alpha, sixteen_bits, .. } = *options;
-    VideoFormat { kind, size, fps, opaque, alpha, sixteen_bits, options: options.video.clone() }
+    VideoFormat { container, size, fps, opaque, alpha, sixteen_bits, options: options.video.clone() }
 }

@@ -13,7 +13,7 @@ pub(crate) struct Chunk<'a> {
 /// Iterator over the chunks of a file; ends with `Err` at a truncated chunk or a wrong CRC.
 pub(crate) struct Chunks<'a>(&'a [u8]);
 
-/// A chunk that is cut off or damaged.
+/// A chunk that is truncated or damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BrokenChunk;
 
@@ -47,13 +47,13 @@ fn split(bytes: &[u8]) -> Option<(Chunk<'_>, &[u8])> {
     (u32::from_be_bytes(*checksum) == hasher.finalize()).then_some((chunk, rest))
 }
 
-/// Appends a chunk whose data are the concatenated `parts`, at most 2^31 - 1 bytes.
-pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], parts: &[&[u8]]) {
-    let length: usize = parts.iter().map(|part| part.len()).sum();
+/// Appends a chunk with the concatenated `slices` as its data, at most 2^31 - 1 bytes.
+pub(crate) fn push(file: &mut Vec<u8>, kind: [u8; 4], slices: &[&[u8]]) {
+    let length: usize = slices.iter().map(|slice| slice.len()).sum();
     file.extend((length as u32).to_be_bytes());
     let start = file.len();
     file.extend(kind);
-    parts.iter().for_each(|part| file.extend_from_slice(part));
+    slices.iter().for_each(|slice| file.extend_from_slice(slice));
     let checksum = crc32fast::hash(&file[start..]);
     file.extend(checksum.to_be_bytes());
 }
@@ -75,10 +75,10 @@ mod tests {
                 assert!(chunks(&file[..cut]).unwrap().any(|chunk| chunk.is_err()), "cut at {cut}");
             }
         }
-        for place in 8..file.len() {
+        for index in 8..file.len() {
             let mut damaged = file.clone();
-            damaged[place] ^= 4;
-            assert!(chunks(&damaged).unwrap().any(|chunk| chunk.is_err()), "damaged at {place}");
+            damaged[index] ^= 4;
+            assert!(chunks(&damaged).unwrap().any(|chunk| chunk.is_err()), "damaged at {index}");
         }
         assert!(chunks(b"GIF89a").is_none());
     }

@@ -11,24 +11,24 @@ use bansho_base::frame::{DisplayImage, DisplayPixels};
 use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{
     error::{MediaError, SizeRule},
-    output::fingerprint,
+    fingerprint,
 };
 
 /// Compression effort.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PngEffort {
-    /// Fast: frames of a sequence, so that writing does not hold up rendering.
+    /// Fast: for frames of a sequence, so that rendering need not wait for writing.
     #[default]
     Fast,
-    /// Small: single pictures for documents.
+    /// Small: for single pictures in documents.
     Small,
 }
 
-/// The bytes of a PNG of `picture`: 8 or 16 bits as it is, without alpha where it is opaque, marked sRGB, with the
-/// fingerprint and the convention of its alpha as text. The same picture gives the same bytes.
+/// The bytes of a PNG of `picture`: with its 8 or 16 bits, without alpha if it is opaque, marked as sRGB, with the fingerprint and the
+/// convention of alpha as text. The same picture gives the same bytes.
 ///
 /// # Errors
-/// A side of 0 or above [`SIDE_LIMIT`], or a number of pixels other than width times height. `path` is only named in errors.
+/// A side of 0 or above [`SIDE_LIMIT`], or a number of pixels other than width times height. `path` is only used in errors.
 pub fn encode(
     picture: &DisplayImage,
     fingerprint: &[u8; 32],
@@ -97,7 +97,7 @@ fn compress(
     Ok(file)
 }
 
-/// Declares sRGB, with gAMA and cHRM as the standard says (section 11.3.2.5), for programs that know only those.
+/// Declares sRGB, and gAMA and cHRM as in section 11.3.2.5 of the standard, for programs that support only those.
 fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
@@ -107,8 +107,8 @@ fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
 
 pub(super) fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort: PngEffort) {
     match effort {
-        // Measured on a dithered flame of 1280 x 720: `Sub` is a fifth smaller than `Up` here, and the adaptive choice of
-        // filters takes half as long again for the same size.
+        // Measured on a dithered flame of 1280 x 720: `Sub` is a fifth smaller than `Up`, and the adaptive choice of filters takes 50 %
+        // more time for the same size.
         PngEffort::Fast => {
             encoder.set_deflate_compression(DeflateCompression::FdeflateUltraFast);
             encoder.set_filter(Filter::Sub);
@@ -117,7 +117,7 @@ pub(super) fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort
     }
 }
 
-/// The samples in file order: big-endian, without alpha where the picture is opaque.
+/// The samples in file order: big-endian, without alpha if the picture is opaque.
 fn samples(picture: &DisplayImage) -> Cow<'_, [u8]> {
     match (&picture.pixels, picture.opaque) {
         (DisplayPixels::Eight(pixels), false) => Cow::Borrowed(bytemuck::cast_slice(pixels)),

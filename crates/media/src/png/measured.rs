@@ -1,4 +1,4 @@
-//! Encoding of measured values as PNG: linear, without a view transform, and with their scale.
+//! Encoding of measured quantities as PNG: linear, without a view transform, with their scale.
 
 use std::path::Path;
 
@@ -7,53 +7,52 @@ use ::png::{BitDepth, ColorType, Encoder, EncodingError, ScaledFloat};
 use super::{KEY_FINGERPRINT, KEY_SCALE, KEY_VERSION, PngEffort, encode::set_effort};
 use crate::{
     error::{MediaError, SizeRule},
-    output::fingerprint,
+    fingerprint,
 };
 
-/// Samples of a measured picture, pixel after pixel, rows from the top; of three channels red, green and blue in turn.
+/// Samples of a measured image: rows from the top, channels interleaved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Samples {
-    /// 8 bits a channel.
+    /// 8 bits per channel.
     Eight(Vec<u8>),
-    /// 16 bits a channel.
+    /// 16 bits per channel.
     Sixteen(Vec<u16>),
 }
 
-/// A picture of measured numbers: number = code / largest code * scale.
+/// An image of measured quantities: value = code / largest code * scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredImage {
     /// Width and height, pixels.
     pub size: [usize; 2],
-    /// 1 (gray) or 3 (red, green, blue) for each pixel.
+    /// Channels per pixel: 1 (gray) or 3 (red, green, blue).
     pub channels: usize,
     /// The codes.
     pub samples: Samples,
-    /// The number that the largest code stands for.
+    /// The value of the largest code.
     pub scale: f32,
 }
 
 impl MeasuredImage {
-    /// Codes for `values`, none of which is below 0, so that the largest has the largest code: 255, or 65535 with `sixteen_bits`.
-    pub fn of_values(size: [usize; 2], channels: usize, values: &[f32], sixteen_bits: bool) -> Self {
+    /// Codes of `values`, which must not be negative, scaled so that the largest gets the largest code: 255, or 65535 with `sixteen_bits`.
+    pub fn from_values(size: [usize; 2], channels: usize, values: &[f32], sixteen_bits: bool) -> Self {
         let scale = values.iter().fold(0.0_f32, |largest, &value| largest.max(value));
-        let units = |largest_code: u16| if scale > 0.0 { f32::from(largest_code) / scale } else { 0.0 };
+        let codes_per_unit = |largest_code: u16| if scale > 0.0 { f32::from(largest_code) / scale } else { 0.0 };
         let samples = if sixteen_bits {
-            let units = units(u16::MAX);
-            Samples::Sixteen(values.iter().map(|value| (value * units + 0.5) as u16).collect())
+            let factor = codes_per_unit(u16::MAX);
+            Samples::Sixteen(values.iter().map(|value| (value * factor + 0.5) as u16).collect())
         } else {
-            let units = units(u8::MAX.into());
-            Samples::Eight(values.iter().map(|value| (value * units + 0.5) as u8).collect())
+            let factor = codes_per_unit(u8::MAX.into());
+            Samples::Eight(values.iter().map(|value| (value * factor + 0.5) as u8).collect())
         };
         Self { size, channels, samples, scale }
     }
 }
 
-/// The bytes of a PNG of measured numbers: marked linear (gAMA 1), with the scale and a fingerprint as text. The same numbers
-/// give the same bytes.
+/// The bytes of a PNG of measured quantities: marked as linear (gAMA 1), with the scale and a fingerprint as text. The same values give the
+/// same bytes.
 ///
 /// # Errors
-/// A side of 0 or above the limit of PNG files, or another number of samples than of pixels times channels. `path` is only named
-/// in errors.
+/// A side of 0 or above the limit of PNG files, or a number of samples other than pixels times channels. `path` is only used in errors.
 pub fn encode_measured(
     picture: &MeasuredImage,
     fingerprint: &[u8; 32],
@@ -114,7 +113,7 @@ mod tests {
     fn numbers_come_back_by_their_scale_within_half_a_code() {
         let values: Vec<f32> = (0..24).map(|i| i as f32 * 3.1e-4).collect();
         for (sixteen_bits, largest, channels) in [(false, 255.0, 1), (true, 65_535.0, 3)] {
-            let picture = MeasuredImage::of_values([24 / channels / 2, 2], channels, &values, sixteen_bits);
+            let picture = MeasuredImage::from_values([24 / channels / 2, 2], channels, &values, sixteen_bits);
             assert_eq!(picture.scale, 23.0 * 3.1e-4);
             let file = encoded(&picture).unwrap();
             let mut reader = ::png::Decoder::new(std::io::Cursor::new(&file)).read_info().unwrap();
@@ -136,16 +135,16 @@ mod tests {
 
     #[test]
     fn nothing_but_zeros_is_a_picture_too() {
-        let picture = MeasuredImage::of_values([3, 1], 1, &[0.0; 3], true);
+        let picture = MeasuredImage::from_values([3, 1], 1, &[0.0; 3], true);
         assert_eq!((picture.scale, &picture.samples), (0.0, &Samples::Sixteen(vec![0; 3])));
         assert!(encoded(&picture).is_ok());
     }
 
     #[test]
     fn sizes_that_do_not_fit_are_refused() {
-        let picture = MeasuredImage::of_values([3, 2], 1, &[0.0; 3], false);
+        let picture = MeasuredImage::from_values([3, 2], 1, &[0.0; 3], false);
         assert!(matches!(encoded(&picture), Err(MediaError::PlaneLength { got: 3, expected: 6, .. })));
-        let picture = MeasuredImage::of_values([0, 2], 1, &[], false);
+        let picture = MeasuredImage::from_values([0, 2], 1, &[], false);
         assert!(matches!(encoded(&picture), Err(MediaError::Size { .. })));
     }
 }

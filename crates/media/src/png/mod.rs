@@ -1,4 +1,4 @@
-//! PNG: display pixels with straight alpha, sRGB; and measured numbers, linear.
+//! PNG: display pixels in sRGB with straight alpha, and measured quantities, linear.
 
 pub(crate) mod chunk;
 mod encode;
@@ -14,5 +14,5 @@ pub const KEY_FINGERPRINT: &str = "bansho:fingerprint";
 pub const KEY_VERSION: &str = "bansho:version";
 /// Key of the text chunk that names the convention of straight alpha: `encoded` or `linear`.
 pub const KEY_ALPHA: &str = "bansho:alpha";
-/// Key of the text chunk that holds the number which the largest code of a measured picture stands for.
+/// Key of the text chunk with the value of the largest code of a measured image.
 pub const KEY_SCALE: &str = "bansho:scale";

@@ -1,4 +1,4 @@
-//! Compositing front to back: `C += Tacc L; Tacc *= T` (the hot loop of a frame that holds little).
+//! Compositing front to back: `C += Tacc L; Tacc *= T`. For frames with little content this is the hot loop.
 
 use bansho_base::{
     image::Rect,
@@ -7,20 +7,20 @@ use bansho_base::{
 };
 use fearless_simd::{Level, dispatch};
 
-/// What a strip of the picture has come to, from the camera up to some depth. Planes are row after row.
+/// The composite of a strip of the picture from the camera to some depth. Planes are stored in rows.
 #[derive(Default)]
 pub(crate) struct Accumulator {
     pub(crate) rect: Rect,
     /// C: red, green, blue of the light that reaches the camera.
     pub(crate) color: [Vec<f32>; 3],
-    /// Tacc: share of the light from behind that still reaches the camera; holds nothing until something absorbs.
+    /// Tacc: fraction of the light from behind that still reaches the camera. Valid only if `absorbs`; otherwise it is 1 everywhere.
     transmittance: [Vec<f32>; 3],
     absorbs: bool,
     /// Depth of the nearest sample, m.
     pub(crate) depth: Vec<f32>,
-    /// Red, green, blue and alpha that each phenomenon adds to the picture; empty unless layers are wanted.
+    /// Red, green, blue and alpha that each phenomenon adds to the picture; empty unless layers are requested.
     pub(crate) layers: Vec<[Vec<f32>; 4]>,
-    /// AOVs of each phenomenon; empty unless they are wanted.
+    /// AOVs of each phenomenon; empty unless they are requested.
     pub(crate) aovs: Vec<Vec<AovPlane>>,
 }
 
@@ -30,7 +30,7 @@ fn refill(plane: &mut Vec<f32>, pixels: usize, value: f32) {
 }
 
 impl Accumulator {
-    /// Makes it empty over `rect`, with so many layers, and so many AOVs for each phenomenon.
+    /// Clears it for the pixels of `rect`, with `layers` layers and `aovs[i]` AOVs of phenomenon `i`.
     pub(crate) fn reset(&mut self, rect: Rect, layers: usize, aovs: &[usize]) {
         let pixels = rect.width * rect.height;
         self.rect = rect;
@@ -56,7 +56,7 @@ impl Accumulator {
         if self.absorbs { [0, 1, 2].map(|c| self.transmittance[c][index]) } else { [1.0; 3] }
     }
 
-    fn begin_to_absorb(&mut self) {
+    fn start_absorbing(&mut self) {
         if !self.absorbs {
             let pixels = self.rect.width * self.rect.height;
             self.transmittance.iter_mut().for_each(|plane| refill(plane, pixels, 1.0));
@@ -64,10 +64,10 @@ impl Accumulator {
         }
     }
 
-    /// Puts `strip`, drawn by the phenomenon of a number with such `aovs`, behind what is there.
+    /// Composites `strip` of the phenomenon with index `phenomenon` and AOVs `aovs` behind the accumulated content.
     pub(crate) fn add_behind(&mut self, level: Level, strip: &Strip, phenomenon: usize, aovs: &[AovDescriptor]) {
         if strip.transmittance_planes().is_some() {
-            self.begin_to_absorb();
+            self.start_absorbing();
         }
         for row in 0..strip.rect.height {
             let from = row * strip.rect.width;
@@ -105,16 +105,16 @@ impl Accumulator {
         dispatch!(level, _simd => nearest_row(nearest, &strip.depth[from..][..width]));
     }
 
-    /// A layer's share of the picture: its light as the camera gets it, and the mean transmittance that it takes.
+    /// What a phenomenon adds to the picture: its light as it reaches the camera, and the mean transmittance that it absorbs.
     fn add_layer_row(&mut self, strip: &Strip, phenomenon: usize, from: usize, to: usize) {
         for x in 0..strip.rect.width {
-            let taken = strip.transmittance(from + x);
+            let own = strip.transmittance(from + x);
             let reaches = self.transmittance_at(to + x);
             let layer = &mut self.layers[phenomenon];
             let mut alpha = 0.0;
             for c in 0..3 {
                 layer[c][to + x] = reaches[c].fma(strip.radiance[c][from + x], layer[c][to + x]);
-                alpha += reaches[c] * (1.0 - taken[c]);
+                alpha += reaches[c] * (1.0 - own[c]);
             }
             layer[3][to + x] += alpha / 3.0;
         }

@@ -1,4 +1,5 @@
-//! What lies behind the slices that are being drawn: the plate, or all that is farther, perhaps seen through air that bends light.
+//! The background of the slices that are being drawn: the plate, or everything farther that has been drawn already. It may be seen through
+//! air that refracts light.
 
 use bansho_base::{
     frame::{Channel, Frame},
@@ -12,64 +13,64 @@ use fearless_simd::{Level, dispatch};
 
 /// The background of some slices, as large as the whole picture.
 #[derive(Clone, Copy)]
-pub(crate) struct Behind<'a> {
+pub(crate) struct Background<'a> {
     /// Exposed radiance and alpha.
     pub(crate) color: Option<&'a Image<4>>,
-    /// Depth, m, row after row.
+    /// Depth, m, in rows.
     depth: Option<&'a [f32]>,
-    /// Layers and AOVs of what has been drawn of it; empty for a plate.
+    /// Layers and AOVs of what has been drawn; empty for a plate.
     pub(crate) channels: &'a [Channel],
-    bend: Option<Bend<'a>>,
+    air: Option<RefractingAir<'a>>,
 }
 
-/// Air that bends light, and what turns its angles into pixels.
+/// Air that refracts light, and the focal length that converts its angles into pixels.
 #[derive(Clone, Copy)]
-struct Bend<'a> {
-    air: Deflection<'a>,
+struct RefractingAir<'a> {
+    deflection: Deflection<'a>,
     focal_pixels: f32,
 }
 
-impl<'a> Behind<'a> {
+impl<'a> Background<'a> {
     /// The plate.
     pub(crate) fn plate(plate: &'a PlateFrame) -> Self {
         let depth = plate.depth.as_ref().map(|depth| depth.pixels().as_flattened());
-        Self { color: plate.color.as_ref(), depth, channels: &[], bend: None }
+        Self { color: plate.color.as_ref(), depth, channels: &[], air: None }
     }
 
     /// A frame that has been drawn.
     pub(crate) fn drawn(frame: &'a Frame) -> Self {
-        Self { color: Some(&frame.beauty), depth: frame.depth.as_deref(), channels: &frame.channels, bend: None }
+        Self { color: Some(&frame.beauty), depth: frame.depth.as_deref(), channels: &frame.channels, air: None }
     }
 
-    /// The same through `air`.
-    pub(crate) fn through(self, air: Deflection<'a>, view: &View) -> Self {
-        Self { bend: Some(Bend { air, focal_pixels: view.camera.focal_pixels as f32 }), ..self }
+    /// The same background seen through air with this deflection.
+    pub(crate) fn through(self, deflection: Deflection<'a>, view: &View) -> Self {
+        Self { air: Some(RefractingAir { deflection, focal_pixels: view.camera.focal_pixels as f32 }), ..self }
     }
 
-    /// Depths in a row of `rect`, m. Bending light changes none.
+    /// Depths in a row of `rect`, m. Refraction does not change them.
     pub(crate) fn depth_row(&self, rect: Rect, row: usize, width: usize) -> Option<&'a [f32]> {
         self.depth.map(|depth| &depth[(rect.y + row) * width + rect.x..][..rect.width])
     }
 
-    /// Finds where the light of those pixels of `rect` comes from that the air bends.
-    pub(crate) fn trace(&self, rect: Rect, sources: &mut Sources) {
-        sources.span = Rect::default();
-        let (Some(bend), Some(image)) = (&self.bend, self.color) else { return };
-        let span = bend.air.rect.intersection(&rect);
-        sources.span = span;
-        sources.list.resize(span.width * span.height, Source::default());
+    /// Finds the origins of the refracted light in `rect`.
+    pub(crate) fn trace(&self, rect: Rect, bent: &mut BentPixels) {
+        bent.rect = Rect::default();
+        let (Some(air), Some(image)) = (&self.air, self.color) else { return };
+        let traced = air.deflection.rect.intersection(&rect);
+        bent.rect = traced;
+        bent.pixels.resize(traced.width * traced.height, BentPixel::default());
         let size = [image.width(), image.height()];
-        for (row, sources) in sources.list.chunks_mut(span.width.max(1)).enumerate() {
-            dispatch!(Level::new(), _simd => bend.trace_row(span.x, span.y + row, size, self.depth, sources));
+        for (row, pixels) in bent.pixels.chunks_mut(traced.width.max(1)).enumerate() {
+            dispatch!(Level::new(), _simd => air.trace_row(traced.x, traced.y + row, size, self.depth, pixels));
         }
     }
 
-    /// Colors in a row of `rect`, traced to `sources`; `buffer` holds them if any is bent.
+    /// Colors in a row of `rect`. `buffer` holds them if any pixel of the row is in `bent`.
     pub(crate) fn color_row<'b>(
         &self,
         rect: Rect,
         row: usize,
-        sources: &Sources,
+        bent: &BentPixels,
         buffer: &'b mut Vec<[f32; 4]>,
     ) -> Option<&'b [[f32; 4]]>
     where
@@ -77,113 +78,113 @@ impl<'a> Behind<'a> {
     {
         let image = self.color?;
         let y = rect.y + row;
-        if sources.row(y).is_empty() {
+        if bent.row(y).is_empty() {
             return Some(&image.row(y)[rect.x..rect.right()]);
         }
         buffer.resize(rect.width, [0.0; 4]);
-        sources.read_row(rect.x, y, image.width(), image.pixels(), buffer);
+        bent.read_row(rect.x, y, image.width(), image.pixels(), buffer);
         Some(buffer)
     }
 
-    /// Values of a plane of [`Behind::channels`] over `rect`, traced to `sources`.
-    pub(crate) fn plane(&self, values: &[f32], rect: Rect, sources: &Sources, width: usize) -> Vec<f32> {
+    /// Values of a plane of [`Background::channels`] in `rect`, as refracted by `bent`.
+    pub(crate) fn plane(&self, values: &[f32], rect: Rect, bent: &BentPixels, width: usize) -> Vec<f32> {
         let mut plane = vec![0.0; rect.width * rect.height];
         for (row, out) in plane.chunks_mut(rect.width.max(1)).enumerate() {
-            sources.read_row(rect.x, rect.y + row, width, values, out);
+            bent.read_row(rect.x, rect.y + row, width, values, out);
         }
         plane
     }
 }
 
-/// Where the light of the bent pixels of a strip comes from.
+/// The pixels of a strip whose light is refracted.
 #[derive(Default)]
-pub(crate) struct Sources {
-    /// The pixels that are bent.
-    span: Rect,
-    /// Their sources, row after row.
-    list: Vec<Source>,
+pub(crate) struct BentPixels {
+    rect: Rect,
+    /// The pixels of `rect`, in rows.
+    pixels: Vec<BentPixel>,
 }
 
-impl Sources {
+impl BentPixels {
     /// Those in row `y` of the picture.
-    fn row(&self, y: usize) -> &[Source] {
-        let rows = self.span.y..self.span.bottom();
-        if rows.contains(&y) { &self.list[(y - self.span.y) * self.span.width..][..self.span.width] } else { &[] }
+    fn row(&self, y: usize) -> &[BentPixel] {
+        let rows = self.rect.y..self.rect.bottom();
+        if rows.contains(&y) { &self.pixels[(y - self.rect.y) * self.rect.width..][..self.rect.width] } else { &[] }
     }
 
-    /// Values that are seen from column `x` of row `y` of the picture on, of a picture `width` pixels wide.
+    /// Refracted values of the pixels of row `y` from column `x` on, in a picture that is `width` pixels wide.
     fn read_row<T: Blend>(&self, x: usize, y: usize, width: usize, values: &[T], out: &mut [T]) {
-        let here = y * width + x;
-        let straight = &values[here..][..out.len()];
-        let sources = self.row(y);
-        if sources.is_empty() {
+        let start = y * width + x;
+        let straight = &values[start..][..out.len()];
+        let pixels = self.row(y);
+        if pixels.is_empty() {
             out.copy_from_slice(straight);
             return;
         }
-        let from = self.span.x - x;
-        let to = from + sources.len();
+        let from = self.rect.x - x;
+        let to = from + pixels.len();
         out[..from].copy_from_slice(&straight[..from]);
         out[to..].copy_from_slice(&straight[to..]);
-        dispatch!(Level::new(), _simd => read(sources, values, here + from, width, &mut out[from..to]));
+        dispatch!(Level::new(), _simd => read(pixels, values, start + from, width, &mut out[from..to]));
     }
 }
 
-/// Values at the sources of pixels from the one at the index `here` on.
+/// Refracted values of consecutive pixels, the first of which has the index `start`.
 #[inline(always)]
-fn read<T: Blend>(sources: &[Source], values: &[T], here: usize, width: usize, out: &mut [T]) {
-    for (index, (source, out)) in sources.iter().zip(out).enumerate() {
-        *out = source.read(values, here + index, width);
+fn read<T: Blend>(pixels: &[BentPixel], values: &[T], start: usize, width: usize, out: &mut [T]) {
+    for (index, (pixel, out)) in pixels.iter().zip(out).enumerate() {
+        *out = pixel.read(values, start + index, width);
     }
 }
 
-/// What can be between two values.
+/// Linear interpolation.
 trait Blend: Copy {
-    /// The value at a share of the way from this to another.
-    fn blend(self, other: Self, share: f32) -> Self;
+    /// `self` at `t` = 0, `other` at `t` = 1.
+    fn blend(self, other: Self, t: f32) -> Self;
 }
 
 impl Blend for f32 {
     #[inline(always)]
-    fn blend(self, other: Self, share: f32) -> Self {
-        share.fma(other - self, self)
+    fn blend(self, other: Self, t: f32) -> Self {
+        t.fma(other - self, self)
     }
 }
 
 impl Blend for [f32; 4] {
     #[inline(always)]
-    fn blend(self, other: Self, share: f32) -> Self {
+    fn blend(self, other: Self, t: f32) -> Self {
         let mut blended = self;
         for c in 0..4 {
-            blended[c] = self[c].blend(other[c], share);
+            blended[c] = self[c].blend(other[c], t);
         }
         blended
     }
 }
 
-/// Where the light of a pixel comes from: between four pixels.
+/// The origin of the light of a pixel: a point between four pixels.
 #[derive(Clone, Copy, Default)]
-struct Source {
-    /// Index of the upper left one.
+struct BentPixel {
+    /// Index of the upper left pixel.
     first: u32,
-    /// Which of the four do not count, a bit each, row after row: in their stead does what is straight behind.
+    /// One bit for each of the four, in rows: set where the value straight behind is used instead.
     hidden: u32,
-    shares: [f32; 2],
+    /// Position between the four, 0 to 1: to the right, down.
+    fractions: [f32; 2],
 }
 
 /// All four pixels are hidden.
 const ALL_HIDDEN: u32 = 0b1111;
 
-impl Source {
-    /// The value there, for the pixel at the index `here` of a picture `width` pixels wide.
+impl BentPixel {
+    /// The value at the origin, for the pixel with the index `own_index` of a picture that is `width` pixels wide.
     #[inline(always)]
-    fn read<T: Blend>(&self, values: &[T], here: usize, width: usize) -> T {
+    fn read<T: Blend>(&self, values: &[T], own_index: usize, width: usize) -> T {
         let first = self.first as usize;
-        let [across, down] = self.shares;
+        let [across, down] = self.fractions;
         if self.hidden == 0 {
             let (upper, lower) = (&values[first..first + 2], &values[first + width..first + width + 2]);
             return upper[0].blend(upper[1], across).blend(lower[0].blend(lower[1], across), down);
         }
-        let straight = values[here];
+        let straight = values[own_index];
         if self.hidden == ALL_HIDDEN {
             return straight;
         }
@@ -193,60 +194,60 @@ impl Source {
     }
 }
 
-impl Bend<'_> {
-    /// Where the light of the pixels of row `y` from column `first` on comes from, at most from the edge of the picture.
+impl RefractingAir<'_> {
+    /// The origins of the light of the pixels of row `y` from column `first` on, clamped to the picture.
     #[inline(always)]
-    fn trace_row(&self, first: usize, y: usize, size: [usize; 2], depth: Option<&[f32]>, sources: &mut [Source]) {
-        let rect = self.air.rect;
-        let angles = &self.air.angle.row(y - rect.y)[first - rect.x..][..sources.len()];
+    fn trace_row(&self, first: usize, y: usize, size: [usize; 2], depth: Option<&[f32]>, pixels: &mut [BentPixel]) {
+        let rect = self.deflection.rect;
+        let angles = &self.deflection.angle.row(y - rect.y)[first - rect.x..][..pixels.len()];
         let start = y * size[0] + first;
         match depth {
             None => {
-                for (index, (source, angle)) in sources.iter_mut().zip(angles).enumerate() {
-                    *source = self.source(first + index, y, *angle, self.focal_pixels, size);
+                for (index, (pixel, angle)) in pixels.iter_mut().zip(angles).enumerate() {
+                    *pixel = self.origin(first + index, y, *angle, self.focal_pixels, size);
                 }
             }
             Some(depth) => {
-                for (index, (source, angle)) in sources.iter_mut().zip(angles).enumerate() {
-                    // 1 where nothing is known to be.
-                    let lever = 1.0 - self.air.depth as f32 / depth[start + index];
-                    *source = self.source(first + index, y, *angle, self.focal_pixels * lever, size);
-                    source.hidden |= if lever > 0.0 { self.nearer(source, depth, size[0]) } else { ALL_HIDDEN };
+                for (index, (pixel, angle)) in pixels.iter_mut().zip(angles).enumerate() {
+                    // 1 where the depth is infinite.
+                    let lever = 1.0 - self.deflection.depth as f32 / depth[start + index];
+                    *pixel = self.origin(first + index, y, *angle, self.focal_pixels * lever, size);
+                    pixel.hidden |= if lever > 0.0 { self.nearer_than_air(pixel, depth, size[0]) } else { ALL_HIDDEN };
                 }
             }
         }
     }
 
-    /// Where the light of a pixel comes from that is bent by `angle`, `reach` pixels before what is behind.
+    /// The origin of the light of a pixel that is deflected by the angles `[right, up]`; `reach` converts radians into pixels at the background.
     #[inline(always)]
-    fn source(&self, x: usize, y: usize, [right, up]: [f32; 2], reach: f32, [width, height]: [usize; 2]) -> Source {
+    fn origin(&self, x: usize, y: usize, [right, up]: [f32; 2], reach: f32, [width, height]: [usize; 2]) -> BentPixel {
         let (column, across) = split(reach.fma(right, x as f32), width);
         let (row, down) = split((-reach).fma(up, y as f32), height);
-        // A picture of one column or row has nothing beside it.
+        // A picture of one column or row has no neighbors in that direction.
         let beside = if width < 2 { 0b1010 } else { 0 } | if height < 2 { 0b1100 } else { 0 };
         let hidden = if right == 0.0 && up == 0.0 { ALL_HIDDEN } else { beside };
-        Source { first: row * width as u32 + column, hidden, shares: [across, down] }
+        BentPixel { first: row * width as u32 + column, hidden, fractions: [across, down] }
     }
 
-    /// Which of the four pixels of a source are nearer than the air: no such light comes through it.
+    /// Bits of those of the four pixels that are nearer than the air, through which their light cannot come.
     #[inline(always)]
-    fn nearer(&self, source: &Source, depth: &[f32], width: usize) -> u32 {
-        let first = source.first as usize;
+    fn nearer_than_air(&self, pixel: &BentPixel, depth: &[f32], width: usize) -> u32 {
+        let first = pixel.first as usize;
         let mut nearer = 0;
         for (corner, index) in [first, first + 1, first + width, first + width + 1].into_iter().enumerate() {
-            let is_nearer = depth.get(index).is_some_and(|depth| *depth < self.air.depth as f32);
+            let is_nearer = depth.get(index).is_some_and(|depth| *depth < self.deflection.depth as f32);
             nearer |= u32::from(is_nearer) << corner;
         }
         nearer
     }
 }
 
-/// Whole part and fraction of a place held within so many pixels: so that there is a pixel after the whole part, if there are two.
+/// Integer part and fraction of a coordinate clamped to `side` pixels. The integer part is at most `side` - 2, so that a pixel follows it.
 #[inline(always)]
-fn split(place: f32, side: usize) -> (u32, f32) {
-    let place = place.max(0.0).min((side - 1) as f32);
-    let whole = place.floor().min(side.saturating_sub(2) as f32);
-    (approximations::round_to_i32(whole).cast_unsigned(), place - whole)
+fn split(coordinate: f32, side: usize) -> (u32, f32) {
+    let coordinate = coordinate.max(0.0).min((side - 1) as f32);
+    let whole = coordinate.floor().min(side.saturating_sub(2) as f32);
+    (approximations::round_to_i32(whole).cast_unsigned(), coordinate - whole)
 }
 
 #[cfg(test)]
@@ -257,9 +258,9 @@ mod tests {
     fn read(angle: [f32; 2], depth: Option<&[f32]>, x: usize, y: usize) -> f32 {
         let values = [0.0, 1.0, 2.0, 10.0, 11.0, 12.0];
         let angles = Image::filled(3, 2, angle);
-        let air = Deflection { depth: 2.0, rect: Rect::from_size(3, 2), angle: &angles };
-        let mut row = [Source::default(); 3];
-        Bend { air, focal_pixels: 1.0 }.trace_row(0, y, [3, 2], depth, &mut row);
+        let deflection = Deflection { depth: 2.0, rect: Rect::from_size(3, 2), angle: &angles };
+        let mut row = [BentPixel::default(); 3];
+        RefractingAir { deflection, focal_pixels: 1.0 }.trace_row(0, y, [3, 2], depth, &mut row);
         row[x].read(&values, 3 * y + x, 3)
     }
 
@@ -275,13 +276,13 @@ mod tests {
     fn pictures_of_one_column_or_row_bend_along_it() {
         for (size, angle) in [([1, 3], [0.0, -0.5]), ([3, 1], [0.5, 0.0])] {
             let angles = Image::filled(size[0], size[1], angle);
-            let air = Deflection { depth: 2.0, rect: Rect::from_size(size[0], size[1]), angle: &angles };
-            let mut sources = Sources::default();
+            let deflection = Deflection { depth: 2.0, rect: Rect::from_size(size[0], size[1]), angle: &angles };
+            let mut bent = BentPixels::default();
             let color = Image::from_pixels(size[0], size[1], [1.0, 2.0, 4.0].map(|v| [v; 4]).to_vec()).unwrap();
-            let bend = Some(Bend { air, focal_pixels: 1.0 });
-            let behind = Behind { color: Some(&color), depth: None, channels: &[], bend };
-            behind.trace(Rect::from_size(size[0], size[1]), &mut sources);
-            let seen = behind.plane(&[1.0, 2.0, 4.0], Rect::from_size(size[0], size[1]), &sources, size[0]);
+            let air = Some(RefractingAir { deflection, focal_pixels: 1.0 });
+            let background = Background { color: Some(&color), depth: None, channels: &[], air };
+            background.trace(Rect::from_size(size[0], size[1]), &mut bent);
+            let seen = background.plane(&[1.0, 2.0, 4.0], Rect::from_size(size[0], size[1]), &bent, size[0]);
             assert_eq!(seen, [1.5, 3.0, 4.0], "{size:?}");
         }
     }
@@ -289,15 +290,15 @@ mod tests {
     #[test]
     fn only_pixels_behind_the_air_are_looked_up_elsewhere() {
         let angles = Image::filled(1, 1, [1.0, 0.0]);
-        let air = Deflection { depth: 2.0, rect: Rect { x: 1, y: 1, width: 1, height: 1 }, angle: &angles };
+        let deflection = Deflection { depth: 2.0, rect: Rect { x: 1, y: 1, width: 1, height: 1 }, angle: &angles };
         let color = Image::from_pixels(3, 2, (0..6_u8).map(|v| [f32::from(v); 4]).collect()).unwrap();
-        let behind =
-            Behind { color: Some(&color), depth: None, channels: &[], bend: Some(Bend { air, focal_pixels: 1.0 }) };
-        let (mut sources, mut buffer) = (Sources::default(), Vec::new());
+        let air = Some(RefractingAir { deflection, focal_pixels: 1.0 });
+        let background = Background { color: Some(&color), depth: None, channels: &[], air };
+        let (mut bent, mut buffer) = (BentPixels::default(), Vec::new());
         let rect = Rect { x: 0, y: 0, width: 3, height: 2 };
-        behind.trace(rect, &mut sources);
+        background.trace(rect, &mut bent);
         let mut row =
-            |row| behind.color_row(rect, row, &sources, &mut buffer).unwrap().iter().map(|c| c[0]).collect::<Vec<_>>();
+            |row| background.color_row(rect, row, &bent, &mut buffer).unwrap().iter().map(|c| c[0]).collect::<Vec<_>>();
         assert_eq!((row(0), row(1)), (vec![0.0, 1.0, 2.0], vec![3.0, 5.0, 5.0]));
     }
 

@@ -1,8 +1,7 @@
-//! The plate and the sky as they are seen in a level mirror.
+//! The plate and the sky as seen in a horizontal mirror.
 //!
-//! What a plate shows of its scene stands where its depth says. The mirrored line of sight of a pixel, followed through the plate's own
-//! picture, ends where it meets what stands there (reflections in screen space: McGuire & Mara 2014). What the plate does not show
-//! is the sky's.
+//! The plate's depth positions its pixels in the scene. The reflected ray of a pixel is marched through the plate's own picture until it
+//! meets a surface there (screen-space reflections: McGuire & Mara 2014). Where it leaves the plate, it shows the sky.
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -16,28 +15,28 @@ use bansho_base::{
 use super::plate::PlateFrame;
 use rayon::prelude::*;
 
-/// Pixels of the picture from one place on a line of sight to the next.
+/// Distance between samples of a ray, pixels.
 const STRIDE: f64 = 1.0;
-/// Fewest and most places on a line of sight.
-const PLACES: [f64; 2] = [16.0, 4096.0];
-/// Share of its depth by which a surface may come nearer from one place to the next; what comes nearer by more stands before the line of
-/// sight, which goes on behind it.
-const JUMP: f64 = 0.03;
-/// What is infinitely far, m.
-const FAR: f64 = 1e6;
-/// Pixels of the picture, along each side, in one of the backdrop.
-const COARSE: usize = 8;
+/// Smallest and largest number of samples of a ray.
+const SAMPLE_COUNTS: [f64; 2] = [16.0, 4096.0];
+/// Largest relative decrease of the plate's depth between two samples that still belongs to one surface. After a larger one the plate shows an
+/// object in front of the ray, which continues behind it.
+const DEPTH_JUMP: f64 = 0.03;
+/// Distance that stands for infinity, m.
+const FAR_M: f64 = 1e6;
+/// Side of a pixel of the backdrop, pixels of the picture.
+const BACKDROP_PIXEL: usize = 8;
 
-/// What a phenomenon's mirror shows.
+/// The reflection in the mirror of a phenomenon.
 pub(crate) struct Mirror {
     /// Radiance and alpha of the whole picture.
-    pub(crate) seen: Image<4>,
-    /// Plate and sky without the phenomena, small; only where there is a plate.
+    pub(crate) image: Image<4>,
+    /// Plate and sky without the phenomena, in low resolution; `None` without a plate.
     pub(crate) backdrop: Option<Backdrop>,
 }
 
-/// The plate seen in a level mirror by `camera`: absolute radiance with coverage, and depth as the camera behind the mirror
-/// measures it. Nothing where there is no plate or the mirror shows what the plate does not.
+/// The plate as `camera` sees it in a horizontal mirror: absolute radiance with coverage, and depth as the mirrored camera measures it.
+/// Transparent where the reflected ray leaves the plate; empty without a plate.
 ///
 /// # Errors
 /// The observer asked to stop.
@@ -49,68 +48,68 @@ pub(crate) fn mirrored(
     observer: &dyn Observer,
 ) -> Result<PlateFrame, Cancelled> {
     let Some(color) = &plate.color else { return Ok(PlateFrame::default()) };
-    let march = March { color, depth: plate.depth.as_ref(), camera, mirror, exposure };
+    let march = RayMarch { color, depth: plate.depth.as_ref(), camera, mirror, exposure };
     let (width, rows) = (color.width(), color.height());
-    let mut seen = Image::filled(width, rows, [0.0; 4]);
+    let mut radiance = Image::filled(width, rows, [0.0; 4]);
     let mut depth = Image::filled(width, rows, [f32::INFINITY]);
-    let lines = seen.pixels_mut().par_chunks_mut(width.max(1)).zip(depth.pixels_mut().par_chunks_mut(width.max(1)));
-    lines.enumerate().try_for_each(|(y, (seen, depth))| {
+    let lines = radiance.pixels_mut().par_chunks_mut(width.max(1)).zip(depth.pixels_mut().par_chunks_mut(width.max(1)));
+    lines.enumerate().try_for_each(|(y, (radiance, depth))| {
         observer::check(observer)?;
-        for (x, (seen, depth)) in seen.iter_mut().zip(depth).enumerate() {
+        for (x, (radiance, depth)) in radiance.iter_mut().zip(depth).enumerate() {
             let pixel = DVec2::new(x as f64, y as f64) + 0.5;
-            if let Some((color, far)) = march.seen(pixel) {
-                (*seen, depth[0]) = (color, far);
+            if let Some(reflected) = march.reflected(pixel) {
+                (*radiance, depth[0]) = (reflected.radiance, reflected.depth);
             }
         }
         Ok(())
     })?;
-    Ok(PlateFrame { color: Some(seen), depth: plate.depth.is_some().then_some(depth) })
+    Ok(PlateFrame { color: Some(radiance), depth: plate.depth.is_some().then_some(depth) })
 }
 
-/// Puts the sky, which a plate stands for in the picture itself, behind what is seen by the camera of a mirrored `view`; `scale` is the
-/// view's pixels in one of `image`.
-pub(crate) fn lay_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale: usize) {
+/// Composites the sky behind `image`, as the camera of a mirrored `view` sees it. `scale` is the side of a pixel of `image` in pixels of the
+/// view. (In the picture itself the plate takes the role of the sky.)
+pub(crate) fn composite_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale: usize) {
     let width = image.width().max(1);
     image.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
-            let place = (DVec2::new(x as f64, y as f64) + 0.5) * scale as f64;
-            let left = 1.0 - pixel[3];
-            let Some(direction) = view.camera.direction(place).filter(|_| left > 0.0) else { continue };
+            let center = (DVec2::new(x as f64, y as f64) + 0.5) * scale as f64;
+            let uncovered = 1.0 - pixel[3];
+            let Some(direction) = view.camera.direction(center).filter(|_| uncovered > 0.0) else { continue };
             let direction = DVec3::new(direction.x, direction.y.abs(), direction.z).normalize();
             let light = sky.radiance(direction);
-            (0..3).for_each(|c| pixel[c] += left * light[c]);
+            (0..3).for_each(|c| pixel[c] += uncovered * light[c]);
             pixel[3] = 1.0;
         }
     });
 }
 
-/// Plate and sky in the mirror, small: for what mirrors too roughly to show more.
+/// Plate and sky in the mirror, in low resolution, for surfaces too rough to reflect more detail.
 pub(crate) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<Backdrop> {
     let fine = mirrored.color.as_ref()?;
-    let size = [fine.width(), fine.height()].map(|side| side.div_ceil(COARSE));
+    let size = [fine.width(), fine.height()].map(|side| side.div_ceil(BACKDROP_PIXEL));
     let mut coarse = Image::filled(size[0], size[1], [0.0; 4]);
     coarse.pixels_mut().par_chunks_mut(size[0].max(1)).enumerate().for_each(|(row, line)| {
         for (column, pixel) in line.iter_mut().enumerate() {
-            let (xs, ys) = (span(column, fine.width()), span(row, fine.height()));
-            let share = 1.0 / (xs.len() * ys.len()) as f32;
+            let (xs, ys) = (fine_pixels(column, fine.width()), fine_pixels(row, fine.height()));
+            let weight = 1.0 / (xs.len() * ys.len()) as f32;
             for y in ys {
                 for value in &fine.row(y)[xs.clone()] {
-                    (0..4).for_each(|c| pixel[c] += share * value[c]);
+                    (0..4).for_each(|c| pixel[c] += weight * value[c]);
                 }
             }
         }
     });
-    lay_sky(&mut coarse, view, sky, COARSE);
-    Some(Backdrop { image: coarse, pixel_size: COARSE })
+    composite_sky(&mut coarse, view, sky, BACKDROP_PIXEL);
+    Some(Backdrop { image: coarse, pixel_size: BACKDROP_PIXEL })
 }
 
-/// Fine pixels in a coarse one.
-fn span(index: usize, end: usize) -> std::ops::Range<usize> {
-    index * COARSE..((index + 1) * COARSE).min(end)
+/// The columns or rows of the picture, which has `side` of them, in a column or row of the backdrop.
+fn fine_pixels(index: usize, side: usize) -> std::ops::Range<usize> {
+    index * BACKDROP_PIXEL..((index + 1) * BACKDROP_PIXEL).min(side)
 }
 
-/// A plate whose mirrored lines of sight are followed.
-struct March<'a> {
+/// A plate through which reflected rays are marched.
+struct RayMarch<'a> {
     color: &'a Image<4>,
     depth: Option<&'a Image<1>>,
     camera: &'a Camera,
@@ -118,123 +117,143 @@ struct March<'a> {
     exposure: f32,
 }
 
-/// A mirrored line of sight: it leaves the mirror and goes to infinity as its parameter goes from 0 to 1, evenly in the picture of a
-/// perspective camera.
-struct Sight {
-    from: DVec3,
-    toward: DVec3,
+/// A reflected ray. Its parameter t goes from 0 at the mirror to 1 at infinity, and is linear in the picture of a perspective camera.
+struct ReflectedRay {
+    origin: DVec3,
+    direction: DVec3,
     scale: f64,
-    trace: Option<Trace>,
+    /// Only for perspective cameras.
+    on_screen: Option<ScreenRay>,
 }
 
-/// A line of sight in the picture of a perspective camera: straight, and as deep as at its start divided by what is left of the parameter.
-struct Trace {
-    from: DVec2,
-    along: DVec2,
+/// A ray in the picture of a perspective camera, where it is straight: its pixel at t is `origin + t * step`, its depth `depth / (1 - t)`.
+struct ScreenRay {
+    origin: DVec2,
+    step: DVec2,
     depth: f64,
 }
 
-impl Sight {
-    /// Way along `toward` at parameter `t`.
-    fn way(&self, t: f64) -> f64 {
+/// The point where a ray meets a surface of the plate.
+struct Hit {
+    pixel: DVec2,
+    /// Distance from the mirror, in lengths of the ray's direction.
+    distance: f64,
+}
+
+/// The reflection at one pixel.
+struct Reflected {
+    /// Radiance and coverage.
+    radiance: [f32; 4],
+    /// Depth as the mirrored camera measures it, m.
+    depth: f32,
+}
+
+impl ReflectedRay {
+    /// Distance along `direction` at parameter `t`.
+    fn distance(&self, t: f64) -> f64 {
         self.scale * t / (1.0 - t)
     }
 
     fn at(&self, t: f64) -> DVec3 {
-        self.from + self.toward * self.way(t)
+        self.origin + self.direction * self.distance(t)
     }
 }
 
-/// A place on a line of sight, and what the plate shows there.
+/// A sample of a ray, and the plate's depth there.
 #[derive(Clone, Copy)]
-struct Stop {
+struct RaySample {
     t: f64,
     pixel: DVec2,
+    /// Depth of the ray, m.
     depth: f64,
-    /// Depth of the plate.
-    plate: f64,
+    /// Depth of the plate, m.
+    plate_depth: f64,
 }
 
-impl March<'_> {
-    /// What is seen in the mirror at a pixel: radiance, coverage, and depth from behind the mirror.
-    fn seen(&self, pixel: DVec2) -> Option<([f32; 4], f32)> {
+impl RayMarch<'_> {
+    /// The reflection at a pixel.
+    fn reflected(&self, pixel: DVec2) -> Option<Reflected> {
         let down = self.camera.direction(pixel)?;
-        let drop = self.camera.position.y - self.mirror.height;
-        if down.y >= 0.0 || drop <= 0.0 {
+        let height = self.camera.position.y - self.mirror.height;
+        if down.y >= 0.0 || height <= 0.0 {
             return None;
         }
-        let ground = drop / -down.y;
-        let standing = self.plate_depth(pixel);
-        if ground > FAR || (standing < ground && self.stands(pixel, standing)) {
-            // The mirror is hidden by what stands before it: nobody sees this, but blurred it is the best guess of what lies beside.
-            return self.radiance(pixel).map(|color| (color, standing as f32));
+        let to_mirror = height / -down.y;
+        let plate_depth = self.plate_depth(pixel);
+        if to_mirror > FAR_M || (plate_depth < to_mirror && self.is_above_mirror(pixel, plate_depth)) {
+            // An object in front hides the mirror here. Its own color is the best guess for blurred reflections beside it.
+            return self.radiance(pixel).map(|radiance| Reflected { radiance, depth: plate_depth as f32 });
         }
-        let toward = DVec3::new(down.x, -down.y, down.z);
-        let sight = self.sight(self.camera.position + down * ground, ground, toward);
-        match self.first_met(pixel, &sight) {
-            Some((place, way)) => Some((self.radiance(place)?, (ground + way) as f32)),
-            None => self.beyond(&sight).map(|color| (color, f32::INFINITY)),
+        let up = DVec3::new(down.x, -down.y, down.z);
+        let ray = self.reflected_ray(self.camera.position + down * to_mirror, to_mirror, up);
+        match self.first_hit(pixel, &ray) {
+            Some(hit) => {
+                Some(Reflected { radiance: self.radiance(hit.pixel)?, depth: (to_mirror + hit.distance) as f32 })
+            }
+            None => self.color_at_infinity(&ray).map(|radiance| Reflected { radiance, depth: f32::INFINITY }),
         }
     }
 
-    /// The line of sight that leaves the mirror at `from`, `depth` away.
-    fn sight(&self, from: DVec3, depth: f64, toward: DVec3) -> Sight {
-        let along = -(self.camera.world_from_camera.transpose() * toward).z;
-        if self.camera.lens != Lens::Perspective || along <= 1e-3 {
-            return Sight { from, toward, scale: depth, trace: None };
+    /// The ray that leaves the mirror at `origin`, whose depth is `depth`.
+    fn reflected_ray(&self, origin: DVec3, depth: f64, direction: DVec3) -> ReflectedRay {
+        let along_axis = -(self.camera.world_from_camera.transpose() * direction).z;
+        if self.camera.lens != Lens::Perspective || along_axis <= 1e-3 {
+            return ReflectedRay { origin, direction, scale: depth, on_screen: None };
         }
-        let mut sight = Sight { from, toward, scale: depth / along, trace: None };
-        let places = [0.0, 0.5].map(|t| self.camera.project(sight.at(t)));
-        if let [Some(start), Some(middle)] = places {
-            sight.trace =
-                Some(Trace { from: start.pixel, along: 2.0 * (middle.pixel - start.pixel), depth: start.depth });
+        let mut ray = ReflectedRay { origin, direction, scale: depth / along_axis, on_screen: None };
+        let points = [0.0, 0.5].map(|t| self.camera.project(ray.at(t)));
+        if let [Some(start), Some(middle)] = points {
+            ray.on_screen =
+                Some(ScreenRay { origin: start.pixel, step: 2.0 * (middle.pixel - start.pixel), depth: start.depth });
         }
-        sight
+        ray
     }
 
-    /// Where a line of sight from the mirror at `start` first meets what stands in the plate: its pixel, and the way there.
-    fn first_met(&self, start: DVec2, sight: &Sight) -> Option<(DVec2, f64)> {
+    /// The first surface of the plate that a ray from the mirror at pixel `start` meets.
+    fn first_hit(&self, start: DVec2, ray: &ReflectedRay) -> Option<Hit> {
         self.depth?;
-        let end = || self.camera.project(sight.from + sight.toward * FAR);
-        let length = match &sight.trace {
-            Some(trace) => trace.along.length(),
-            None => end().map_or(PLACES[1] * 0.25, |end| (end.pixel - start).length()),
+        let end = || self.camera.project(ray.origin + ray.direction * FAR_M);
+        let length = match &ray.on_screen {
+            Some(screen) => screen.step.length(),
+            None => end().map_or(SAMPLE_COUNTS[1] * 0.25, |end| (end.pixel - start).length()),
         };
-        let count = (length / STRIDE).ceil().clamp(PLACES[0], PLACES[1]);
-        let mut before = self.stop(sight, 0.0)?;
-        // Where it was last seen before it went behind what stands nearer.
-        let mut lost: Option<Stop> = None;
+        let count = (length / STRIDE).ceil().clamp(SAMPLE_COUNTS[0], SAMPLE_COUNTS[1]);
+        let mut before = self.sample(ray, 0.0)?;
+        // The last sample before the ray passed behind a nearer object; `None` while it is in front of the plate.
+        let mut hidden_since: Option<RaySample> = None;
         for step in 1..count as usize {
-            let Some(stop) = self.stop(sight, step as f64 / count) else { break };
-            if stop.depth > stop.plate && self.stands(stop.pixel, stop.plate) {
-                // The mirror itself may stand a little before or behind the plate's own depth of it.
-                if lost.is_none() && stop.plate > before.depth.min(before.plate) * (1.0 - JUMP) {
-                    return Some(self.crossing(sight, &before, &stop));
+            let Some(sample) = self.sample(ray, step as f64 / count) else { break };
+            if sample.depth > sample.plate_depth && self.is_above_mirror(sample.pixel, sample.plate_depth) {
+                // The tolerance is for the mirror itself, whose depth in the plate may differ a little from its true one.
+                if hidden_since.is_none()
+                    && sample.plate_depth > before.depth.min(before.plate_depth) * (1.0 - DEPTH_JUMP)
+                {
+                    return Some(self.crossing(ray, &before, &sample));
                 }
-                // It met what is farther while it was behind what is nearer.
-                if lost.is_some() && stop.plate > before.plate * (1.0 + JUMP) {
-                    return Some((stop.pixel, sight.way(stop.t)));
+                // While it was behind the nearer object, it met a farther surface.
+                if hidden_since.is_some() && sample.plate_depth > before.plate_depth * (1.0 + DEPTH_JUMP) {
+                    return Some(Hit { pixel: sample.pixel, distance: ray.distance(sample.t) });
                 }
-                lost = lost.or(Some(before));
+                hidden_since = hidden_since.or(Some(before));
             } else {
-                lost = None;
+                hidden_since = None;
             }
-            before = stop;
+            before = sample;
         }
-        // What it does not come out from behind of hides what it meets: what was seen beside that is the best guess.
-        lost.map(|stop| (stop.pixel, sight.way(stop.t)))
+        // The object hides what the ray meets behind it. The color seen beside the object is the best guess.
+        hidden_since.map(|sample| Hit { pixel: sample.pixel, distance: ray.distance(sample.t) })
     }
 
-    /// The place on a line of sight at `t`; none outside the picture.
-    fn stop(&self, sight: &Sight, t: f64) -> Option<Stop> {
-        let (pixel, depth) = match &sight.trace {
-            Some(trace) => (trace.from + trace.along * t, trace.depth / (1.0 - t)),
+    /// The sample of a ray at `t`; `None` outside the picture.
+    fn sample(&self, ray: &ReflectedRay, t: f64) -> Option<RaySample> {
+        let (pixel, depth) = match &ray.on_screen {
+            Some(screen) => (screen.origin + screen.step * t, screen.depth / (1.0 - t)),
             None => {
-                let place = self.camera.project(sight.at(t))?;
-                (place.pixel, place.depth)
+                let projected = self.camera.project(ray.at(t))?;
+                (projected.pixel, projected.depth)
             }
         };
-        self.is_inside(pixel).then(|| Stop { t, pixel, depth, plate: self.plate_depth(pixel) })
+        self.is_inside(pixel).then(|| RaySample { t, pixel, depth, plate_depth: self.plate_depth(pixel) })
     }
 
     fn is_inside(&self, pixel: DVec2) -> bool {
@@ -242,30 +261,30 @@ impl March<'_> {
         pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width && pixel.y < height
     }
 
-    /// Between two places, where the line of sight is as deep as the plate.
-    fn crossing(&self, sight: &Sight, before: &Stop, after: &Stop) -> (DVec2, f64) {
-        let [ahead, past] = [before, after].map(|stop| stop.plate - stop.depth);
-        let even = ahead.is_finite() && ahead > 0.0 && ahead - past > 0.0;
-        // Where it leaves the mirror the plate is the mirror itself, and what lies between them is rounding.
-        let part = if even && before.t > 0.0 { ahead / (ahead - past) } else { 1.0 };
-        let t = before.t + part * (after.t - before.t);
-        (before.pixel + (after.pixel - before.pixel) * part, sight.way(t))
+    /// The point between two samples where ray and plate have the same depth.
+    fn crossing(&self, ray: &ReflectedRay, before: &RaySample, after: &RaySample) -> Hit {
+        let [ahead, past] = [before, after].map(|sample| sample.plate_depth - sample.depth);
+        let is_linear = ahead.is_finite() && ahead > 0.0 && ahead - past > 0.0;
+        // At t = 0 the plate shows the mirror itself, and the difference of depths is only rounding.
+        let fraction = if is_linear && before.t > 0.0 { ahead / (ahead - past) } else { 1.0 };
+        let t = before.t + fraction * (after.t - before.t);
+        Hit { pixel: before.pixel + (after.pixel - before.pixel) * fraction, distance: ray.distance(t) }
     }
 
-    /// The plate's color infinitely far along a line of sight that met nothing.
-    fn beyond(&self, sight: &Sight) -> Option<[f32; 4]> {
-        let end = self.camera.project(sight.from + sight.toward * FAR)?.pixel;
+    /// The plate's color at the end of a ray that met no surface, where the plate is infinitely far.
+    fn color_at_infinity(&self, ray: &ReflectedRay) -> Option<[f32; 4]> {
+        let end = self.camera.project(ray.origin + ray.direction * FAR_M)?.pixel;
         (self.is_inside(end) && !self.plate_depth(end).is_finite()).then(|| self.radiance(end))?
     }
 
-    /// Whether what the plate shows at a pixel, at this depth, stands above the mirror.
-    fn stands(&self, pixel: DVec2, depth: f64) -> bool {
+    /// Whether what the plate shows at a pixel, at this depth, is above the mirror.
+    fn is_above_mirror(&self, pixel: DVec2, depth: f64) -> bool {
         let Some(direction) = self.camera.direction(pixel).filter(|_| depth.is_finite()) else { return false };
         let above = self.camera.position.y + direction.y * depth - self.mirror.height;
         above > self.mirror.tolerance_at(depth, self.camera.focal_pixels)
     }
 
-    /// The plate's depth at a pixel: never mixed between pixels.
+    /// The plate's depth at a pixel, m; not interpolated.
     fn plate_depth(&self, pixel: DVec2) -> f64 {
         let Some(depth) = self.depth else { return f64::INFINITY };
         let (x, y) = (pixel.x as usize, pixel.y as usize);
@@ -310,7 +329,7 @@ mod tests {
         View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, SIZE, 0)
     }
 
-    /// Where a ray first meets pillar, wall or, unless it comes from there, ground: way, and whether it is not the ground.
+    /// Where a ray first meets the pillar, the wall or (unless it starts there) the ground: distance, and whether it is not the ground.
     fn met(from: DVec3, toward: DVec3) -> Option<(f64, bool)> {
         let plane = |z: f64, inside: fn(DVec3) -> bool| {
             let way = (z - from.z) / toward.z;
@@ -322,7 +341,7 @@ mod tests {
         [pillar, wall, ground].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// A plate whose colors are the places that it shows, exposed.
+    /// A plate whose colors are the exposed positions of what it shows.
     fn plate(view: &View) -> PlateFrame {
         let mut color = Image::filled(SIZE[0], SIZE[1], [0.0, 0.0, 0.0, 1.0]);
         let mut depth = Image::filled(SIZE[0], SIZE[1], [f32::INFINITY]);
@@ -341,8 +360,8 @@ mod tests {
 
     #[test]
     fn a_wall_and_a_pillar_are_mirrored_at_the_right_place() {
-        // Wrong are outlines of the pillar, and in wide views the wall's top, where pixels of the plate are of both.
-        for (roll, vertical_fov_deg, most) in
+        // Errors are at the outlines of the pillar, and in wide views at the top of the wall, where a pixel of the plate covers both.
+        for (roll, vertical_fov_deg, limit) in
             [(0.0, 32.0, 0.005), (4.0, 32.0, 0.01), (0.0, 60.0, 0.03), (4.0, 60.0, 0.035), (0.0, 90.0, 0.05)]
         {
             let view = view(roll, vertical_fov_deg);
@@ -369,8 +388,8 @@ mod tests {
                 if near { right += 1 } else { wrong += 1 }
             }
             assert!(right > 7_000, "{right}");
-            let share = f64::from(wrong) / f64::from(right);
-            assert!(share < most, "{vertical_fov_deg} degrees, roll {roll}: {share}");
+            let fraction = f64::from(wrong) / f64::from(right);
+            assert!(fraction < limit, "{vertical_fov_deg} degrees, roll {roll}: {fraction}");
         }
     }
 
@@ -382,7 +401,7 @@ mod tests {
         let mut seen = mirrored.color.clone().unwrap();
         let parameters = SkyParameters { kind: SkyKind::Uniform, luminance: 300.0.into(), ..SkyParameters::default() };
         let sky = parameters.at(0.0);
-        lay_sky(&mut seen, &view.mirrored(0.0), &sky, 1);
+        composite_sky(&mut seen, &view.mirrored(0.0), &sky, 1);
         // The lowest row looks 31 degrees down, and by the mirror over the wall and out of the picture.
         let lowest = seen.at(SIZE[0] / 2, SIZE[1] - 1);
         assert_eq!(lowest[..3], sky.radiance(DVec3::Y));
@@ -391,7 +410,7 @@ mod tests {
         assert!(backdrop.pixels().iter().all(|pixel| (pixel[3] - 1.0).abs() < 1e-5));
     }
 
-    /// South of what each row of the mirrored plate shows at a column beside the pillar, for rows of the ground from the wall's foot down.
+    /// z of what each row of the mirrored plate shows, in a column beside the pillar, for the rows of the ground from the foot of the wall down.
     fn souths(plate: &PlateFrame, camera: &Camera, mirror: LevelMirror, rows: usize) -> Vec<f64> {
         let column = 0.3 * SIZE[0] as f64 + 0.5;
         let is_ground = |row: &usize| {

@@ -1,12 +1,13 @@
-//! Compositing on the processor: slices of depth, strips of rows, the plate behind all, refraction and the mirror.
+//! Compositing on the CPU: slices of depth, strips of rows, plate, refraction, mirror.
 
 mod accumulate;
 pub(crate) mod background;
 pub(crate) mod mirror;
 pub(crate) mod plate;
+pub(crate) mod plate_cache;
 mod plate_light;
 pub(crate) mod refraction;
-pub mod slices;
+pub(crate) mod slices;
 pub(crate) mod strips;
 
 pub(crate) use plate_light::plate_light;

@@ -1,4 +1,4 @@
-//! The light that a plate was taken in, as far as it shows it: what drops before it refract.
+//! The light in which a plate was taken, estimated from the plate itself. Drops in front of a plate refract it.
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -8,31 +8,31 @@ use bansho_base::{
     world::sky::{ElevationProfile, ElevationSample},
 };
 
-use super::plate::{Fit, to_scene};
-use crate::context::ShotContext;
+use super::plate::{PlateMapping, to_scene};
+use crate::{compiled::CompiledScene, plan::Plan};
 
 /// Samples along a plate's longer side.
 const SAMPLES: usize = 256;
-/// How many times display white what a photograph shows as white may be: nobody knows how much brighter it was.
-const BLOWN_OUT: f32 = 2.0;
+/// Largest luminance that is taken from a photograph, relative to display white. How much brighter a clipped pixel was is unknown.
+const CLIPPED_LUMINANCE: f32 = 2.0;
 
-/// The light from all elevations as the plate of the first frame shows it through the camera of time 0; 1.0 is display white. `None`
+/// The light from all elevations, as the plate of the first frame shows it through the camera at time 0; 1.0 is display white. `None`
 /// where there is no plate, or none that can be read.
 ///
-/// It is taken once a shot, so that it never flickers, and from the whole plate, whatever the crop.
-pub(crate) fn plate_light(context: &ShotContext) -> Option<ElevationProfile> {
-    let path = context.plan.scene.plate.image.as_ref()?;
-    let picture = context.compiled.assets().picture(&path.0, context.plan.scene.picture.first_frame).ok()?;
-    let camera = context.plan.scene.camera.at(0.0, context.plan.size);
+/// It is computed once a shot, so that it does not flicker, and from the whole plate, whatever the crop.
+pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<ElevationProfile> {
+    let path = plan.scene.plate.image.as_ref()?;
+    let picture = compiled.assets().picture(&path.0, plan.scene.picture.first_frame).ok()?;
+    let camera = plan.scene.camera.at(0.0, plan.size);
     let [width, height] = [picture.color.width(), picture.color.height()];
-    let fit = Fit::new(context, [width, height]);
-    let view = context.plan.shown();
+    let mapping = PlateMapping::new(plan, [width, height]);
+    let view = plan.view_transform();
     let step = width.max(height).div_ceil(SAMPLES);
-    let places = |side: usize| (step.min(side) / 2..side).step_by(step);
-    let samples: Vec<_> = places(height)
-        .flat_map(|y| places(width).map(move |x| [x, y]))
+    let positions = |side: usize| (step.min(side) / 2..side).step_by(step);
+    let samples: Vec<_> = positions(height)
+        .flat_map(|y| positions(width).map(move |x| [x, y]))
         .filter_map(|[x, y]| {
-            let pixel = DVec2::new(fit.in_picture(0, x), fit.in_picture(1, y));
+            let pixel = DVec2::new(mapping.picture_position(0, x), mapping.picture_position(1, y));
             let [red, green, blue, _] = picture.color.at(x, y);
             let light = to_scene(&view, picture.encoding, [red, green, blue]);
             sample(&camera, pixel, limited(picture.encoding, light))
@@ -42,20 +42,20 @@ pub(crate) fn plate_light(context: &ShotContext) -> Option<ElevationProfile> {
     ElevationProfile::from_samples(samples.into_iter().chain(above))
 }
 
-/// Share of the upper half of a plate that is taken for its sky: the brightest.
-const SKY_SHARE: f64 = 0.1;
-/// Steps of elevation in which the sky above the plate is given.
-const STEPS: usize = 96;
-/// Weight of what is only inferred beside what is seen, which decides wherever there is any.
-const INFERRED: f64 = 1e-6;
+/// Fraction of the upper half of a plate, the brightest, that is assumed to be sky.
+const SKY_FRACTION: f64 = 0.1;
+/// Elevations at which the sky above the plate is sampled.
+const INFERRED_SAMPLES: usize = 96;
+/// Weight of inferred samples, so small that samples of the plate decide wherever there are any.
+const INFERRED_WEIGHT: f64 = 1e-6;
 
-/// The sky above all that a plate shows, which must be open where rain falls from it: as bright as what is brightest in the plate's upper half,
-/// and brighter toward the zenith as an overcast sky is (CIE S 011).
+/// The sky above the field of view of a plate, which is assumed to be open since rain falls from it: as bright as the brightest pixels in the
+/// upper half of the plate, and brighter toward the zenith as the overcast sky of CIE S 011.
 fn open_sky(samples: &[ElevationSample]) -> Vec<ElevationSample> {
     let mut upper: Vec<&ElevationSample> = samples[..samples.len().div_ceil(2)].iter().collect();
     let seen = |sample: &&ElevationSample| color::luminance(sample.radiance);
     upper.sort_by(|a, b| seen(b).total_cmp(&seen(a)));
-    upper.truncate((upper.len() as f64 * SKY_SHARE).ceil() as usize);
+    upper.truncate((upper.len() as f64 * SKY_FRACTION).ceil() as usize);
     let Some(count) = std::num::NonZero::new(upper.len()) else { return Vec::new() };
     let mean =
         |of: &dyn Fn(&ElevationSample) -> f64| upper.iter().map(|each| of(each)).sum::<f64>() / count.get() as f64;
@@ -64,14 +64,14 @@ fn open_sky(samples: &[ElevationSample]) -> Vec<ElevationSample> {
     let level = mean(&|each| overcast(each.sine));
     let highest = samples.iter().map(|each| each.sine).fold(-1.0, f64::max);
     let at = |step: usize| {
-        let sine = math::lerp(highest, 1.0, (step as f64 + 0.5) / STEPS as f64);
+        let sine = math::lerp(highest, 1.0, (step as f64 + 0.5) / INFERRED_SAMPLES as f64);
         let radiance = radiance.map(|value| (value * overcast(sine) / level) as f32);
-        ElevationSample { sine, weight: INFERRED, radiance }
+        ElevationSample { sine, weight: INFERRED_WEIGHT, radiance }
     };
-    (0..STEPS).map(at).collect()
+    (0..INFERRED_SAMPLES).map(at).collect()
 }
 
-/// Light that is seen at a place in the picture, in the direction and the solid angle of its pixel.
+/// The light of a pixel, with the sine of its elevation and its solid angle as the weight.
 fn sample(camera: &Camera, pixel: DVec2, radiance: [f32; 3]) -> Option<ElevationSample> {
     let direction = camera.direction(pixel)?;
     let length = direction.length();
@@ -83,12 +83,12 @@ fn sample(camera: &Camera, pixel: DVec2, radiance: [f32; 3]) -> Option<Elevation
     Some(ElevationSample { sine: direction.y / length, weight, radiance })
 }
 
-/// Light as it can have been: none below nothing, and of a picture made to be looked at none far beyond white.
+/// Light without negative values, and for display pictures at most [`CLIPPED_LUMINANCE`].
 fn limited(encoding: Encoding, light: [f32; 3]) -> [f32; 3] {
     let light = light.map(|value| value.max(0.0));
     let brightest = color::luminance(light);
     let factor = match encoding {
-        Encoding::DisplaySrgb if brightest > BLOWN_OUT => BLOWN_OUT / brightest,
+        Encoding::DisplaySrgb if brightest > CLIPPED_LUMINANCE => CLIPPED_LUMINANCE / brightest,
         _ => 1.0,
     };
     light.map(|value| value * factor)
@@ -111,14 +111,14 @@ mod tests {
         let sky = open_sky(&samples);
         assert!(sky.iter().all(|each| (0.3..=1.0).contains(&each.sine) && each.weight < 1e-3));
         // The brightest of the upper half lie at sines of 0.1 and 0.3 alike: the first of them count.
-        let [lowest, zenith] = [sky[0], sky[STEPS - 1]].map(|each| each.radiance);
+        let [lowest, zenith] = [sky[0], sky[INFERRED_SAMPLES - 1]].map(|each| each.radiance);
         assert!(
             (lowest[0] - 0.6).abs() < 0.01 && (zenith[0] / lowest[0] - 3.0 / 1.6).abs() < 0.02,
             "{lowest:?} {zenith:?}"
         );
         assert!((zenith[2] / zenith[0] - 2.0).abs() < 1e-5);
         let profile = ElevationProfile::from_samples(samples.iter().copied().chain(sky)).unwrap();
-        // What is seen stays as it is: at its top the mean of pillars and sky.
+        // Samples of the plate are unchanged: at its top the mean of pillars and sky.
         let seen =
             bansho_base::world::sky::Sky::measured(profile).radiance(bansho_base::math::DVec3::new(0.0, 0.29, 0.0));
         assert!(seen[0] < 0.45, "{seen:?}");
@@ -130,7 +130,7 @@ mod tests {
         let white = to_scene(&color::View::DISPLAY, Encoding::DisplaySrgb, [1.0; 3]);
         assert!(color::luminance(white) > 10.0);
         let [limited_white, light] = [Encoding::DisplaySrgb, Encoding::LinearAcescg].map(|kind| limited(kind, white));
-        assert!((color::luminance(limited_white) - BLOWN_OUT).abs() < 1e-5);
+        assert!((color::luminance(limited_white) - CLIPPED_LUMINANCE).abs() < 1e-5);
         assert_eq!(light, white);
         assert_eq!(limited(Encoding::LinearAcescg, [-0.1, 0.5, 0.2]), [0.0, 0.5, 0.2]);
     }

@@ -1,7 +1,7 @@
-//! Frames in which hot air bends what lies behind it.
+//! Frames with hot air that refracts the light from behind it.
 //!
-//! The slices fall into groups, each nearer than one bending layer. From far to near, each group is laid before what lies behind it, seen
-//! through the layer between. AOVs are not bent.
+//! The refracting layers divide the slices into groups. From far to near, each group is composited over what has been drawn, as seen through
+//! the layer between. AOVs are not refracted.
 
 use bansho_base::{
     frame::{Frame, FrameHeader},
@@ -10,40 +10,43 @@ use bansho_base::{
 };
 
 use super::{
-    background::Behind,
+    background::Background,
     strips::{self, Composition},
 };
 
-pub(crate) fn frame(
+/// Draws and composites the whole window, with refraction.
+pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
-    mut spent: Option<Frame>,
+    mut recycled: Option<Frame>,
     observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
-    let mut bends: Vec<Deflection> = composition.prepared.iter().filter_map(|prepared| prepared.deflection()).collect();
-    bends.sort_by(|a, b| b.depth.total_cmp(&a.depth));
-    let farthest = bends.first().map_or(f64::INFINITY, |bend| bend.depth);
-    let (mut slices, far) = composition.slices.split_at(nearer(composition, farthest));
+    let mut layers: Vec<Deflection> =
+        composition.prepared.iter().filter_map(|prepared| prepared.deflection()).collect();
+    layers.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+    let farthest = layers.first().map_or(f64::INFINITY, |layer| layer.depth);
+    let (mut slices, far) = composition.slices.split_at(slices_before(composition, farthest));
     let mut drawn = match far {
         [] => None,
-        far => Some(strips::frame(&Composition { slices: far, ..*composition }, header.clone(), None, observer)?),
+        far => Some(strips::draw_frame(&Composition { slices: far, ..*composition }, header.clone(), None, observer)?),
     };
-    for (number, bend) in bends.iter().enumerate() {
-        let next = bends.get(number + 1).map_or(f64::NEG_INFINITY, |next| next.depth);
-        let (rest, group) = slices.split_at(nearer(composition, next));
+    for (index, layer) in layers.iter().enumerate() {
+        let next = layers.get(index + 1).map_or(f64::NEG_INFINITY, |next| next.depth);
+        let (rest, group) = slices.split_at(slices_before(composition, next));
         slices = rest;
-        let behind = drawn.as_ref().map_or(composition.behind, Behind::drawn).through(*bend, composition.view);
-        let group = Composition { slices: group, behind, ..*composition };
-        let memory = if rest.is_empty() { spent.take() } else { None };
-        drawn = Some(strips::frame(&group, header.clone(), memory, observer)?);
+        let background = drawn.as_ref().map_or(composition.background, Background::drawn);
+        let background = background.through(*layer, composition.view);
+        let group = Composition { slices: group, background, ..*composition };
+        let memory = if rest.is_empty() { recycled.take() } else { None };
+        drawn = Some(strips::draw_frame(&group, header.clone(), memory, observer)?);
     }
     match drawn {
         Some(frame) => Ok(frame),
-        None => strips::frame(composition, header, spent, observer),
+        None => strips::draw_frame(composition, header, recycled, observer),
     }
 }
 
-/// How many slices begin before a depth.
-fn nearer(composition: &Composition, depth: f64) -> usize {
+/// Number of slices that begin at or before a depth.
+fn slices_before(composition: &Composition, depth: f64) -> usize {
     composition.slices.partition_point(|slice| slice.interval.near <= depth)
 }

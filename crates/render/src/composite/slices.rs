@@ -1,24 +1,23 @@
-//! Cutting the depth of a picture so that phenomena lie rightly before and behind each other.
+//! Cutting the depth of a picture into slices, so that phenomena occlude each other correctly.
 
 use bansho_base::phenomenon::strip::DepthInterval;
 
-/// A stretch of depth and the phenomena that fill some of it.
+/// An interval of depth, and the phenomena in it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Slice {
-    /// The stretch.
-    pub interval: DepthInterval,
-    /// Which phenomena, by their place in the scene.
-    pub members: Vec<usize>,
+pub(crate) struct Slice {
+    pub(crate) interval: DepthInterval,
+    /// Indices of the phenomena.
+    pub(crate) members: Vec<usize>,
 }
 
-/// Most slices of a picture; beyond it the thinnest neighbors are drawn as one.
-pub const MOST_SLICES: usize = 24;
+/// Largest number of slices. With more, the thinnest neighbors are merged.
+const MAX_SLICES: usize = 24;
 
 /// Slices from near to far, cut wherever a phenomenon begins or ends.
 ///
-/// `intervals[i]` are the stretches that phenomenon `i` fills. Neighboring slices with the same members stay apart
-/// only where another phenomenon begins or ends between them.
-pub fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
+/// `intervals[i]` are the intervals that phenomenon `i` fills. Neighboring slices with the same members are separate only where another
+/// phenomenon begins or ends between them.
+pub(crate) fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
     let intervals: Vec<Vec<DepthInterval>> =
         intervals.iter().map(|filled| filled.iter().map(thickened).collect()).collect();
     let intervals = intervals.as_slice();
@@ -37,13 +36,13 @@ pub fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
         .filter(|slice| !slice.members.is_empty())
         .collect();
     merge_lone_neighbors(&mut slices);
-    while slices.len() > MOST_SLICES {
+    while slices.len() > MAX_SLICES {
         merge_thinnest(&mut slices);
     }
     slices
 }
 
-/// A sheet that faces the camera fills a single depth; its slice is the thinnest there is.
+/// An interval of positive length. A sheet that faces the camera has a single depth; its interval becomes the shortest possible.
 fn thickened(interval: &DepthInterval) -> DepthInterval {
     DepthInterval { near: interval.near, far: interval.far.max(interval.near.next_up()) }
 }
@@ -53,7 +52,7 @@ fn members(intervals: &[Vec<DepthInterval>], slice: &DepthInterval) -> Vec<usize
     (0..intervals.len()).filter(fills).collect()
 }
 
-/// One phenomenon alone sorts its own parts, so touching slices that hold only it need no edge.
+/// Merges touching slices that contain only the same phenomenon, since a phenomenon sorts its own contents.
 fn merge_lone_neighbors(slices: &mut Vec<Slice>) {
     slices.dedup_by(|next, previous| {
         let lone = next.members.len() == 1 && next.members == previous.members;
@@ -115,7 +114,7 @@ mod tests {
         let many: Vec<Vec<DepthInterval>> =
             (0..500).map(|i| vec![interval(f64::from(i) * 0.1, f64::from(i) * 0.1 + 0.05)]).collect();
         let slices = cut(&many);
-        assert!(slices.len() <= MOST_SLICES);
+        assert!(slices.len() <= MAX_SLICES);
         let mut seen: Vec<usize> = slices.iter().flat_map(|slice| slice.members.clone()).collect();
         seen.sort_unstable();
         seen.dedup();

@@ -1,4 +1,4 @@
-//! From prepared phenomena to a frame: strip by strip, slice by slice, nearest first, the plate behind all.
+//! From prepared phenomena to a frame: each strip composites its slices from near to far, then adds the background.
 
 use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
@@ -10,46 +10,46 @@ use bansho_base::{
     math::MulAdd,
     phenomenon::{
         Prepared,
-        strip::{AovRule, Strip, View},
+        strip::{AovDescriptor, AovRule, Strip, View},
     },
 };
 
 use super::{
     accumulate::Accumulator,
-    background::{Behind, Sources},
+    background::{Background, BentPixels},
     plate::PlateFrame,
     slices::Slice,
 };
-use crate::compiled::ActiveRun;
+use crate::{compiled::ActiveRun, plan::Plan};
 use bansho_scene::PLATE_LAYER;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-/// Rows of a strip: the planes of a 1920-pixel strip stay within a core's second-level cache.
+/// Rows of a strip: few enough that the planes of a strip of 1920 pixels fit in the L2 cache of a core.
 pub(crate) const STRIP_ROWS: usize = 8;
 
-/// What a frame is to hold.
+/// What a frame contains.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outputs {
-    /// What absolute radiance is multiplied by.
+    /// Factor from absolute radiance to exposed values.
     pub(crate) exposure: f32,
-    /// Whether each phenomenon gets a layer.
+    /// Whether each phenomenon gets a layer of its own.
     pub(crate) layers: bool,
     /// Whether AOVs are written.
     pub(crate) aovs: bool,
 }
 
 impl Outputs {
-    /// What the shot asks for.
-    pub(crate) fn of_plan(plan: &crate::plan::Plan) -> Self {
+    /// As the plan requests.
+    pub(crate) fn of_plan(plan: &Plan) -> Self {
         Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs }
     }
 
-    /// Nothing but absolute radiance.
+    /// Absolute radiance without layers and AOVs.
     pub(crate) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false };
 }
 
-/// One frame, ready to be composited.
+/// A frame that is ready to be composited.
 #[derive(Clone, Copy)]
 pub(crate) struct Composition<'a> {
     pub(crate) outputs: Outputs,
@@ -58,47 +58,49 @@ pub(crate) struct Composition<'a> {
     pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
     pub(crate) slices: &'a [Slice],
     pub(crate) plate: &'a PlateFrame,
-    /// What the slices stand before.
-    pub(crate) behind: Behind<'a>,
+    /// What is behind the slices.
+    pub(crate) background: Background<'a>,
 }
 
-/// Scratch of one thread.
+/// Scratch memory of one thread.
 #[derive(Default)]
-struct Worker {
+struct StripScratch {
     strip: Strip,
     accumulator: Accumulator,
-    /// Where the light behind the strip comes from, where it is bent, and a row of it.
-    sources: Sources,
+    /// The refracted pixels of the background.
+    bent: BentPixels,
+    /// A row of refracted colors.
     row: Vec<[f32; 4]>,
 }
 
 impl Composition<'_> {
-    /// The strip with index `index` of the window.
+    /// The rectangle of the strip with this index.
     fn strip_rect(&self, index: usize) -> Rect {
         let window = self.view.window;
         let y = index * STRIP_ROWS;
         Rect { x: window.x, y: window.y + y, width: window.width, height: STRIP_ROWS.min(window.height - y) }
     }
 
-    /// The part of a strip that can differ from nothing; all of it where there is something behind, a layer or an AOV to fill.
-    fn worth_drawing(&self, rect: Rect) -> Rect {
-        if self.behind.color.is_some() || self.outputs.layers || self.outputs.aovs {
+    /// The rectangle of a strip that must be drawn: the bounds of the phenomena, or the whole strip where there is a background or where layers
+    /// or AOVs are requested.
+    fn nonempty_rect(&self, rect: Rect) -> Rect {
+        if self.background.color.is_some() || self.outputs.layers || self.outputs.aovs {
             return rect;
         }
         let touched = |slice: &Slice| {
             let each = slice.members.iter().map(|&member| self.prepared[member].bounds(&slice.interval));
             each.fold(Rect::default(), |all, bounds| all.union(&bounds.intersection(&rect)))
         };
-        self.slices.iter().map(touched).fold(Rect::default(), |all, part| all.union(&part))
+        self.slices.iter().map(touched).fold(Rect::default(), |all, rect| all.union(&rect))
     }
 
-    /// The part of the frame that can differ from nothing, in the frame's own pixels.
+    /// The rectangle of the frame outside of which all pixels are empty, in pixels of the frame.
     fn content(&self) -> Rect {
         let window = self.view.window;
         let strips = 0..window.height.div_ceil(STRIP_ROWS);
-        let all = strips.map(|index| self.worth_drawing(self.strip_rect(index)));
-        let part = all.fold(Rect::default(), |all, part| all.union(&part));
-        Rect { x: part.x.saturating_sub(window.x), y: part.y.saturating_sub(window.y), ..part }
+        let all = strips.map(|index| self.nonempty_rect(self.strip_rect(index)));
+        let bounds = all.fold(Rect::default(), |all, rect| all.union(&rect));
+        Rect { x: bounds.x.saturating_sub(window.x), y: bounds.y.saturating_sub(window.y), ..bounds }
     }
 
     fn layer_count(&self) -> usize {
@@ -112,45 +114,46 @@ impl Composition<'_> {
         self.runs.iter().map(|run| run.info().aovs.len()).collect()
     }
 
-    /// Draws the slices within `rect` into the worker's accumulator, nearest first.
-    fn accumulate(&self, level: Level, rect: Rect, worker: &mut Worker) {
+    /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first.
+    fn accumulate(&self, level: Level, rect: Rect, scratch: &mut StripScratch) {
         let aovs = self.aov_counts();
-        worker.accumulator.reset(rect, self.layer_count(), &aovs);
+        scratch.accumulator.reset(rect, self.layer_count(), &aovs);
         let plate_depth = self.plate.depth.as_ref();
         for slice in self.slices {
             for &member in &slice.members {
                 let prepared = &self.prepared[member];
-                let wanted = aovs.get(member).copied().unwrap_or(0);
+                let aov_count = aovs.get(member).copied().unwrap_or(0);
                 let touched = prepared.bounds(&slice.interval).intersection(&rect);
                 if touched.is_empty() {
                     continue;
                 }
-                // AOV planes are added as wholes, so their strips keep the full size.
-                let drawn = if wanted > 0 { rect } else { touched };
+                // AOV planes are added as a whole, so strips with AOVs have the full size.
+                let drawn = if aov_count > 0 { rect } else { touched };
                 match plate_depth {
-                    Some(image) => worker.strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), wanted),
-                    None => worker.strip.reset(drawn, None, wanted),
+                    Some(image) => scratch.strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
+                    None => scratch.strip.reset(drawn, None, aov_count),
                 }
-                prepared.draw(&slice.interval, &mut worker.strip);
-                worker.accumulator.add_behind(level, &worker.strip, member, self.runs[member].info().aovs);
+                prepared.draw(&slice.interval, &mut scratch.strip);
+                scratch.accumulator.add_behind(level, &scratch.strip, member, self.runs[member].info().aovs);
             }
         }
     }
 }
 
-/// Memory for a frame: empty pixels, but for those of the frame that it held before.
-struct Canvas {
+/// The memory of a frame.
+struct FrameMemory {
     beauty: Image<4>,
     depth: Vec<f32>,
+    /// Pixels that still contain an earlier frame; all others are empty.
     stale: Rect,
 }
 
-impl Canvas {
-    /// Takes the memory of a spent frame if it fits: fresh memory costs more than drawing a sparse frame.
-    fn new(window: Rect, spent: Option<Frame>) -> Self {
+impl FrameMemory {
+    /// Takes the memory of a recycled frame of the same size: page faults of new memory cost more than drawing a sparse frame.
+    fn new(window: Rect, recycled: Option<Frame>) -> Self {
         let (width, height) = (window.width, window.height);
         let fits = |frame: &Frame| frame.beauty.width() == width && frame.beauty.height() == height;
-        if let Some(Frame { beauty, depth: Some(depth), content, .. }) = spent.filter(fits) {
+        if let Some(Frame { beauty, depth: Some(depth), content, .. }) = recycled.filter(fits) {
             return Self { beauty, depth, stale: content };
         }
         let depth = vec![f32::INFINITY; width * height];
@@ -158,7 +161,7 @@ impl Canvas {
     }
 }
 
-/// Empties what a spent frame left in the rows from `first` on.
+/// Clears the stale pixels in the rows from `first` on.
 fn clear(stale: Rect, first: usize, width: usize, beauty: &mut [[f32; 4]], depth: &mut [f32]) {
     for (row, (beauty, depth)) in beauty.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
         if (stale.y..stale.bottom()).contains(&(first + row)) {
@@ -169,17 +172,17 @@ fn clear(stale: Rect, first: usize, width: usize, beauty: &mut [[f32; 4]], depth
 }
 
 /// Draws and composites the whole window.
-pub(crate) fn frame(
+pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
-    spent: Option<Frame>,
+    recycled: Option<Frame>,
     observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
     let level = Level::new();
-    let Canvas { mut beauty, mut depth, stale } = Canvas::new(window, spent);
+    let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, recycled);
     let strip_pixels = STRIP_ROWS * window.width;
-    let workers = ScratchPool::new(Worker::default);
+    let scratches = ScratchPool::new(StripScratch::default);
     let planes: Vec<Vec<Vec<f32>>> = beauty
         .pixels_mut()
         .par_chunks_mut(strip_pixels)
@@ -190,15 +193,15 @@ pub(crate) fn frame(
             observer::check(observer)?;
             clear(stale, index * STRIP_ROWS, window.width, beauty, depth);
             let strip = composition.strip_rect(index);
-            let rect = composition.worth_drawing(strip);
+            let rect = composition.nonempty_rect(strip);
             if rect.is_empty() {
                 return Ok(Vec::new());
             }
-            workers.with(|worker| {
-                composition.accumulate(level, rect, worker);
-                composition.behind.trace(rect, &mut worker.sources);
-                finish_strip(composition, level, worker, strip, beauty, depth);
-                Ok(channel_planes(composition, worker))
+            scratches.with(|scratch| {
+                composition.accumulate(level, rect, scratch);
+                composition.background.trace(rect, &mut scratch.bent);
+                finish_strip(composition, level, scratch, strip, beauty, depth);
+                Ok(channel_planes(composition, scratch))
             })
         })
         .collect::<Result<_, Cancelled>>()?;
@@ -215,17 +218,17 @@ pub(crate) fn frame(
     })
 }
 
-/// Exposes the strip, puts behind it what is there, and gives it its alpha.
+/// Exposes a strip, computes its alpha, and composites the background behind it.
 fn finish_strip(
     composition: &Composition,
     level: Level,
-    worker: &mut Worker,
+    scratch: &mut StripScratch,
     strip: Rect,
     beauty: &mut [[f32; 4]],
     depth: &mut [f32],
 ) {
-    let (exposure, behind) = (composition.outputs.exposure, &composition.behind);
-    let Worker { accumulator, sources, row: buffer, .. } = worker;
+    let (exposure, background) = (composition.outputs.exposure, &composition.background);
+    let StripScratch { accumulator, bent, row: buffer, .. } = scratch;
     let rect = accumulator.rect;
     for row in 0..rect.height {
         let pixels = row * rect.width..(row + 1) * rect.width;
@@ -236,21 +239,21 @@ fn finish_strip(
         match accumulator.transmittance() {
             None => dispatch!(level, _simd => expose_row(exposure, color, out)),
             Some(planes) => {
-                let through = planes.each_ref().map(|plane| &plane[pixels.clone()]);
-                dispatch!(level, _simd => expose_absorbed_row(exposure, color, through, out));
+                let transmittance = planes.each_ref().map(|plane| &plane[pixels.clone()]);
+                dispatch!(level, _simd => expose_absorbed_row(exposure, color, transmittance, out));
             }
         }
-        if let Some(colors) = behind.color_row(rect, row, sources, buffer) {
+        if let Some(colors) = background.color_row(rect, row, bent, buffer) {
             match accumulator.transmittance() {
-                None => dispatch!(level, _simd => lay_behind(colors, out)),
+                None => dispatch!(level, _simd => composite_background(colors, out)),
                 Some(planes) => {
-                    let through = planes.each_ref().map(|plane| &plane[pixels.clone()]);
-                    dispatch!(level, _simd => lay_behind_absorbed(through, colors, out));
+                    let transmittance = planes.each_ref().map(|plane| &plane[pixels.clone()]);
+                    dispatch!(level, _simd => composite_absorbed_background(transmittance, colors, out));
                 }
             }
         }
-        if let Some(depths) = behind.depth_row(rect, row, composition.view.size[0]) {
-            depth.iter_mut().zip(depths).for_each(|(depth, behind)| *depth = depth.min(*behind));
+        if let Some(depths) = background.depth_row(rect, row, composition.view.size[0]) {
+            depth.iter_mut().zip(depths).for_each(|(depth, farther)| *depth = depth.min(*farther));
         }
     }
 }
@@ -263,86 +266,86 @@ fn expose_row(exposure: f32, [red, green, blue]: [&[f32]; 3], out: &mut [[f32; 4
 }
 
 #[inline(always)]
-fn expose_absorbed_row(exposure: f32, color: [&[f32]; 3], through: [&[f32]; 3], out: &mut [[f32; 4]]) {
+fn expose_absorbed_row(exposure: f32, color: [&[f32]; 3], transmittance: [&[f32]; 3], out: &mut [[f32; 4]]) {
     expose_row(exposure, color, out);
-    let [red, green, blue] = through;
+    let [red, green, blue] = transmittance;
     for (((out, red), green), blue) in out.iter_mut().zip(red).zip(green).zip(blue) {
         out[3] = 1.0 - (red + green + blue) * (1.0 / 3.0);
     }
 }
 
-/// Puts behind a row what is there, where nothing absorbs.
+/// Composites the background behind a row in which nothing absorbs.
 #[inline(always)]
-fn lay_behind(behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
-    for (out, behind) in out.iter_mut().zip(behind) {
-        let share = [1.0, 1.0, 1.0, 1.0 - out[3]];
+fn composite_background(background: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    for (out, background) in out.iter_mut().zip(background) {
+        let weight = [1.0, 1.0, 1.0, 1.0 - out[3]];
         for c in 0..4 {
-            out[c] = share[c].fma(behind[c], out[c]);
+            out[c] = weight[c].fma(background[c], out[c]);
         }
     }
 }
 
-/// The same where something absorbs.
+/// As [`composite_background`], where something absorbs.
 #[inline(always)]
-fn lay_behind_absorbed([red, green, blue]: [&[f32]; 3], behind: &[[f32; 4]], out: &mut [[f32; 4]]) {
-    for ((((out, behind), red), green), blue) in out.iter_mut().zip(behind).zip(red).zip(green).zip(blue) {
-        let share = [*red, *green, *blue, 1.0 - out[3]];
+fn composite_absorbed_background([red, green, blue]: [&[f32]; 3], background: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    for ((((out, background), red), green), blue) in out.iter_mut().zip(background).zip(red).zip(green).zip(blue) {
+        let weight = [*red, *green, *blue, 1.0 - out[3]];
         for c in 0..4 {
-            out[c] = share[c].fma(behind[c], out[c]);
+            out[c] = weight[c].fma(background[c], out[c]);
         }
     }
 }
 
-/// This strip's part of every layer and AOV, in the order of [`channels`].
-fn channel_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32>> {
-    let mut planes = layer_planes(composition, worker);
+/// The planes of this strip for every layer and AOV, in the order of [`channels`].
+fn channel_planes(composition: &Composition, scratch: &mut StripScratch) -> Vec<Vec<f32>> {
+    let mut planes = layer_planes(composition, scratch);
     let layers = planes.len();
-    planes.extend(aov_planes(composition, &worker.accumulator));
+    planes.extend(aov_planes(composition, &scratch.accumulator));
     let rules = composition.runs.iter().flat_map(|run| run.info().aovs).map(|aov| aov.rule);
-    let behind = composition.behind.channels.get(layers..).unwrap_or_default();
-    for ((plane, behind), rule) in planes[layers..].iter_mut().zip(behind).zip(rules) {
-        let values = composition.behind.plane(
-            &behind.values,
-            worker.accumulator.rect,
-            &Sources::default(),
+    let drawn = composition.background.channels.get(layers..).unwrap_or_default();
+    for ((plane, drawn), rule) in planes[layers..].iter_mut().zip(drawn).zip(rules) {
+        let values = composition.background.plane(
+            &drawn.values,
+            scratch.accumulator.rect,
+            &BentPixels::default(),
             composition.view.size[0],
         );
-        plane.iter_mut().zip(values).for_each(|(own, behind)| *own = nearest_aov(*own, behind, rule));
+        plane.iter_mut().zip(values).for_each(|(own, farther)| *own = combine_aov(*own, farther, rule));
     }
     planes
 }
 
-/// An AOV of a phenomenon that reaches into several groups of slices: of the nearest group with a value, unless values are added.
-fn nearest_aov(own: f32, behind: f32, rule: AovRule) -> f32 {
+/// Combines the AOV of a phenomenon that extends over several groups of slices: the sum, or the value of the nearest group that has one.
+fn combine_aov(own: f32, farther: f32, rule: AovRule) -> f32 {
     match rule {
-        AovRule::Sum => own + behind,
-        AovRule::WeightedMean | AovRule::Nearest if own == 0.0 => behind,
+        AovRule::Sum => own + farther,
+        AovRule::WeightedMean | AovRule::Nearest if own == 0.0 => farther,
         AovRule::WeightedMean | AovRule::Nearest => own,
     }
 }
 
-/// Layers of the phenomena and of the plate: what is behind the strip, as far as it lets it through, and its own.
-fn layer_planes(composition: &Composition, worker: &mut Worker) -> Vec<Vec<f32>> {
-    let (exposure, behind) = (composition.outputs.exposure, &composition.behind);
-    let accumulator = &worker.accumulator;
+/// Layers of the phenomena and of the plate: those of this strip, and those of the background times its transmittance.
+fn layer_planes(composition: &Composition, scratch: &mut StripScratch) -> Vec<Vec<f32>> {
+    let (exposure, background) = (composition.outputs.exposure, &composition.background);
+    let accumulator = &scratch.accumulator;
     let mut planes = Vec::new();
     for layer in &accumulator.layers {
         planes.extend(layer[..3].iter().map(|plane| plane.iter().map(|value| exposure * value).collect::<Vec<f32>>()));
         planes.push(layer[3].clone());
     }
     if composition.outputs.layers && composition.plate.color.is_some() {
-        match behind.channels {
-            [] => planes.extend(plate_layer(composition, worker)),
+        match background.channels {
+            [] => planes.extend(plate_layer(composition, scratch)),
             _ => planes.extend([0; 4].map(|_| vec![0.0; accumulator.depth.len()])),
         }
     }
-    let accumulator = &worker.accumulator;
-    for (number, (plane, drawn)) in planes.iter_mut().zip(behind.channels).enumerate() {
-        let values = behind.plane(&drawn.values, accumulator.rect, &worker.sources, composition.view.size[0]);
+    let accumulator = &scratch.accumulator;
+    for (channel, (plane, drawn)) in planes.iter_mut().zip(background.channels).enumerate() {
+        let values = background.plane(&drawn.values, accumulator.rect, &scratch.bent, composition.view.size[0]);
         for (index, (own, value)) in plane.iter_mut().zip(values).enumerate() {
             let through = accumulator.transmittance_at(index);
-            let share = through.get(number % 4).copied().unwrap_or((through[0] + through[1] + through[2]) / 3.0);
-            *own = share.fma(value, *own);
+            let weight = through.get(channel % 4).copied().unwrap_or((through[0] + through[1] + through[2]) / 3.0);
+            *own = weight.fma(value, *own);
         }
     }
     planes
@@ -359,12 +362,12 @@ fn aov_planes(composition: &Composition, accumulator: &Accumulator) -> Vec<Vec<f
     planes
 }
 
-fn plate_layer(composition: &Composition, worker: &mut Worker) -> [Vec<f32>; 4] {
-    let Worker { accumulator, sources, row: buffer, .. } = worker;
+fn plate_layer(composition: &Composition, scratch: &mut StripScratch) -> [Vec<f32>; 4] {
+    let StripScratch { accumulator, bent, row: buffer, .. } = scratch;
     let rect = accumulator.rect;
     let mut layer: [Vec<f32>; 4] = Default::default();
     for row in 0..rect.height {
-        let Some(plate) = composition.behind.color_row(rect, row, sources, buffer) else { break };
+        let Some(plate) = composition.background.color_row(rect, row, bent, buffer) else { break };
         for (x, plate) in plate.iter().enumerate() {
             let through = accumulator.transmittance_at(row * rect.width + x);
             for c in 0..3 {
@@ -376,7 +379,7 @@ fn plate_layer(composition: &Composition, worker: &mut Worker) -> [Vec<f32>; 4] 
     layer
 }
 
-/// Joins the strips' planes and names them.
+/// Concatenates the planes of all strips into named channels.
 fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) -> Vec<Channel> {
     let mut channels = channel_names(composition);
     for strip in strips {
@@ -400,9 +403,7 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
     }
     if composition.outputs.aovs {
         for run in composition.runs {
-            let aov = |aov: &bansho_base::phenomenon::strip::AovDescriptor| {
-                channel(format!("{}.{}", run.info().name, aov.name), Precision::Single)
-            };
+            let aov = |aov: &AovDescriptor| channel(format!("{}.{}", run.info().name, aov.name), Precision::Single);
             channels.extend(run.info().aovs.iter().map(aov));
         }
     }

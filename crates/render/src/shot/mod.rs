@@ -1,4 +1,4 @@
-//! A shot: runs of everything that a compiled scene shows, and the frame that was drawn last.
+//! A shot: the runs of all phenomena of a compiled scene, and the last frame.
 
 mod snapshot;
 pub(crate) mod stepping;
@@ -20,30 +20,30 @@ use bansho_base::{
 use rayon::prelude::*;
 
 use crate::{
-    compiled::{ActiveRun, CompiledScene, Participant},
+    compiled::{ActiveRun, BuiltPhenomenon, CompiledScene},
     composite::{
-        background::Behind,
+        background::Background,
         mirror::{self, Mirror},
-        plate::{PlateCache, PlateFrame},
+        plate::PlateFrame,
+        plate_cache::PlateCache,
         refraction,
         slices::{self, Slice},
         strips::{self, Composition, Outputs},
     },
     context::ShotContext,
-    fingerprint,
     plan::Plan,
 };
 
 /// Why a frame cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RenderError {
-    /// The caller stopped it.
+    /// The observer asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-    /// The plate of a frame cannot be had: its picture or its depth, which the fault names.
+    /// The picture or the depth of the plate cannot be read.
     #[error("plate.{}: {}", .0.key, .0.kind)]
     Plate(Box<BuildError>),
-    /// A snapshot does not fit.
+    /// A snapshot cannot be restored.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
     /// The snapshot belongs to another scene, seed or version.
@@ -53,43 +53,45 @@ pub enum RenderError {
 
 /// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
 ///
-/// It draws on the processor, in the rayon pool of the caller. Same scene and plan, same bytes, whatever the threads.
+/// It runs on the CPU, in the rayon pool of the caller. The same scene and plan give the same bytes with any number of threads.
 pub struct Shot {
     context: ShotContext,
     runs: Vec<ActiveRun>,
     plates: PlateCache,
+    /// Number of the frame that the shot was advanced to.
     number: i64,
-    /// Whether the state was reached under another scene.
-    carried: bool,
+    /// Whether the state was simulated, at least partly, with an earlier scene.
+    has_earlier_state: bool,
     frame: Option<Frame>,
-    spent: Option<Frame>,
+    /// A frame whose memory the next one reuses.
+    recycled: Option<Frame>,
 }
 
 impl Shot {
-    /// A shot of `compiled`, planned as `plan` says, at its beginning. Takes no construction.
+    /// A shot of `compiled` in its initial state. Builds nothing.
     pub fn open(compiled: Arc<CompiledScene>, plan: Arc<Plan>) -> Self {
         Self {
             runs: compiled.start(),
             number: plan.frames().start,
             context: ShotContext::new(compiled, plan),
             plates: PlateCache::default(),
-            carried: false,
+            has_earlier_state: false,
             frame: None,
-            spent: None,
+            recycled: None,
         }
     }
 
-    /// Steps everything to frame `number`; begins anew where that lies in the past.
+    /// Steps all simulations to frame `number`; restarts them if they are past it.
     ///
     /// # Errors
-    /// The observer asked to stop; the shot then stands at some earlier step and may be advanced again.
+    /// The observer asked to stop. The shot is then at some earlier step and may be advanced again.
     pub fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
         let _stage = StageGuard::begin(observer, Stage::Advance);
         self.frame = None;
         let shutter = self.context.plan.shutter(number);
-        if self.runs.iter().any(|run| run.taken > run.steps_until(shutter)) {
+        if self.runs.iter().any(|run| run.steps_taken > run.steps_until(shutter)) {
             self.runs = self.context.compiled.start();
-            self.carried = false;
+            self.has_earlier_state = false;
         }
         stepping::advance(&self.context, &mut self.runs, shutter, observer)?;
         self.number = number;
@@ -99,19 +101,21 @@ impl Shot {
     /// Draws the frame that the shot was advanced to.
     ///
     /// # Errors
-    /// The observer asked to stop, or the plate cannot be had.
+    /// The observer asked to stop, or the plate cannot be read.
     pub fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
         let plate = {
             let _stage = StageGuard::begin(observer, Stage::Load);
-            self.plates.frame(&self.context, self.number)?
+            let ShotContext { compiled, plan, .. } = &self.context;
+            let plate = self.plates.frame(compiled, plan, self.number);
+            plate.map_err(|error| RenderError::Plate(Box::new(error)))?
         };
         let mirrored = match self.mirror() {
-            Some((_, mirror)) => self.plates.mirrored(&self.context, mirror, observer)?,
+            Some((_, mirror)) => self.plates.mirrored(&self.context.plan, mirror, observer)?,
             None => Arc::default(),
         };
         let mut view = self.context.plan.view(self.number);
-        let spent = self.spent.take();
-        let frame = match self.compose(&view, &plate, &mirrored, spent, observer)? {
+        let recycled = self.recycled.take();
+        let frame = match self.compose(&view, &plate, &mirrored, recycled, observer)? {
             Some(frame) => frame,
             None => {
                 let all = Rect::from_size(view.size[0], view.size[1]);
@@ -124,73 +128,75 @@ impl Shot {
         Ok(())
     }
 
-    /// Takes the frame that was drawn; `None` where none was since the last.
+    /// Takes the frame that was drawn; `None` if none was drawn since the last call.
     pub fn read(&mut self) -> Option<Frame> {
         self.frame.take()
     }
 
-    /// Gives back a frame that nobody needs any more, so that the next is drawn into its memory.
-    pub fn recycle(&mut self, spent: Frame) {
-        self.spent = Some(spent);
+    /// Gives back a frame that is no longer needed, so that the next one is drawn into its memory.
+    pub fn recycle(&mut self, frame: Frame) {
+        self.recycled = Some(frame);
     }
 
-    /// Goes on with another scene or plan, as an editor does while it is played. What is simulated keeps the state that it came to, where it
-    /// can; what cannot begins anew.
+    /// Continues with another scene or plan, as an editor does during playback. Simulations keep their state where the edited phenomenon can
+    /// restore it; the others restart.
     pub fn replan(&mut self, compiled: Arc<CompiledScene>, plan: Arc<Plan>) {
-        let same = fingerprint::of_state(&self.context.compiled) == fingerprint::of_state(&compiled);
+        let is_same_scene = self.context.compiled.state_fingerprint() == compiled.state_fingerprint();
         let mut old: Vec<Option<ActiveRun>> = std::mem::take(&mut self.runs).into_iter().map(Some).collect();
-        let taken_over: Vec<Option<ActiveRun>> =
-            compiled.participants().iter().map(|participant| take_out(&mut old, participant)).collect();
+        let kept: Vec<Option<ActiveRun>> =
+            compiled.enabled().iter().map(|built| take_equal_run(&mut old, built)).collect();
         let loop_s = compiled.scene().loop_s;
-        let go_on = |(participant, run): (&Participant, Option<ActiveRun>)| {
-            run.unwrap_or_else(|| go_on_from(&old, ActiveRun::start(participant, loop_s)))
+        let kept_or_restored = |(built, run): (&BuiltPhenomenon, Option<ActiveRun>)| {
+            run.unwrap_or_else(|| restored_from_namesake(&old, ActiveRun::start(built, loop_s)))
         };
-        self.runs = compiled.participants().iter().zip(taken_over).map(go_on).collect();
-        self.carried = self.runs.iter().any(|run| run.taken > 0) && (self.carried || !same);
+        self.runs = compiled.enabled().iter().zip(kept).map(kept_or_restored).collect();
+        let has_stepped = self.runs.iter().any(|run| run.steps_taken > 0);
+        self.has_earlier_state = has_stepped && (self.has_earlier_state || !is_same_scene);
         if self.context.plan.scene.plate != plan.scene.plate {
             self.plates = PlateCache::default();
         }
         self.context = ShotContext::new(compiled, plan);
-        (self.frame, self.spent) = (None, None);
+        (self.frame, self.recycled) = (None, None);
     }
 
-    /// Whether the state is the one that the scene leads to from its beginning. After [`replan`](Self::replan) it need not be, until the
-    /// shot begins anew.
+    /// Whether the state is the one to which the scene leads from its initial state. After [`replan`](Self::replan) it may differ until the
+    /// simulations restart.
     pub fn is_exact(&self) -> bool {
-        !self.carried
+        !self.has_earlier_state
     }
 
-    /// The particles of everything that has any, at the frame that the shot was advanced to.
+    /// The particles of all phenomena, at the frame that the shot was advanced to.
     pub fn particles(&self) -> PointCloud {
         let t = self.context.plan.shutter(self.number).middle();
         let mut all = PointCloud::default();
-        self.runs.iter().filter_map(|run| run.run.export(t)).for_each(|own| all.extend(&own));
+        self.runs.iter().filter_map(|run| run.run.export(t)).for_each(|cloud| all.extend(&cloud));
         all
     }
 
-    /// The state of everything, for [`restore`](Self::restore).
+    /// The state of all simulations, for [`restore`](Self::restore).
     pub fn snapshot(&self) -> Vec<u8> {
         snapshot::write(&self.context.compiled, &self.runs)
     }
 
-    /// Returns to the state of a snapshot.
+    /// Restores the state of a snapshot.
     ///
     /// # Errors
-    /// The bytes are damaged or belong to another scene; the shot is then unchanged.
+    /// The bytes are damaged or belong to another scene. The shot is then unchanged.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
         let mut runs = self.context.compiled.start();
         snapshot::read(&self.context.compiled, snapshot, &mut runs)?;
-        (self.runs, self.carried, self.frame) = (runs, false, None);
+        (self.runs, self.has_earlier_state, self.frame) = (runs, false, None);
         Ok(())
     }
 
-    /// Draws the view; `None` where only the whole picture gives its parts rightly, since bent light comes from beyond.
+    /// Draws the view. `None` if the window is not the whole picture and light is refracted: it may come from outside the window, so the whole
+    /// picture must be drawn and cropped.
     fn compose(
         &self,
         view: &View,
         plate: &PlateFrame,
         mirrored: &PlateFrame,
-        spent: Option<Frame>,
+        recycled: Option<Frame>,
         observer: &dyn Observer,
     ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
@@ -198,18 +204,18 @@ impl Shot {
         let reflection = self.reflection(view, mirrored, &publications, observer)?;
         let surroundings = self.surroundings(view, &publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.runs.len()).collect();
-        let (slices, prepared) = self.prepare(&all, view, &surroundings, observer)?;
+        let PreparedSlices { slices, prepared } = self.prepare(&all, view, &surroundings, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
-        // Where nothing lies behind, nothing is bent.
-        let behind = plate.color.is_some() || self.runs.len() > 1;
+        // Only what is behind refracting air is refracted.
+        let has_background = plate.color.is_some() || self.runs.len() > 1;
         let is_whole = view.window == Rect::from_size(view.size[0], view.size[1]);
-        // Also where the window itself sees nothing bent: a picture before which light is bent is rounded otherwise everywhere.
-        if !is_whole && behind && prepared.iter().any(|prepared| prepared.may_refract()) {
+        // Also if nothing in the window is refracted: compositing in groups of slices rounds all pixels differently.
+        if !is_whole && has_background && prepared.iter().any(|prepared| prepared.may_refract()) {
             return Ok(None);
         }
-        let bends = behind && prepared.iter().any(|prepared| prepared.deflection().is_some());
+        let is_refracted = has_background && prepared.iter().any(|prepared| prepared.deflection().is_some());
         let composition = Composition {
             outputs: Outputs::of_plan(&self.context.plan),
             view,
@@ -217,13 +223,13 @@ impl Shot {
             prepared: &prepared,
             slices: &slices,
             plate,
-            behind: Behind::plate(plate),
+            background: Background::plate(plate),
         };
         let header = self.context.header(self.number);
-        let mut frame = if bends {
-            refraction::frame(&composition, header, spent, observer)?
+        let mut frame = if is_refracted {
+            refraction::draw_frame(&composition, header, recycled, observer)?
         } else {
-            strips::frame(&composition, header, spent, observer)?
+            strips::draw_frame(&composition, header, recycled, observer)?
         };
         if self.context.plan.figures {
             frame.figures = self.figures(&prepared);
@@ -240,13 +246,13 @@ impl Shot {
             .collect()
     }
 
-    /// The first mirror, and the number of the phenomenon that it is.
+    /// The first mirror, and the index of its phenomenon.
     fn mirror(&self) -> Option<(usize, LevelMirror)> {
         let mirrors = self.runs.iter().enumerate();
         mirrors.filter_map(|(index, each)| Some((index, each.info().mirror?))).next()
     }
 
-    /// Everything but the first mirror, as it is seen in that mirror, before the `mirrored` plate.
+    /// The reflection in the first mirror: all other phenomena, in front of the `mirrored` plate.
     fn reflection(
         &self,
         view: &View,
@@ -254,11 +260,11 @@ impl Shot {
         publications: &[Publication],
         observer: &dyn Observer,
     ) -> Result<Option<Mirror>, RenderError> {
-        let Some((number, mirror)) = self.mirror() else { return Ok(None) };
+        let Some((mirror_index, mirror)) = self.mirror() else { return Ok(None) };
         let view = view.mirrored(mirror.height);
         let surroundings = self.surroundings(&view, publications, None);
-        let seen: Vec<usize> = (0..self.runs.len()).filter(|&index| index != number).collect();
-        let (slices, prepared) = self.prepare(&seen, &view, &surroundings, observer)?;
+        let others: Vec<usize> = (0..self.runs.len()).filter(|&index| index != mirror_index).collect();
+        let PreparedSlices { slices, prepared } = self.prepare(&others, &view, &surroundings, observer)?;
         let composition = Composition {
             outputs: Outputs::RADIANCE,
             view: &view,
@@ -266,71 +272,72 @@ impl Shot {
             prepared: &prepared,
             slices: &slices,
             plate: mirrored,
-            behind: Behind::plate(mirrored),
+            background: Background::plate(mirrored),
         };
-        let mut seen = strips::frame(&composition, self.context.header(self.number), None, observer)?.beauty;
+        let mut image = strips::draw_frame(&composition, self.context.header(self.number), None, observer)?.beauty;
         let sky = self.context.sky(view.shutter.middle());
-        // A sky that is not to be seen lights the ground, and stands in no still water.
-        let is_seen = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
-        if is_seen && mirrored.color.is_some() {
-            mirror::lay_sky(&mut seen, &view, &sky, 1);
+        // An invisible sky lights the ground, but is not reflected in still water.
+        let is_visible = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
+        if is_visible && mirrored.color.is_some() {
+            mirror::composite_sky(&mut image, &view, &sky, 1);
         }
         let backdrop = mirror::backdrop(mirrored, &view, &sky);
-        Ok(Some(Mirror { seen, backdrop }))
+        Ok(Some(Mirror { image, backdrop }))
     }
 
-    /// Slices of the phenomena `which`, and those phenomena ready to draw; a slice's members count within `which`.
+    /// Prepares the phenomena with the indices `which`, and cuts them into slices, whose members are positions in `which`.
     fn prepare<'a>(
         &'a self,
         which: &[usize],
         view: &'a View,
         surroundings: &'a [Surroundings<'a>],
         observer: &dyn Observer,
-    ) -> Result<Ready<'a>, RenderError> {
+    ) -> Result<PreparedSlices<'a>, RenderError> {
         let each = || which.par_iter().map(|&index| (&self.runs[index].run, &surroundings[index]));
         let intervals: Vec<_> = each().map(|(run, s)| run.depth_intervals(view, s)).collect();
         let prepared = each().map(|(run, s)| run.prepare(view, s, observer)).collect::<Result<_, _>>()?;
-        Ok((slices::cut(&intervals), prepared))
+        Ok(PreparedSlices { slices: slices::cut(&intervals), prepared })
     }
 
-    /// What each phenomenon sees of all others.
+    /// The surroundings of each phenomenon.
     fn surroundings<'a>(
         &'a self,
         view: &View,
         publications: &[Publication],
         mirror: Option<&'a Mirror>,
     ) -> Vec<Surroundings<'a>> {
-        let seen_by = |index| stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
-        (0..self.runs.len()).map(seen_by).collect()
+        let of_phenomenon = |index| stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
+        (0..self.runs.len()).map(of_phenomenon).collect()
     }
 }
 
-/// The run of what was built from the same, which then is no longer among the `old`.
-fn take_out(old: &mut [Option<ActiveRun>], participant: &Participant) -> Option<ActiveRun> {
-    let is_same = |run: &Option<ActiveRun>| {
-        run.as_ref().is_some_and(|run| run.participant.fingerprint == participant.fingerprint)
-    };
-    let run = old.iter_mut().find(|run| is_same(run))?.take()?;
-    Some(ActiveRun { participant: participant.clone(), ..run })
+/// Takes the run of an equal phenomenon, one with the same fingerprint, out of `old`.
+fn take_equal_run(old: &mut [Option<ActiveRun>], built: &BuiltPhenomenon) -> Option<ActiveRun> {
+    let is_equal = |run: &Option<ActiveRun>| run.as_ref().is_some_and(|run| run.built.fingerprint == built.fingerprint);
+    let run = old.iter_mut().find(|run| is_equal(run))?.take()?;
+    Some(ActiveRun { built: built.clone(), ..run })
 }
 
-/// A `run` at its beginning, after it took up the state that its namesake among the `old` came to, at the same time; at its beginning where
-/// it cannot.
-fn go_on_from(old: &[Option<ActiveRun>], mut run: ActiveRun) -> ActiveRun {
+/// `run`, which is in its initial state, with the state of the run in `old` whose phenomenon has the same name, at the same time. Unchanged
+/// where it cannot restore that state.
+fn restored_from_namesake(old: &[Option<ActiveRun>], mut run: ActiveRun) -> ActiveRun {
     let namesake = old.iter().flatten().find(|old| old.info().name == run.info().name);
-    let taken = namesake.and_then(|old| run.stepping?.steps_for(&old.stepping?, old.taken));
-    if let (Some(taken), Some(state)) = (taken, namesake.and_then(|old| old.as_stepped()).map(|old| old.snapshot()))
+    let steps = namesake.and_then(|old| run.stepping?.steps_for(&old.stepping?, old.steps_taken));
+    if let (Some(steps), Some(state)) = (steps, namesake.and_then(|old| old.as_stepped()).map(|old| old.snapshot()))
         && run.run.as_stepped_mut().is_some_and(|stepped| stepped.restore(&state).is_ok())
     {
-        run.taken = taken;
+        run.steps_taken = steps;
     }
     run
 }
 
-/// Slices of depth, and the phenomena that they count, ready to draw.
-type Ready<'a> = (Vec<Slice>, Vec<Box<dyn Prepared + 'a>>);
+/// Slices of depth, and the prepared phenomena to which their members refer.
+struct PreparedSlices<'a> {
+    slices: Vec<Slice>,
+    prepared: Vec<Box<dyn Prepared + 'a>>,
+}
 
-/// The part `window` of a whole frame.
+/// The region `window` of a whole frame.
 fn crop(whole: Frame, window: Rect) -> Option<Frame> {
     let width = whole.beauty.width();
     let plane = |values: &[f32]| -> Vec<f32> {

@@ -1,26 +1,25 @@
-//! Snapshots of a shot: a header with version and key, each phenomenon's steps and state, a checksum behind all.
+//! Snapshots of a shot: a header with version and fingerprint, steps and state of each phenomenon, a BLAKE3 checksum at the end.
 
 use bansho_base::phenomenon::SnapshotError;
 
 use crate::{
     compiled::{ActiveRun, CompiledScene},
-    fingerprint,
     shot::RenderError,
 };
 
 const MAGIC: &[u8; 8] = b"BANSHOSS";
 const VERSION: u32 = 1;
-const CHECKSUM: usize = 32;
+const CHECKSUM_BYTES: usize = 32;
 
 pub(crate) fn write(compiled: &CompiledScene, runs: &[ActiveRun]) -> Vec<u8> {
     let mut bytes = Vec::new();
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&VERSION.to_le_bytes());
-    bytes.extend_from_slice(&fingerprint::of_state(compiled));
+    bytes.extend_from_slice(&compiled.state_fingerprint());
     bytes.extend_from_slice(&(runs.len() as u64).to_le_bytes());
     for run in runs {
         let state = run.as_stepped().map(|stepped| stepped.snapshot()).unwrap_or_default();
-        bytes.extend_from_slice(&run.taken.to_le_bytes());
+        bytes.extend_from_slice(&run.steps_taken.to_le_bytes());
         bytes.extend_from_slice(&(state.len() as u64).to_le_bytes());
         bytes.extend_from_slice(&state);
     }
@@ -29,10 +28,11 @@ pub(crate) fn write(compiled: &CompiledScene, runs: &[ActiveRun]) -> Vec<u8> {
     bytes
 }
 
-/// Restores `runs`, which must be at their beginnings.
+/// Restores `runs`, which must be in their initial states.
 pub(crate) fn read(compiled: &CompiledScene, bytes: &[u8], runs: &mut [ActiveRun]) -> Result<(), RenderError> {
     let damaged = || RenderError::from(SnapshotError::Damaged);
-    let (contents, checksum) = bytes.len().checked_sub(CHECKSUM).map(|at| bytes.split_at(at)).ok_or_else(damaged)?;
+    let (contents, checksum) =
+        bytes.len().checked_sub(CHECKSUM_BYTES).map(|at| bytes.split_at(at)).ok_or_else(damaged)?;
     let mut rest = contents.strip_prefix(MAGIC).ok_or_else(damaged)?;
     let found = u32::from_le_bytes(take(&mut rest).ok_or_else(damaged)?);
     if found != VERSION {
@@ -41,31 +41,31 @@ pub(crate) fn read(compiled: &CompiledScene, bytes: &[u8], runs: &mut [ActiveRun
     if blake3::hash(contents).as_bytes() != checksum {
         return Err(damaged());
     }
-    let key: [u8; 32] = take(&mut rest).ok_or_else(damaged)?;
-    if key != fingerprint::of_state(compiled) {
+    let fingerprint: [u8; 32] = take(&mut rest).ok_or_else(damaged)?;
+    if fingerprint != compiled.state_fingerprint() {
         return Err(RenderError::ForeignSnapshot);
     }
     if u64::from_le_bytes(take(&mut rest).ok_or_else(damaged)?) != runs.len() as u64 {
         return Err(damaged());
     }
-    runs.iter_mut().try_for_each(|run| read_one(&mut rest, run))
+    runs.iter_mut().try_for_each(|run| read_run(&mut rest, run))
 }
 
-fn read_one(rest: &mut &[u8], run: &mut ActiveRun) -> Result<(), RenderError> {
+fn read_run(rest: &mut &[u8], run: &mut ActiveRun) -> Result<(), RenderError> {
     let mut word = || take(rest).map(u64::from_le_bytes).ok_or(SnapshotError::Damaged);
-    let (taken, length) = (word()?, word()?);
+    let (steps_taken, length) = (word()?, word()?);
     let length = usize::try_from(length).ok().filter(|length| *length <= rest.len()).ok_or(SnapshotError::Damaged)?;
-    let (state, behind) = rest.split_at(length);
-    *rest = behind;
+    let (state, after) = rest.split_at(length);
+    *rest = after;
     if let Some(stepped) = run.run.as_stepped_mut() {
         stepped.restore(state)?;
     }
-    run.taken = taken;
+    run.steps_taken = steps_taken;
     Ok(())
 }
 
 fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
-    let (head, behind) = rest.split_first_chunk::<N>()?;
-    *rest = behind;
+    let (head, after) = rest.split_first_chunk::<N>()?;
+    *rest = after;
     Some(*head)
 }

@@ -1,4 +1,4 @@
-//! Time of what is stepped: fixed steps in one order, whatever the frames.
+//! Stepping of simulated phenomena: fixed time steps in an order that does not depend on the frames.
 
 use bansho_base::{
     host::observer::{self, Cancelled, Observer},
@@ -10,7 +10,7 @@ use bansho_base::{
 
 use crate::{compiled::ActiveRun, composite::mirror::Mirror, context::ShotContext};
 
-/// What phenomenon `index` is among during `shutter`.
+/// The surroundings of phenomenon `index` during `shutter`.
 pub(crate) fn surroundings<'a>(
     context: &'a ShotContext,
     publications: &[Publication],
@@ -22,15 +22,15 @@ pub(crate) fn surroundings<'a>(
         wind: context.compiled.wind(),
         air: &context.plan.scene.air,
         sky: context.sky(shutter.middle()),
-        reflection: mirror.map(|mirror| &mirror.seen),
+        reflection: mirror.map(|mirror| &mirror.image),
         backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
         others: others(context, publications, index, shutter),
     }
 }
 
-/// What everybody but `index` publishes during `shutter`, and the scene's own lights and obstacles.
+/// What all phenomena but `index` publish during `shutter`, and the scene's own lights and obstacles.
 fn others(context: &ShotContext, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
-    let mut others = of_scene(context, shutter);
+    let mut others = scene_publication(context, shutter);
     for (other, publication) in publications.iter().enumerate() {
         if other != index {
             others.extend(publication);
@@ -39,14 +39,14 @@ fn others(context: &ShotContext, publications: &[Publication], index: usize, shu
     others
 }
 
-/// The scene's own lights and obstacles.
-pub(crate) fn of_scene(context: &ShotContext, shutter: Shutter) -> Publication {
+/// The scene's own lights and obstacles during `shutter`.
+pub(crate) fn scene_publication(context: &ShotContext, shutter: Shutter) -> Publication {
     let lights = context.plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
     Publication { lights, occluders: context.compiled.obstacles().cloned().collect(), ..Publication::default() }
 }
 
-/// Steps everybody until no state lies more than a step before that which an exposure is drawn from, always the one that is furthest
-/// behind, so that the order of steps depends on nothing but the steps themselves.
+/// Steps all phenomena to the states from which the exposure `shutter` is drawn. The one whose time is earliest steps next, so that the order
+/// of steps depends only on the lengths of the steps.
 pub(crate) fn advance(
     context: &ShotContext,
     runs: &mut [ActiveRun],
@@ -54,11 +54,11 @@ pub(crate) fn advance(
     observer: &dyn Observer,
 ) -> Result<(), Cancelled> {
     loop {
-        let behind = (0..runs.len())
-            .filter(|&index| runs[index].taken < runs[index].steps_until(shutter))
-            .filter_map(|index| Some((index, runs[index].stepping?.time_after(runs[index].taken))))
+        let earliest = (0..runs.len())
+            .filter(|&index| runs[index].steps_taken < runs[index].steps_until(shutter))
+            .filter_map(|index| Some((index, runs[index].stepping?.time_after(runs[index].steps_taken))))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((index, now)) = behind else { return Ok(()) };
+        let Some((index, now)) = earliest else { return Ok(()) };
         observer::check(observer)?;
         let instant = Shutter { open: now, close: now };
         let publications: Vec<Publication> = runs.iter().map(|other| other.run.publish(instant)).collect();
@@ -66,6 +66,6 @@ pub(crate) fn advance(
         if let Some(stepped) = runs[index].run.as_stepped_mut() {
             stepped.step(now, &surroundings);
         }
-        runs[index].taken += 1;
+        runs[index].steps_taken += 1;
     }
 }

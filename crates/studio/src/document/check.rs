@@ -75,7 +75,12 @@ impl Checker {
         let whole = self.check(name, text, assets);
         let planned = |whole: PlannedScene| {
             let compiled = build(name, &draft, assets, &mut self.draft)?;
-            let plan = Plan::given(compiled.scene().clone(), &PlanOptions::default(), whole.plan.exposure_ev100, 0);
+            let plan = Plan::with_exposure_and_loop_start(
+                compiled.scene().clone(),
+                &PlanOptions::default(),
+                whole.plan.exposure_ev100,
+                0,
+            );
             let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
             Ok(PlannedScene { compiled, plan })
         };
@@ -140,7 +145,7 @@ pub fn recheck(name: &str, text: &str, found: Result<f32, Vec<ReportedProblem>>)
     let scene = parse(name, text)?;
     match found {
         Ok(ev100) => {
-            let plan = Plan::given(scene, &PlanOptions::default(), ev100, 0);
+            let plan = Plan::with_exposure_and_loop_start(scene, &PlanOptions::default(), ev100, 0);
             plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
         }
         Err(found) => {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bansho::{CompiledScene, Shot, render::fingerprint};
+use bansho::{CompiledScene, Shot};
 
 /// Most bytes of snapshots.
 const MAX_BYTES: usize = 256 << 20;
@@ -50,7 +50,7 @@ impl SnapshotCache {
         if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, compiled)) {
             return;
         }
-        let of = fingerprint::of_state(compiled);
+        let of = compiled.state_fingerprint();
         if self.of.as_ref().is_none_or(|(_, own)| *own != of) {
             self.bytes = 0;
             self.by_frame.clear();

@@ -37,7 +37,7 @@ impl SettingsStore {
     /// Keeps `text` as `name`; whether it could.
     #[cfg(not(target_arch = "wasm32"))]
     pub(crate) fn write(&self, name: &str, text: &str) -> bool {
-        self.file(name).is_none_or(|file| bansho::media::output::atomic::write_bytes(&file, text.as_bytes()).is_ok())
+        self.file(name).is_none_or(|file| bansho::media::files::atomic::write_bytes(&file, text.as_bytes()).is_ok())
     }
 
     /// The text `name`, if it is kept.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bansho_media::{
     assets::FileAssets,
-    output::{
+    files::{
         file_identity::resolved,
         overwrite_policy::{InputFiles, OverwriteError, OverwritePolicy},
     },
@@ -27,8 +27,8 @@ pub(crate) fn check(policy: &OverwritePolicy, outputs: impl IntoIterator<Item = 
         match policy.check(&folder.resolved(&path)) {
             Ok(()) => {}
             Err(OverwriteError::Input) => return Err(Conflict::OverInput { path }.into()),
-            Err(OverwriteError::Unmarked) if unmarked.is_none() => unmarked = Some(path),
-            Err(OverwriteError::Unmarked) => others += 1,
+            Err(OverwriteError::NotMadeByBansho) if unmarked.is_none() => unmarked = Some(path),
+            Err(OverwriteError::NotMadeByBansho) => others += 1,
         }
     }
     unmarked.map_or(Ok(()), |path| Err(Conflict::Unmarked { path, others }.into()))

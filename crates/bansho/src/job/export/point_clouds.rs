@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use bansho_base::host::observer::{Stage, StageGuard, check};
 use bansho_media::{
-    output::{atomic, naming::NumberedPath, overwrite_policy::OverwritePolicy},
+    files::{atomic, naming::NumberedPath, overwrite_policy::OverwritePolicy},
     ply,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
@@ -118,7 +118,7 @@ impl PreparedSimulation {
         let lost = |&&number: &&i64| !finished.is_there(&self.pattern.path(number));
         let frames: Vec<i64> = self.frames.iter().filter(lost).copied().collect();
         if !frames.is_empty() {
-            return Err(JobError::FramesLost { frames, files: self.pattern.of_all() });
+            return Err(JobError::FramesLost { frames, files: self.pattern.template_path() });
         }
         Ok(Summary { drawn: self.frames.len(), kept: 0, first_file: self.pattern.path(self.frames[0]) })
     }

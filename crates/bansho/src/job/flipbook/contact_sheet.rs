@@ -6,12 +6,14 @@ use bansho_base::{
     frame::{DisplayImage, Frame},
     host::observer::{Observer, Stage, StageGuard},
 };
-use bansho_media::output::{
-    label,
-    sink::{FrameSlot, Picture},
-    sprite_sheet::{SheetLayout, tile_display},
+use bansho_media::{
+    imageops::{
+        label,
+        sprite_sheet::{SheetLayout, tile_display},
+    },
+    output::sink::{FrameSlot, Picture},
 };
-use bansho_render::{Shot, fingerprint};
+use bansho_render::Shot;
 
 use super::tiles::Gather;
 use crate::job::{
@@ -74,7 +76,7 @@ fn lay_over(frame: &mut Frame, background: ContactBackground, view: &View) {
 
 /// A tile that bears the number of its frame.
 fn numbered(mut tile: DisplayImage, number: i64) -> DisplayImage {
-    label::number(&mut tile, number);
+    label::draw_number(&mut tile, number);
     tile
 }
 
@@ -82,7 +84,7 @@ fn numbered(mut tile: DisplayImage, number: i64) -> DisplayImage {
 fn own_fingerprint(job: &PreparedJob) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     for &number in &job.frames {
-        hasher.update(&fingerprint::of_frame(&job.compiled, &job.plan, number));
+        hasher.update(&job.plan.frame_fingerprint(number, job.compiled.assets().as_ref()));
     }
     hasher.update(job.contact_background.name().as_bytes());
     job.format.fingerprint(*hasher.update(b"contact sheet").finalize().as_bytes())

@@ -10,13 +10,9 @@ use bansho_base::{
 };
 use bansho_media::{
     exr,
-    output::{
-        atomic,
-        naming::OutputKind,
-        overwrite_policy::OverwritePolicy,
-        provenance,
-        sprite_sheet::{SheetLayout, tile, tile_display},
-    },
+    files::{atomic, overwrite_policy::OverwritePolicy, provenance},
+    format::OutputKind,
+    imageops::sprite_sheet::{SheetLayout, tile, tile_display},
     png::{self, PngEffort},
 };
 use bansho_render::{

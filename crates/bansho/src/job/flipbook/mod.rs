@@ -13,10 +13,10 @@ use bansho_base::{
     color::{AlphaConvention, View},
     image::Rect,
 };
-use bansho_media::output::{
-    naming::{OutputKind, OutputPattern},
-    overwrite_policy::OverwritePolicy,
-    sprite_sheet::SheetLayout,
+use bansho_media::{
+    files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
+    format::OutputKind,
+    imageops::sprite_sheet::SheetLayout,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot, display::BitDepth};
 use bansho_scene::{FrameRate, Scene, SceneOptions};
@@ -152,7 +152,11 @@ impl Flipbook {
         let stem = &self.scene.stem;
         let path = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(format!("{stem}.png")));
         let pattern = OutputPattern::parse(&path, 1)?;
-        if !matches!(pattern.kind(), OutputKind::Png | OutputKind::Exr) || pattern.is_numbered() {
+        let is_picture = match pattern.kind() {
+            OutputKind::Png | OutputKind::Exr => true,
+            OutputKind::Apng | OutputKind::Gif | OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => false,
+        };
+        if !is_picture || pattern.is_numbered() {
             return Err(Conflict::Sheet { path, allowed: "NAME.png or NAME.exr" }.into());
         }
         let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use bansho_base::{frame::Frame, host::observer::Observer};
-use bansho_media::output::sprite_sheet::SheetLayout;
+use bansho_media::imageops::sprite_sheet::SheetLayout;
 
 use crate::job::{
     error::{Conflict, JobError, SheetKind},

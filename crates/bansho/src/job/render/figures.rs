@@ -8,7 +8,7 @@ use std::{
 use bansho_base::frame::{Figure, FigureSet, Frame};
 use bansho_media::{
     MediaError,
-    output::{atomic, overwrite_policy::OverwritePolicy, provenance},
+    files::{atomic, overwrite_policy::OverwritePolicy, provenance},
 };
 use serde_json::{Map, Value, json};
 

@@ -8,7 +8,7 @@ use std::{
     time::SystemTime,
 };
 
-use bansho_media::output::{file_identity::FileIdentity, provenance::is_bansho_file};
+use bansho_media::files::{file_identity::FileIdentity, provenance::is_bansho_file};
 
 /// What tells cheaply that a file was not touched.
 #[derive(Clone, Debug, PartialEq, Eq)]

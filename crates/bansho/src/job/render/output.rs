@@ -13,11 +13,9 @@ use bansho_base::{
 };
 use bansho_media::{
     MediaError,
-    output::{
-        naming::{OutputKind, OutputPattern},
-        overwrite_policy::OverwritePolicy,
-        sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
-    },
+    files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
+    format::{OutputKind, PictureFormat},
+    output::sink::{FrameSlot, Picture, Sink, SinkOptions},
 };
 use bansho_render::{
     Plan,
@@ -50,7 +48,12 @@ impl Format {
     pub(crate) fn fingerprint(&self, frame: [u8; 32]) -> [u8; 32] {
         match self.pattern.kind() {
             OutputKind::Png => fingerprint::of_png(frame, self.bits, self.alpha),
-            _ => frame,
+            OutputKind::Exr
+            | OutputKind::Apng
+            | OutputKind::Gif
+            | OutputKind::Mp4
+            | OutputKind::Mov
+            | OutputKind::Webm => frame,
         }
     }
 

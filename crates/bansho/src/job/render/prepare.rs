@@ -12,11 +12,12 @@ use bansho_base::{
 };
 use bansho_media::{
     assets::FileAssets,
-    output::{
-        naming::{self, OutputKind, OutputPattern},
+    files::{
+        naming::{self, OutputPattern},
         overwrite_policy::OverwritePolicy,
-        sprite_sheet::SheetLayout,
     },
+    format::OutputKind,
+    imageops::sprite_sheet::SheetLayout,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
 use bansho_scene::{Positions, SceneOptions};
@@ -95,7 +96,8 @@ pub fn check_scene(scene: &SceneFile) -> Result<(Arc<CompiledScene>, Plan), JobE
     let plan = Plan::new(&compiled, &PlanOptions::default())?;
     // With its overscan, as EXR is drawn.
     let widest = PlanOptions { overscan: true, ..PlanOptions::default() };
-    let widest = Plan::given(plan.scene().clone(), &widest, plan.exposure_ev100, plan.loop_start)?;
+    let widest =
+        Plan::with_exposure_and_loop_start(plan.scene().clone(), &widest, plan.exposure_ev100, plan.loop_start)?;
     let frames = (plan.frames().end - plan.frames().start) as usize;
     let request = MemoryRequest { frames, tiles: 0, display: Some(BitDepth::Eight), own_size: false };
     memory::check(scene, &compiled, &widest, request)?;
@@ -160,7 +162,8 @@ impl Job {
 
     fn output_path(&self) -> PathBuf {
         let stem = &self.scene.stem;
-        let name = if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::pictures(stem) };
+        let name =
+            if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::default_sequence(stem) };
         self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
     }
 
@@ -197,7 +200,7 @@ impl Job {
             (_, true) => Channels::Aovs,
             _ => return Ok(()),
         };
-        if kind == OutputKind::Exr { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
+        if kind.is_scene_linear() { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
     }
 
     /// Figures lie beside a picture of one frame.
@@ -215,7 +218,7 @@ impl Job {
     fn plan_options(&self, kind: OutputKind) -> PlanOptions {
         PlanOptions {
             size: self.size,
-            overscan: kind == OutputKind::Exr,
+            overscan: kind.is_scene_linear(),
             crop: self.crop,
             layers: self.layers,
             aovs: self.aovs,
@@ -244,20 +247,19 @@ impl Job {
         let kind = job.format.pattern.kind();
         let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
         notes.extend(remarks(&self.scene, &job.compiled, &job.plan));
-        let wide = matches!(kind, OutputKind::Png | OutputKind::Apng | OutputKind::Mov | OutputKind::Webm);
-        if self.bits == BitDepth::Sixteen && !wide {
+        if self.bits == BitDepth::Sixteen && !kind.takes_sixteen_bits() {
             notes.push(Note::BitsUnused { kind });
         }
         let scene = job.plan.scene();
         if self.transparent && (scene.has_plate() || scene.shows_stated_backdrop()) {
             notes.push(Note::TransparentUnused);
         }
-        let has_alpha = wide && !job.plan.scene().has_plate() && job.sheet.is_none();
+        let has_alpha = kind.has_straight_alpha() && !job.plan.scene().has_plate() && job.sheet.is_none();
         if self.alpha.is_some() && !has_alpha {
             notes.push(Note::AlphaUnused);
         }
         // With a plate the view matters to EXR too: the plate is taken back through it.
-        if kind == OutputKind::Exr && self.view != View::DISPLAY && !job.plan.scene().has_plate() {
+        if kind.is_scene_linear() && self.view != View::DISPLAY && !job.plan.scene().has_plate() {
             notes.push(Note::ViewUnused);
         }
         if self.resume && !job.resume {

@@ -1,7 +1,6 @@
 //! Which frames of a job are already there, whole and its own.
 
 use bansho_media::output::resume::existing_fingerprint;
-use bansho_render::fingerprint;
 
 use super::{figures, finished_files::Finished, prepare::PreparedJob};
 use crate::job::error::JobError;
@@ -34,14 +33,15 @@ impl PreparedJob {
             !files.all(|file| finished.is_untouched(&file)) && !self.is_whole(number)
         };
         let frames: Vec<i64> = self.frames.par_iter().filter(is_lost).copied().collect();
-        let lost = || JobError::FramesLost { frames: frames.clone(), files: self.format.pattern.of_all() };
+        let lost = || JobError::FramesLost { frames: frames.clone(), files: self.format.pattern.template_path() };
         if frames.is_empty() { Ok(()) } else { Err(lost()) }
     }
 
     /// Whether frame `number` of this very job is there, with its figures if it has some.
     fn is_whole(&self, number: i64) -> bool {
-        let expected = self.format.fingerprint(fingerprint::of_frame(&self.compiled, &self.plan, number));
+        let expected = self.format.fingerprint(self.plan.frame_fingerprint(number, self.compiled.assets().as_ref()));
         let path = self.format.pattern.path(number);
-        existing_fingerprint(&path) == Some(expected) && (!self.format.figures || figures::are_there(&path, expected))
+        let found = existing_fingerprint(&path, self.format.pattern.kind());
+        found == Some(expected) && (!self.format.figures || figures::are_there(&path, expected))
     }
 }

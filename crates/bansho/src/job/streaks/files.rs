@@ -14,7 +14,7 @@ use bansho_base::{
 };
 use bansho_media::{
     exr,
-    output::{atomic, overwrite_policy::OverwritePolicy},
+    files::{atomic, overwrite_policy::OverwritePolicy},
     png::{self, MeasuredImage, PngEffort},
 };
 use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;
@@ -113,7 +113,7 @@ impl Writer {
 
     fn write_measured(&self, file: &str, channels: usize, image: &Image<1>, values: &[f32]) -> Result<f32, JobError> {
         let size = [image.width(), image.height()];
-        let picture = MeasuredImage::of_values(size, channels, values, self.bits == BitDepth::Sixteen);
+        let picture = MeasuredImage::from_values(size, channels, values, self.bits == BitDepth::Sixteen);
         let path = self.folder.join(file);
         let bytes = png::encode_measured(&picture, &self.fingerprint(file), PngEffort::Fast, &path)?;
         self.keep(&path, &bytes)?;

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use bansho_base::image::Image;
-use bansho_media::output::provenance;
+use bansho_media::files::provenance;
 use bansho_rain::{
     billboards::texture::{FallingDrop, StreakCube},
     drops::size_distribution::{DropSizeDistribution, SizeBin},

@@ -13,7 +13,7 @@ use std::{
 use bansho_base::host::observer::check;
 use bansho_media::{
     MediaError,
-    output::overwrite_policy::{InputFiles, OverwritePolicy},
+    files::overwrite_policy::{InputFiles, OverwritePolicy},
 };
 use bansho_rain::{
     billboards::texture::StreakCube,
@@ -201,7 +201,7 @@ impl PreparedStreaks {
     /// Removes the index of another run, which a run that is stopped would make wrong.
     fn remove(&self, index: &Path) -> Result<(), JobError> {
         if self.writer.overwrite.check(index).is_err() {
-            return Err(MediaError::Unmarked { path: index.to_path_buf() }.into());
+            return Err(MediaError::NotMadeByBansho { path: index.to_path_buf() }.into());
         }
         match fs::remove_file(index) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(MediaError::from_io(index, error).into()),

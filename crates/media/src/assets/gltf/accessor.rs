@@ -16,7 +16,7 @@ enum Element {
 
 impl Element {
     fn of(accessor: &Object) -> Result<Option<Self>, AssetProblem> {
-        Ok(match (accessor.needed("componentType")?, accessor.text("type")?) {
+        Ok(match (accessor.required_unsigned("componentType")?, accessor.text("type")?) {
             (5126, Some("VEC3")) => Some(Self::Vector),
             (5121, Some("SCALAR")) => Some(Self::U8),
             (5123, Some("SCALAR")) => Some(Self::U16),
@@ -50,8 +50,10 @@ impl<'b> Accessor<'b> {
     pub(super) fn positions(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
         let accessor = root.item("accessors", index)?;
         match Element::of(&accessor)? {
-            Some(Element::Vector) => Self::located(root, &accessor, Element::Vector, buffers),
-            _ => Err(accessor.fault("type", "is not that of positions; allowed: VEC3 of componentType 5126, floats")),
+            Some(Element::Vector) => Self::with_element(root, &accessor, Element::Vector, buffers),
+            _ => {
+                Err(accessor.error_at("type", "is not that of positions; allowed: VEC3 of componentType 5126, floats"))
+            }
         }
     }
 
@@ -59,36 +61,39 @@ impl<'b> Accessor<'b> {
     pub(super) fn indices(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
         let accessor = root.item("accessors", index)?;
         match Element::of(&accessor)? {
-            Some(element) if element != Element::Vector => Self::located(root, &accessor, element, buffers),
-            _ => {
-                Err(accessor
-                    .fault("type", "is not that of indices; allowed: SCALAR of componentType 5121, 5123 or 5125"))
-            }
+            Some(element) if element != Element::Vector => Self::with_element(root, &accessor, element, buffers),
+            _ => Err(accessor
+                .error_at("type", "is not that of indices; allowed: SCALAR of componentType 5121, 5123 or 5125")),
         }
     }
 
-    fn located(root: &Object, accessor: &Object, element: Element, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+    fn with_element(
+        root: &Object,
+        accessor: &Object,
+        element: Element,
+        buffers: &'b Buffers,
+    ) -> Result<Self, AssetProblem> {
         if accessor.object("sparse")?.is_some() {
-            return Err(accessor.fault("sparse", "is not read; allowed: accessors without it"));
+            return Err(accessor.error_at("sparse", "is not supported; allowed: accessors without it"));
         }
         let view = accessor.index("bufferView", root.list("bufferViews")?.len())?;
         let view =
-            view.ok_or_else(|| accessor.fault("bufferView", "is missing, perhaps because the mesh is compressed"))?;
+            view.ok_or_else(|| accessor.error_at("bufferView", "is missing, perhaps because the mesh is compressed"))?;
         let view = root.item("bufferViews", view)?;
-        let buffer = view.index("buffer", buffers.len())?.ok_or_else(|| view.fault("buffer", "is missing"))?;
+        let buffer = view.index("buffer", buffers.len())?.ok_or_else(|| view.error_at("buffer", "is missing"))?;
         let buffer = buffers.get(buffer);
-        let (offset, length) = (view.whole("byteOffset")?.unwrap_or(0), view.needed("byteLength")?);
-        let of_view = offset.checked_add(length).and_then(|end| buffer.get(offset..end));
-        let of_view = of_view.ok_or_else(|| {
-            view.fault("byteLength", format!("reaches beyond its buffer, which has {} bytes", buffer.len()))
+        let (offset, length) = (view.unsigned("byteOffset")?.unwrap_or(0), view.required_unsigned("byteLength")?);
+        let view_bytes = offset.checked_add(length).and_then(|end| buffer.get(offset..end));
+        let view_bytes = view_bytes.ok_or_else(|| {
+            view.error_at("byteLength", format!("reaches beyond its buffer, which has {} bytes", buffer.len()))
         })?;
-        let stride = view.whole("byteStride")?.unwrap_or(element.bytes()).max(1);
-        let (start, count) = (accessor.whole("byteOffset")?.unwrap_or(0), accessor.needed("count")?);
-        let bytes = (count.max(1) - 1).checked_mul(stride).and_then(|length| length.checked_add(element.bytes()));
-        let end = bytes.and_then(|bytes| start.checked_add(bytes));
-        let bytes = end.and_then(|end| of_view.get(start..end));
+        let stride = view.unsigned("byteStride")?.unwrap_or(element.bytes()).max(1);
+        let (start, count) = (accessor.unsigned("byteOffset")?.unwrap_or(0), accessor.required_unsigned("count")?);
+        let length = (count.max(1) - 1).checked_mul(stride).and_then(|length| length.checked_add(element.bytes()));
+        let end = length.and_then(|length| start.checked_add(length));
+        let bytes = end.and_then(|end| view_bytes.get(start..end));
         let bytes = bytes.ok_or_else(|| {
-            accessor.fault("count", format!("reaches beyond its buffer view, which has {} bytes", of_view.len()))
+            accessor.error_at("count", format!("reaches beyond its buffer view, which has {} bytes", view_bytes.len()))
         })?;
         Ok(Self { bytes, stride, count, element })
     }
@@ -98,7 +103,7 @@ impl<'b> Accessor<'b> {
         (0..self.count).filter_map(element)
     }
 
-    /// Its elements as vectors; none if they are integers.
+    /// The elements as vectors; empty if they are integers.
     pub(super) fn vectors(self) -> impl Iterator<Item = [f32; 3]> + use<'b> {
         let vector = |bytes: [u8; 12]| {
             std::array::from_fn(|axis| {
@@ -108,7 +113,7 @@ impl<'b> Accessor<'b> {
         self.elements::<12>().map(vector)
     }
 
-    /// Its elements as integers; none if they are vectors.
+    /// The elements as integers; empty if they are vectors.
     pub(super) fn indices_u32(self) -> Vec<u32> {
         match self.element {
             Element::Vector => Vec::new(),

@@ -14,7 +14,7 @@ use base64::{
 use super::{ReadResource, json::Object};
 use crate::assets::limits::MemoryLimit;
 
-/// All buffers. One that is named several times is held once.
+/// All buffers. A URI that occurs several times is read once.
 pub(super) struct Buffers<'a> {
     contents: Vec<Cow<'a, [u8]>>,
     /// Index of each buffer's content.
@@ -37,42 +37,42 @@ impl<'a> Buffers<'a> {
             let slot = match known.get(&uri) {
                 Some(&slot) => slot,
                 None => {
-                    let left = limit.available().saturating_sub(buffers.memory_bytes());
-                    let content = content(&buffer, uri, binary, &|uri| read_resource(uri, left))?;
+                    let remaining = limit.available().saturating_sub(buffers.memory_bytes());
+                    let content = content(&buffer, uri, binary, &|uri| read_resource(uri, remaining))?;
                     known.insert(uri, buffers.contents.len());
                     buffers.contents.push(content);
                     limit.check(buffers.memory_bytes())?;
                     buffers.contents.len() - 1
                 }
             };
-            let (claimed, there) = (buffer.needed("byteLength")?, buffers.contents[slot].len());
-            if claimed > there {
-                return Err(buffer.fault("byteLength", format!("says {claimed} bytes, but {there} are there")));
+            let (claimed, found) = (buffer.required_unsigned("byteLength")?, buffers.contents[slot].len());
+            if claimed > found {
+                return Err(buffer.error_at("byteLength", format!("is {claimed}, but the buffer has {found} bytes")));
             }
             buffers.content_of.push(slot);
         }
         Ok(buffers)
     }
 
-    /// Bytes of the contents that are not part of the file itself.
+    /// Bytes of the contents that are not in the file itself.
     pub(super) fn memory_bytes(&self) -> u64 {
         let own = self.contents.iter().filter(|content| matches!(content, Cow::Owned(_)));
         own.map(|content| content.len() as u64).sum()
     }
 
-    /// How many there are.
+    /// Number of buffers.
     pub(super) fn len(&self) -> usize {
         self.content_of.len()
     }
 
-    /// The bytes of one of them.
+    /// The bytes of a buffer.
     pub(super) fn get(&self, index: usize) -> &[u8] {
         &self.contents[self.content_of[index]]
     }
 }
 
-/// URIs of external buffers, each once; as many as can be found in a damaged file.
-pub(super) fn files<'a>(root: &Object<'a>) -> BTreeSet<&'a str> {
+/// URIs of external buffers, each once; of a damaged file, those that can be found.
+pub(super) fn external_uris<'a>(root: &Object<'a>) -> BTreeSet<&'a str> {
     let buffers = root.items("buffers").into_iter().flatten().filter_map(Result::ok);
     let names = buffers.filter_map(|buffer| buffer.text("uri").ok().flatten());
     names.filter(|name| !name.starts_with("data:")).collect()
@@ -85,12 +85,12 @@ fn content<'a>(
     read_resource: &dyn Fn(&str) -> Result<Vec<u8>, AssetProblem>,
 ) -> Result<Cow<'a, [u8]>, AssetProblem> {
     let Some(uri) = uri else {
-        let missing = || buffer.fault("uri", "is missing, and there is no binary buffer in the file");
+        let missing = || buffer.error_at("uri", "is missing, and the file has no binary buffer");
         return binary.map(Cow::Borrowed).ok_or_else(missing);
     };
     let Some(data) = uri.strip_prefix("data:") else { return read_resource(uri).map(Cow::Owned) };
     let decoded = data.split_once(";base64,").and_then(|(_, text)| decode_base64(text));
-    decoded.map(Cow::Owned).ok_or_else(|| buffer.fault("uri", "is not base64; allowed: `data:...;base64,...`"))
+    decoded.map(Cow::Owned).ok_or_else(|| buffer.error_at("uri", "is not base64; allowed: `data:...;base64,...`"))
 }
 
 /// Decodes base64 (RFC 4648), with or without padding: some writers of glTF leave it out.

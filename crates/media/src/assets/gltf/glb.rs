@@ -4,28 +4,28 @@ use bansho_base::host::assets::AssetProblem;
 
 use super::damaged;
 
-/// What a binary glTF holds.
+/// The contents of a binary glTF.
 #[derive(Debug, PartialEq)]
 pub(super) struct Glb<'a> {
     pub(super) json: &'a [u8],
-    /// The buffer that comes with it.
+    /// The buffer in the file.
     pub(super) binary: Option<&'a [u8]>,
 }
 
-/// Takes a binary glTF apart.
+/// Splits a binary glTF into its chunks.
 pub(super) fn split(file: &[u8]) -> Result<Glb<'_>, AssetProblem> {
-    let not_one = || damaged("it is no binary glTF: it does not begin with `glTF`, a version and a length");
-    let rest = file.strip_prefix(b"glTF").ok_or_else(not_one)?;
-    let (version, rest) = number(rest).ok_or_else(not_one)?;
-    let (length, rest) = number(rest).ok_or_else(not_one)?;
+    let not_glb = || damaged("it is not a binary glTF: it does not begin with `glTF`, a version and a length");
+    let rest = file.strip_prefix(b"glTF").ok_or_else(not_glb)?;
+    let (version, rest) = number(rest).ok_or_else(not_glb)?;
+    let (length, rest) = number(rest).ok_or_else(not_glb)?;
     if version != 2 {
         return Err(damaged(format!("it is binary glTF of version {version}; allowed: 2")));
     }
     if length > file.len() {
-        return Err(damaged(format!("it is cut short: of its {length} bytes {} are there", file.len())));
+        return Err(damaged(format!("it is truncated: it has {} of its {length} bytes", file.len())));
     }
     let rest = &rest[..length.saturating_sub(12).min(rest.len())];
-    let (first, mut rest) = chunk(rest)?.ok_or_else(|| damaged("it has no chunk of JSON"))?;
+    let (first, mut rest) = chunk(rest)?.ok_or_else(|| damaged("it has no JSON chunk"))?;
     if first.kind != *b"JSON" {
         return Err(damaged("its first chunk is not JSON"));
     }
@@ -50,7 +50,7 @@ fn chunk(bytes: &[u8]) -> Result<Option<(Chunk<'_>, &[u8])>, AssetProblem> {
     let Some((length, (&kind, rest))) = header else { return Ok(None) };
     let (bytes, rest) = rest
         .split_at_checked(length)
-        .ok_or_else(|| damaged(format!("a chunk is cut short: of its {length} bytes {} are there", rest.len())))?;
+        .ok_or_else(|| damaged(format!("a chunk is truncated: it has {} of its {length} bytes", rest.len())))?;
     Ok(Some((Chunk { kind, bytes }, rest)))
 }
 

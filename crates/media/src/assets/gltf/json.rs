@@ -1,4 +1,4 @@
-//! The JSON of a glTF: objects that know their path, for error messages.
+//! The JSON of a glTF: objects that know their paths, for error messages.
 
 use std::fmt::Display;
 
@@ -7,13 +7,13 @@ use bansho_base::host::assets::AssetProblem;
 use super::damaged;
 use serde_json::{Map, Value};
 
-/// Largest number of values; each takes up to two hundred bytes of memory.
+/// Largest number of values.
 const MAX_VALUES: usize = 2_000_000;
 
-/// Bytes of a value in memory: those of an object with one field, the largest one.
+/// Largest memory of a value, bytes: that of an object with one field.
 const VALUE_BYTES: u64 = 400;
 
-/// Before every value but the first stands one of these.
+/// Number of values, estimated from above: each but the first follows one of these characters.
 fn count_values(json: &[u8]) -> usize {
     json.iter().filter(|byte| matches!(byte, b'[' | b'{' | b',')).count()
 }
@@ -50,34 +50,34 @@ impl<'a> Object<'a> {
         if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
 
-    /// An error at the value of `key`.
-    pub(super) fn fault(&self, key: &str, told: impl Display) -> AssetProblem {
-        damaged(format!("{} {told}", self.path_of(key)))
+    /// An error about the value of `key`.
+    pub(super) fn error_at(&self, key: &str, message: impl Display) -> AssetProblem {
+        damaged(format!("{} {message}", self.path_of(key)))
     }
 
     fn get(&self, key: &str) -> Option<&'a Value> {
         self.fields.get(key).filter(|value| !value.is_null())
     }
 
-    /// The value of `key` as `read` reads it, which is `expected`; `None` where there is none.
+    /// The value of `key`, converted by `read`; `expected` describes it in errors. `None` if it is missing.
     fn read<T>(
         &self,
         key: &str,
         expected: &str,
         read: impl FnOnce(&'a Value) -> Option<T>,
     ) -> Result<Option<T>, AssetProblem> {
-        let fault = || self.fault(key, format!("is wrong; allowed: {expected}"));
-        self.get(key).map(|value| read(value).ok_or_else(fault)).transpose()
+        let error = || self.error_at(key, format!("is invalid; allowed: {expected}"));
+        self.get(key).map(|value| read(value).ok_or_else(error)).transpose()
     }
 
     /// A whole number.
-    pub(super) fn whole(&self, key: &str) -> Result<Option<usize>, AssetProblem> {
+    pub(super) fn unsigned(&self, key: &str) -> Result<Option<usize>, AssetProblem> {
         self.read(key, "a whole number from 0 on", |value| usize::try_from(value.as_u64()?).ok())
     }
 
-    /// A whole number that must be there.
-    pub(super) fn needed(&self, key: &str) -> Result<usize, AssetProblem> {
-        self.whole(key)?.ok_or_else(|| self.fault(key, "is missing; allowed: a whole number from 0 on"))
+    /// A required whole number.
+    pub(super) fn required_unsigned(&self, key: &str) -> Result<usize, AssetProblem> {
+        self.unsigned(key)?.ok_or_else(|| self.error_at(key, "is missing; allowed: a whole number from 0 on"))
     }
 
     /// A text.
@@ -101,7 +101,7 @@ impl<'a> Object<'a> {
         self.read(key, "an object", object)
     }
 
-    /// A list; empty where there is none.
+    /// A list; empty if it is missing.
     pub(super) fn list(&self, key: &str) -> Result<&'a [Value], AssetProblem> {
         Ok(self.read(key, "a list", |value| value.as_array().map(Vec::as_slice))?.unwrap_or_default())
     }
@@ -109,12 +109,13 @@ impl<'a> Object<'a> {
     /// The object at `index` of a list.
     pub(super) fn item(&self, key: &str, index: usize) -> Result<Self, AssetProblem> {
         let list = self.list(key)?;
-        let value =
-            list.get(index).ok_or_else(|| self.fault(key, format!("has no element {index}; {}", only(list.len()))))?;
+        let value = list
+            .get(index)
+            .ok_or_else(|| self.error_at(key, format!("has no element {index}; {}", allowed_indices(list.len()))))?;
         let path = format!("{}[{index}]", self.path_of(key));
         match value.as_object() {
             Some(fields) => Ok(Self { path, fields }),
-            None => Err(damaged(format!("{path} is wrong; allowed: an object"))),
+            None => Err(damaged(format!("{path} is invalid; allowed: an object"))),
         }
     }
 
@@ -125,8 +126,10 @@ impl<'a> Object<'a> {
 
     /// An index into another list, of `length` elements.
     pub(super) fn index(&self, key: &str, length: usize) -> Result<Option<usize>, AssetProblem> {
-        match self.whole(key)? {
-            Some(index) if index >= length => Err(self.fault(key, format!("names {index}; {}", only(length)))),
+        match self.unsigned(key)? {
+            Some(index) if index >= length => {
+                Err(self.error_at(key, format!("is {index}; {}", allowed_indices(length))))
+            }
             index => Ok(index),
         }
     }
@@ -134,14 +137,14 @@ impl<'a> Object<'a> {
     /// Indices into another list, of `length` elements.
     pub(super) fn indices(&self, key: &str, length: usize) -> Result<Vec<usize>, AssetProblem> {
         let index = |value: &Value| usize::try_from(value.as_u64()?).ok().filter(|index| *index < length);
-        let fault = |value: &Value| self.fault(key, format!("names {value}; {}", only(length)));
-        self.list(key)?.iter().map(|value| index(value).ok_or_else(|| fault(value))).collect()
+        let error = |value: &Value| self.error_at(key, format!("contains {value}; {}", allowed_indices(length)));
+        self.list(key)?.iter().map(|value| index(value).ok_or_else(|| error(value))).collect()
     }
 }
 
-fn only(length: usize) -> String {
+fn allowed_indices(length: usize) -> String {
     match length.checked_sub(1) {
         Some(last) => format!("allowed: 0 to {last}"),
-        None => "allowed: none, since there are none".to_owned(),
+        None => "allowed: none, since the list is empty".to_owned(),
     }
 }

@@ -1,7 +1,7 @@
-//! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside or beside it.
+//! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside it or in external files.
 //!
-//! `glb` takes a binary file apart, `json` reads values and says where they stand, `buffers` reads each file once, `nodes` says which
-//! meshes are shown where. What all of them together would take is counted before the first corner is read.
+//! `glb` splits a binary file, `json` reads values and knows their paths for error messages, `buffers` reads each file once, and
+//! `nodes` finds the meshes of a scene and their transforms. The total memory is computed before the first vertex is read.
 
 mod accessor;
 mod buffers;
@@ -20,26 +20,26 @@ use bansho_base::{
 use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::MeshInstance};
 use super::limits::MemoryLimit;
 
-/// Reads an external resource of a glTF by its URI, up to a number of bytes.
+/// Reads an external buffer of a glTF by its URI, up to a number of bytes.
 pub type ReadResource<'a> = &'a dyn Fn(&str, u64) -> Result<Vec<u8>, AssetProblem>;
 
-/// Memory of a vertex and a triangle while meshes are built: growing lists take twice the size, and triangles need
-/// their vertex order too.
-const CORNER_BYTES: usize = 2 * size_of::<[f32; 3]>();
+/// Memory of a vertex and of a triangle while a mesh is built: growing lists take up to twice their size, and triangles also need the list
+/// of indices.
+const VERTEX_BYTES: usize = 2 * size_of::<[f32; 3]>();
 const TRIANGLE_BYTES: usize = 2 * size_of::<[u32; 3]>() + 2 * size_of::<[u32; 3]>();
 
 fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Reads all triangles of the default scene (of the first, where none is the default; of all nodes, where there is none), each where its
-/// node stands.
+/// Decodes all triangles of the default scene, with the transforms of their nodes. Without a default scene it is the first one; without
+/// scenes, all nodes.
 ///
-/// `file` are the bytes of a file whose name ends in `extension`; `beside` gives the bytes of files that it names, of at most so many bytes.
-/// Morph targets, skins, required extensions and sparse or compressed accessors are not read.
+/// `file` are the bytes of a file with this `extension`; `read_resource` reads external buffers. Morph targets, skins, required extensions, and
+/// sparse or compressed accessors are not supported.
 ///
 /// # Errors
-/// Another extension, damage, more than is read, more memory than `limit`, or no triangles. Never panics.
+/// Another extension, damage, an unsupported feature, more memory than `limit`, or no triangles. Never panics.
 pub fn decode_mesh(
     file: &[u8],
     extension: &str,
@@ -55,27 +55,27 @@ pub fn decode_mesh(
     limit.check(read_bytes)?;
     let value = json::parse(json)?;
     let root = Object::root(&value)?;
-    check_demands(&root)?;
+    check_version_and_extensions(&root)?;
     let mesh_instances = nodes::mesh_instances(&root)?;
     let limit = MemoryLimit { used: limit.used.saturating_add(read_bytes), ..limit };
     let buffers = Buffers::read(&root, binary, read_resource, limit)?;
-    let mut shapes = BTreeMap::new();
+    let mut meshes = BTreeMap::new();
     for &MeshInstance { mesh, .. } in &mesh_instances {
-        if let std::collections::btree_map::Entry::Vacant(entry) = shapes.entry(mesh) {
-            entry.insert(PrimitiveMesh::read(&root, mesh, &buffers)?);
+        if let std::collections::btree_map::Entry::Vacant(entry) = meshes.entry(mesh) {
+            entry.insert(TrianglePrimitives::read(&root, mesh, &buffers)?);
         }
     }
-    let gathered_bytes = check_totals(mesh_instances.iter().map(|mesh_instances| &shapes[&mesh_instances.mesh]))?;
-    limit.check(buffers.memory_bytes().saturating_add(gathered_bytes))?;
-    let mut gathering = MeshBuilder::default();
+    let mesh_bytes = check_totals(mesh_instances.iter().map(|instance| &meshes[&instance.mesh]))?;
+    limit.check(buffers.memory_bytes().saturating_add(mesh_bytes))?;
+    let mut builder = MeshBuilder::default();
     for MeshInstance { mesh, world_from_mesh } in &mesh_instances {
-        shapes[mesh].parts.iter().try_for_each(|primitive_data| gathering.add(primitive_data, world_from_mesh))?;
+        meshes[mesh].primitives.iter().try_for_each(|primitive| builder.add(primitive, world_from_mesh))?;
     }
-    Ok(Mesh::new(gathering.corners, gathering.triangles)?)
+    Ok(Mesh::new(builder.vertices, builder.triangles)?)
 }
 
-/// Names of the files beside it that a glTF's numbers lie in, each once, as many as can be found; `file` and `extension` as in [`decode_mesh`].
-pub fn files_beside(file: &[u8], extension: &str) -> Vec<String> {
+/// URIs of the external buffers of a glTF, each once; of a damaged file, those that can be found. `file` and `extension` are as in [`decode_mesh`].
+pub(crate) fn external_buffer_uris(file: &[u8], extension: &str) -> Vec<String> {
     let json = match extension.to_ascii_lowercase().as_str() {
         "glb" => glb::split(file).map(|glb| glb.json).unwrap_or_default(),
         "gltf" => file,
@@ -83,46 +83,47 @@ pub fn files_beside(file: &[u8], extension: &str) -> Vec<String> {
     };
     let Ok(value) = json::parse(json) else { return Vec::new() };
     let root = Object::root(&value);
-    root.map(|root| buffers::files(&root).into_iter().map(str::to_owned).collect()).unwrap_or_default()
+    root.map(|root| buffers::external_uris(&root).into_iter().map(str::to_owned).collect()).unwrap_or_default()
 }
 
-/// Refuses required extensions and other versions.
-fn check_demands(root: &Object) -> Result<(), AssetProblem> {
+/// Rejects required extensions and other versions than 2.
+fn check_version_and_extensions(root: &Object) -> Result<(), AssetProblem> {
     let asset =
-        root.object("asset")?.ok_or_else(|| root.fault("asset", "is missing; allowed: { \"version\": \"2.0\" }"))?;
+        root.object("asset")?.ok_or_else(|| root.error_at("asset", "is missing; allowed: { \"version\": \"2.0\" }"))?;
     let version = asset.text("version")?.unwrap_or_default();
     if !version.starts_with("2.") {
-        return Err(asset.fault("version", format!("is {version:?}; allowed: \"2.0\"")));
+        return Err(asset.error_at("version", format!("is {version:?}; allowed: \"2.0\"")));
     }
     match root.list("extensionsRequired")? {
         [] => Ok(()),
         [first, ..] => {
-            Err(root.fault("extensionsRequired", format!("demands {first}; allowed: files that demand no extensions")))
+            Err(root
+                .error_at("extensionsRequired", format!("requires {first}; allowed: files that require no extensions")))
         }
     }
 }
 
-/// Refuses more than a mesh may have before reading any of it; returns the memory that building it takes.
-fn check_totals<'s>(shapes: impl Iterator<Item = &'s PrimitiveMesh<'s>>) -> Result<u64, MeshError> {
-    let (mut triangles, mut corners) = (0_usize, 0_usize);
-    for shape in shapes {
-        triangles = triangles.saturating_add(shape.triangles);
-        corners = corners.saturating_add(shape.corners);
+/// Rejects too many triangles or vertices before any are read; returns the memory for building the mesh.
+fn check_totals<'m>(meshes: impl Iterator<Item = &'m TrianglePrimitives<'m>>) -> Result<u64, MeshError> {
+    let (mut triangles, mut vertices) = (0_usize, 0_usize);
+    for mesh in meshes {
+        triangles = triangles.saturating_add(mesh.triangles);
+        vertices = vertices.saturating_add(mesh.vertices);
     }
     if triangles > MAX_TRIANGLES {
         return Err(MeshError::TooManyTriangles { found: triangles });
     }
-    if corners > MAX_VERTICES {
-        return Err(MeshError::TooManyVertices { found: corners });
+    if vertices > MAX_VERTICES {
+        return Err(MeshError::TooManyVertices { found: vertices });
     }
-    Ok((corners * CORNER_BYTES + triangles * TRIANGLE_BYTES) as u64)
+    Ok((vertices * VERTEX_BYTES + triangles * TRIANGLE_BYTES) as u64)
 }
 
 /// The triangle primitives of a mesh.
-struct PrimitiveMesh<'b> {
-    parts: Vec<Primitive<'b>>,
+struct TrianglePrimitives<'b> {
+    primitives: Vec<Primitive<'b>>,
     triangles: usize,
-    corners: usize,
+    vertices: usize,
 }
 
 /// A primitive of triangles.
@@ -143,38 +144,37 @@ enum PrimitiveMode {
 impl PrimitiveMode {
     /// The mode of a primitive; `None` for points and lines.
     fn of(primitive: &Object) -> Result<Option<Self>, AssetProblem> {
-        match primitive.whole("mode")? {
+        match primitive.unsigned("mode")? {
             None | Some(4) => Ok(Some(Self::Triangles)),
             Some(5) => Ok(Some(Self::Strip)),
             Some(6) => Ok(Some(Self::Fan)),
             Some(0..=3) => Ok(None),
-            Some(mode) => Err(primitive.fault("mode", format!("is {mode}; allowed: 0 to 6"))),
+            Some(mode) => Err(primitive.error_at("mode", format!("is {mode}; allowed: 0 to 6"))),
         }
     }
 
     /// Number of triangles for this number of vertices.
-    fn triangles(self, corners: usize) -> usize {
+    fn triangles(self, vertices: usize) -> usize {
         match self {
-            Self::Triangles => corners / 3,
-            Self::Strip | Self::Fan => corners.saturating_sub(2),
+            Self::Triangles => vertices / 3,
+            Self::Strip | Self::Fan => vertices.saturating_sub(2),
         }
     }
 }
 
-impl<'b> PrimitiveMesh<'b> {
+impl<'b> TrianglePrimitives<'b> {
     fn read(root: &Object, mesh: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
-        let mut shape = Self { parts: Vec::new(), triangles: 0, corners: 0 };
+        let mut own = Self { primitives: Vec::new(), triangles: 0, vertices: 0 };
         for primitive in root.item("meshes", mesh)?.items("primitives")? {
-            let Some(primitive_data) = Primitive::read(root, &primitive?, buffers)? else { continue };
-            let triangles =
-                primitive_data.mode.triangles(primitive_data.indices.unwrap_or(primitive_data.positions).count);
+            let Some(primitive) = Primitive::read(root, &primitive?, buffers)? else { continue };
+            let triangles = primitive.mode.triangles(primitive.indices.unwrap_or(primitive.positions).count);
             if triangles > 0 {
-                shape.triangles = shape.triangles.saturating_add(triangles);
-                shape.corners = shape.corners.saturating_add(primitive_data.positions.count);
-                shape.parts.push(primitive_data);
+                own.triangles = own.triangles.saturating_add(triangles);
+                own.vertices = own.vertices.saturating_add(primitive.positions.count);
+                own.primitives.push(primitive);
             }
         }
-        Ok(shape)
+        Ok(own)
     }
 }
 
@@ -194,43 +194,46 @@ impl<'b> Primitive<'b> {
 
 #[derive(Default)]
 struct MeshBuilder {
-    corners: Vec<[f32; 3]>,
+    vertices: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl MeshBuilder {
-    /// Adds a primitive, transformed. Indices must refer to its own vertices.
-    fn add(&mut self, primitive_data: &Primitive, world_from_mesh: &DMat4) -> Result<(), MeshError> {
-        let (first, corners) = (self.corners.len() as u32, primitive_data.positions.count);
-        let place = |corner: [f32; 3]| {
-            world_from_mesh.transform_point3(DVec3::from(corner.map(f64::from))).as_vec3().to_array()
+    /// Adds a primitive, transformed.
+    ///
+    /// # Errors
+    /// An index beyond its vertices.
+    fn add(&mut self, primitive: &Primitive, world_from_mesh: &DMat4) -> Result<(), MeshError> {
+        let (first, count) = (self.vertices.len() as u32, primitive.positions.count);
+        let transformed = |vertex: [f32; 3]| {
+            world_from_mesh.transform_point3(DVec3::from(vertex.map(f64::from))).as_vec3().to_array()
         };
-        self.corners.extend(primitive_data.positions.vectors().map(place));
-        let order = primitive_data.indices.map_or_else(|| (0..corners as u32).collect(), Accessor::indices_u32);
-        let triangles = triangles(primitive_data.mode, &order);
-        for (triangle, named) in triangles.iter().enumerate() {
-            if let Some(&corner) = named.iter().find(|&&corner| corner as usize >= corners) {
-                return Err(MeshError::VertexIndexOutOfRange { triangle, vertex: corner, vertex_count: corners });
+        self.vertices.extend(primitive.positions.vectors().map(transformed));
+        let indices = primitive.indices.map_or_else(|| (0..count as u32).collect(), Accessor::indices_u32);
+        let triangles = triangles(primitive.mode, &indices);
+        for (triangle, own) in triangles.iter().enumerate() {
+            if let Some(&vertex) = own.iter().find(|&&vertex| vertex as usize >= count) {
+                return Err(MeshError::VertexIndexOutOfRange { triangle, vertex, vertex_count: count });
             }
         }
-        self.triangles.extend(triangles.into_iter().map(|named| named.map(|corner| first + corner)));
+        self.triangles.extend(triangles.into_iter().map(|own| own.map(|vertex| first + vertex)));
         Ok(())
     }
 }
 
-/// The triangles of a vertex order.
-fn triangles(mode: PrimitiveMode, order: &[u32]) -> Vec<[u32; 3]> {
+/// The triangles of a list of indices.
+fn triangles(mode: PrimitiveMode, indices: &[u32]) -> Vec<[u32; 3]> {
     match mode {
-        PrimitiveMode::Triangles => order.as_chunks::<3>().0.to_vec(),
+        PrimitiveMode::Triangles => indices.as_chunks::<3>().0.to_vec(),
         PrimitiveMode::Strip => {
-            let turn = |(index, corners): (usize, &[u32])| match index % 2 {
-                0 => [corners[0], corners[1], corners[2]],
-                _ => [corners[1], corners[0], corners[2]],
+            let triangle = |(index, vertices): (usize, &[u32])| match index % 2 {
+                0 => [vertices[0], vertices[1], vertices[2]],
+                _ => [vertices[1], vertices[0], vertices[2]],
             };
-            order.windows(3).enumerate().map(turn).collect()
+            indices.windows(3).enumerate().map(triangle).collect()
         }
         PrimitiveMode::Fan => {
-            let (Some(&hub), rim) = (order.first(), order.get(1..).unwrap_or_default()) else { return Vec::new() };
+            let (Some(&hub), rim) = (indices.first(), indices.get(1..).unwrap_or_default()) else { return Vec::new() };
             rim.windows(2).map(|pair| [hub, pair[0], pair[1]]).collect()
         }
     }

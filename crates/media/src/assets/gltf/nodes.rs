@@ -23,18 +23,18 @@ struct Node {
     parent: Option<usize>,
 }
 
-/// The meshes of the default scene; of the first, where none is the default; of all nodes, where there is none.
+/// The meshes of the default scene; without a default, of the first scene; without scenes, of all nodes.
 pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetProblem> {
     let nodes = read_tree(root)?;
     let mut mesh_instances = Vec::new();
-    let mut open: Vec<(usize, DMat4)> =
+    let mut stack: Vec<(usize, DMat4)> =
         root_nodes(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
     // Every node has at most one parent, so none is visited twice.
-    while let Some((index, world_from_parent)) = open.pop() {
+    while let Some((index, world_from_parent)) = stack.pop() {
         let node = &nodes[index];
         let world_from_node = world_from_parent * node.parent_from_node;
         mesh_instances.extend(node.mesh.map(|mesh| MeshInstance { mesh, world_from_mesh: world_from_node }));
-        open.extend(node.children.iter().map(|&child| (child, world_from_node)));
+        stack.extend(node.children.iter().map(|&child| (child, world_from_node)));
     }
     Ok(mesh_instances)
 }
@@ -43,7 +43,7 @@ pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetPr
 fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
     let count = root.list("nodes")?.len();
     if count > MAX_NODES {
-        return Err(root.fault("nodes", format!("has {count} elements; allowed: up to {MAX_NODES}")));
+        return Err(root.error_at("nodes", format!("has {count} elements; allowed: up to {MAX_NODES}")));
     }
     let meshes = root.list("meshes")?.len();
     let mut nodes: Vec<Node> =
@@ -51,9 +51,9 @@ fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
     for index in 0..count {
         for child in std::mem::take(&mut nodes[index].children) {
             if let Some(other) = nodes[child].parent.replace(index) {
-                let told =
+                let message =
                     format!("node {child} is a child of node {other} and again of node {index}; allowed: one parent");
-                return Err(damaged(told));
+                return Err(damaged(message));
             }
             nodes[index].children.push(child);
         }
@@ -71,9 +71,9 @@ fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
 }
 
 fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem> {
-    let vector = |key, otherwise: f32| {
+    let vector = |key, default: f32| {
         let numbers: Option<[f32; 3]> = node.numbers(key)?;
-        Ok::<_, AssetProblem>(DVec3::from(numbers.unwrap_or([otherwise; 3]).map(f64::from)))
+        Ok::<_, AssetProblem>(DVec3::from(numbers.unwrap_or([default; 3]).map(f64::from)))
     };
     let parent_from_node = match node.numbers::<16>("matrix")? {
         Some(columns) => DMat4::from_cols_array(&columns.map(f64::from)),
@@ -99,14 +99,15 @@ fn root_nodes(root: &Object, nodes: &[Node]) -> Result<Vec<usize>, AssetProblem>
     };
     let scene = root.item("scenes", scene)?;
     let root_nodes = scene.indices("nodes", nodes.len())?;
-    let mut named = vec![false; nodes.len()];
+    let mut listed = vec![false; nodes.len()];
     for &index in &root_nodes {
         if let Some(parent) = nodes[index].parent {
-            let told = format!("names {index}, which is a child of node {parent}; allowed: nodes without a parent");
-            return Err(scene.fault("nodes", told));
+            let message =
+                format!("contains {index}, which is a child of node {parent}; allowed: nodes without a parent");
+            return Err(scene.error_at("nodes", message));
         }
-        if std::mem::replace(&mut named[index], true) {
-            return Err(scene.fault("nodes", format!("names {index} twice; allowed: every node once")));
+        if std::mem::replace(&mut listed[index], true) {
+            return Err(scene.error_at("nodes", format!("contains {index} twice; allowed: every node once")));
         }
     }
     Ok(root_nodes)

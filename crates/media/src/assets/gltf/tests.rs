@@ -35,17 +35,17 @@ fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     file
 }
 
-fn nothing_beside(_: &str, _: u64) -> Result<Vec<u8>, AssetProblem> {
+fn no_resources(_: &str, _: u64) -> Result<Vec<u8>, AssetProblem> {
     Err(AssetProblem::Missing)
 }
 
 fn reason(file: &[u8], extension: &str) -> String {
-    decode_mesh(file, extension, &nothing_beside, LIMIT).unwrap_err().to_string()
+    decode_mesh(file, extension, &no_resources, LIMIT).unwrap_err().to_string()
 }
 
 #[test]
 fn triangles_stand_where_their_node_does() {
-    let mesh = decode_mesh(&glb(&document("", 3, ""), &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
+    let mesh = decode_mesh(&glb(&document("", 3, ""), &bytes()), "glb", &no_resources, LIMIT).unwrap();
     let triangles: Vec<_> = mesh.triangles().collect();
     let corner = DVec3::new;
     assert_eq!(triangles, [[corner(0.0, 5.0, 0.0), corner(2.0, 5.0, 0.0), corner(0.0, 7.0, 0.0)]]);
@@ -67,7 +67,7 @@ fn buffers_may_lie_beside_or_inside_the_text() {
     assert_eq!(reason(read_resource.as_bytes(), "gltf"), "no such file");
     let text = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA";
     let inside = document(&format!(r#","uri":"data:application/octet-stream;base64,{text}""#), 3, "");
-    assert_eq!(decode_mesh(inside.as_bytes(), "gltf", &nothing_beside, LIMIT).unwrap().len(), 1);
+    assert_eq!(decode_mesh(inside.as_bytes(), "gltf", &no_resources, LIMIT).unwrap().len(), 1);
 }
 
 #[test]
@@ -84,11 +84,11 @@ fn strips_and_fans_make_triangles_that_face_the_same_way() {
 fn hostile_files_are_refused_with_a_reason() {
     let good = glb(&document("", 3, ""), &bytes());
     for end in 0..good.len() {
-        assert!(decode_mesh(&good[..end], "glb", &nothing_beside, LIMIT).is_err(), "{end} bytes of it");
+        assert!(decode_mesh(&good[..end], "glb", &no_resources, LIMIT).is_err(), "{end} bytes of it");
     }
     let shorter = reason(&good[..good.len() - 1], "glb");
     assert!(
-        shorter.ends_with(&format!("it is cut short: of its {} bytes {} are there", good.len(), good.len() - 1)),
+        shorter.ends_with(&format!("it is truncated: it has {} of its {} bytes", good.len() - 1, good.len())),
         "{shorter}"
     );
     assert!(
@@ -113,33 +113,37 @@ fn changed(from: &str, to: &str) -> Vec<u8> {
 
 #[test]
 fn a_fault_says_where_it_is_and_what_is_allowed() {
-    let faults = [
+    let errors = [
         (r#""version":"2.0""#, r#""version":"1.0""#, r#"asset.version is "1.0"; allowed: "2.0""#),
-        (r#""scene":0"#, r#""scene":3"#, "scene names 3; allowed: 0 to 0"),
-        (r#""mesh":0"#, r#""mesh":-1"#, "nodes[0].mesh is wrong; allowed: a whole number from 0 on"),
-        (r#""scale":[2,2,2]"#, r#""scale":[2,2]"#, "nodes[0].scale is wrong; allowed: 3 numbers"),
-        (r#""POSITION":0"#, r#""POSITION":2"#, "meshes[0].primitives[0].attributes.POSITION names 2; allowed: 0 to 1"),
+        (r#""scene":0"#, r#""scene":3"#, "scene is 3; allowed: 0 to 0"),
+        (r#""mesh":0"#, r#""mesh":-1"#, "nodes[0].mesh is invalid; allowed: a whole number from 0 on"),
+        (r#""scale":[2,2,2]"#, r#""scale":[2,2]"#, "nodes[0].scale is invalid; allowed: 3 numbers"),
+        (r#""POSITION":0"#, r#""POSITION":2"#, "meshes[0].primitives[0].attributes.POSITION is 2; allowed: 0 to 1"),
         (r#""indices":1"#, r#""indices":0"#, "accessors[0].type is not that of indices; allowed: SCALAR of"),
         (r#""indices":1"#, r#""indices":1,"mode":7"#, "meshes[0].primitives[0].mode is 7; allowed: 0 to 6"),
         (r#""type":"VEC3""#, r#""type":"VEC2""#, "accessors[0].type is not that of positions; allowed: VEC3 of"),
         (r#""bufferView":0,"#, "", "accessors[0].bufferView is missing, perhaps because the mesh is compressed"),
-        (r#""count":3,"type":"SCALAR""#, r#""count":3,"type":"SCALAR","sparse":{}"#, "accessors[1].sparse is not read"),
+        (
+            r#""count":3,"type":"SCALAR""#,
+            r#""count":3,"type":"SCALAR","sparse":{}"#,
+            "accessors[1].sparse is not supported",
+        ),
         (
             r#""byteOffset":36,"byteLength":6"#,
             r#""byteOffset":37,"byteLength":6"#,
             "bufferViews[1].byteLength reaches beyond",
         ),
-        (r#""byteLength":42"#, r#""byteLength":43"#, "buffers[0].byteLength says 43 bytes, but 42 are there"),
+        (r#""byteLength":42"#, r#""byteLength":43"#, "buffers[0].byteLength is 43, but the buffer has 42 bytes"),
         (
             r#""buffers":[{"#,
             r#""extensionsRequired":["X"],"buffers":[{"#,
-            r#"extensionsRequired demands "X"; allowed: "#,
+            r#"extensionsRequired requires "X"; allowed: "#,
         ),
-        (r#""buffers":[{"#, r#""buffers":[7,{"#, "buffers[0] is wrong; allowed: an object"),
+        (r#""buffers":[{"#, r#""buffers":[7,{"#, "buffers[0] is invalid; allowed: an object"),
     ];
-    for (from, to, told) in faults {
+    for (from, to, message) in errors {
         let found = reason(&changed(from, to), "glb");
-        assert!(found.contains(told), "{to}: {found}");
+        assert!(found.contains(message), "{to}: {found}");
     }
     let mut named_beyond = bytes();
     named_beyond[40] = 3;
@@ -164,16 +168,16 @@ fn nodes_make_trees() {
     );
     assert!(
         three(r#""children":[1]},{"mesh":0}"#, r#""nodes":[0,1]"#)
-            .contains("scenes[0].nodes names 1, which is a child of node 0")
+            .contains("scenes[0].nodes contains 1, which is a child of node 0")
     );
-    assert!(three(r#""children":[1]},{"mesh":0}"#, r#""nodes":[0,0]"#).contains("scenes[0].nodes names 0 twice"));
+    assert!(three(r#""children":[1]},{"mesh":0}"#, r#""nodes":[0,0]"#).contains("scenes[0].nodes contains 0 twice"));
     let often = format!(r#""children":[{}1]}},{{"mesh":0}}"#, "1,".repeat(2999));
     assert!(three(&often, scene).contains("node 1 is a child of node 0 and again of node 0; allowed: one parent"));
     // Without a scene every node is shown once, where its parents put it.
     let family = changed(r#""scene":0,"scenes":[{"nodes":[0]}],"#, "");
     let family = String::from_utf8_lossy(&family[20..]).replace(r#""scale":[2,2,2]}"#, r#""children":[1]},{"mesh":0}"#);
     let json = &family[..family.rfind('}').unwrap() + 1];
-    let mesh = decode_mesh(&glb(json, &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
+    let mesh = decode_mesh(&glb(json, &bytes()), "glb", &no_resources, LIMIT).unwrap();
     assert!(mesh.len() == 2 && mesh.bounds() == [DVec3::new(0.0, 5.0, 0.0), DVec3::new(1.0, 6.0, 0.0)]);
 }
 
@@ -182,7 +186,7 @@ fn a_turned_and_nested_mesh_stands_where_the_format_says() {
     let turned = r#""rotation":[0,0,0.7071067811865476,0.7071067811865476],"translation":[1,0,0],"children":[1]},
         {"mesh":0,"matrix":[3,0,0,0, 0,3,0,0, 0,0,3,0, 0,2,0,1]}"#;
     let json = document("", 3, "").replace(r#""mesh":0,"translation":[0,5,0],"scale":[2,2,2]}"#, turned);
-    let mesh = decode_mesh(&glb(&json, &bytes()), "glb", &nothing_beside, LIMIT).unwrap();
+    let mesh = decode_mesh(&glb(&json, &bytes()), "glb", &no_resources, LIMIT).unwrap();
     let corners = mesh.triangles().next().unwrap();
     for (found, wanted) in corners.iter().zip([[-1.0, 0.0, 0.0], [-1.0, 3.0, 0.0], [-4.0, 0.0, 0.0]]) {
         assert!((*found - DVec3::from(wanted)).length() < 1e-6, "{corners:?}");
@@ -202,11 +206,11 @@ fn what_is_shown_too_often_is_refused_before_it_is_read() {
         .replace(r#""byteLength":42"#, &format!(r#""byteLength":{}"#, 12 * positions + 6))
         .replace(r#""nodes":[{"#, &format!(r#""nodes":[{nodes}{{"#))
         .replace(r#""nodes":[0]"#, &format!(r#""nodes":[{}]"#, scene.join(",")));
-    let told = reason(&glb(&json, &binary), "glb");
-    assert!(told.ends_with("it has 2000000000 vertices; at most 12000000 are read"), "{told}");
+    let message = reason(&glb(&json, &binary), "glb");
+    assert!(message.ends_with("it has 2000000000 vertices; at most 12000000 are read"), "{message}");
     let unindexed = json.replace(r#","indices":1"#, "");
-    let told = reason(&glb(&unindexed, &binary), "glb");
-    assert!(told.ends_with("it has 666666000 triangles; at most 4000000 are read"), "{told}");
+    let message = reason(&glb(&unindexed, &binary), "glb");
+    assert!(message.ends_with("it has 666666000 triangles; at most 4000000 are read"), "{message}");
 }
 
 #[test]
@@ -248,7 +252,7 @@ fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
     let given = |_: &str, _: u64| Ok(bytes());
     let fits = (0..100_000).find(|&total| decode(total, &given).is_ok()).unwrap();
     assert!((10_000..50_000).contains(&fits), "{fits}");
-    // A buffer is told how much is left, and asked for no more.
+    // `read_resource` gets the number of remaining bytes as its limit.
     let asked = std::cell::Cell::new(None);
     let refused = |_: &str, left: u64| {
         asked.set(Some(left));
@@ -256,13 +260,13 @@ fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
     };
     assert!(matches!(decode(fits, &refused), Err(AssetProblem::FileSize { .. })));
     assert!(asked.get().is_some_and(|left| (42..1000).contains(&left)), "{asked:?}");
-    let told = decode(fits - 1, &given).unwrap_err();
-    assert!(matches!(told, AssetProblem::Memory { others, .. } if others > 1000), "{told}");
+    let message = decode(fits - 1, &given).unwrap_err();
+    assert!(matches!(message, AssetProblem::Memory { others, .. } if others > 1000), "{message}");
     // Text that would be costly to parse is not parsed.
     let many = format!("[{}0]", "{},".repeat(1_000_000));
-    let told = decode_mesh(many.as_bytes(), "gltf", &given, MemoryLimit { total: 100 << 20, used: 0 }).unwrap_err();
+    let message = decode_mesh(many.as_bytes(), "gltf", &given, MemoryLimit { total: 100 << 20, used: 0 }).unwrap_err();
     assert_eq!(
-        told,
+        message,
         AssetProblem::Memory { bytes: 2 * many.len() as u64 + 400 * 2_000_000, limit: 100 << 20, others: 0 }
     );
 }
@@ -270,12 +274,12 @@ fn what_would_take_too_much_memory_is_refused_before_it_is_read() {
 #[test]
 fn every_single_damaged_byte_is_survived() {
     let good = glb(&document("", 3, ""), &bytes());
-    for place in 0..good.len() {
+    for index in 0..good.len() {
         for value in [0, b'9', b'"', 0xff] {
             let mut bad = good.clone();
-            bad[place] = value;
-            // Whatever it makes of it, it must come back.
-            drop(decode_mesh(&bad, "glb", &nothing_beside, LIMIT));
+            bad[index] = value;
+            // Any result will do, as long as it returns.
+            drop(decode_mesh(&bad, "glb", &no_resources, LIMIT));
         }
     }
 }

@@ -12,7 +12,7 @@ use bansho_base::{
 };
 
 use self::{
-    numbers::Numbers,
+    numbers::NumberReader,
     path::PathError,
     transform::Transform,
     xml::{Event, Events, Tag},
@@ -31,28 +31,28 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
     AssetProblem::Damaged(reason.to_string())
 }
 
-/// Reads the strokes of an SVG file in the order in which they are drawn. Curves become lines through 16 points each; fills,
-/// widths and style sheets are not looked at, and neither `use` nor nested coordinate systems are followed.
+/// Decodes the strokes of an SVG file in drawing order. Each curve becomes 16 segments. Fills, widths, style sheets, `use` and nested
+/// coordinate systems are ignored.
 ///
 /// # Errors
-/// A text that is no SVG, a path that cannot be read, no strokes, or more than a million points. Never panics.
+/// A text that is not an SVG, an invalid path, no strokes, or more than a million points. Never panics.
 pub fn decode_drawing(text: &str) -> Result<Drawing, AssetProblem> {
-    let mut reading = SvgReader::default();
+    let mut reader = SvgReader::default();
     let mut events = Events::new(text);
     let mut is_svg = false;
     while let Some(event) = events.next().map_err(damaged)? {
         match event {
             Event::Start(tag) => {
                 is_svg |= tag.name == "svg";
-                reading.start(&tag)?;
+                reader.start(&tag)?;
             }
-            Event::End => drop(reading.levels.pop()),
+            Event::End => drop(reader.levels.pop()),
         }
     }
     if !is_svg {
-        return Err(damaged("it is no SVG"));
+        return Err(damaged("it is not an SVG"));
     }
-    reading.finish()
+    reader.finish()
 }
 
 /// Inherited state of an element.
@@ -68,9 +68,9 @@ struct SvgReader {
     strokes: Vec<Stroke>,
     points: usize,
     /// Names of unsupported elements that were drawn.
-    others: Vec<&'static str>,
+    unsupported: Vec<&'static str>,
     /// The drawing area, from the root element.
-    sheet: Option<[DVec2; 2]>,
+    drawing_area: Option<[DVec2; 2]>,
 }
 
 impl SvgReader {
@@ -82,29 +82,29 @@ impl SvgReader {
         let is_hidden = HIDDEN_ELEMENTS.contains(&tag.name) || tag.get("display") == Some("none") || is_hidden(tag);
         let level = GroupState { transform: outer.transform.after(&own), is_drawn: outer.is_drawn && !is_hidden };
         if tag.name == "svg" && self.levels.is_empty() {
-            self.sheet = sheet(tag)?;
+            self.drawing_area = drawing_area(tag)?;
         }
         self.levels.push(level);
         if !level.is_drawn {
             return Ok(());
         }
-        let other = UNSUPPORTED_ELEMENTS.into_iter().find(|name| *name == tag.name);
-        self.others.extend(other.filter(|name| !self.others.contains(name)));
-        for line in lines(tag).map_err(|reason| damaged(format!("{}: {reason}", self.name(tag))))? {
+        let unsupported = UNSUPPORTED_ELEMENTS.into_iter().find(|name| *name == tag.name);
+        self.unsupported.extend(unsupported.filter(|name| !self.unsupported.contains(name)));
+        for line in polylines(tag).map_err(|reason| damaged(format!("{}: {reason}", self.name(tag))))? {
             self.points += line.len();
             if self.points > MAX_POINTS {
                 return Err(damaged(format!("it has more than {MAX_POINTS} points")));
             }
             let points: Vec<DVec2> = line.into_iter().map(|point| level.transform.apply(point)).collect();
             if !points.iter().all(|point| point.is_finite()) {
-                return Err(damaged(format!("{}: a point lies infinitely far away", self.name(tag))));
+                return Err(damaged(format!("{}: a point is infinitely far away", self.name(tag))));
             }
             self.strokes.push(Stroke { id: tag.get("id").map(str::to_owned), points });
         }
         Ok(())
     }
 
-    /// Name of an element in error messages: its id, or else the number of strokes before it.
+    /// Name of an element in error messages: its id; without one, the number of strokes before it.
     fn name(&self, tag: &Tag) -> String {
         match tag.get("id") {
             Some(id) => format!("{} `{id}`", tag.name),
@@ -114,11 +114,11 @@ impl SvgReader {
 
     fn finish(self) -> Result<Drawing, AssetProblem> {
         if self.strokes.is_empty() {
-            return Err(AssetProblem::NoStrokes { instead: self.others });
+            return Err(AssetProblem::NoStrokes { instead: self.unsupported });
         }
         let points = || self.strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
         let bounds = || [points().fold(DVec2::INFINITY, DVec2::min), points().fold(DVec2::NEG_INFINITY, DVec2::max)];
-        let [min, max] = self.sheet.unwrap_or_else(bounds);
+        let [min, max] = self.drawing_area.unwrap_or_else(bounds);
         Ok(Drawing { strokes: self.strokes, min, max })
     }
 }
@@ -131,13 +131,13 @@ fn is_hidden(tag: &Tag) -> bool {
         .any(|(key, value)| (key.trim(), value.trim()) == ("display", "none"))
 }
 
-/// The view box, or else width and height where both are given.
-fn sheet(tag: &Tag) -> Result<Option<[DVec2; 2]>, AssetProblem> {
+/// The view box; without it, width and height if both are stated.
+fn drawing_area(tag: &Tag) -> Result<Option<[DVec2; 2]>, AssetProblem> {
     let Some(view) = tag.get("viewBox") else {
-        let side = |name: &str| Numbers::new(tag.get(name)?).next().filter(|side| *side > 0.0);
+        let side = |name: &str| NumberReader::new(tag.get(name)?).next().filter(|side| *side > 0.0);
         return Ok(side("width").zip(side("height")).map(|(width, height)| [DVec2::ZERO, DVec2::new(width, height)]));
     };
-    let mut numbers = Numbers::new(view);
+    let mut numbers = NumberReader::new(view);
     match (numbers.take_all::<4>(), numbers.next()) {
         (Some([x, y, width, height]), None) if width > 0.0 && height > 0.0 => {
             let low = DVec2::new(x, y);
@@ -147,13 +147,13 @@ fn sheet(tag: &Tag) -> Result<Option<[DVec2; 2]>, AssetProblem> {
     }
 }
 
-/// The lines of an element, none where it is of another kind.
-fn lines(tag: &Tag) -> Result<Vec<Vec<DVec2>>, PathError> {
-    let number = |name: &str| tag.get(name).and_then(|value| Numbers::new(value).next()).unwrap_or(0.0);
+/// The polylines of an element; empty for elements of other kinds.
+fn polylines(tag: &Tag) -> Result<Vec<Vec<DVec2>>, PathError> {
+    let number = |name: &str| tag.get(name).and_then(|value| NumberReader::new(value).next()).unwrap_or(0.0);
     Ok(match tag.name {
         "path" => path::subpaths(tag.get("d").unwrap_or_default(), MAX_POINTS)?,
         "polyline" | "polygon" => {
-            let mut numbers = Numbers::new(tag.get("points").unwrap_or_default());
+            let mut numbers = NumberReader::new(tag.get("points").unwrap_or_default());
             let mut line: Vec<DVec2> =
                 std::iter::from_fn(|| numbers.take_all::<2>()).map(DVec2::from).take(MAX_POINTS + 1).collect();
             if tag.name == "polygon" {
@@ -210,14 +210,14 @@ mod tests {
 
     #[test]
     fn faults_name_their_path() {
-        let fault = |text: &str| decode_drawing(text).unwrap_err().to_string();
-        assert!(fault("<svg><path id='arc' d='M0 0L1'/></svg>").contains("path `arc`: "));
-        assert!(fault("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes: "));
+        let error = |text: &str| decode_drawing(text).unwrap_err().to_string();
+        assert!(error("<svg><path id='arc' d='M0 0L1'/></svg>").contains("path `arc`: "));
+        assert!(error("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes: "));
         assert!(
-            fault("<svg><g id='all' transform='turn(3)'/></svg>").contains("g `all`: its transform cannot be read")
+            error("<svg><g id='all' transform='turn(3)'/></svg>").contains("g `all`: its transform cannot be read")
         );
         for view in ["", "0 0 10", "0 0 10 0", "0 0 -3 4", "0 0 wide 3", "0 0 1 2 3"] {
-            let shown = fault(&format!("<svg viewBox='{view}'><path d='M0 0L1 1'/></svg>"));
+            let shown = error(&format!("<svg viewBox='{view}'><path d='M0 0L1 1'/></svg>"));
             assert!(shown.contains(&format!("its viewBox is `{view}`")), "{shown}");
         }
     }

@@ -1,30 +1,30 @@
-//! Numbers as SVG writes them: apart by spaces or commas, or by nothing where a sign or a second point begins the next.
+//! NumberReader in SVG: separated by spaces or commas, or by nothing where a sign or a second decimal point begins the next number.
 
 /// Reads numbers from a text.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Numbers<'a> {
+pub(super) struct NumberReader<'a> {
     rest: &'a str,
 }
 
-impl<'a> Numbers<'a> {
+impl<'a> NumberReader<'a> {
     pub(super) fn new(text: &'a str) -> Self {
         Self { rest: text.trim_start() }
     }
 
-    /// What comes next, without spaces and commas.
+    /// The next character that is neither a space nor a comma.
     pub(super) fn peek(&mut self) -> Option<char> {
         self.rest = self.rest.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
         self.rest.chars().next()
     }
 
-    /// Takes the next character.
+    /// Takes that character.
     pub(super) fn take(&mut self) -> Option<char> {
         let next = self.peek()?;
         self.rest = &self.rest[next.len_utf8()..];
         Some(next)
     }
 
-    /// The next number, if one is there; finite.
+    /// The next number; `None` if there is none or it is not finite.
     pub(super) fn next(&mut self) -> Option<f64> {
         self.peek()?;
         let (number, rest) = self.rest.split_at(length(self.rest.as_bytes()));
@@ -42,7 +42,7 @@ impl<'a> Numbers<'a> {
         Some(values)
     }
 
-    /// The next flag of an arc, 0 or 1, after which nothing need stand.
+    /// The next flag of an arc, 0 or 1, which needs no separator after it.
     pub(super) fn flag(&mut self) -> Option<bool> {
         match self.take()? {
             '0' => Some(false),
@@ -52,7 +52,7 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// How many bytes belong to the number that the text begins with.
+/// Length in bytes of the number at the start of the text.
 fn length(text: &[u8]) -> usize {
     let sign = |at: usize| usize::from(matches!(text.get(at), Some(b'+' | b'-')));
     let digits = |from: usize| text[from.min(text.len())..].iter().take_while(|byte| byte.is_ascii_digit()).count();
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn numbers_need_nothing_between_them() {
-        let mut numbers = Numbers::new(" 1,-2.5.5-1e-2+3E1 10em");
+        let mut numbers = NumberReader::new(" 1,-2.5.5-1e-2+3E1 10em");
         let read: Vec<f64> = std::iter::from_fn(|| numbers.next()).collect();
         assert_eq!(read, [1.0, -2.5, 0.5, -0.01, 30.0, 10.0]);
         assert_eq!(numbers.peek(), Some('e'));
@@ -85,12 +85,12 @@ mod tests {
 
     #[test]
     fn flags_are_single_digits() {
-        let mut numbers = Numbers::new("01 5");
+        let mut numbers = NumberReader::new("01 5");
         assert_eq!(
             (numbers.flag(), numbers.flag(), numbers.next(), numbers.flag()),
             (Some(false), Some(true), Some(5.0), None)
         );
-        assert_eq!(Numbers::new("1e999").next(), None);
-        assert_eq!(Numbers::new("2 x").take_all::<2>(), None);
+        assert_eq!(NumberReader::new("1e999").next(), None);
+        assert_eq!(NumberReader::new("2 x").take_all::<2>(), None);
     }
 }

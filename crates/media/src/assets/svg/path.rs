@@ -2,7 +2,7 @@
 
 use bansho_base::math::{self, DVec2};
 
-use super::numbers::Numbers;
+use super::numbers::NumberReader;
 
 /// Segments of a curve, and of each quarter of an arc.
 const CURVE_SEGMENTS: usize = 16;
@@ -12,14 +12,21 @@ const CURVE_SEGMENTS: usize = 16;
 pub(super) enum PathError {
     #[error("a path does not begin with a move (M or m)")]
     NoMove,
-    #[error("after `{0}` a path lacks numbers")]
-    Numbers(char),
-    #[error("`{0}` is no command of a path")]
-    Command(char),
-    #[error("a path of a single point is no line; allowed: at least 2 points")]
-    OnePoint,
+    #[error("a path lacks numbers after `{0}`")]
+    MissingNumbers(char),
+    #[error("`{0}` is not a path command")]
+    UnknownCommand(char),
+    #[error("a path has a single point; allowed: at least 2 points")]
+    SinglePoint,
     #[error("a path has more than {0} points")]
-    ManyPoints(usize),
+    TooManyPoints(usize),
+}
+
+/// The last control point of a curve.
+#[derive(Clone, Copy)]
+struct ControlPoint {
+    is_cubic: bool,
+    point: DVec2,
 }
 
 /// The state of the pen.
@@ -27,18 +34,19 @@ pub(super) enum PathError {
 struct Pen {
     subpaths: Vec<Vec<DVec2>>,
     points: usize,
-    at: DVec2,
+    current: DVec2,
+    /// Start of the subpath.
     start: DVec2,
-    /// The last control point of a cubic (`true`) or quadratic curve, for smooth curves.
-    control: Option<(bool, DVec2)>,
+    /// The last control point of the curve that was just drawn, for smooth curves.
+    control: Option<ControlPoint>,
 }
 
-/// The lines of a path, one for each move; moves that draw nothing are left out beside others.
+/// The subpaths of a path, each as a polyline. Moves that draw nothing are skipped.
 ///
 /// # Errors
-/// An unknown command, missing numbers, moves alone, or more than `most` points.
+/// An unknown command, missing numbers, only moves, or more than `limit` points.
 pub(super) fn subpaths(data: &str, limit: usize) -> Result<Vec<Vec<DVec2>>, PathError> {
-    let mut numbers = Numbers::new(data);
+    let mut numbers = NumberReader::new(data);
     let mut pen = Pen::default();
     let mut command = None;
     while let Some(next) = numbers.peek() {
@@ -52,9 +60,9 @@ pub(super) fn subpaths(data: &str, limit: usize) -> Result<Vec<Vec<DVec2>>, Path
         }
         pen.draw(letter, &mut numbers)?;
         if pen.points > limit {
-            return Err(PathError::ManyPoints(limit));
+            return Err(PathError::TooManyPoints(limit));
         }
-        // Further pairs after a move are lines; nothing may follow a closing but a command.
+        // Further pairs after a move are lines. After a closing, only a command may follow.
         command = match letter {
             'M' => Some('L'),
             'm' => Some('l'),
@@ -64,32 +72,40 @@ pub(super) fn subpaths(data: &str, limit: usize) -> Result<Vec<Vec<DVec2>>, Path
     }
     let moves = !pen.subpaths.is_empty();
     pen.subpaths.retain(|points| points.len() > 1);
-    if moves && pen.subpaths.is_empty() { Err(PathError::OnePoint) } else { Ok(pen.subpaths) }
+    if moves && pen.subpaths.is_empty() { Err(PathError::SinglePoint) } else { Ok(pen.subpaths) }
+}
+
+/// The flags of an arc.
+struct ArcFlags {
+    /// More than 180 degrees.
+    large: bool,
+    /// In the direction of increasing angles.
+    sweep: bool,
 }
 
 impl Pen {
-    fn draw(&mut self, letter: char, numbers: &mut Numbers) -> Result<(), PathError> {
-        let origin = if letter.is_ascii_lowercase() { self.at } else { DVec2::ZERO };
-        let missing = PathError::Numbers(letter);
+    fn draw(&mut self, letter: char, numbers: &mut NumberReader) -> Result<(), PathError> {
+        let origin = if letter.is_ascii_lowercase() { self.current } else { DVec2::ZERO };
+        let missing = PathError::MissingNumbers(letter);
         let mut point = || numbers.take_all::<2>().map(|pair| origin + DVec2::from(pair)).ok_or(missing);
         match letter.to_ascii_uppercase() {
             'M' => self.move_to(point()?),
             'L' => self.line_to(point()?),
-            'H' => self.line_to(DVec2::new(origin.x + numbers.next().ok_or(missing)?, self.at.y)),
-            'V' => self.line_to(DVec2::new(self.at.x, origin.y + numbers.next().ok_or(missing)?)),
+            'H' => self.line_to(DVec2::new(origin.x + numbers.next().ok_or(missing)?, self.current.y)),
+            'V' => self.line_to(DVec2::new(self.current.x, origin.y + numbers.next().ok_or(missing)?)),
             'C' => self.cubic_to(point()?, point()?, point()?),
-            'S' => self.cubic_to(self.mirrored(true), point()?, point()?),
+            'S' => self.cubic_to(self.reflected_control(true), point()?, point()?),
             'Q' => self.quadratic_to(point()?, point()?),
-            'T' => self.quadratic_to(self.mirrored(false), point()?),
+            'T' => self.quadratic_to(self.reflected_control(false), point()?),
             'A' => {
-                let [rx, ry, turn] = numbers.take_all().ok_or(missing)?;
+                let [rx, ry, rotation_deg] = numbers.take_all().ok_or(missing)?;
                 let large = numbers.flag().ok_or(missing)?;
                 let sweep = numbers.flag().ok_or(missing)?;
                 let end = numbers.take_all::<2>().map(|pair| origin + DVec2::from(pair)).ok_or(missing)?;
-                self.arc_to(DVec2::new(rx, ry), turn.to_radians(), [large, sweep], end);
+                self.arc_to(DVec2::new(rx, ry), rotation_deg.to_radians(), ArcFlags { large, sweep }, end);
             }
             'Z' => self.close(),
-            _ => return Err(PathError::Command(letter)),
+            _ => return Err(PathError::UnknownCommand(letter)),
         }
         Ok(())
     }
@@ -97,7 +113,7 @@ impl Pen {
     fn move_to(&mut self, point: DVec2) {
         self.subpaths.push(vec![point]);
         self.points += 1;
-        (self.at, self.start, self.control) = (point, point, None);
+        (self.current, self.start, self.control) = (point, point, None);
     }
 
     fn push(&mut self, point: DVec2) {
@@ -105,7 +121,7 @@ impl Pen {
             points.push(point);
         }
         self.points += 1;
-        self.at = point;
+        self.current = point;
     }
 
     fn line_to(&mut self, point: DVec2) {
@@ -115,47 +131,47 @@ impl Pen {
 
     fn close(&mut self) {
         let start = self.start;
-        if self.at != start {
+        if self.current != start {
             self.line_to(start);
         }
-        // What follows without a move begins at the start.
+        // A command that follows without a move begins at the start.
         self.move_to(start);
     }
 
-    /// The reflected control point, or the current point after anything but a curve of the same kind.
-    fn mirrored(&self, cubic: bool) -> DVec2 {
+    /// The reflected control point; the current point, if no curve of the same degree precedes.
+    fn reflected_control(&self, is_cubic: bool) -> DVec2 {
         match self.control {
-            Some((kind, control)) if kind == cubic => 2.0 * self.at - control,
-            _ => self.at,
+            Some(control) if control.is_cubic == is_cubic => 2.0 * self.current - control.point,
+            _ => self.current,
         }
     }
 
     fn cubic_to(&mut self, first: DVec2, second: DVec2, end: DVec2) {
-        let start = self.at;
-        for piece in 1..=CURVE_SEGMENTS {
-            let t = piece as f64 / CURVE_SEGMENTS as f64;
+        let start = self.current;
+        for segment in 1..=CURVE_SEGMENTS {
+            let t = segment as f64 / CURVE_SEGMENTS as f64;
             let [a, b, c] = [start.lerp(first, t), first.lerp(second, t), second.lerp(end, t)];
             self.push(a.lerp(b, t).lerp(b.lerp(c, t), t));
         }
-        self.control = Some((true, second));
+        self.control = Some(ControlPoint { is_cubic: true, point: second });
     }
 
     fn quadratic_to(&mut self, control: DVec2, end: DVec2) {
-        let start = self.at;
-        for piece in 1..=CURVE_SEGMENTS {
-            let t = piece as f64 / CURVE_SEGMENTS as f64;
+        let start = self.current;
+        for segment in 1..=CURVE_SEGMENTS {
+            let t = segment as f64 / CURVE_SEGMENTS as f64;
             self.push(start.lerp(control, t).lerp(control.lerp(end, t), t));
         }
-        self.control = Some((false, control));
+        self.control = Some(ControlPoint { is_cubic: false, point: control });
     }
 
     /// An arc of an ellipse, by its end points (SVG 1.1, appendix F.6).
-    fn arc_to(&mut self, radii: DVec2, turn: f64, [large, sweep]: [bool; 2], end: DVec2) {
+    fn arc_to(&mut self, radii: DVec2, rotation: f64, ArcFlags { large, sweep }: ArcFlags, end: DVec2) {
         self.control = None;
         let radii = radii.abs();
-        let (sin, cos) = math::sin_cos(turn);
+        let (sin, cos) = math::sin_cos(rotation);
         let axis = DVec2::new(cos, sin);
-        let half = DVec2::new(cos, -sin).rotate((self.at - end) / 2.0);
+        let half = DVec2::new(cos, -sin).rotate((self.current - end) / 2.0);
         if radii.min_element() == 0.0 || half == DVec2::ZERO {
             self.push(end);
             return;
@@ -165,20 +181,20 @@ impl Pen {
         let ratio = half / radii;
         let square = (1.0 / ratio.length_squared() - 1.0).max(0.0).sqrt();
         let sign = if large == sweep { -1.0 } else { 1.0 };
-        // On the unit circle: center, and the angles of both ends.
+        // Center and end angles on the unit circle.
         let center = sign * square * DVec2::new(ratio.y, -ratio.x);
         let angle = |point: DVec2| math::atan2(point.y - center.y, point.x - center.x);
         let from = angle(ratio);
-        let mut way = angle(-ratio) - from;
-        if sweep && way < 0.0 {
-            way += std::f64::consts::TAU;
-        } else if !sweep && way > 0.0 {
-            way -= std::f64::consts::TAU;
+        let mut swept = angle(-ratio) - from;
+        if sweep && swept < 0.0 {
+            swept += std::f64::consts::TAU;
+        } else if !sweep && swept > 0.0 {
+            swept -= std::f64::consts::TAU;
         }
-        let middle = self.at.midpoint(end);
-        let pieces = (way.abs() / std::f64::consts::FRAC_PI_2 * CURVE_SEGMENTS as f64).ceil().max(1.0) as usize;
-        for piece in 1..pieces {
-            let (sin, cos) = math::sin_cos(from + way * piece as f64 / pieces as f64);
+        let middle = self.current.midpoint(end);
+        let segments = (swept.abs() / std::f64::consts::FRAC_PI_2 * CURVE_SEGMENTS as f64).ceil().max(1.0) as usize;
+        for segment in 1..segments {
+            let (sin, cos) = math::sin_cos(from + swept * segment as f64 / segments as f64);
             self.push(middle + axis.rotate((center + DVec2::new(cos, sin)) * radii));
         }
         self.push(end);
@@ -225,7 +241,7 @@ mod tests {
             assert!(line.iter().all(|point| (point.distance(center.into()) - 1.0).abs() < 1e-12), "{data}");
             assert!(line.len().abs_diff(pieces + 1) <= 1, "{data}: {}", line.len());
         }
-        // Too small a radius grows to half of the way; a turned ellipse keeps its ends.
+        // A radius that is too small grows to half of the distance; a rotated ellipse keeps its end points.
         let grown = subpaths("M0 0A1 1 0 0 1 4 0", 1000).unwrap().remove(0);
         assert!(grown.iter().all(|point| (point.distance(DVec2::new(2.0, 0.0)) - 2.0).abs() < 1e-12));
         let turned = subpaths("M0 0A3 1 30 0 1 4 1", 1000).unwrap().remove(0);
@@ -237,11 +253,11 @@ mod tests {
     fn broken_paths_are_errors() {
         assert_eq!(subpaths("L1 1", 1000), Err(PathError::NoMove));
         assert_eq!(subpaths("1 1", 1000), Err(PathError::NoMove));
-        assert_eq!(subpaths("M1", 1000), Err(PathError::Numbers('M')));
-        assert_eq!(subpaths("M1 1 B2 2", 1000), Err(PathError::Command('B')));
+        assert_eq!(subpaths("M1", 1000), Err(PathError::MissingNumbers('M')));
+        assert_eq!(subpaths("M1 1 B2 2", 1000), Err(PathError::UnknownCommand('B')));
         assert_eq!(subpaths("M1 1 L2 2 z 3", 1000), Err(PathError::NoMove));
-        assert_eq!(subpaths("M0 0 A1 1 0 2 0 1 1", 1000), Err(PathError::Numbers('A')));
+        assert_eq!(subpaths("M0 0 A1 1 0 2 0 1 1", 1000), Err(PathError::MissingNumbers('A')));
         // Closings alone make points too, and no more are made than may be.
-        assert_eq!(subpaths(&format!("M0 0{}", "z".repeat(1000)), 1000), Err(PathError::ManyPoints(1000)));
+        assert_eq!(subpaths(&format!("M0 0{}", "z".repeat(1000)), 1000), Err(PathError::TooManyPoints(1000)));
     }
 }

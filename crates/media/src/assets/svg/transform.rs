@@ -2,7 +2,7 @@
 
 use bansho_base::math::{self, DVec2};
 
-use super::numbers::Numbers;
+use super::numbers::NumberReader;
 
 /// `x' = a x + c y + e`, `y' = b x + d y + f`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,21 +22,21 @@ impl Transform {
         x * point.x + y * point.y + shift
     }
 
-    /// First `inner`, then this.
+    /// The composition that applies `inner` first.
     pub(super) fn after(&self, inner: &Self) -> Self {
         let [x, y, shift] = self.columns;
         let linear = |column: DVec2| x * column.x + y * column.y;
         Self { columns: [linear(inner.columns[0]), linear(inner.columns[1]), linear(inner.columns[2]) + shift] }
     }
 
-    /// Reads a list such as `translate(3 4) rotate(30)`; `None` where it is none.
+    /// Reads a list such as `translate(3 4) rotate(30)`; `None` if it is invalid.
     pub(super) fn parse(list: &str) -> Option<Self> {
         let mut all = Self::IDENTITY;
         let mut rest = list.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
         while !rest.is_empty() {
             let (name, after) = rest.split_once('(')?;
             let (arguments, after) = after.split_once(')')?;
-            let mut numbers = Numbers::new(arguments);
+            let mut numbers = NumberReader::new(arguments);
             let arguments: Vec<f64> = std::iter::from_fn(|| numbers.next()).collect();
             all = all.after(&Self::function(name.trim(), &arguments)?);
             rest = after.trim_start_matches(|c: char| c.is_whitespace() || c == ',');

@@ -24,7 +24,7 @@ impl Tag<'_> {
     }
 }
 
-/// Where a text is not XML.
+/// Why a text is not XML.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum XmlError {
     #[error("a tag, comment or declaration does not end")]
@@ -46,7 +46,7 @@ impl<'a> Events<'a> {
         Self { rest: text, is_empty_tag: false }
     }
 
-    /// What stands before the next `end`; goes on behind it.
+    /// The text before the next `end`; continues after it.
     fn until(&mut self, end: &str) -> Result<&'a str, XmlError> {
         let (before, after) = self.rest.split_once(end).ok_or(XmlError::Unended)?;
         self.rest = after;
@@ -83,7 +83,7 @@ impl<'a> Events<'a> {
     /// A document type may hold declarations of its own in brackets.
     fn declaration(&mut self) -> Result<(), XmlError> {
         let end = self.rest.find('>').ok_or(XmlError::Unended)?;
-        // Only what is before the end is looked through, since there may be any number of declarations.
+        // Only the text before the end is searched: searching the rest for each of many declarations would take quadratic time.
         if self.rest[..end].contains('[') {
             self.until("]")?;
         }
@@ -91,7 +91,7 @@ impl<'a> Events<'a> {
     }
 
     fn tag(&mut self) -> Result<Tag<'a>, XmlError> {
-        let name = self.word();
+        let name = self.name();
         let mut attributes = Vec::new();
         loop {
             self.rest = self.rest.trim_start();
@@ -110,7 +110,7 @@ impl<'a> Events<'a> {
     }
 
     fn attribute(&mut self) -> Result<(&'a str, &'a str), XmlError> {
-        let name = self.word();
+        let name = self.name();
         if name.is_empty() {
             return Err(if self.rest.is_empty() { XmlError::Unended } else { XmlError::NoValue });
         }
@@ -121,12 +121,12 @@ impl<'a> Events<'a> {
     }
 
     /// The characters up to one that ends a name.
-    fn word(&mut self) -> &'a str {
+    fn name(&mut self) -> &'a str {
         let ends =
             |character: char| character.is_whitespace() || matches!(character, '=' | '>' | '/' | '"' | '\'' | '<');
-        let (word, rest) = self.rest.split_at(self.rest.find(ends).unwrap_or(self.rest.len()));
+        let (name, rest) = self.rest.split_at(self.rest.find(ends).unwrap_or(self.rest.len()));
         self.rest = rest;
-        word
+        name
     }
 }
 

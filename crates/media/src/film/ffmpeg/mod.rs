@@ -1,8 +1,7 @@
 //! Films by `ffmpeg`: H.264, ProRes 4444 with alpha, VP9 with alpha, AV1.
 //!
-//! Raw frames go through a pipe; the film lies under a temporary name until `ffmpeg` has ended well. The pixels are marked
-//! as what they are: Rec. 709 primaries and matrix, sRGB transfer, limited range. Films agree between versions of
-//! `ffmpeg` to the eye, not to the byte.
+//! Raw frames go through a pipe; the film has a temporary name until `ffmpeg` has exited successfully. It is tagged with Rec. 709 primaries
+//! and matrix, sRGB transfer and limited range. Films of different versions of `ffmpeg` look the same, but their bytes may differ.
 
 mod arguments;
 mod process;
@@ -14,14 +13,14 @@ use bansho_base::{
     frame::{DisplayImage, DisplayPixels},
 };
 
-use crate::output::{flatten, naming::OutputKind};
+use crate::imageops::flatten;
 
 pub(crate) use self::process::FfmpegFilm;
 
 /// Options of films by `ffmpeg`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VideoOptions {
-    /// The program; a bare name is searched in the system's path.
+    /// The program; a name without a folder is searched in `PATH`.
     pub program: PathBuf,
     /// Codec of `.webm`.
     pub webm: WebmCodec,
@@ -43,10 +42,21 @@ pub enum WebmCodec {
     Av1,
 }
 
+/// Containers that `ffmpeg` writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum VideoContainer {
+    /// H.264.
+    Mp4,
+    /// QuickTime, with ProRes 4444.
+    Mov,
+    /// VP9 or AV1, by [`VideoOptions::webm`].
+    Webm,
+}
+
 /// The format of all frames of a film.
 #[derive(Clone, Debug)]
 pub(crate) struct VideoFormat {
-    pub(crate) kind: OutputKind,
+    pub(crate) container: VideoContainer,
     pub(crate) size: [usize; 2],
     pub(crate) fps: [u32; 2],
     pub(crate) opaque: bool,
@@ -57,65 +67,66 @@ pub(crate) struct VideoFormat {
 
 impl VideoFormat {
     /// Whether the film has no alpha.
-    fn is_flat(&self) -> bool {
-        self.opaque || !carries_alpha(self.kind, &self.options)
+    fn is_opaque(&self) -> bool {
+        self.opaque || !carries_alpha(self.container, &self.options)
     }
 
-    /// The encoded size: 4:2:0 without alpha needs even sides, so an odd one repeats its last pixels.
-    fn coded_size(&self) -> [usize; 2] {
-        let odd_is_fine = self.kind == OutputKind::Mov;
-        if odd_is_fine { self.size } else { self.size.map(|side| side.next_multiple_of(2)) }
+    /// The encoded size. 4:2:0 chroma needs even sides, so the last column or row of an odd side is repeated.
+    fn encoded_size(&self) -> [usize; 2] {
+        match self.container {
+            VideoContainer::Mov => self.size,
+            VideoContainer::Mp4 | VideoContainer::Webm => self.size.map(|side| side.next_multiple_of(2)),
+        }
     }
 }
 
-/// Whether a film of this kind has alpha.
-pub(crate) fn carries_alpha(kind: OutputKind, options: &VideoOptions) -> bool {
-    match kind {
-        OutputKind::Mov => true,
-        OutputKind::Webm => options.webm == WebmCodec::Vp9,
-        _ => false,
+/// Whether a film in this container has alpha.
+pub(crate) fn carries_alpha(container: VideoContainer, options: &VideoOptions) -> bool {
+    match (container, options.webm) {
+        (VideoContainer::Mov, _) | (VideoContainer::Webm, WebmCodec::Vp9) => true,
+        (VideoContainer::Mp4, _) | (VideoContainer::Webm, WebmCodec::Av1) => false,
     }
 }
 
 /// A frame as raw video for `ffmpeg`: RGBA rows of 8 bits, or of 16 bits little-endian.
 pub(crate) fn prepare(picture: &DisplayImage, format: &VideoFormat) -> Vec<u8> {
-    let flat;
-    let picture = if format.is_flat() && !picture.opaque {
-        flat = flatten::over_black(picture);
-        &flat
+    let flattened;
+    let picture = if format.is_opaque() && !picture.opaque {
+        flattened = flatten::over_black(picture);
+        &flattened
     } else {
         picture
     };
-    let coded = format.coded_size();
+    let encoded_size = format.encoded_size();
     if format.sixteen_bits {
         let wide = match &picture.pixels {
-            DisplayPixels::Sixteen(pixels) => padded(pixels, format.size, coded),
+            DisplayPixels::Sixteen(pixels) => padded(pixels, format.size, encoded_size),
             DisplayPixels::Eight(pixels) => {
                 let wide: Vec<[u16; 4]> = pixels.iter().map(|pixel| pixel.map(|code| u16::from(code) * 257)).collect();
-                padded(&wide, format.size, coded)
+                padded(&wide, format.size, encoded_size)
             }
         };
         wide.as_flattened().iter().flat_map(|code| code.to_le_bytes()).collect()
     } else {
-        padded(&flatten::to_eight_bits(&picture.pixels), format.size, coded).into_flattened()
+        padded(&flatten::to_eight_bits(&picture.pixels), format.size, encoded_size).into_flattened()
     }
 }
 
-/// `pixels` with the last column and row repeated up to the size `coded`.
-fn padded<T: Copy>(pixels: &[T], [width, height]: [usize; 2], coded: [usize; 2]) -> Vec<T> {
-    if coded == [width, height] {
+/// `pixels` with the last column and row repeated up to the size `padded_size`.
+fn padded<T: Copy>(pixels: &[T], [width, height]: [usize; 2], padded_size: [usize; 2]) -> Vec<T> {
+    if padded_size == [width, height] {
         return pixels.to_vec();
     }
     let pixel = |index: usize| {
-        let (x, y) = (index % coded[0], index / coded[0]);
+        let (x, y) = (index % padded_size[0], index / padded_size[0]);
         pixels[y.min(height - 1) * width + x.min(width - 1)]
     };
-    (0..coded[0] * coded[1]).map(pixel).collect()
+    (0..padded_size[0] * padded_size[1]).map(pixel).collect()
 }
 
-/// The arguments that make the film at `output`.
+/// The command line of `ffmpeg` for a film at `output`.
 pub(crate) fn arguments(format: &VideoFormat, output: &Path) -> Vec<std::ffi::OsString> {
-    arguments::of(format, output)
+    arguments::arguments(format, output)
 }
 
 #[cfg(test)]

@@ -10,21 +10,21 @@ use std::{
 use super::{VideoFormat, arguments};
 use crate::{
     error::MediaError,
+    files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
     film::ordered::FilmEncoder,
-    output::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
 };
 
-/// Bytes of the end of its standard error that are kept.
+/// Number of bytes at the end of standard error that are kept.
 const TAIL_BYTES: usize = 4096;
 
 /// `CreateProcess` flag for a process that Ctrl-C in the console does not reach.
 #[cfg(windows)]
 const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
 
-/// A film in progress. When dropped unfinished, it stops `ffmpeg` and leaves no file.
+/// A film in progress. If it is dropped before it is finished, `ffmpeg` is stopped and no file is left.
 pub(crate) struct FfmpegFilm {
     // Drop order: the process must have ended before its file is removed.
-    running: FfmpegProcess,
+    process: FfmpegProcess,
     file: AtomicFile,
 }
 
@@ -46,7 +46,7 @@ impl FfmpegFilm {
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         // SVT-AV1 ignores `-loglevel`; this is its own option to log errors only.
         command.env("SVT_LOG", "1");
-        // A process group of its own, so that Ctrl-C reaches Bansho only and the film ends in order.
+        // A separate process group, so that Ctrl-C reaches only Bansho, which then ends the film in order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         #[cfg(windows)]
@@ -59,7 +59,7 @@ impl FfmpegFilm {
         })?;
         let frames = child.stdin.take();
         let stderr = child.stderr.take().map(|stream| std::thread::spawn(move || tail(stream)));
-        Ok(Self { running: FfmpegProcess { child, frames, stderr }, file })
+        Ok(Self { process: FfmpegProcess { child, frames, stderr }, file })
     }
 }
 
@@ -74,9 +74,9 @@ fn tail(mut stream: impl Read) -> Vec<u8> {
 }
 
 impl FfmpegProcess {
-    /// Waits for the process and checks its result. The exit status alone is not enough: `ffmpeg` (at least 5.1) exits
-    /// with 0 if only writing the trailer or closing the file failed. It logs errors only, so success is a silent end.
-    fn end(&mut self, path: &Path) -> Result<(), MediaError> {
+    /// Waits for the process and checks its result. The exit status alone is not enough: `ffmpeg` (at least 5.1) exits with 0 if only
+    /// writing the trailer or closing the file failed. Since only errors are logged, success means an empty log.
+    fn wait(&mut self, path: &Path) -> Result<(), MediaError> {
         drop(self.frames.take());
         let status = self.child.wait().map_err(|source| MediaError::from_io(path, source))?;
         let stderr = self.stderr.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
@@ -103,12 +103,12 @@ impl FilmEncoder for FfmpegFilm {
     type EncodedFrame = Vec<u8>;
 
     fn append(&mut self, encoded: Vec<u8>) -> Result<(), MediaError> {
-        let written = self.running.frames.as_mut().map(|pipe| pipe.write_all(&encoded));
+        let written = self.process.frames.as_mut().map(|pipe| pipe.write_all(&encoded));
         match written {
             Some(Ok(())) => Ok(()),
-            // The pipe is closed because the program gave up; its own words say why.
+            // The pipe is closed because the program failed; its log has the reason.
             Some(Err(source)) => {
-                self.running.end(self.file.path())?;
+                self.process.wait(self.file.path())?;
                 Err(MediaError::from_io(self.file.path(), source))
             }
             None => Err(MediaError::AlreadyFailed { path: self.file.path().to_path_buf() }),
@@ -116,7 +116,7 @@ impl FilmEncoder for FfmpegFilm {
     }
 
     fn finish(mut self) -> Result<(), MediaError> {
-        self.running.end(self.file.path())?;
+        self.process.wait(self.file.path())?;
         self.file.finish()
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bansho::{
-    media::{output::naming, zip::ZipWriter},
+    media::{files::naming, zip::ZipWriter},
     scene::ValuePath,
 };
 
@@ -197,7 +197,7 @@ impl Rendering {
 
     /// Takes in the picture of frame `number`; what was saved, once that was the last.
     fn take(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
-        let name = naming::picture(&self.stem, number);
+        let name = naming::default_picture(&self.stem, number);
         self.done += 1;
         let Some(shot) = &mut self.shot else { return save(&name, &BlobParts::of(png)).map(Some) };
         shot.add(&name, png).map_err(|error| error.to_string())?;

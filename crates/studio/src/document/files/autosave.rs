@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho::media::{MediaError, output::atomic};
+use bansho::media::{MediaError, files::atomic};
 
 use crate::document::Document;
 

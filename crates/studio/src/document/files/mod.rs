@@ -12,7 +12,7 @@ use std::{
 
 use bansho::{
     job::{JobError, SceneFile},
-    media::{MediaError, output::atomic},
+    media::{MediaError, files::atomic},
 };
 
 use super::Document;

@@ -1,4 +1,4 @@
-//! Bounded reading of files that others made: regular files only, up to a limit of bytes.
+//! Bounded reading of untrusted files: regular files only, up to a number of bytes.
 //!
 //! The file type is checked before opening, because opening a pipe blocks until there is a writer, and a device may be
 //! endless.
@@ -14,13 +14,13 @@ use bansho_base::host::{assets::AssetProblem, memory};
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
-    /// Not a regular file.
+    /// It is not a regular file.
     #[error("is {found}; allowed: an ordinary file")]
     NotAFile {
         /// Its type, such as `a pipe`.
         found: &'static str,
     },
-    /// More bytes than the limit.
+    /// It has more bytes than the limit.
     #[error("has {}; allowed: up to {}", size(.bytes), memory::format_bytes(*.limit))]
     Size {
         /// Its length; `None` for a stream, which is not read to its end.
@@ -28,7 +28,7 @@ pub enum InputError {
         /// The limit, bytes.
         limit: u64,
     },
-    /// An error of the system.
+    /// An error of the operating system.
     #[error(transparent)]
     Io(#[from] io::Error),
 }
@@ -48,10 +48,10 @@ impl From<InputError> for AssetProblem {
     }
 }
 
-/// Opens an ordinary file of at most `limit` bytes, and says how many it has.
+/// Opens a regular file of at most `limit` bytes; returns it with its length.
 ///
 /// # Errors
-/// Nothing is there, it is no ordinary file, it has more bytes, or it may not be read.
+/// It does not exist, is not a regular file, is longer, or cannot be read.
 pub fn open(path: &Path, limit: u64) -> Result<(File, u64), InputError> {
     check(&fs::metadata(path)?, limit)?;
     let file = File::open(path)?;
@@ -60,7 +60,7 @@ pub fn open(path: &Path, limit: u64) -> Result<(File, u64), InputError> {
     Ok((file, bytes))
 }
 
-/// Whether an ordinary file is there, whatever its size.
+/// Checks that a regular file exists, of any length.
 ///
 /// # Errors
 /// As [`open`].
@@ -68,7 +68,7 @@ pub fn find(path: &Path) -> Result<(), InputError> {
     check(&fs::metadata(path)?, u64::MAX).map(drop)
 }
 
-/// All bytes of an ordinary file, if they are at most `limit`.
+/// All bytes of a regular file of at most `limit` bytes.
 ///
 /// # Errors
 /// As [`open`], or reading fails.
@@ -77,10 +77,10 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, InputError> {
     read_stream(file, limit)
 }
 
-/// All bytes of a stream, if they are at most `limit`; no more than that is read of it.
+/// All bytes of a stream of at most `limit` bytes. At most one byte more is read.
 ///
 /// # Errors
-/// It has more bytes, or reading fails.
+/// It is longer, or reading fails.
 pub fn read_stream(stream: impl Read, limit: u64) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::new();
     stream.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
@@ -123,7 +123,7 @@ fn special_kind(_: &Metadata) -> &'static str {
 mod tests {
     use super::*;
 
-    fn told(path: &Path, limit: u64) -> String {
+    fn message(path: &Path, limit: u64) -> String {
         read(path, limit).unwrap_err().to_string()
     }
 
@@ -133,8 +133,8 @@ mod tests {
         let path = folder.path().join("a");
         fs::write(&path, b"12345").unwrap();
         assert_eq!(read(&path, 5).unwrap(), b"12345");
-        assert_eq!(told(&path, 4), "has 5 bytes; allowed: up to 4 bytes");
-        assert_eq!(told(folder.path(), 4), "is a folder; allowed: an ordinary file");
+        assert_eq!(message(&path, 4), "has 5 bytes; allowed: up to 4 bytes");
+        assert_eq!(message(folder.path(), 4), "is a folder; allowed: an ordinary file");
         assert!(matches!(read(&folder.path().join("b"), 5), Err(InputError::Io(_))));
         find(&path).unwrap();
         assert!(find(folder.path()).is_err());
@@ -145,7 +145,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sparse");
         File::create(&path).unwrap().set_len(1 << 42).unwrap();
-        assert_eq!(told(&path, 16 << 20), "has 4096.0 GiB; allowed: up to 16.0 MiB");
+        assert_eq!(message(&path, 16 << 20), "has 4096.0 GiB; allowed: up to 16.0 MiB");
     }
 
     #[cfg(unix)]
@@ -155,13 +155,13 @@ mod tests {
         let (socket, link) = (folder.path().join("socket"), folder.path().join("zero"));
         let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
         std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
-        assert_eq!(told(&socket, 9), "is a socket; allowed: an ordinary file");
-        assert_eq!(told(&link, 9), "is a device; allowed: an ordinary file");
+        assert_eq!(message(&socket, 9), "is a socket; allowed: an ordinary file");
+        assert_eq!(message(&link, 9), "is a device; allowed: an ordinary file");
         // Opening a pipe that nobody writes to would wait for ever.
         let pipe = folder.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
-        assert_eq!(told(&pipe, 9), "is a pipe; allowed: an ordinary file");
+        assert_eq!(message(&pipe, 9), "is a pipe; allowed: an ordinary file");
     }
 
     #[test]

@@ -20,12 +20,12 @@ const GLYPHS: [[u8; 7]; 11] = [
     [0b00000, 0b00000, 0b00000, 0b11111, 0b00000, 0b00000, 0b00000],
 ];
 
-/// Dark border around the glyphs, dots.
+/// Black border around the glyphs, dots.
 const MARGIN: usize = 1;
 
-/// Draws `number` into the top left corner of `picture`, white on black: about a sixteenth of its height, at most an
-/// eighth; not at all where it would be illegible or not fit.
-pub fn number(picture: &mut DisplayImage, number: i64) {
+/// Draws `number` into the top left corner of `picture`, white on black. Its height is about a sixteenth of the picture's, at most an eighth. It
+/// is left out where it would be illegible or does not fit.
+pub fn draw_number(picture: &mut DisplayImage, number: i64) {
     let glyphs: Vec<usize> =
         number.to_string().bytes().map(|byte| usize::from(byte.wrapping_sub(b'0')).min(10)).collect();
     let dots = dots(&glyphs);
@@ -46,16 +46,16 @@ fn dots(glyphs: &[usize]) -> [usize; 2] {
 
 /// Pixels for each dot.
 fn scale([columns, rows]: [usize; 2], [width, height]: [usize; 2]) -> Option<usize> {
-    let most = (height / (8 * rows)).min(width / columns);
-    let usual = (height + 8 * rows) / (16 * rows);
-    (most > 0).then(|| usual.clamp(1, most))
+    let max = (height / (8 * rows)).min(width / columns);
+    let default = (height + 8 * rows) / (16 * rows);
+    (max > 0).then(|| default.clamp(1, max))
 }
 
 /// Whether a dot belongs to a glyph.
 fn is_lit(glyphs: &[usize], column: usize, row: usize) -> bool {
     let (Some(column), Some(row)) = (column.checked_sub(MARGIN), row.checked_sub(MARGIN)) else { return false };
-    let (place, column) = (column / (GLYPH[0] + 1), column % (GLYPH[0] + 1));
-    match glyphs.get(place) {
+    let (index, column) = (column / (GLYPH[0] + 1), column % (GLYPH[0] + 1));
+    match glyphs.get(index) {
         Some(&glyph) if row < GLYPH[1] && column < GLYPH[0] => GLYPHS[glyph][row] >> (GLYPH[0] - 1 - column) & 1 == 1,
         _ => false,
     }
@@ -86,7 +86,7 @@ mod tests {
         let pixels = DisplayPixels::Eight(vec![[9, 9, 9, 255]; size[0] * size[1]]);
         let mut picture =
             DisplayImage { width: size[0], height: size[1], opaque: true, alpha: AlphaConvention::Linear, pixels };
-        number(&mut picture, shown);
+        draw_number(&mut picture, shown);
         picture
     }
 

@@ -21,7 +21,7 @@ impl FileIdentity {
     /// The file that `path` leads to, through all links.
     ///
     /// # Errors
-    /// There is none, or the system does not say.
+    /// It does not exist, or its metadata cannot be read.
     pub fn of(path: &Path) -> io::Result<Self> {
         identity(path).map(Self)
     }
@@ -38,8 +38,8 @@ fn identity(path: &Path) -> io::Result<Identity> {
     fs::canonicalize(path)
 }
 
-/// Where `path` will lead once the folders that it passes through are made: what is there is followed through all links, and `..` behind a
-/// folder that is missing leads back to where that folder will be.
+/// The path to which `path` will lead once its missing folders are created. Links in the existing part are followed; `..` after a missing folder
+/// leads to the parent of that folder.
 pub fn resolved(path: &Path) -> PathBuf {
     let mut resolved = if path.is_absolute() { PathBuf::new() } else { canonical_or_same(Path::new(".")) };
     for component in path.components() {
@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(resolved(Path::new("x/../no such file")), fs::canonicalize(".").unwrap().join("no such file"));
         #[cfg(unix)]
         {
-            // What lies above a link is above what it leads to.
+            // `..` after a link leads to the parent of its target.
             fs::create_dir_all(root.join("far/deep")).unwrap();
             std::os::unix::fs::symlink("far/deep", root.join("link")).unwrap();
             assert_eq!(resolved(&root.join("link/../a.png")), root.join("far/a.png"));

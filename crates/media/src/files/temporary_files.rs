@@ -1,4 +1,4 @@
-//! Register of temporary files, so that a program that must end at once can remove them first.
+//! Register of temporary files, so that a program that is about to exit can remove them.
 
 use std::{
     collections::BTreeSet,
@@ -32,21 +32,21 @@ pub(crate) fn create(
     make: impl FnOnce() -> io::Result<NamedTempFile>,
 ) -> io::Result<(NamedTempFile, TemporaryFileGuard)> {
     // Locked while the file is created, so that no file is ever missing from the register.
-    let mut unfinished = temporary_files();
+    let mut files = temporary_files();
     let file = make()?;
     let path: &Path = file.path();
-    unfinished.insert(path.to_path_buf());
+    files.insert(path.to_path_buf());
     let guard = TemporaryFileGuard(path.to_path_buf());
     Ok((file, guard))
 }
 
-/// Removes every file that is being written but does not bear its final name yet, and lets no other be begun: whoever tries waits for ever.
+/// Removes all temporary files, and blocks forever every thread that creates another one.
 ///
-/// For a program that ends right after, without waiting for what its other threads do. Files that bear their names stay, whole.
-#[expect(clippy::mem_forget, reason = "the lock is kept until the program ends, so that no other file is begun")]
+/// For a program that exits right after, without waiting for its other threads. Files with their final names are complete and stay.
+#[expect(clippy::mem_forget, reason = "the lock is kept until the program exits, so that no other file is created")]
 pub fn abandon_all() {
-    let unfinished = temporary_files();
-    // One that just got its name is not there any more, which is as well.
-    unfinished.iter().for_each(|path| drop(fs::remove_file(path)));
-    mem::forget(unfinished);
+    let files = temporary_files();
+    // A file that was renamed in the meantime is not found, which is fine.
+    files.iter().for_each(|path| drop(fs::remove_file(path)));
+    mem::forget(files);
 }

@@ -1,7 +1,7 @@
 //! Atomic writing of files: a temporary file in the same folder, then a rename.
 //!
-//! The temporary name is `.NAME.RANDOM.part`: hidden and unique, so that two machines that write the same frame do not
-//! interfere. After a power failure or SIGKILL such a file may remain; nothing reads it and it may be deleted.
+//! The temporary name is `.NAME.RANDOM.part`: hidden, and unique so that two machines that write the same frame do not interfere. After a power
+//! failure or SIGKILL such a file may remain. Nothing reads it, and it may be deleted.
 
 use std::{
     fs::{self, File},
@@ -30,30 +30,31 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Makes the folders that lead to `path`, and a temporary file beside it, or beside what it links to.
+    /// Creates the parent folders of `path`, and a temporary file in the same folder (that of the target, if `path` is a link).
     ///
     /// # Errors
-    /// The folder cannot be made or written, the disk is full, or `path` is a folder, a device or a pipe.
+    /// The folder cannot be created or written, the disk is full, or `path` is a folder, a device or a pipe.
     pub fn create(path: &Path) -> Result<Self, MediaError> {
         Self::create_with(path, &OverwritePolicy::any())
     }
 
-    /// As [`AtomicFile::create`], for a file that takes no other's place than `policy` allows, now and when it is finished.
+    /// As [`AtomicFile::create`], for a file that replaces an existing one only if `policy` allows it. This is checked now and again when it is
+    /// finished.
     ///
     /// # Errors
-    /// As [`AtomicFile::create`], or `path` leads to a file that must stay.
+    /// As [`AtomicFile::create`], or `path` leads to a file that must not be replaced.
     pub fn create_with(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
         let fail = |source| MediaError::from_io(path, source);
         // First, because a path such as `missing/../a.png` can only be resolved when its folders exist.
         fs::create_dir_all(folder_of(path)).map_err(|source| match source.kind() {
-            // The error of `create_dir_all` if a file is in the place of a folder.
+            // The error of `create_dir_all` if a parent folder is a file.
             io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
             _ => fail(source),
         })?;
         match fs::metadata(path) {
-            Ok(there) if there.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
+            Ok(existing) if existing.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
             // A rename would replace it.
-            Ok(there) if !there.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
+            Ok(existing) if !existing.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
             _ => {}
         }
         let target = match fs::canonicalize(path) {
@@ -62,7 +63,7 @@ impl AtomicFile {
             Err(source) if path.is_symlink() && source.kind() != io::ErrorKind::NotFound => return Err(fail(source)),
             _ => path.to_path_buf(),
         };
-        allow(policy, &target, path)?;
+        check_policy(policy, &target, path)?;
         let (temporary, guard) = temporary_files::create(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
         Ok(Self { temporary, _guard: guard, path: path.to_path_buf(), target, policy: policy.clone() })
     }
@@ -82,25 +83,25 @@ impl AtomicFile {
         &self.path
     }
 
-    /// Gives it its name, which no file may bear.
+    /// Renames it to its final name, which no file may have.
     ///
     /// # Errors
-    /// A file bears it, or it cannot be renamed; the temporary file is then removed.
+    /// A file has that name, or it cannot be renamed. The temporary file is then removed.
     pub fn finish_new(self) -> Result<(), MediaError> {
         let path = self.path;
         self.temporary.persist_noclobber(&self.target).map(drop).map_err(|error| match error.error.kind() {
-            io::ErrorKind::AlreadyExists => MediaError::IsThere { path },
+            io::ErrorKind::AlreadyExists => MediaError::AlreadyExists { path },
             _ => MediaError::from_io(&path, error.error),
         })
     }
 
-    /// Gives it its name, in place of any file that bore it, and who may read and write that one may do so with this.
+    /// Renames it to its final name. It replaces an existing file, whose permissions it takes.
     ///
     /// # Errors
-    /// It cannot be renamed, or a file that must stay came to bear the name; the temporary file is then removed.
+    /// It cannot be renamed, or a file that must not be replaced has got the name. The temporary file is then removed.
     pub fn finish(self) -> Result<(), MediaError> {
         let path = self.path;
-        allow(&self.policy, &self.target, &path)?;
+        check_policy(&self.policy, &self.target, &path)?;
         let fail = |source| MediaError::from_io(&path, source);
         if let Ok(old) = fs::metadata(&self.target) {
             self.temporary.as_file().set_permissions(old.permissions()).map_err(fail)?;
@@ -113,16 +114,16 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether `target`, given as `path`, may be overwritten.
-fn allow(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), MediaError> {
+/// Whether `target` may be overwritten; `path` is its name in errors.
+fn check_policy(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<(), MediaError> {
     let path = path.to_path_buf();
-    policy.check(target).map_err(|kept| match kept {
-        OverwriteError::Input => MediaError::OverInput { path },
-        OverwriteError::Unmarked => MediaError::Unmarked { path },
+    policy.check(target).map_err(|error| match error {
+        OverwriteError::Input => MediaError::IsInput { path },
+        OverwriteError::NotMadeByBansho => MediaError::NotMadeByBansho { path },
     })
 }
 
-/// A new, empty, hidden file in `folder`, with the user's default permissions, since it becomes the picture.
+/// A new, empty, hidden file in `folder`, with default permissions (umask), since it becomes the final file.
 fn temporary_in(folder: &Path, path: &Path) -> io::Result<NamedTempFile> {
     // Names are limited to 255 bytes: a long one is cut in front of the unique letters.
     let name: String = path.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
@@ -134,10 +135,10 @@ fn temporary_in(folder: &Path, path: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Writes a whole file by `fill`, or none.
+/// Writes a file by `fill`, completely or not at all.
 ///
 /// # Errors
-/// As [`AtomicFile::create`], or what `fill` could not write.
+/// As [`AtomicFile::create`], or an error of `fill`.
 pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>) -> Result<(), MediaError> {
     let mut atomic = AtomicFile::create(path)?;
     let mut buffer = BufWriter::with_capacity(1 << 16, atomic.file());
@@ -146,7 +147,7 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Re
     atomic.finish()
 }
 
-/// Writes `bytes` as a whole file, or none.
+/// Writes `bytes` to a file, completely or not at all.
 ///
 /// # Errors
 /// As [`AtomicFile::create`], or the bytes cannot be written.
@@ -154,7 +155,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
     write_bytes_with(path, bytes, &OverwritePolicy::any())
 }
 
-/// As [`write_bytes`], in place of no other file than `policy` allows.
+/// As [`write_bytes`], replacing an existing file only if `policy` allows it.
 ///
 /// # Errors
 /// As [`AtomicFile::create_with`], or the bytes cannot be written.
@@ -164,13 +165,13 @@ pub fn write_bytes_with(path: &Path, bytes: &[u8], policy: &OverwritePolicy) -> 
     atomic.finish()
 }
 
-/// Writes `bytes` as a whole new file, or none; one that is there already stays.
+/// Writes `bytes` to a new file, completely or not at all. An existing file is never replaced.
 ///
 /// # Errors
-/// As [`write_bytes`], or a file is there.
+/// As [`write_bytes`], or the file exists.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
     if path.exists() {
-        return Err(MediaError::IsThere { path: path.to_path_buf() });
+        return Err(MediaError::AlreadyExists { path: path.to_path_buf() });
     }
     let mut atomic = AtomicFile::create(path)?;
     atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
@@ -186,10 +187,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.toml");
         write_new(&path, b"first").unwrap();
-        assert!(matches!(write_new(&path, b"second"), Err(MediaError::IsThere { .. })));
-        // Also where it came in the meantime.
+        assert!(matches!(write_new(&path, b"second"), Err(MediaError::AlreadyExists { .. })));
+        // Also one that was created in the meantime.
         let late = AtomicFile::create(&path).unwrap();
-        assert!(matches!(late.finish_new(), Err(MediaError::IsThere { .. })));
+        assert!(matches!(late.finish_new(), Err(MediaError::AlreadyExists { .. })));
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -199,7 +200,7 @@ mod tests {
     fn no_link_that_is_made_on_the_way_leads_to_an_input() {
         use std::os::unix::fs::symlink;
 
-        use crate::output::overwrite_policy::InputFiles;
+        use crate::files::overwrite_policy::InputFiles;
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("plate.png"), "plate").unwrap();
@@ -209,13 +210,13 @@ mod tests {
         // Whether the folder that the path passes through is missing or there.
         for _ in 0..2 {
             let made = write_bytes_with(&at("x/../plate.png"), b"new", &policy);
-            assert!(matches!(made, Err(MediaError::OverInput { .. })));
+            assert!(matches!(made, Err(MediaError::IsInput { .. })));
         }
         symlink("plate.png", at("soft.png")).unwrap();
         fs::hard_link(at("plate.png"), at("hard.png")).unwrap();
         for name in ["soft.png", "hard.png"] {
             let error = AtomicFile::create_with(&at(name), &policy).unwrap_err();
-            assert!(matches!(&error, MediaError::OverInput { path } if *path == at(name)), "{error}");
+            assert!(matches!(&error, MediaError::IsInput { path } if *path == at(name)), "{error}");
         }
         // The folder becomes a link while the file is written.
         fs::create_dir(at("out")).unwrap();
@@ -224,7 +225,7 @@ mod tests {
         fs::rename(&temporary, folder.path().join(temporary.file_name().unwrap())).unwrap();
         fs::remove_dir(at("out")).unwrap();
         symlink(".", at("out")).unwrap();
-        assert!(matches!(late.finish(), Err(MediaError::OverInput { .. })));
+        assert!(matches!(late.finish(), Err(MediaError::IsInput { .. })));
         assert_eq!(fs::read(at("plate.png")).unwrap(), b"plate");
     }
 
@@ -234,8 +235,11 @@ mod tests {
         let path = folder.path().join("a.png");
         let late = AtomicFile::create_with(&path, &OverwritePolicy::default()).unwrap();
         fs::write(&path, "a photograph").unwrap();
-        assert!(matches!(late.finish(), Err(MediaError::Unmarked { .. })));
-        assert!(matches!(write_bytes_with(&path, b"", &OverwritePolicy::default()), Err(MediaError::Unmarked { .. })));
+        assert!(matches!(late.finish(), Err(MediaError::NotMadeByBansho { .. })));
+        assert!(matches!(
+            write_bytes_with(&path, b"", &OverwritePolicy::default()),
+            Err(MediaError::NotMadeByBansho { .. })
+        ));
         assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"a photograph".to_vec(), vec!["a.png".into()]));
     }
 

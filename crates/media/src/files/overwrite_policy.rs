@@ -13,7 +13,7 @@ use super::{file_identity::FileIdentity, provenance::is_bansho_file};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InputFiles {
     identities: HashSet<FileIdentity>,
-    /// Canonical paths: a file that is saved again under its name is another inode.
+    /// Canonical paths too, since a file that an editor saves again has another inode.
     paths: HashSet<PathBuf>,
 }
 
@@ -31,7 +31,7 @@ impl InputFiles {
     }
 }
 
-/// Which existing files may be overwritten. By default those that Bansho made ([`is_bansho_file`]), and empty ones.
+/// Which existing files may be overwritten: by default those that Bansho made ([`is_bansho_file`]), and empty ones.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OverwritePolicy {
     inputs: Arc<InputFiles>,
@@ -44,7 +44,7 @@ pub enum OverwriteError {
     /// It is an input of the job.
     Input,
     /// Bansho did not make it.
-    Unmarked,
+    NotMadeByBansho,
 }
 
 impl OverwritePolicy {
@@ -63,15 +63,15 @@ impl OverwritePolicy {
     /// # Errors
     /// Why not.
     pub fn check(&self, path: &Path) -> Result<(), OverwriteError> {
-        let Ok(there) = fs::metadata(path) else { return Ok(()) };
+        let Ok(existing) = fs::metadata(path) else { return Ok(()) };
         if self.inputs.contains(path) {
             return Err(OverwriteError::Input);
         }
         // What is not a regular file is refused by the writer, with its own reason.
-        if self.any || !there.is_file() || there.len() == 0 || is_bansho_file(path) {
+        if self.any || !existing.is_file() || existing.len() == 0 || is_bansho_file(path) {
             Ok(())
         } else {
-            Err(OverwriteError::Unmarked)
+            Err(OverwriteError::NotMadeByBansho)
         }
     }
 }
@@ -91,14 +91,17 @@ mod tests {
         let mut inputs = InputFiles::default();
         inputs.insert(&at("plate.ply"));
         inputs.insert(&at("gone"));
-        let (usual, all) = (OverwritePolicy::new(inputs.clone(), false), OverwritePolicy::new(inputs, true));
+        let (default, all) = (OverwritePolicy::new(inputs.clone(), false), OverwritePolicy::new(inputs, true));
         let check = |policy: &OverwritePolicy, name: &str| policy.check(&at(name));
         for name in ["ours.ply", "empty.png", "new.png", "gone", ""] {
-            assert_eq!((check(&usual, name), check(&all, name)), (Ok(()), Ok(())), "{name}");
+            assert_eq!((check(&default, name), check(&all, name)), (Ok(()), Ok(())), "{name}");
         }
-        assert_eq!((check(&usual, "theirs.png"), check(&all, "theirs.png")), (Err(OverwriteError::Unmarked), Ok(())));
-        assert_eq!([&usual, &all].map(|policy| check(policy, "plate.ply")), [Err(OverwriteError::Input); 2]);
-        // Saved anew, as editors do.
+        assert_eq!(
+            (check(&default, "theirs.png"), check(&all, "theirs.png")),
+            (Err(OverwriteError::NotMadeByBansho), Ok(()))
+        );
+        assert_eq!([&default, &all].map(|policy| check(policy, "plate.ply")), [Err(OverwriteError::Input); 2]);
+        // Saved to a new inode, as editors do.
         fs::copy(at("plate.ply"), at("saved")).unwrap();
         fs::rename(at("saved"), at("plate.ply")).unwrap();
         assert_eq!(check(&all, "plate.ply"), Err(OverwriteError::Input));

@@ -2,9 +2,9 @@
 
 use bansho_base::host::assets::Encoding;
 
-use super::attribute::AP1;
+use crate::exr::attribute::AP1;
 
-/// The encoding after the matrix, if there is one.
+/// A color matrix, and the encoding of its result; without a matrix, the encoding of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Conversion {
     pub(crate) encoding: Encoding,
@@ -14,16 +14,16 @@ pub(crate) struct Conversion {
 /// CIE xy of red, green, blue and white of Rec. 709 and sRGB.
 const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
 
-/// Tolerance of written chromaticities.
+/// Tolerance for rounded chromaticities.
 const TOLERANCE: f32 = 0.001;
 
 type Matrix = [[f64; 3]; 3];
 
 /// The conversion for these chromaticities; without any, Rec. 709 is assumed. `None` for collinear ones.
 pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conversion> {
-    let given = chromaticities.unwrap_or(REC709);
+    let own = chromaticities.unwrap_or(REC709);
     let is = |known: [[f32; 2]; 4]| {
-        given.as_flattened().iter().zip(known.as_flattened()).all(|(a, b)| (a - b).abs() <= TOLERANCE)
+        own.as_flattened().iter().zip(known.as_flattened()).all(|(a, b)| (a - b).abs() <= TOLERANCE)
     };
     if is(REC709) {
         return Some(Conversion { encoding: Encoding::LinearSrgb, matrix: None });
@@ -31,8 +31,8 @@ pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conver
     if is(AP1) {
         return Some(Conversion { encoding: Encoding::LinearAcescg, matrix: None });
     }
-    let (from, to) = (to_xyz(given)?, to_xyz(REC709)?);
-    let adapted = multiply(bradford(white(given)?, white(REC709)?)?, from);
+    let (from, to) = (to_xyz(own)?, to_xyz(REC709)?);
+    let adapted = multiply(bradford(white(own)?, white(REC709)?)?, from);
     let matrix = multiply(inverse(to)?, adapted).map(|row| row.map(|value| value as f32));
     let is_finite = matrix.as_flattened().iter().all(|value| value.is_finite());
     is_finite.then_some(Conversion { encoding: Encoding::LinearSrgb, matrix: Some(matrix) })

@@ -5,18 +5,18 @@ use bansho_base::{
     frame::{DisplayImage, DisplayPixels},
 };
 
-/// `picture` over black, blended as its [`AlphaConvention`] says, so that what is seen is the light that was there.
+/// `picture` over black, blended as its [`AlphaConvention`] says, so that it shows the light of the frame.
 ///
-/// An opaque picture is given back as it is. Formats without alpha look a little better where the view transform itself
-/// draws over black, since this begins from rounded values.
+/// An opaque picture is returned unchanged. A view transform of a frame over black is a little more exact, since this function starts from
+/// rounded codes.
 pub fn over_black(picture: &DisplayImage) -> DisplayImage {
     let pixels = match (&picture.pixels, picture.alpha) {
         (same, _) if picture.opaque => same.clone(),
         (DisplayPixels::Eight(pixels), AlphaConvention::Linear) => {
-            DisplayPixels::Eight(pixels.iter().map(eight).collect())
+            DisplayPixels::Eight(pixels.iter().map(linear_eight).collect())
         }
         (DisplayPixels::Sixteen(pixels), AlphaConvention::Linear) => {
-            DisplayPixels::Sixteen(pixels.iter().map(sixteen).collect())
+            DisplayPixels::Sixteen(pixels.iter().map(linear_sixteen).collect())
         }
         (DisplayPixels::Eight(pixels), AlphaConvention::Encoded) => {
             DisplayPixels::Eight(pixels.iter().map(|&[rgb @ .., a]| encoded_eight(rgb, a)).collect())
@@ -28,7 +28,7 @@ pub fn over_black(picture: &DisplayImage) -> DisplayImage {
     DisplayImage { width: picture.width, height: picture.height, opaque: true, alpha: picture.alpha, pixels }
 }
 
-/// Rounded product of codes and alpha: encoded values over black.
+/// Rounded product of codes and alpha.
 fn encoded_eight(rgb: [u8; 3], alpha: u8) -> [u8; 4] {
     let [r, g, b] = rgb.map(|code| ((u32::from(code) * u32::from(alpha) + 127) / 255) as u8);
     [r, g, b, u8::MAX]
@@ -39,7 +39,8 @@ fn encoded_sixteen(rgb: [u16; 3], alpha: u16) -> [u16; 4] {
     [r, g, b, u16::MAX]
 }
 
-fn eight(&[r, g, b, alpha]: &[u8; 4]) -> [u8; 4] {
+/// Product of linear light and alpha.
+fn linear_eight(&[r, g, b, alpha]: &[u8; 4]) -> [u8; 4] {
     let [r, g, b] = match alpha {
         0 => [0; 3],
         255 => [r, g, b],
@@ -51,7 +52,7 @@ fn eight(&[r, g, b, alpha]: &[u8; 4]) -> [u8; 4] {
     [r, g, b, 255]
 }
 
-fn sixteen(&[r, g, b, alpha]: &[u16; 4]) -> [u16; 4] {
+fn linear_sixteen(&[r, g, b, alpha]: &[u16; 4]) -> [u16; 4] {
     let [r, g, b] = match alpha {
         0 => [0; 3],
         u16::MAX => [r, g, b],
@@ -63,7 +64,7 @@ fn sixteen(&[r, g, b, alpha]: &[u16; 4]) -> [u16; 4] {
     [r, g, b, u16::MAX]
 }
 
-/// The picture with 8 bits per channel.
+/// The pixels with 8 bits per channel.
 pub(crate) fn to_eight_bits(pixels: &DisplayPixels) -> Vec<[u8; 4]> {
     match pixels {
         DisplayPixels::Eight(pixels) => pixels.clone(),

@@ -10,13 +10,13 @@ use bansho_base::{
 pub enum SheetError {
     /// There is no picture.
     #[error("a sheet needs at least one picture")]
-    Nothing,
-    /// A sheet without columns.
+    NoPictures,
+    /// The number of columns is 0.
     #[error("a sheet needs at least one column")]
     NoColumns,
-    /// Pictures of several sizes.
-    #[error("picture {} is {width} x {height}; all on a sheet must be as large as the first", index + 1)]
-    Sizes {
+    /// The pictures have different sizes.
+    #[error("picture {} is {width} x {height}; all pictures of a sheet must have the size of the first", index + 1)]
+    SizesDiffer {
         /// The first picture that differs, from 0.
         index: usize,
         /// Its width, pixels.
@@ -24,15 +24,15 @@ pub enum SheetError {
         /// Its height, pixels.
         height: usize,
     },
-    /// 8-bit and 16-bit pictures together.
-    #[error("picture {} has another number of bits than the first", index + 1)]
-    Depths {
+    /// Pictures of 8 bits and of 16 bits.
+    #[error("picture {} has another bit depth than the first", index + 1)]
+    BitDepthsDiffer {
         /// The first picture that differs, from 0.
         index: usize,
     },
 }
 
-/// Layout of a sheet: cells row by row from the top left, with `gutter` pixels between them and none around.
+/// Layout of a sheet: cells in rows from the top left, with `gutter` pixels between them and none around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SheetLayout {
     /// Number of pictures.
@@ -46,7 +46,7 @@ pub struct SheetLayout {
 }
 
 impl SheetLayout {
-    /// How many rows there are; the last may not be full.
+    /// Number of rows; the last may not be full.
     pub fn rows(&self) -> usize {
         self.count.div_ceil(self.columns.max(1))
     }
@@ -65,62 +65,62 @@ impl SheetLayout {
         Rect { x, y, width, height }
     }
 
-    /// Copies `images`, rows of pixels of one size, onto a sheet filled with `fill`.
+    /// Copies `images`, each the pixels of a cell in rows, onto a sheet filled with `fill`.
     fn copy_cells<T: Copy>(&self, images: &[&[T]], fill: T) -> Vec<T> {
         let [sheet_width, sheet_height] = self.size();
         let mut sheet = vec![fill; sheet_width * sheet_height];
         for (index, pixels) in images.iter().enumerate() {
-            let place = self.cell_rect(index);
-            for (row, line) in pixels.chunks_exact(place.width.max(1)).enumerate() {
-                sheet[(place.y + row) * sheet_width + place.x..][..place.width].copy_from_slice(line);
+            let rect = self.cell_rect(index);
+            for (row, line) in pixels.chunks_exact(rect.width.max(1)).enumerate() {
+                sheet[(rect.y + row) * sheet_width + rect.x..][..rect.width].copy_from_slice(line);
             }
         }
         sheet
     }
 }
 
-fn sheet(sizes: impl Iterator<Item = [usize; 2]>, columns: usize, gutter: usize) -> Result<SheetLayout, SheetError> {
+fn layout(sizes: impl Iterator<Item = [usize; 2]>, columns: usize, gutter: usize) -> Result<SheetLayout, SheetError> {
     if columns == 0 {
         return Err(SheetError::NoColumns);
     }
     let (mut cell, mut count) = (None, 0);
     for (index, [width, height]) in sizes.enumerate() {
         if *cell.get_or_insert([width, height]) != [width, height] {
-            return Err(SheetError::Sizes { index, width, height });
+            return Err(SheetError::SizesDiffer { index, width, height });
         }
         count += 1;
     }
-    let cell = cell.ok_or(SheetError::Nothing)?;
+    let cell = cell.ok_or(SheetError::NoPictures)?;
     Ok(SheetLayout { count, columns: columns.min(count), cell, gutter })
 }
 
-/// One picture of all `images`, `columns` beside each other; `fill` between them and where the last row is not full.
+/// One picture of all `images` in `columns` columns. `fill` is the color of gutters and of empty cells.
 ///
 /// # Errors
-/// No picture, no column, or several sizes.
+/// No picture, no column, or different sizes.
 pub fn tile<const N: usize>(
     images: &[Image<N>],
     columns: usize,
     gutter: usize,
     fill: [f32; N],
 ) -> Result<Image<N>, SheetError> {
-    let sheet = sheet(images.iter().map(|image| [image.width(), image.height()]), columns, gutter)?;
+    let layout = layout(images.iter().map(|image| [image.width(), image.height()]), columns, gutter)?;
     let pixels: Vec<_> = images.iter().map(Image::pixels).collect();
-    let [width, height] = sheet.size();
-    Image::from_pixels(width, height, sheet.copy_cells(&pixels, fill)).ok_or(SheetError::Nothing)
+    let [width, height] = layout.size();
+    Image::from_pixels(width, height, layout.copy_cells(&pixels, fill)).ok_or(SheetError::NoPictures)
 }
 
 /// As [`tile`], for display pixels; `fill` in 8 bits. The sheet is opaque if all pictures and the fill are.
 ///
 /// # Errors
-/// No picture, no column, several sizes or numbers of bits.
+/// No picture, no column, different sizes or bit depths.
 pub fn tile_display(
     images: &[DisplayImage],
     columns: usize,
     gutter: usize,
     fill: [u8; 4],
 ) -> Result<DisplayImage, SheetError> {
-    let sheet = sheet(images.iter().map(|image| [image.width, image.height]), columns, gutter)?;
+    let layout = layout(images.iter().map(|image| [image.width, image.height]), columns, gutter)?;
     let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
     for (index, image) in images.iter().enumerate() {
         match &image.pixels {
@@ -128,16 +128,16 @@ pub fn tile_display(
             DisplayPixels::Sixteen(pixels) => sixteen.push(&pixels[..]),
         }
         if !eight.is_empty() && !sixteen.is_empty() {
-            return Err(SheetError::Depths { index });
+            return Err(SheetError::BitDepthsDiffer { index });
         }
     }
-    let [width, height] = sheet.size();
+    let [width, height] = layout.size();
     let pixels = if sixteen.is_empty() {
-        DisplayPixels::Eight(sheet.copy_cells(&eight, fill))
+        DisplayPixels::Eight(layout.copy_cells(&eight, fill))
     } else {
-        DisplayPixels::Sixteen(sheet.copy_cells(&sixteen, fill.map(|code| u16::from(code) * 257)))
+        DisplayPixels::Sixteen(layout.copy_cells(&sixteen, fill.map(|code| u16::from(code) * 257)))
     };
-    let is_full = gutter == 0 && sheet.count == sheet.columns * sheet.rows();
+    let is_full = gutter == 0 && layout.count == layout.columns * layout.rows();
     let opaque = images.iter().all(|image| image.opaque) && (is_full || fill[3] == u8::MAX);
     Ok(DisplayImage { width, height, opaque, alpha: images[0].alpha, pixels })
 }
@@ -185,11 +185,14 @@ mod tests {
     fn what_does_not_fit_together_is_refused() {
         let image = |width| Image::<1>::filled(width, 1, [0.0]);
         assert_eq!(tile(&[image(1)], 0, 0, [0.0]), Err(SheetError::NoColumns));
-        assert_eq!(tile::<1>(&[], 1, 0, [0.0]), Err(SheetError::Nothing));
-        assert_eq!(tile(&[image(1), image(2)], 1, 0, [0.0]), Err(SheetError::Sizes { index: 1, width: 2, height: 1 }));
+        assert_eq!(tile::<1>(&[], 1, 0, [0.0]), Err(SheetError::NoPictures));
+        assert_eq!(
+            tile(&[image(1), image(2)], 1, 0, [0.0]),
+            Err(SheetError::SizesDiffer { index: 1, width: 2, height: 1 })
+        );
         let pixels = DisplayPixels::Eight(vec![[0; 4]]);
         let eight = DisplayImage { width: 1, height: 1, opaque: true, alpha: AlphaConvention::Linear, pixels };
         let sixteen = DisplayImage { pixels: DisplayPixels::Sixteen(vec![[0; 4]]), ..eight };
-        assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(SheetError::Depths { index: 1 }));
+        assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(SheetError::BitDepthsDiffer { index: 1 }));
     }
 }

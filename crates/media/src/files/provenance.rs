@@ -1,4 +1,4 @@
-//! The mark by which a file says that Bansho made it, so that it may be replaced without asking.
+//! The mark in a file that Bansho made it, so that it may be replaced without asking.
 //!
 //! | format | mark | where |
 //! | --- | --- | --- |
@@ -7,13 +7,13 @@
 //! | GIF | a comment that begins with `bansho:` | before the first frame |
 //! | MP4 | the tag `comment`, which begins with `bansho:` | `moov`, which is written first |
 //! | MOV | a tag that begins with `bansho:` | `moov`, which is written last |
-//! | WebM | a tag that begins with `BANSHO:` | before or behind the frames |
-//! | JSON | `"program"`, second behind `"format"` | head |
+//! | WebM | a tag that begins with `BANSHO:` | before or after the frames |
+//! | JSON | `"program"`, second after `"format"` | start |
 //! | PLY | a comment that begins with `Bansho:` | header |
-//! | snapshot | its first eight bytes | head |
+//! | snapshot | its first eight bytes | start |
 //!
-//! A file that was cut off behind its mark, as by a power cut, still bears it; only a MOV and a file cut off within its first bytes do not.
-//! Neither do GIF, MP4, JSON and films without alpha that were made before there were marks.
+//! A file that was truncated after its mark, for example by a power failure, still has it. Without a mark are a truncated MOV, a file
+//! truncated within its first bytes, and GIF, MP4, JSON and films without alpha from before marks were introduced.
 
 use std::{
     fs::{self, File},
@@ -50,21 +50,21 @@ const EBML: [u8; 4] = [0x1a, 0x45, 0xdf, 0xa3];
 /// regular file or cannot be read.
 pub fn is_bansho_file(path: &Path) -> bool {
     // Opening a pipe would block.
-    fs::metadata(path).is_ok_and(|found| found.is_file()) && look(path).unwrap_or(false)
+    fs::metadata(path).is_ok_and(|found| found.is_file()) && has_mark(path).unwrap_or(false)
 }
 
-fn look(path: &Path) -> io::Result<bool> {
+fn has_mark(path: &Path) -> io::Result<bool> {
     let mut file = File::open(path)?;
     let length = file.metadata()?.len();
-    let head = part(&mut file, 0..HEAD_BYTES)?;
+    let head = read_range(&mut file, 0..HEAD_BYTES)?;
     Ok(match &head[..] {
         head if head.starts_with(&chunk::SIGNATURE) => in_png(head),
         head if head.starts_with(&exr::attribute::MAGIC) => {
-            in_exr(head) || length > HEAD_BYTES && in_exr(&part(&mut file, 0..EXR_HEADER_BYTES)?)
+            in_exr(head) || length > HEAD_BYTES && in_exr(&read_range(&mut file, 0..EXR_HEADER_BYTES)?)
         }
         head if head.starts_with(b"GIF8") => in_gif(head).is_some(),
         head if head.starts_with(&EBML) => {
-            has_prefix(head) || has_prefix(&part(&mut file, length.saturating_sub(TAG_BYTES)..length)?)
+            contains_prefix(head) || contains_prefix(&read_range(&mut file, length.saturating_sub(TAG_BYTES)..length)?)
         }
         head if head.get(4..8) == Some(b"ftyp") => in_film(&mut file, length)?,
         head if head.starts_with(b"ply\n") => in_ply(head),
@@ -73,31 +73,33 @@ fn look(path: &Path) -> io::Result<bool> {
     })
 }
 
-/// The bytes of `range`, as far as the file has them.
-fn part(file: &mut File, range: Range<u64>) -> io::Result<Vec<u8>> {
+/// The bytes of `range`, up to the end of the file.
+fn read_range(file: &mut File, range: Range<u64>) -> io::Result<Vec<u8>> {
     file.seek(SeekFrom::Start(range.start))?;
     let mut bytes = Vec::new();
     file.take(range.end.saturating_sub(range.start)).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-fn begins(bytes: &[u8]) -> bool {
+fn starts_with_prefix(bytes: &[u8]) -> bool {
     bytes.get(..PREFIX.len()).is_some_and(|start| start.eq_ignore_ascii_case(PREFIX))
 }
 
-fn has_prefix(bytes: &[u8]) -> bool {
-    bytes.windows(PREFIX.len()).any(begins)
+fn contains_prefix(bytes: &[u8]) -> bool {
+    bytes.windows(PREFIX.len()).any(starts_with_prefix)
 }
 
 fn in_png(head: &[u8]) -> bool {
     let chunks = chunk::chunks(head).into_iter().flatten().map_while(Result::ok);
-    chunks.take_while(|chunk| chunk.kind != *b"IDAT").any(|chunk| chunk.kind == *b"tEXt" && begins(chunk.contents))
+    chunks
+        .take_while(|chunk| chunk.kind != *b"IDAT")
+        .any(|chunk| chunk.kind == *b"tEXt" && starts_with_prefix(chunk.contents))
 }
 
 fn in_exr(head: &[u8]) -> bool {
-    let outline = exr::parse::parse_header(head);
-    outline.is_ok_and(|outline| {
-        outline.parts.iter().flat_map(|part| &part.strings).any(|(name, _)| begins(name.as_bytes()))
+    let header = exr::parse::parse_header(head);
+    header.is_ok_and(|header| {
+        header.parts.iter().flat_map(|part| &part.strings).any(|(name, _)| starts_with_prefix(name.as_bytes()))
     })
 }
 
@@ -110,7 +112,7 @@ fn in_gif(head: &[u8]) -> Option<()> {
     let mut rest = head.get(13 + palette..)?;
     while let [EXTENSION, label, blocks @ ..] = rest {
         let (length, mut blocks) = blocks.split_first()?;
-        if *label == COMMENT && begins(blocks.get(..usize::from(*length))?) {
+        if *label == COMMENT && starts_with_prefix(blocks.get(..usize::from(*length))?) {
             return Some(());
         }
         let mut length = *length;
@@ -128,7 +130,7 @@ fn in_film(file: &mut File, length: u64) -> io::Result<bool> {
     let Some(movie) = find_box(file, 0..length, *b"moov")? else { return Ok(false) };
     for kind in [*b"udta", *b"meta"] {
         if let Some(tags) = find_box(file, movie.clone(), kind)?
-            && has_prefix(&part(file, tags.start..tags.end.min(tags.start.saturating_add(TAG_BYTES)))?)
+            && contains_prefix(&read_range(file, tags.start..tags.end.min(tags.start.saturating_add(TAG_BYTES)))?)
         {
             return Ok(true);
         }
@@ -137,10 +139,10 @@ fn in_film(file: &mut File, length: u64) -> io::Result<bool> {
 }
 
 /// The contents of the first box of a kind.
-fn find_box(file: &mut File, within: Range<u64>, wanted: [u8; 4]) -> io::Result<Option<Range<u64>>> {
+fn find_box(file: &mut File, within: Range<u64>, expected: [u8; 4]) -> io::Result<Option<Range<u64>>> {
     let mut at = within.start;
     for _ in 0..MAX_MP4_BOXES {
-        let head = part(file, at..within.end.min(at.saturating_add(16)))?;
+        let head = read_range(file, at..within.end.min(at.saturating_add(16)))?;
         let Some((size, kind)) = head.first_chunk().copied().zip(head.get(4..8)) else { break };
         let (size, start) = match (u32::from_be_bytes(size), head.get(8..16).and_then(|long| long.try_into().ok())) {
             (0, _) => (within.end - at, 8),
@@ -151,7 +153,7 @@ fn find_box(file: &mut File, within: Range<u64>, wanted: [u8; 4]) -> io::Result<
         if size < start {
             break;
         }
-        if kind == wanted {
+        if kind == expected {
             return Ok(Some(at + start..end.max(at + start)));
         }
         at = end;
@@ -161,18 +163,18 @@ fn find_box(file: &mut File, within: Range<u64>, wanted: [u8; 4]) -> io::Result<
 
 fn in_ply(head: &[u8]) -> bool {
     let mut lines = head.split(|&byte| byte == b'\n').take_while(|line| *line != b"end_header");
-    lines.any(|line| line.strip_prefix(b"comment ").is_some_and(begins))
+    lines.any(|line| line.strip_prefix(b"comment ").is_some_and(starts_with_prefix))
 }
 
 fn in_json(head: &[u8]) -> bool {
-    let mut letters = head.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
-    let mut follows = |text: &[u8]| text.iter().all(|&letter| letters.next() == Some(letter));
+    let mut bytes = head.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
+    let mut follows = |text: &[u8]| text.iter().all(|&byte| bytes.next() == Some(byte));
     if !follows(b"{\"format\":") {
         return false;
     }
-    let version = letters.by_ref().take_while(u8::is_ascii_digit).count();
-    let mut follows = |text: &[u8]| text.iter().all(|&letter| letters.next() == Some(letter));
-    // The comma behind the number ended it.
+    let version = bytes.by_ref().take_while(u8::is_ascii_digit).count();
+    let mut follows = |text: &[u8]| text.iter().all(|&byte| bytes.next() == Some(byte));
+    // `take_while` consumed the comma after the number.
     (1..9).contains(&version) && follows(b"\"program\":\"Bansho")
 }
 
@@ -184,11 +186,9 @@ mod tests {
 
     use super::*;
     use crate::{
-        output::{
-            naming::OutputPattern,
-            overwrite_policy::OverwritePolicy,
-            sink::{FrameSlot, Picture, PictureFormat, Sink, SinkOptions},
-        },
+        files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
+        format::PictureFormat,
+        output::sink::{FrameSlot, Picture, Sink, SinkOptions},
         ply, testing,
     };
 
@@ -220,10 +220,10 @@ mod tests {
         is_bansho_file(path)
     }
 
-    /// The file without the letters of the mark is somebody's.
+    /// Without the letters of the mark it counts as made by another program.
     fn unmark(bytes: &mut [u8]) {
-        let places: Vec<usize> = (0..bytes.len()).filter(|&place| begins(&bytes[place..])).collect();
-        places.iter().for_each(|&place| bytes[place..place + PREFIX.len()].copy_from_slice(b"bandage"));
+        let offsets: Vec<usize> = (0..bytes.len()).filter(|&offset| starts_with_prefix(&bytes[offset..])).collect();
+        offsets.iter().for_each(|&offset| bytes[offset..offset + PREFIX.len()].copy_from_slice(b"bandage"));
     }
 
     #[test]
@@ -233,7 +233,7 @@ mod tests {
             for opaque in [false, true] {
                 let path = made(folder.path(), name, opaque);
                 assert!(is_bansho_file(&path), "{name}");
-                // What a power cut may leave.
+                // What a power failure may leave.
                 assert!(rewritten(&path, |bytes| bytes.truncate(bytes.len() * 9 / 10)), "{name}");
                 assert!(!rewritten(&path, |bytes| unmark(bytes)), "{name}");
             }
@@ -292,7 +292,7 @@ mod tests {
         let file = exr::encode(&frame, Path::new("a.exr")).unwrap();
         assert!(file.windows(9).position(|bytes| bytes == b"bansho:ve").unwrap() > HEAD_BYTES as usize);
         assert!(is_marked_with(&file));
-        // A film of 1 TB whose index stands behind the pictures: a sparse file.
+        // A film of 1 TB with its index after the pictures: a sparse file.
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mov");
         let mut file = File::create(&path).unwrap();

@@ -1,7 +1,6 @@
 //! OpenEXR plates: color and depth of any part, any sample type, lines or tiles.
 //!
-//! The header is first read by [`super::parse`], which trusts nothing, so that a file cannot make the decoder ask for more
-//! memory than it could ever fill.
+//! The header is first checked by [`crate::exr::parse`], so that a file cannot make the decoder allocate more memory than the file could fill.
 
 use std::{io::Cursor, ops::Range, panic::catch_unwind};
 
@@ -22,11 +21,14 @@ use bansho_base::{
 };
 
 use super::{
-    KEY_EXPOSURE,
-    parse::{self, FileHeader, PartHeader},
+    limits::{self, MemoryLimit},
     primaries,
 };
-use crate::assets::limits::{self, MemoryLimit};
+use crate::exr::{
+    KEY_EXPOSURE,
+    attribute::Window,
+    parse::{self, FileHeader, PartHeader},
+};
 
 use rayon::prelude::*;
 
@@ -34,20 +36,19 @@ use rayon::prelude::*;
 const MAX_CHUNKS: u64 = 32;
 /// Bytes of pixels in one batch of chunks; a single chunk may exceed it.
 const BATCH_BYTES: u64 = 64 << 20;
-/// Memory of a chunk while it is decompressed, in multiples of its pixels: in the file, between two steps, and as
-/// pixels.
+/// Memory of a chunk during decompression, in multiples of its pixels: compressed, intermediate, and decompressed.
 const CHUNK_COPIES: u64 = 4;
 
-/// Reads a plate: the part and layer with `R`, `G` and `B` (or a lone gray `Y`), with `A` where there is one, and depth
-/// from `Z`, `depth.Z`, or the only channel of a file that has just one. Pixels cover the display window; where the file
-/// has none they are transparent and infinitely far. Colors are given straight, those that are no numbers as 0.
+/// Decodes a plate: the first part and layer with `R`, `G` and `B` (or a gray `Y`), and `A` if it exists; and depth from `Z`, `depth.Z`, or
+/// the only channel of a file. The result covers the display window; pixels outside the data window are transparent and infinitely far.
+/// Alpha becomes straight, and NaN becomes 0.
 pub(crate) fn decode(file: &[u8], limit: MemoryLimit) -> Result<Picture, AssetProblem> {
     let header = parse::parse_header(file).map_err(damaged)?;
     check(&header, file)?;
     let selection = ChannelSelection::choose(&header)
         .ok_or_else(|| AssetProblem::NoChannel(format!("R, Y or Z (it has {})", all_names(&header))))?;
-    let display = header.parts[0].display.ok_or_else(|| damaged("it has no display window"))?;
-    let size = limits::window_size(display);
+    let display = header.parts[0].display_window.ok_or_else(|| damaged("it has no display window"))?;
+    let size = display.size();
     let (width, height) = (size[0] as usize, size[1] as usize);
     let batch = ChunkBatch::new(&header, &selection);
     limit.check(file.len() as u64 + selection.bytes(size[0] * size[1]) + batch.bytes)?;
@@ -65,30 +66,30 @@ fn all_names(header: &FileHeader) -> String {
     names.take(12).collect::<Vec<_>>().join(", ")
 }
 
-/// Refuses files that would need more memory than is allowed, or than their bytes could ever fill.
+/// Rejects files that need more memory than is allowed, or than their bytes could fill.
 fn check(header: &FileHeader, file: &[u8]) -> Result<(), AssetProblem> {
     if header.deep {
-        return Err(damaged("deep pixels are not read; flatten them first"));
+        return Err(damaged("deep pixels are not supported; flatten them first"));
     }
     for part in &header.parts {
-        let (Some(data), Some(display)) = (part.data, part.display) else {
+        let (Some(data), Some(display)) = (part.data_window, part.display_window) else {
             return Err(damaged("its header lacks a window"));
         };
-        limits::check_size(limits::window_size(display))?;
-        let [width, height] = limits::check_size(limits::window_size(data))?;
+        limits::check_size(display.size())?;
+        let [width, height] = limits::check_size(data.size())?;
         if part.tile.is_some_and(|tile| tile.iter().any(|side| !(1..=limits::SIDE as u32).contains(side))) {
-            return Err(damaged("its tiles have no possible size"));
+            return Err(damaged("its tile size is invalid"));
         }
         if part.channels.is_empty() || part.channels.iter().any(|channel| channel.sampling != [1, 1]) {
-            return Err(damaged("channels of fewer samples than pixels are not read"));
+            return Err(damaged("subsampled channels are not supported"));
         }
-        limits::check_expansion([width, height], part_bytes(part), file, greatest_ratio(part))?;
+        limits::check_expansion([width, height], part_bytes(part), file, max_compression_ratio(part))?;
     }
     Ok(())
 }
 
 /// Largest compression ratio of a part.
-fn greatest_ratio(part: &PartHeader) -> u64 {
+fn max_compression_ratio(part: &PartHeader) -> u64 {
     match part.compression {
         Some(0) => 1,
         Some(1) => 64, // run lengths of up to 128 in 2 bytes
@@ -99,13 +100,19 @@ fn greatest_ratio(part: &PartHeader) -> u64 {
     }
 }
 
+/// The channel of the depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct DepthChannel {
+    part: usize,
+    channel: usize,
+}
+
 /// The selected channels of color and depth.
 struct ChannelSelection {
     part: usize,
-    /// Index in the part's channel list, for red, green, blue and alpha.
+    /// Indices in the channel list of `part`, for red, green, blue and alpha.
     color: [Option<usize>; 4],
-    /// Part and channel of the depth.
-    depth: Option<(usize, usize)>,
+    depth: Option<DepthChannel>,
 }
 
 impl ChannelSelection {
@@ -114,8 +121,13 @@ impl ChannelSelection {
         let parts = || header.parts.iter().enumerate();
         let depth = ["Z", "depth.Z", "Depth.Z", "depth.z", "depth"]
             .iter()
-            .find_map(|name| parts().find_map(|(index, part)| Some((index, find(part, name)?))))
-            .or_else(|| (header.parts.len() == 1 && header.parts[0].channels.len() == 1).then_some((0, 0)));
+            .find_map(|name| {
+                parts().find_map(|(index, part)| Some(DepthChannel { part: index, channel: find(part, name)? }))
+            })
+            .or_else(|| {
+                let is_single = header.parts.len() == 1 && header.parts[0].channels.len() == 1;
+                is_single.then_some(DepthChannel { part: 0, channel: 0 })
+            });
         let layer = |part: &PartHeader, prefix: &str| {
             let channel = |name: &str| find(part, &format!("{prefix}{name}"));
             Some([Some(channel("R")?), Some(channel("G")?), Some(channel("B")?), channel("A")])
@@ -127,7 +139,7 @@ impl ChannelSelection {
         match (color, depth) {
             (None, None) => None,
             (Some((part, color)), depth) => Some(Self { part, color, depth }),
-            (None, Some((part, channel))) => Some(Self { part, color: [None; 4], depth: Some((part, channel)) }),
+            (None, Some(depth)) => Some(Self { part: depth.part, color: [None; 4], depth: Some(depth) }),
         }
     }
 
@@ -143,7 +155,7 @@ impl ChannelSelection {
     }
 
     fn contains_part(&self, part: usize) -> bool {
-        (self.color[0].is_some() && part == self.part) || self.depth.is_some_and(|(depth, _)| depth == part)
+        (self.color[0].is_some() && part == self.part) || self.depth.is_some_and(|depth| depth.part == part)
     }
 }
 
@@ -168,7 +180,14 @@ struct PlaneWriter {
     values: DecodedPlanes,
 }
 
-/// Number of chunks in a batch, and the bytes that it takes.
+/// The pixels of the picture that a line covers.
+struct LineSpan {
+    /// Number of values to the left of the picture.
+    skipped: usize,
+    pixels: Range<usize>,
+}
+
+/// Number of chunks in a batch, and its memory in bytes.
 struct ChunkBatch {
     chunks: usize,
     bytes: u64,
@@ -186,7 +205,7 @@ impl ChunkBatch {
 
 /// Bytes of a part's pixels.
 fn part_bytes(part: &PartHeader) -> u64 {
-    let [width, height] = part.data.map_or([0, 0], limits::window_size);
+    let [width, height] = part.data_window.map_or([0, 0], Window::size);
     width * height * pixel_bytes(part)
 }
 
@@ -196,7 +215,7 @@ fn pixel_bytes(part: &PartHeader) -> u64 {
 
 /// Bytes of the pixels of a part's chunk.
 fn chunk_bytes(part: &PartHeader) -> u64 {
-    let [width, height] = part.data.map_or([0, 0], limits::window_size);
+    let [width, height] = part.data_window.map_or([0, 0], Window::size);
     let rows = match part.compression {
         Some(0..=2) => 1,
         Some(3 | 5) => 16,
@@ -210,7 +229,7 @@ fn chunk_bytes(part: &PartHeader) -> u64 {
 fn read_chunks(
     file: &[u8],
     selection: &ChannelSelection,
-    at_a_time: usize,
+    batch_size: usize,
     planes: &mut PlaneWriter,
 ) -> Result<(), AssetProblem> {
     let reader = ::exr::block::read(Cursor::new(file), false).map_err(damaged)?;
@@ -220,21 +239,21 @@ fn read_chunks(
     let mut chunks = reader.filter_chunks(false, full_size).map_err(damaged)?;
     let meta = chunks.meta_data().clone();
     loop {
-        let batch: Vec<Chunk> = chunks.by_ref().take(at_a_time).collect::<Result<_, _>>().map_err(damaged)?;
+        let batch: Vec<Chunk> = chunks.by_ref().take(batch_size).collect::<Result<_, _>>().map_err(damaged)?;
         if batch.is_empty() {
             return Ok(());
         }
         let blocks: Vec<UncompressedBlock> =
             batch.into_par_iter().map(|chunk| decompress(chunk, &meta)).collect::<Result<_, _>>()?;
         for block in &blocks {
-            let header = meta.headers.get(block.index.layer).ok_or_else(|| damaged("a block of no part"))?;
+            let header = meta.headers.get(block.index.layer).ok_or_else(|| damaged("a block belongs to no part"))?;
             planes.copy_block(block, header, selection);
         }
     }
 }
 
-/// Decompresses a chunk. The crate's PIZ and B44 decoders are known to panic on damaged chunks (exr 1.74: an empty list in
-/// `piz/huffman.rs`, overflow in `b44/mod.rs`); they own all they touch, so that nothing is left half-changed.
+/// Decompresses a chunk. The PIZ and B44 decoders of the crate panic on some damaged chunks (exr 1.74: an empty list in `piz/huffman.rs`,
+/// overflow in `b44/mod.rs`). They own all their data, so catching the panic is safe.
 fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, AssetProblem> {
     check_dwa(&chunk, meta)?;
     catch_unwind(|| UncompressedBlock::decompress_chunk(chunk, meta, false))
@@ -245,30 +264,30 @@ fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, AssetP
 /// Fields of 8 bytes at the start of a DWA chunk: version, nine lengths, and the kind of entropy coding.
 const DWA_FIELDS: usize = 11;
 
-/// Refuses a DWA chunk whose header claims more than its pixels could take, since the crate (exr 1.74,
-/// `dwa/section_stream.rs`) takes memory for whatever it claims.
+/// Rejects a DWA chunk whose header claims more bytes than its pixels could need, since the crate (exr 1.74, `dwa/section_stream.rs`) allocates
+/// whatever the header claims.
 fn check_dwa(chunk: &Chunk, meta: &MetaData) -> Result<(), AssetProblem> {
-    let header = meta.headers.get(chunk.layer_index).ok_or_else(|| damaged("a block of no part"))?;
+    let header = meta.headers.get(chunk.layer_index).ok_or_else(|| damaged("a block belongs to no part"))?;
     if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
         return Ok(());
     }
     let bytes = match &chunk.compressed_block {
         CompressedBlock::Tile(tile) => &tile.compressed_pixels_le,
         CompressedBlock::ScanLine(lines) => &lines.compressed_pixels_le,
-        _ => return Err(damaged("deep pixels are not read")),
+        _ => return Err(damaged("deep pixels are not supported")),
     };
     let index = header.get_block_data_indices(&chunk.compressed_block).map_err(damaged)?;
     let area = header.get_absolute_block_pixel_coordinates(index).map_err(damaged)?.size.area();
     let pixel_bytes = area * header.channels.bytes_per_pixel;
-    // A chunk that compression would have made larger is stored as it is, without the fields.
+    // A chunk that compression would enlarge is stored uncompressed, without the fields.
     if bytes.is_empty() || bytes.len() == pixel_bytes {
         return Ok(());
     }
-    // Coefficients stand for samples one to one, with at most as many ends of blocks.
+    // There is one coefficient per sample, and at most as many end-of-block codes.
     let limit = 4 * pixel_bytes as u64 + 4096;
     let fields: Option<&[[u8; 8]]> = bytes.as_chunks().0.get(..DWA_FIELDS);
     let is_possible = fields.is_some_and(|fields| fields.iter().all(|field| u64::from_le_bytes(*field) <= limit));
-    if is_possible { Ok(()) } else { Err(damaged("a chunk claims more than its pixels can take")) }
+    if is_possible { Ok(()) } else { Err(damaged("a chunk claims more bytes than its pixels can need")) }
 }
 
 impl PlaneWriter {
@@ -278,9 +297,11 @@ impl PlaneWriter {
         for line in block.lines(&header.channels) {
             let channel = line.location.channel;
             let Some(kind) = header.channels.list.get(channel).map(|channel| channel.sample_type) else { continue };
-            let Some((skipped, pixels)) = self.span(&line, header) else { continue };
+            let Some(LineSpan { skipped, pixels }) = self.span(&line, header) else { continue };
             let values = || samples(&line, kind).skip(skipped);
-            if let Some(depth) = self.values.depth.as_mut().filter(|_| selection.depth == Some((part, channel))) {
+            if let Some(depth) =
+                self.values.depth.as_mut().filter(|_| selection.depth == Some(DepthChannel { part, channel }))
+            {
                 depth[pixels.clone()].iter_mut().zip(values()).for_each(|(z, value)| *z = value);
             }
             if let Some(color) = self.values.color.as_mut().filter(|_| selection.part == part) {
@@ -289,15 +310,16 @@ impl PlaneWriter {
         }
     }
 
-    /// Number of values of a line left of the picture, and the pixels of the others; `None` outside of the picture.
-    fn span(&self, line: &LineRef<'_>, header: &Header) -> Option<(usize, Range<usize>)> {
+    /// The pixels that a line covers; `None` outside the picture.
+    fn span(&self, line: &LineRef<'_>, header: &Header) -> Option<LineSpan> {
         let origin = header.own_attributes.layer_position;
         let x = line.location.position.0 as i64 + i64::from(origin.0) - i64::from(self.display_min[0]);
         let y = line.location.position.1 as i64 + i64::from(origin.1) - i64::from(self.display_min[1]);
         let row = usize::try_from(y).ok().filter(|row| *row < self.height)? * self.width;
         let end = (x + line.location.sample_count as i64).min(self.width as i64);
         let start = x.max(0);
-        (start < end).then(|| ((start - x) as usize, row + start as usize..row + end as usize))
+        (start < end)
+            .then(|| LineSpan { skipped: (start - x) as usize, pixels: row + start as usize..row + end as usize })
     }
 }
 
@@ -309,7 +331,7 @@ fn copy_color(pixels: &mut [[f32; 4]], values: impl Iterator<Item = f32>, color:
     }
     for (pixel, value) in pixels.iter_mut().zip(values) {
         (0..4).filter(|component| targets[*component]).for_each(|component| pixel[component] = value);
-        // Without alpha in the file, the pixels that it has are opaque and the others are not.
+        // Without alpha in the file, pixels inside the data window are opaque and the others transparent.
         if color[3].is_none() {
             pixel[3] = 1.0;
         }
@@ -326,19 +348,19 @@ fn samples<'a>(line: &LineRef<'a>, kind: SampleType) -> Box<dyn Iterator<Item = 
     }
 }
 
-/// Converts to straight alpha and known primaries, and removes values that would spoil compositing.
+/// Converts to straight alpha and known primaries, and removes NaN and infinities.
 fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter) -> Result<Picture, AssetProblem> {
     let (width, height) = (planes.width, planes.height);
     let conversion = primaries::conversion(header.parts[selection.part].chromaticities)
         .ok_or_else(|| damaged("its chromaticities describe no colors"))?;
     let mut color = planes.values.color.unwrap_or_else(|| {
-        // A file of depth alone: shown as gray, opaque.
+        // A file with depth only: shown in gray, opaque.
         let depth = planes.values.depth.iter().flatten();
         depth.map(|&z| [z, z, z, 1.0]).collect()
     });
     color.par_iter_mut().for_each(|pixel| *pixel = unpremultiply(pixel.map(finite), conversion.matrix.as_ref()));
     let depth = planes.values.depth.map(|mut depth| {
-        // No distance at all counts as infinitely far.
+        // NaN means infinitely far.
         depth.iter_mut().filter(|z| z.is_nan()).for_each(|z| *z = f32::INFINITY);
         depth
     });
@@ -347,7 +369,7 @@ fn finish(header: &FileHeader, selection: &ChannelSelection, planes: PlaneWriter
     Ok(Picture { color, depth, encoding: conversion.encoding, exposure_ev100 })
 }
 
-/// Exposure value at ISO 100 by Bansho's own attribute, or by those of OpenEXR for a camera's settings.
+/// Exposure value at ISO 100 from Bansho's own attribute, or from OpenEXR's attributes for camera settings.
 fn exposure(part: &PartHeader) -> Option<f64> {
     let own = part.float(KEY_EXPOSURE).filter(|ev100| ev100.abs() <= MAX_EV100);
     own.or_else(|| ev100_of_camera(part.float("aperture")?, part.float("expTime")?, part.float("isoSpeed")?))

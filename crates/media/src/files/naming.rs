@@ -1,113 +1,58 @@
-//! Output file names with frame numbers: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
+//! Names of output files, with frame numbers: `frame.####.exr`, `frame.%04d.exr`, `film.mp4`.
 
 use std::path::{Path, PathBuf};
 
-/// Output formats, by extension.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum OutputKind {
-    /// One PNG for each frame: display pixels.
-    Png,
-    /// One OpenEXR for each frame: scene-linear.
-    Exr,
-    /// Animated PNG.
-    Apng,
-    /// Animated GIF.
-    Gif,
-    /// H.264 in MP4, by ffmpeg.
-    Mp4,
-    /// ProRes 4444 in QuickTime, by ffmpeg.
-    Mov,
-    /// VP9 or AV1 in WebM, by ffmpeg.
-    Webm,
-}
-
-impl OutputKind {
-    /// Every kind.
-    pub const ALL: [Self; 7] = [Self::Png, Self::Exr, Self::Apng, Self::Gif, Self::Mp4, Self::Mov, Self::Webm];
-
-    /// Its extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Png => "png",
-            Self::Exr => "exr",
-            Self::Apng => "apng",
-            Self::Gif => "gif",
-            Self::Mp4 => "mp4",
-            Self::Mov => "mov",
-            Self::Webm => "webm",
-        }
-    }
-
-    /// The format with this extension, case-insensitive.
-    pub fn from_extension(extension: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.extension().eq_ignore_ascii_case(extension))
-    }
-
-    /// Whether every frame is a file of its own.
-    pub fn is_sequence(self) -> bool {
-        matches!(self, Self::Png | Self::Exr)
-    }
-
-    /// Whether it holds scene-linear pixels.
-    pub fn is_scene_linear(self) -> bool {
-        self == Self::Exr
-    }
-
-    /// Whether it is made by the program `ffmpeg`.
-    pub fn needs_ffmpeg(self) -> bool {
-        matches!(self, Self::Mp4 | Self::Mov | Self::Webm)
-    }
-}
+use crate::format::{OutputKind, extensions};
 
 /// Why a name cannot be used for output.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NamingError {
-    /// Nothing after the last dot, or no dot.
-    #[error("{path}: has no extension; allowed: {ALLOWED}", path = .path.display())]
+    /// There is no dot, or nothing after the last one.
+    #[error("{path}: has no extension; allowed: {}", extensions(OutputKind::ALL), path = .path.display())]
     NoExtension {
         /// The name.
         path: PathBuf,
     },
-    /// An extension that Bansho does not write.
-    #[error("{path}: `.{extension}` is not written; allowed: {ALLOWED}", path = .path.display())]
+    /// No output format has this extension.
+    #[error("{path}: `.{extension}` is not supported; allowed: {}", extensions(OutputKind::ALL), path = .path.display())]
     UnknownExtension {
         /// The name.
         path: PathBuf,
         /// Its extension.
         extension: String,
     },
-    /// An extension other than the only one that will do.
-    #[error("{path}: `.{extension}` is not written here; allowed: .{allowed}", path = .path.display())]
+    /// Another extension than the only one that is possible.
+    #[error("{path}: `.{extension}` is not supported here; allowed: .{allowed}", path = .path.display())]
     OtherExtension {
         /// The name.
         path: PathBuf,
         /// Its extension.
         extension: String,
-        /// The one that will do.
+        /// The possible one.
         allowed: &'static str,
     },
     /// More than one placeholder for the frame number.
-    #[error("{path}: more than one place for the frame number; use one run of # or one %04d", path = .path.display())]
+    #[error("{path}: more than one placeholder for the frame number; use one run of # or one %04d", path = .path.display())]
     TwoPlaceholders {
         /// The name.
         path: PathBuf,
     },
-    /// A percent sign that is not a frame number.
-    #[error("{path}: `%` must begin %d or %04d; write %% for the sign itself", path = .path.display())]
+    /// A percent sign that begins no placeholder.
+    #[error("{path}: `%` must begin %d or %04d; write %% for a literal percent sign", path = .path.display())]
     BadPercent {
         /// The name.
         path: PathBuf,
     },
-    /// A frame number of more digits than numbers have.
+    /// A placeholder with too many digits.
     #[error("{path}: a frame number of {digits} digits; allowed: up to {MAX_DIGITS}", path = .path.display())]
     ManyDigits {
         /// The name.
         path: PathBuf,
-        /// How many digits it asks for.
+        /// Its number of digits.
         digits: usize,
     },
-    /// A frame number in a file that holds all frames.
-    #[error("{path}: a .{extension} file holds all frames, so its name has no place for a frame number", path = .path.display())]
+    /// A placeholder for the frame number in the name of a film.
+    #[error("{path}: a .{extension} file contains all frames, so its name must not have a frame number", path = .path.display())]
     NumberedFilm {
         /// The name.
         path: PathBuf,
@@ -122,17 +67,16 @@ pub enum NamingError {
     },
 }
 
-const ALLOWED: &str = ".png, .exr, .apng, .gif, .mp4, .mov, .webm";
-
 /// Largest width of a placeholder.
 const MAX_DIGITS: usize = 20;
 
 /// A file name with at most one placeholder for the frame number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FrameTemplate {
-    before: String,
+    prefix: String,
+    /// Smallest number of digits; `None` without a placeholder.
     digits: Option<usize>,
-    after: String,
+    suffix: String,
 }
 
 /// Why a name with placeholders cannot be parsed.
@@ -145,7 +89,7 @@ pub(crate) enum TemplateError {
 impl FrameTemplate {
     /// Parses runs of `#` and, with `printf`, `%d`, `%04d` and `%%`.
     pub(crate) fn parse(name: &str, printf: bool) -> Result<Self, TemplateError> {
-        let mut template = Self { before: String::new(), digits: None, after: String::new() };
+        let mut template = Self { prefix: String::new(), digits: None, suffix: String::new() };
         let mut rest = name;
         while let Some(first) = rest.chars().next() {
             let (placeholder, length) = match first {
@@ -157,7 +101,7 @@ impl FrameTemplate {
                     (Some(run), run)
                 }
                 '%' if printf && rest.starts_with("%%") => {
-                    template.literal('%');
+                    template.push_literal('%');
                     (None, 2)
                 }
                 '%' if printf => {
@@ -165,7 +109,7 @@ impl FrameTemplate {
                     (Some(digits), length)
                 }
                 other => {
-                    template.literal(other);
+                    template.push_literal(other);
                     (None, other.len_utf8())
                 }
             };
@@ -177,15 +121,15 @@ impl FrameTemplate {
         Ok(template)
     }
 
-    fn literal(&mut self, letter: char) {
-        if self.digits.is_some() { self.after.push(letter) } else { self.before.push(letter) }
+    fn push_literal(&mut self, letter: char) {
+        if self.digits.is_some() { self.suffix.push(letter) } else { self.prefix.push(letter) }
     }
 
     /// The name for frame `number`: the sign first, then the digits, padded with zeros.
     pub(crate) fn name(&self, number: i64) -> String {
-        let Some(digits) = self.digits else { return self.before.clone() };
+        let Some(digits) = self.digits else { return self.prefix.clone() };
         let sign = if number < 0 { "-" } else { "" };
-        format!("{}{sign}{:0digits$}{}", self.before, number.unsigned_abs(), self.after)
+        format!("{}{sign}{:0digits$}{}", self.prefix, number.unsigned_abs(), self.suffix)
     }
 }
 
@@ -197,15 +141,15 @@ fn printf_digits(text: &str) -> Option<(usize, usize)> {
     (digits <= MAX_DIGITS).then_some((digits, width.len() + 2))
 }
 
-/// Default name of the pictures of a scene with the file stem `stem`.
-pub fn pictures(stem: &str) -> String {
+/// Default name of the sequence of pictures of a scene with the file stem `stem`.
+pub fn default_sequence(stem: &str) -> String {
     format!("{stem}.####.png")
 }
 
-/// Default name of the picture of frame `number` of a scene with the file stem `stem`.
-pub fn picture(stem: &str, number: i64) -> String {
-    let (before, after) = (format!("{stem}."), ".png".to_owned());
-    FrameTemplate { before, digits: Some(4), after }.name(number)
+/// Name of the picture of frame `number` in [`default_sequence`].
+pub fn default_picture(stem: &str, number: i64) -> String {
+    let (prefix, suffix) = (format!("{stem}."), ".png".to_owned());
+    FrameTemplate { prefix, digits: Some(4), suffix }.name(number)
 }
 
 /// A path whose file name may contain the frame number.
@@ -216,11 +160,11 @@ pub struct NumberedPath {
 }
 
 impl NumberedPath {
-    /// Reads a name of files with this extension (without the dot), such as `gas.####.ply`. `count` is how many files there will be: a
-    /// lone `gas.ply` becomes `gas.####.ply` unless there is exactly one.
+    /// Parses a name of files with this extension (without the dot), such as `gas.####.ply`. `count` is the number of files: unless it is 1,
+    /// `gas.ply` becomes `gas.####.ply`.
     ///
     /// # Errors
-    /// Another extension, two placeholders, a stray percent sign.
+    /// Another extension, two placeholders, or a percent sign that begins none.
     pub fn parse(path: &Path, extension: &'static str, count: usize) -> Result<Self, NamingError> {
         let name = file_name(path)?;
         let own = extension_of(path, name)?;
@@ -230,7 +174,7 @@ impl NumberedPath {
         }
         let mut numbered = Self::read(path, name)?;
         if count != 1 {
-            numbered.number();
+            numbered.insert_placeholder();
         }
         Ok(numbered)
     }
@@ -246,12 +190,12 @@ impl NumberedPath {
     }
 
     /// Inserts a placeholder before the extension if there is none.
-    fn number(&mut self) {
+    fn insert_placeholder(&mut self) {
         let template = &mut self.template;
         if template.digits.is_none() {
-            let dot = template.before.rfind('.').unwrap_or(template.before.len());
-            template.after = template.before.split_off(dot);
-            template.before.push('.');
+            let dot = template.prefix.rfind('.').unwrap_or(template.prefix.len());
+            template.suffix = template.prefix.split_off(dot);
+            template.prefix.push('.');
             template.digits = Some(4);
         }
     }
@@ -261,10 +205,10 @@ impl NumberedPath {
         self.template.digits.is_some()
     }
 
-    /// The name of all files, with a `#` for each digit of the frame number.
-    pub fn of_all(&self) -> PathBuf {
-        let FrameTemplate { before, digits, after } = &self.template;
-        self.folder.join(format!("{before}{}{after}", "#".repeat(digits.unwrap_or(0))))
+    /// The path with a `#` for each digit of the frame number.
+    pub fn template_path(&self) -> PathBuf {
+        let FrameTemplate { prefix, digits, suffix } = &self.template;
+        self.folder.join(format!("{prefix}{}{suffix}", "#".repeat(digits.unwrap_or(0))))
     }
 
     /// The file for frame `number`.
@@ -281,11 +225,11 @@ pub struct OutputPattern {
 }
 
 impl OutputPattern {
-    /// Reads the name that was asked for. `frame_count` is how many frames the job has: a lone `name.png` becomes
-    /// `name.####.png` unless there is exactly one. Only the last part of the path may hold a placeholder.
+    /// Parses an output path. `frame_count` is the number of frames of the job: unless it is 1, `name.png` becomes `name.####.png`. Only the
+    /// file name may contain a placeholder.
     ///
     /// # Errors
-    /// No extension or one that is not written, two placeholders, a stray percent sign, a placeholder in a film's name.
+    /// No extension or an unsupported one, two placeholders, a percent sign that begins none, a placeholder in the name of a film.
     pub fn parse(path: &Path, frame_count: usize) -> Result<Self, NamingError> {
         let name = file_name(path)?;
         let kind = kind_of(path, name)?;
@@ -294,7 +238,7 @@ impl OutputPattern {
             return Err(NamingError::NumberedFilm { path: path.to_path_buf(), extension: kind.extension() });
         }
         if kind.is_sequence() && frame_count != 1 {
-            numbered.number();
+            numbered.insert_placeholder();
         }
         Ok(Self { numbered, kind })
     }
@@ -309,12 +253,12 @@ impl OutputPattern {
         self.numbered.is_numbered()
     }
 
-    /// The name of all files, with a `#` for each digit of the frame number.
-    pub fn of_all(&self) -> PathBuf {
-        self.numbered.of_all()
+    /// The path with a `#` for each digit of the frame number.
+    pub fn template_path(&self) -> PathBuf {
+        self.numbered.template_path()
     }
 
-    /// The file of frame `number`; a film has one file for all.
+    /// The file of frame `number`; the same for all frames of a film.
     pub fn path(&self, number: i64) -> PathBuf {
         self.numbered.path(number)
     }
@@ -344,9 +288,9 @@ mod tests {
 
     #[test]
     fn one_picture_is_called_as_the_pattern_of_all_says() {
-        let pattern = OutputPattern::parse(Path::new(&pictures("fire")), 2).unwrap();
+        let pattern = OutputPattern::parse(Path::new(&default_sequence("fire")), 2).unwrap();
         for number in [-12_345, -5, 0, 7, 12_345] {
-            assert_eq!(pattern.path(number), Path::new(&picture("fire", number)));
+            assert_eq!(pattern.path(number), Path::new(&default_picture("fire", number)));
         }
     }
 
@@ -381,7 +325,7 @@ mod tests {
 
     #[test]
     fn all_files_have_a_name_too() {
-        let all = |pattern: &str, frames| OutputPattern::parse(Path::new(pattern), frames).unwrap().of_all();
+        let all = |pattern: &str, frames| OutputPattern::parse(Path::new(pattern), frames).unwrap().template_path();
         for (pattern, frames, expected) in
             [("a/f.%03d.png", 9, "a/f.###.png"), ("f.exr", 2, "f.####.exr"), ("f.exr", 1, "f.exr")]
         {
@@ -421,7 +365,7 @@ mod tests {
         assert!(matches!(error("a.%099d.png"), NamingError::BadPercent { .. }));
         assert!(matches!(error("a.%-4d.png"), NamingError::BadPercent { .. }));
         assert!(matches!(error(&format!("{}.png", "#".repeat(21))), NamingError::ManyDigits { digits: 21, .. }));
-        // As many as the standard library could not write.
+        // More digits than the standard library can format.
         assert!(matches!(error(&format!("{}.png", "#".repeat(100_000))), NamingError::ManyDigits { .. }));
         assert_eq!(name(&format!("{}.png", "#".repeat(20)), 2, 1), "00000000000000000001.png");
         assert!(matches!(error("film.####.mp4"), NamingError::NumberedFilm { .. }));
@@ -429,7 +373,7 @@ mod tests {
             assert!(matches!(error(bare), NamingError::NoExtension { .. }), "{bare}");
         }
         let text = error("frame.tiff").to_string();
-        for extension in OutputKind::ALL.map(OutputKind::extension) {
+        for extension in OutputKind::ALL.iter().map(|kind| kind.extension()) {
             assert!(text.contains(&format!(".{extension}")), "{text}");
         }
     }

@@ -1,0 +1,92 @@
+//! The first frame of a loop in closed form: viewers look for the seam, so it is put where consecutive frames differ least.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    color::{AlphaConvention, View},
+    host::observer::{Cancelled, Unobserved},
+};
+
+use crate::{
+    compiled::CompiledScene,
+    display,
+    plan::Plan,
+    shot::{RenderError, Shot},
+};
+
+/// Longer side of the thumbnails that are compared, pixels.
+const THUMBNAIL_SIDE: usize = 96;
+/// Candidates, spread evenly over the loop. Of 16, the best is well below the median.
+const CANDIDATES: i64 = 16;
+
+/// Offset in frames, from the beginning of the loop, of the candidate that differs least from the frame before it.
+///
+/// 0 for what is simulated: its loops close in the middle of a crossfade, where frames differ little. Also 0 where a frame cannot be drawn;
+/// the error is reported when it is drawn for output.
+pub(crate) fn search(compiled: &Arc<CompiledScene>, plan: &Plan) -> i64 {
+    if plan.loop_s().is_none() || compiled.is_stepped() {
+        return 0;
+    }
+    least_change(compiled, plan).unwrap_or_default()
+}
+
+fn least_change(compiled: &Arc<CompiledScene>, plan: &Plan) -> Result<i64, RenderError> {
+    let frames = plan.frames();
+    let count = frames.end - frames.start;
+    let candidates = CANDIDATES.min(count);
+    let offsets: Vec<i64> = (0..candidates).map(|candidate| candidate * count / candidates).collect();
+    let mut shot = Shot::open(compiled.clone(), Arc::new(thumbnail_plan(plan)));
+    let mut difference = |offset: &i64| {
+        let number = frames.start + offset;
+        Ok(Difference::between(&draw_thumbnail(&mut shot, number - 1)?, &draw_thumbnail(&mut shot, number)?))
+    };
+    let differences = offsets.iter().map(&mut difference).collect::<Result<Vec<_>, RenderError>>()?;
+    let sum = differences.iter().fold(Difference::default(), |sum, each| Difference {
+        codes: sum.codes + each.codes,
+        light: sum.light + each.light,
+    });
+    let relative = |each: &Difference| (each.codes * sum.light).max(each.light * sum.codes);
+    let best = offsets.iter().zip(&differences).min_by(|a, b| relative(a.1).total_cmp(&relative(b.1)));
+    Ok(best.map_or(0, |(offset, _)| *offset))
+}
+
+/// How much two frames differ.
+#[derive(Default)]
+struct Difference {
+    /// Sum over display codes, which are nearly perceptually uniform.
+    codes: f64,
+    /// Sum over linear light, to which bright regions contribute more.
+    light: f64,
+}
+
+impl Difference {
+    /// Of display codes; their squares are nearly linear light.
+    fn between(before: &[f64], after: &[f64]) -> Self {
+        let pairs = || before.iter().zip(after);
+        Self {
+            codes: pairs().map(|(a, b)| (a - b).abs()).sum(),
+            light: pairs().map(|(a, b)| (a * a - b * b).abs()).sum(),
+        }
+    }
+}
+
+/// The same shot in thumbnail size, without layers, AOVs and figures.
+pub(crate) fn thumbnail_plan(plan: &Plan) -> Plan {
+    let longest = plan.size[0].max(plan.size[1]);
+    let size = plan.size.map(|side| (side * THUMBNAIL_SIDE).div_ceil(longest));
+    Plan { layers: false, aovs: false, figures: false, ..plan.at_size(size) }
+}
+
+/// Display codes of a frame over black, from 0 to 1.
+pub(crate) fn draw_thumbnail(shot: &mut Shot, number: i64) -> Result<Vec<f64>, RenderError> {
+    shot.advance(number, &Unobserved)?;
+    shot.draw(&Unobserved)?;
+    let frame = shot.read().ok_or(Cancelled)?;
+    let codes = display::codes::<u16>(&frame, &View::DISPLAY, AlphaConvention::Linear).into_iter();
+    Ok(codes
+        .flat_map(|[r, g, b, alpha]| [r, g, b].map(|code| f64::from(code) * f64::from(alpha) * CODE_STEP * CODE_STEP))
+        .collect())
+}
+
+/// Difference between two codes of 16 bits, where the largest code is 1.
+const CODE_STEP: f64 = 1.0 / u16::MAX as f64;
