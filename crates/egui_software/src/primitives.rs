@@ -7,9 +7,9 @@ use egui::{
 
 use super::{
     blend::{Rgba, multiply},
+    pixel_rect::{PixelRect, SUBPIXELS},
     textures::{Texture, Textures},
-    tiles::PixelRect,
-    triangle::{Corner, SUBPIXELS, Triangle},
+    triangle::{Corner, Triangle},
 };
 
 /// Images whose texels align with pixels within this fraction of a texel are copied without filtering: the error is half of 1/255 at most.

@@ -4,9 +4,9 @@ use egui::Color32;
 
 use super::{
     blend::{Rgba, blend_over, blend_over_f32, blend_tinted_over, pack_xrgb},
+    pixel_rect::PixelRect,
     primitives::{DrawPrimitive, Shape},
     textures::{FilterTaps, Texture, Textures},
-    tiles::PixelRect,
     triangle::{Coloring, Triangle},
 };
 

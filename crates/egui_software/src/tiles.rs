@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::{
+    pixel_rect::PixelRect,
     primitives::{DrawPrimitive, Shape, mix_hash},
     raster::{TILE_WIDTH, TilePixels, hides},
     textures::Textures,
-    triangle::SUBPIXELS,
 };
 
 /// Height of a tile, pixels.
@@ -14,48 +14,6 @@ const TILE_HEIGHT: usize = 32;
 
 /// With fewer changed tiles than this, waking other threads takes longer than painting.
 const PARALLEL_TILES_MIN: usize = 4;
-
-/// A half-open rectangle of pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelRect {
-    /// The first column.
-    pub left: i32,
-    /// The first row.
-    pub top: i32,
-    /// One past the last column.
-    pub right: i32,
-    /// One past the last row.
-    pub bottom: i32,
-}
-
-impl PixelRect {
-    /// Whether it contains no pixel.
-    pub fn is_empty(self) -> bool {
-        self.left >= self.right || self.top >= self.bottom
-    }
-
-    /// The pixels whose centers lie in the half-open box from `low` to `high`, subpixels.
-    pub(super) fn covering(low: [i32; 2], high: [i32; 2]) -> Self {
-        let first = |at: i32| (at - SUBPIXELS / 2 + SUBPIXELS - 1).div_euclid(SUBPIXELS);
-        let ([left, top], [right, bottom]) = (low.map(first), high.map(first));
-        Self { left, top, right, bottom }
-    }
-
-    /// The intersection.
-    pub(super) fn within(self, other: Self) -> Self {
-        Self {
-            left: self.left.max(other.left),
-            top: self.top.max(other.top),
-            right: self.right.min(other.right),
-            bottom: self.bottom.min(other.bottom),
-        }
-    }
-
-    pub(super) fn words(self) -> [u64; 2] {
-        let pair = |a: i32, b: i32| u64::from(a as u32) << 32 | u64::from(b as u32);
-        [pair(self.left, self.top), pair(self.right, self.bottom)]
-    }
-}
 
 /// All tiles of a framebuffer, row by row.
 #[derive(Default)]

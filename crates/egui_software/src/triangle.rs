@@ -3,11 +3,8 @@
 
 use super::{
     blend::{Rgba, multiply},
-    tiles::PixelRect,
+    pixel_rect::{PixelRect, SUBPIXELS},
 };
-
-/// Subpixels per pixel.
-pub(super) const SUBPIXELS: i32 = 256;
 
 /// Coordinates are clamped to this, pixels, so that edge functions do not overflow.
 const MAX_COORDINATE: f32 = 1048576.0;
