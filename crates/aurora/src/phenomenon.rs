@@ -7,6 +7,7 @@ use bansho_base::{
     host::observer::{Cancelled, Observer},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
+        editor_hints::{DraftLimit, EditorHints},
         kind::{BuildContext, BuildError, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
@@ -40,6 +41,8 @@ impl Describe for AuroraParameters {
         "rays.contrast",
         "folds.amplitude_km",
     ];
+    const EDITOR_HINTS: EditorHints =
+        EditorHints { draft_limits: &[DraftLimit { key: "particles.count", max: 24_000 }], ..EditorHints::NONE };
     const IN_THE_SKY: bool = true;
     // From the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky stays darker than the curtains.
     const SETTING: &'static str = "\

@@ -24,9 +24,6 @@ const WINDOW: [&str; 2] = ["window width", "window height"];
 /// Smaller sizes are ignored: the window is being opened or minimized. Points.
 const SMALLEST: f32 = 200.0;
 
-/// The panel at the bottom, whose size is its height.
-const AURORA: &str = "aurora";
-
 /// Key of the theme: 0 as the system's, 1 dark, 2 light.
 const THEME: &str = "theme";
 
@@ -53,11 +50,30 @@ impl Layout {
         self.values.insert(key.to_owned(), value.round());
     }
 
-    /// Shows `panel` with its stored size, or the default size, and records its size.
-    pub(super) fn panel_ui(&mut self, key: &str, panel: Panel, default: f32, ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
-        let sideways = key != AURORA;
+    /// Shows `panel` at the left or right with its stored width, or `default`, and records its width. Points.
+    pub(super) fn side_panel_ui(
+        &mut self,
+        key: &str,
+        panel: Panel,
+        default: f32,
+        ui: &mut Ui,
+        add: impl FnOnce(&mut Ui),
+    ) {
         let shown = panel.default_size(self.get(key, default)).show(ui, add).response.rect;
-        self.set(key, if sideways { shown.width() } else { shown.height() });
+        self.set(key, shown.width());
+    }
+
+    /// Shows `panel` at the bottom with its stored height, or `default`, and records its height. Points.
+    pub(super) fn bottom_panel_ui(
+        &mut self,
+        key: &str,
+        panel: Panel,
+        default: f32,
+        ui: &mut Ui,
+        add: impl FnOnce(&mut Ui),
+    ) {
+        let shown = panel.default_size(self.get(key, default)).show(ui, add).response.rect;
+        self.set(key, shown.height());
     }
 
     /// Applies the stored theme; dark by default.

@@ -18,29 +18,20 @@ use eframe::egui;
 pub use self::shortcuts::function_keys;
 use self::{files::Files, layout::Layout, viewport::Viewport};
 pub use super::session::{AssetsForFolder, Session};
-pub use crate::editors::flame_sheet::stages_ui::color_image;
 use crate::{
-    editors::{aurora::AuroraEditor, flame_sheet::stages_ui::StagesView},
+    editors::KindEditors,
     session::{selection::Selection, settings_store::SettingsStore},
 };
-use panels::{inspector::Inspector, problems::ProblemAction, text::TextPanel};
-
-/// The kind of phenomenon with an editor of shapes.
-const KIND_WITH_SHAPES: &str = "aurora";
-
-/// The kind of phenomenon with burners.
-const KIND_WITH_BURNERS: &str = "flame_particles";
-
-/// The kind of phenomenon with pictures of its stages.
-const KIND_WITH_STAGES: &str = "flame_sheet";
+use panels::{inspector::Inspector, problems::ProblemAction, stages::StagesSection, text::TextPanel};
+pub use widgets::picture_texture::color_image;
 
 /// The whole window.
 pub struct Studio {
     session: Session,
     selection: Selection,
     viewport: Viewport,
-    aurora: AuroraEditor,
-    stages: StagesView,
+    editors: KindEditors,
+    stages: StagesSection,
     inspector: Inspector,
     text: TextPanel,
     files: Files,
@@ -76,8 +67,8 @@ impl Studio {
             session,
             selection,
             viewport: Viewport::default(),
-            aurora: AuroraEditor::default(),
-            stages: StagesView::default(),
+            editors: KindEditors::default(),
+            stages: StagesSection::default(),
             inspector: Inspector::default(),
             text: TextPanel::default(),
             files: Files::new(&store),
@@ -145,16 +136,17 @@ impl Studio {
         if self.opened != self.session.opened || gone {
             self.opened = self.session.opened;
             self.selection = Selection::first_of(&self.session.document);
-            self.aurora = AuroraEditor::default();
+            self.editors = KindEditors::default();
         }
     }
 
     fn panels_ui(&mut self, ui: &mut egui::Ui) {
         self.side_panels_ui(ui);
-        if let (KIND_WITH_SHAPES, Some(index)) = (self.selection.key, self.selection.index) {
-            let panel = egui::Panel::bottom("aurora").resizable(true);
-            let Self { aurora, session, layout, .. } = self;
-            layout.panel_ui("aurora", panel, 420.0, ui, |ui| aurora.ui(ui, session, index));
+        let selected = self.selection.phenomenon();
+        if let Some(phenomenon) = selected.filter(|selected| self.editors.has_editor(selected.kind)) {
+            let panel = egui::Panel::bottom(phenomenon.kind).resizable(true);
+            let Self { editors, session, layout, .. } = self;
+            layout.bottom_panel_ui(phenomenon.kind, panel, 420.0, ui, |ui| editors.ui(ui, session, phenomenon));
         }
     }
 
@@ -168,16 +160,16 @@ impl Studio {
             None => {}
         }
         let Self { session, selection, text, stages, inspector, layout, visible_panels, .. } = self;
-        layout.panel_ui("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
+        layout.side_panel_ui("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| panels::scene::scene_ui(ui, session, selection));
         });
         if visible_panels.text {
-            layout.panel_ui("text", egui::Panel::right("text"), 380.0, ui, |ui| text.ui(ui, session));
+            layout.side_panel_ui("text", egui::Panel::right("text"), 380.0, ui, |ui| text.ui(ui, session));
         }
-        layout.panel_ui("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+        layout.side_panel_ui("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
             session.stages = None;
-            if let (KIND_WITH_STAGES, Some(index)) = (selection.key, selection.index) {
-                stages.ui(ui, session, index);
+            if let Some(phenomenon) = selection.phenomenon() {
+                stages.ui(ui, session, phenomenon);
             }
             // Wide rows scroll: otherwise they would widen the panel, which widens the rows.
             egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.ui(ui, session, selection));

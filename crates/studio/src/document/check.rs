@@ -15,6 +15,8 @@ use bansho::{
     },
 };
 
+use super::descriptors;
+
 /// The scene as `bansho render` draws it unless it is told otherwise.
 fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
     let options = SceneOptions { implied_backdrop: true, ..SceneOptions::default() };
@@ -70,8 +72,8 @@ impl Checker {
         text: &str,
         assets: &Arc<dyn Assets>,
     ) -> Option<Result<PlannedScene, SceneError>> {
-        let fewer = fewer_particles(&values(text).ok()?);
-        let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
+        let operations = draft_operations(&values(text).ok()?);
+        let draft = operation::apply(text, &operations).ok().filter(|_| !operations.is_empty())?;
         let whole = self.check(name, text, assets);
         let planned = |whole: PlannedScene| {
             let compiled = build(name, &draft, assets, &mut self.draft)?;
@@ -150,38 +152,27 @@ pub fn recheck(name: &str, text: &str, found: Result<f32, Vec<ReportedProblem>>)
     }
 }
 
-/// What a draft makes do with: a kind of phenomenon, the key of its number of particles, and how many.
-const DRAFT: [(&str, &[&str], i64); 2] =
-    [("aurora", &["particles", "count"], 24_000), ("flame_particles", &["particles"], 4_000)];
-
-fn fewer_particles(root: &Table) -> Vec<Operation> {
+/// The operations that lower the parameters of the scene `root` to the limits of a draft. Empty where none is above its limit.
+fn draft_operations(root: &Table) -> Vec<Operation> {
     let mut operations = Vec::new();
-    for (kind, keys, most) in DRAFT {
-        let Some(Value::List(all)) = root.get(kind).map(|node| &node.value) else { continue };
+    for kind in KINDS {
+        let Some(Value::List(all)) = root.get(kind.key).map(|node| &node.value) else { continue };
         for index in 0..all.len() {
-            let place = keys.iter().fold(ValuePath::root().key(kind).index(index), |place, key| place.key(key));
-            let stated = place.find(root).and_then(|node| node.value.as_number());
-            if stated.or_else(|| usual(kind, keys)).is_some_and(|count| count > most as f64) {
-                operations.push(Operation::Set { place, value: Value::Integer(most) });
+            for limit in kind.editor_hints.draft_limits {
+                let path = descriptors::within(&ValuePath::root().key(kind.key).index(index), limit.key);
+                if effective_number(root, &path).is_some_and(|number| number > limit.max as f64) {
+                    operations.push(Operation::Set { place: path, value: Value::Integer(limit.max) });
+                }
             }
         }
     }
     operations
 }
 
-/// The default of a number of `kind`.
-fn usual(kind: &str, keys: &[&str]) -> Option<f64> {
-    let kind = KINDS.iter().find(|own| own.key == kind)?;
-    let (last, way) = keys.split_last()?;
-    let table = way.iter().try_fold((kind.table)(), |table, key| {
-        let parameter = table.parameters.iter().find(|parameter| parameter.key == *key)?;
-        match &parameter.kind {
-            bansho::base::parameters::Kind::Table(inner) => Some(inner()),
-            _ => None,
-        }
-    })?;
-    let parameter = table.parameters.iter().find(|parameter| parameter.key == *last)?;
-    parameter.default.as_ref()?.as_number()
+/// The number at `path` of the scene `root`, or the parameter's default.
+fn effective_number(root: &Table, path: &ValuePath) -> Option<f64> {
+    let stated = path.find(root).and_then(|node| node.value.as_number());
+    stated.or_else(|| descriptors::descriptor(path)?.default.as_ref()?.as_number())
 }
 
 /// A fault that only planning shows, which lies in no one line.
@@ -213,9 +204,10 @@ mod tests {
     #[test]
     fn a_draft_has_fewer_particles_where_there_are_many() {
         let many = "bansho = 2\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
-        let fewer = fewer_particles(&values(many).unwrap());
-        let places: Vec<String> = fewer.iter().map(|operation| operation.place().to_string()).collect();
-        assert_eq!(places, ["aurora.0.particles.count", "flame_particles.0.particles"]);
+        let operations = draft_operations(&values(many).unwrap());
+        let mut paths: Vec<String> = operations.iter().map(|operation| operation.place().to_string()).collect();
+        paths.sort();
+        assert_eq!(paths, ["aurora.0.particles.count", "flame_particles.0.particles"]);
         assert!(draft("bansho = 2\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
         assert!(draft("bansho = 2\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());
     }

@@ -1,46 +1,21 @@
 //! Values keyed over time, as a scene states them.
 
 use bansho::{
-    KINDS,
     base::{
         math::{
             DVec3,
             curve::{Curve, Interpolation},
         },
-        parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
+        parameters::{Descriptor, InterpolationName, Node, Table, Value},
     },
-    scene::{SHARED_TABLES, Segment, ValuePath},
+    scene::ValuePath,
 };
 
-/// Whether what stands at `place` of a scene may be keyed over time.
-pub(crate) fn animatable(place: &ValuePath) -> bool {
-    let keys: Vec<&str> = place.segments().iter().filter_map(key).collect();
-    let [root, inner @ .., last] = keys.as_slice() else { return false };
-    let shared = SHARED_TABLES.iter().find(|table| table.key == *root).map(|table| (table.table)());
-    let table = shared.or_else(|| KINDS.iter().find(|kind| kind.key == *root).map(|kind| (kind.table)()));
-    let within = |table: &'static TableDescriptor, key: &&str| table_of(&parameter(table, key)?.kind);
-    let table = table.and_then(|table| inner.iter().try_fold(table, within));
-    table.and_then(|table| parameter(table, last)).is_some_and(Descriptor::animatable)
-}
+use super::descriptors::descriptor;
 
-/// Items of a list are alike.
-fn key(segment: &Segment) -> Option<&str> {
-    match segment {
-        Segment::Key(key) => Some(key),
-        Segment::Index(_) => None,
-    }
-}
-
-fn parameter(table: &'static TableDescriptor, key: &str) -> Option<&'static Descriptor> {
-    table.parameters.iter().find(|parameter| parameter.key == key)
-}
-
-fn table_of(kind: &Kind) -> Option<&'static TableDescriptor> {
-    match kind {
-        Kind::Table(table) => Some(table()),
-        Kind::List { item, .. } => table_of(item),
-        _ => None,
-    }
+/// Whether the value at `path` of a scene may be keyframed over time.
+pub(crate) fn animatable(path: &ValuePath) -> bool {
+    descriptor(path).is_some_and(Descriptor::animatable)
 }
 
 /// Whether `value` is keyed: `{ keys = [[seconds, value], ...] }`.

@@ -1,6 +1,7 @@
 //! The scene as text: edits that keep comments, undo, problems with their lines, and the last good plan.
 
 mod check;
+pub(crate) mod descriptors;
 pub mod files;
 mod history;
 pub(crate) mod keyframes;
@@ -27,7 +28,7 @@ use bansho::{
 
 pub use check::{Checker, PlannedScene, ReportedProblem, check, recheck};
 pub use named_files::named_files;
-pub use phenomena::{PhenomenonEntry, operations};
+pub use phenomena::{PhenomenonEntry, PhenomenonId, operations};
 
 use history::History;
 

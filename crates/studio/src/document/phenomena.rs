@@ -3,29 +3,48 @@
 use bansho::{
     KINDS,
     base::parameters::{Table, Value},
-    scene::{ValuePath, operation::Operation},
+    scene::{Segment, ValuePath, operation::Operation},
 };
 
-use super::Document;
+use super::{Document, descriptors};
 
-/// A phenomenon as the text lists it; it need not be without faults.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhenomenonEntry {
+/// A phenomenon of a scene: its kind, and its index among the phenomena of that kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PhenomenonId {
     /// Its kind, such as `rain`.
     pub kind: &'static str,
-    /// Which of its kind.
+    /// Its index in the list of its kind.
     pub index: usize,
+}
+
+impl PhenomenonId {
+    /// Phenomenon `index` of the kind called `kind` in scene files, if there is such a kind.
+    pub fn find(kind: &str, index: usize) -> Option<Self> {
+        descriptors::phenomenon_kind(kind).map(|kind| Self { kind: kind.key, index })
+    }
+
+    /// The path of its table.
+    pub fn path(self) -> ValuePath {
+        ValuePath::root().key(self.kind).index(self.index)
+    }
+}
+
+/// Whether a list without items at `path` is equivalent to a list with one item that has default values.
+pub(crate) fn implies_one_item(path: &ValuePath) -> bool {
+    let [Segment::Key(kind), Segment::Index(_), Segment::Key(list)] = path.segments() else { return false };
+    let handles = descriptors::phenomenon_kind(kind).and_then(|kind| kind.editor_hints.position_handles);
+    handles.and_then(|handles| handles.items).is_some_and(|items| items == list)
+}
+
+/// A phenomenon as the text lists it. Its parameters may be invalid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhenomenonEntry {
+    /// Its kind and index.
+    pub id: PhenomenonId,
     /// Its name.
     pub name: String,
     /// Whether it is drawn.
     pub enabled: bool,
-}
-
-impl PhenomenonEntry {
-    /// Where it stands.
-    pub fn place(&self) -> ValuePath {
-        ValuePath::root().key(self.kind).index(self.index)
-    }
 }
 
 impl Document {
@@ -39,20 +58,21 @@ impl Document {
                 Value::Table(table) => Some((index, table)),
                 _ => None,
             });
-            listed.extend(tables.map(|(index, table)| describe(kind.key, index, table)));
+            listed.extend(tables.map(|(index, table)| describe(PhenomenonId { kind: kind.key, index }, table)));
         }
         listed
     }
 }
 
-fn describe(kind: &'static str, index: usize, table: &Table) -> PhenomenonEntry {
+fn describe(id: PhenomenonId, table: &Table) -> PhenomenonEntry {
+    let PhenomenonId { kind, index } = id;
     let name = match table.get("name").map(|node| &node.value) {
         Some(Value::Text(name)) => name.clone(),
         _ if index == 0 => kind.to_owned(),
         _ => format!("{kind} {}", index + 1),
     };
     let enabled = table.get("enabled").is_none_or(|node| node.value != Value::Bool(false));
-    PhenomenonEntry { kind, index, name, enabled }
+    PhenomenonEntry { id, name, enabled }
 }
 
 /// A name that none of `listed` has: `wanted`, or `wanted` with a number.
@@ -79,19 +99,19 @@ pub mod operations {
 
     /// Adds a phenomenon like `original` under a name of its own.
     pub fn duplicate(document: &Document, original: &PhenomenonEntry) -> Vec<Operation> {
-        let Some(Value::Table(table)) = original.place().find(document.values()).map(|node| &node.value) else {
+        let Some(Value::Table(table)) = original.id.path().find(document.values()).map(|node| &node.value) else {
             return Vec::new();
         };
         let mut copy = Table::default();
         copy.push("name", Value::Text(free_name(&original.name, &document.phenomena())));
         let others = table.entries.iter().filter(|entry| entry.key != "name");
         others.for_each(|entry| copy.push(entry.key.clone(), entry.node.value.clone()));
-        vec![Operation::Append { place: ValuePath::root().key(original.kind), value: Value::Table(copy) }]
+        vec![Operation::Append { place: ValuePath::root().key(original.id.kind), value: Value::Table(copy) }]
     }
 
     /// Draws it, or does not.
     pub fn set_enabled(listed: &PhenomenonEntry, enabled: bool) -> Operation {
-        let place = listed.place().key("enabled");
+        let place = listed.id.path().key("enabled");
         match (enabled, listed.enabled) {
             // Being drawn is the default.
             (true, false) => Operation::Remove { place },

@@ -14,7 +14,7 @@ use bansho::{
 };
 
 use super::{Event, FrameRequest, Picture, snapshot_cache::SnapshotCache};
-use crate::document::{Checker, PlannedScene, Revision, stages};
+use crate::document::{Checker, PhenomenonId, PlannedScene, Revision, stages};
 use web_time::Instant;
 
 /// Why a request has no picture.
@@ -98,8 +98,8 @@ impl Engine {
         }
         let picture = self.draw(&scene, request, observer)?;
         emit(Event::Drawn(Picture { draft, ..picture }));
-        if let Some(sheet) = request.stages {
-            self.stages.set_scene(&scene, sheet, request);
+        if let Some(phenomenon) = request.stages {
+            self.stages.set_scene(&scene, phenomenon, request);
             for (stage, opened) in self.stages.shots.iter_mut().enumerate() {
                 let picture =
                     opened.draw(request, request.number.unwrap_or(scene.plan.frames().start), &mut None, observer)?;
@@ -174,28 +174,28 @@ impl OpenShot {
     }
 }
 
-/// Shots of the stages of a flame sheet.
+/// Shots of the stages of a phenomenon.
 #[derive(Default)]
 struct StageShots {
-    /// Of which scene and which sheet.
-    of: Option<(PlannedScene, usize)>,
+    /// The scene and the phenomenon in it.
+    of: Option<(PlannedScene, PhenomenonId)>,
     shots: Vec<OpenShot>,
 }
 
 impl StageShots {
-    fn set_scene(&mut self, scene: &PlannedScene, sheet: usize, request: &FrameRequest) {
-        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(&of.plan, &scene.plan) && *own == sheet) {
+    fn set_scene(&mut self, scene: &PlannedScene, phenomenon: PhenomenonId, request: &FrameRequest) {
+        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(&of.plan, &scene.plan) && *own == phenomenon) {
             return;
         }
-        // Of a text with faults there are none; the last pictures stay.
-        let plans = stages::plans(&request.name, &request.text, &request.assets, sheet).unwrap_or_default();
+        // A text with errors has no plans; the last pictures stay.
+        let plans = stages::plans(&request.name, &request.text, &request.assets, phenomenon).unwrap_or_default();
         let open = |of: PlannedScene| OpenShot {
             shot: Shot::open(of.compiled.clone(), of.plan.clone()),
             size: of.plan.size(),
             of,
         };
         self.shots = plans.into_iter().map(open).collect();
-        self.of = Some((scene.clone(), sheet));
+        self.of = Some((scene.clone(), phenomenon));
     }
 }
 

@@ -24,7 +24,7 @@ use std::{sync::Arc, time::Duration};
 
 use bansho::{Assets, Plan, SceneError};
 
-use crate::document::Revision;
+use crate::document::{PhenomenonId, Revision};
 
 pub use polled::PolledPlayer;
 pub use preview_size::{FrameTiming, PreviewScale};
@@ -55,8 +55,8 @@ pub struct FrameRequest {
     pub draft: bool,
     /// Whether the finished picture is wanted, as `bansho render` writes it, in place of one for a window.
     pub full_quality: bool,
-    /// The flame sheet whose stages are wanted besides.
-    pub stages: Option<usize>,
+    /// The phenomenon whose stages are drawn too.
+    pub stages: Option<PhenomenonId>,
 }
 
 /// A rendered preview.
@@ -93,7 +93,7 @@ pub enum Event {
     },
     /// A picture is there.
     Drawn(Picture),
-    /// A small picture of a stage of the flame sheet that was asked for, which of [`stages`](crate::document::stages::names).
+    /// A small picture of a stage of the requested phenomenon: its index in [`stages::names`](crate::document::stages::names).
     Stage(usize, Picture),
     /// The finished picture of a frame is there.
     FullQualityFrame {

@@ -23,8 +23,7 @@ use bansho::{
 };
 
 use crate::{
-    document::{Document, Revision, keyframes},
-    editors::aurora::document::{AuroraDrawing, ShapeEditError},
+    document::{Document, PhenomenonId, Revision, keyframes},
     player::{Event, FrameRequest, FrameTiming, Picture, Player, PreviewScale, Transport},
     scenes::examples::Bundle,
 };
@@ -55,8 +54,8 @@ pub struct Session {
     pub opened: u64,
     /// Whether pictures may be simulated with fewer particles than the scene has.
     pub draft: bool,
-    /// The flame sheet whose stages are shown.
-    pub stages: Option<usize>,
+    /// The phenomenon whose stages are shown.
+    pub stages: Option<PhenomenonId>,
     /// Whether to autosave at once.
     pub autosave_now: bool,
     player: Box<dyn Player>,
@@ -84,7 +83,7 @@ struct LastRequest {
     number: Option<i64>,
     within: [usize; 2],
     draft: bool,
-    stages: Option<usize>,
+    stages: Option<PhenomenonId>,
 }
 
 impl Session {
@@ -156,7 +155,7 @@ impl Session {
         self.picture.as_ref().map(|picture| (picture, self.drawn))
     }
 
-    /// The last picture of a stage of the selected flame sheet, with its serial number.
+    /// The last picture of a stage of the phenomenon whose stages are shown, with its serial number.
     pub fn stage(&self, stage: usize) -> Option<(&Picture, u64)> {
         self.stage_pictures.get(stage).map(|(picture, drawn)| (picture, *drawn))
     }
@@ -200,21 +199,6 @@ impl Session {
             }
             Err(error) => self.notice = Some(error.to_string()),
         }
-    }
-
-    /// Applies `operations` to the shapes of aurora `index`. Returns its shapes.
-    ///
-    /// # Errors
-    /// The resulting shapes are invalid; nothing is changed then.
-    pub fn edit_shapes(
-        &mut self,
-        label: &str,
-        operations: &[Operation],
-        index: usize,
-    ) -> Result<AuroraDrawing, ShapeEditError> {
-        let drawing = self.document.edit_shapes(label, operations, index, &self.assets)?;
-        self.notice = None;
-        Ok(drawing)
     }
 
     /// Seeks to the frame at `time`, s, again once the scene is checked, since an edit may make the shot longer.

@@ -6,14 +6,12 @@ use bansho::{
 };
 
 use crate::{
-    app::{
-        viewport::handles::implies_one_item,
-        widgets::{
-            icon::{self, Icon},
-            value::{ValueEditor, initial_value},
-        },
+    app::widgets::{
+        icon::{self, Icon},
+        key_label,
+        value::{ValueEditor, initial_value},
     },
-    document::keyframes,
+    document::{keyframes, phenomena::implies_one_item},
     session::{Session, selection::Selection},
 };
 
@@ -70,7 +68,7 @@ impl SearchFilter {
             Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.is_in(inner())),
             _ => false,
         };
-        within || said(&words(parameter.key)) || said(&parameter.doc)
+        within || said(&key_label(parameter.key)) || said(&parameter.doc)
     }
 
     fn is_in(&self, table: &TableDescriptor) -> bool {
@@ -100,7 +98,7 @@ fn table_ui(
 
 /// A collapsing header that is open while searching.
 fn header(title: &str, place: &ValuePath, filter: &SearchFilter) -> CollapsingHeader {
-    CollapsingHeader::new(words(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
+    CollapsingHeader::new(key_label(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
 }
 
 fn section_ui(
@@ -144,7 +142,7 @@ fn list_ui(
         for (index, node) in items.iter().enumerate() {
             list_item_ui(ui, session, &place.index(index), item, &node.value, filter, &before);
         }
-        if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
+        if ui.button(format!("Add to {}", key_label(parameter.key))).clicked() {
             let append = Operation::Append { place: place.clone(), value: initial_value(item) };
             session.edit("add", &[before.as_slice(), &[append]].concat());
         }
@@ -188,7 +186,7 @@ fn row_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Des
     let implied_value = session.implied_value(place).or_else(|| parameter.default.clone());
     let present = stated.as_ref().or(implied_value.as_ref()).and_then(|value| keyframes::at(value, time));
     let curve = matches!(parameter.kind, Kind::Curve { .. });
-    let name = RichText::new(words(parameter.key));
+    let name = RichText::new(key_label(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
     ui.horizontal_wrapped(|ui| {
         let label = name_ui(ui, name).on_hover_text(help(parameter)).id;
@@ -232,7 +230,7 @@ fn name_ui(ui: &mut Ui, name: RichText) -> Response {
 }
 
 fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor, stated: bool) {
-    let name = format!("Default of {}", words(parameter.key));
+    let name = format!("Default of {}", key_label(parameter.key));
     if stated && icon::button(ui, Icon::Reset, &name).clicked() {
         session.edit("default", &[Operation::Remove { place: place.clone() }]);
     }
@@ -261,9 +259,4 @@ fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, stated: 
 fn help(parameter: &Descriptor) -> String {
     let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
     format!("{}{unit}\n\nAllowed: {}.", parameter.doc, parameter.kind.expectation())
-}
-
-/// A key in words.
-pub(crate) fn words(key: &str) -> String {
-    key.replace('_', " ")
 }

@@ -123,7 +123,7 @@ fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
 
     drop_on(&mut harness, &[file("ring.glb")]);
     assert_eq!(text(&mut harness), before);
-    assert!(notice(&mut harness).contains("particle flame"), "{}", notice(&mut harness));
+    assert!(notice(&mut harness).contains("flame_particles"), "{}", notice(&mut harness));
     fs::write(file("words.doc"), "").unwrap();
     drop_on(&mut harness, &[file("words.doc")]);
     assert!(notice(&mut harness).starts_with("words.doc: "), "{}", notice(&mut harness));

@@ -1,8 +1,9 @@
 //! The viewport: the picture, and dragging in it to move the camera, the wind, lamps and burners.
 
-pub(crate) mod handles;
-pub(crate) mod pointer;
-pub(crate) mod wind_drag;
+mod curve_overlay;
+mod handles;
+mod pointer;
+mod wind_drag;
 
 use bansho::{
     base::{
@@ -14,13 +15,10 @@ use bansho::{
 };
 
 use crate::{
-    editors::flame_sheet::{curves_ui, stages_ui::color_image},
+    app::widgets::picture_texture::PictureTexture,
     session::{Session, selection::Selection},
 };
-use eframe::egui::{
-    self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2,
-    pos2, vec2,
-};
+use eframe::egui::{self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use handles::{Handle, handles};
 use pointer::{CameraPose, rounded};
 use wind_drag::WindDrag;
@@ -43,7 +41,7 @@ pub(super) enum ViewportTool {
 /// The viewport.
 #[derive(Default)]
 pub(super) struct Viewport {
-    texture: Option<(TextureHandle, u64)>,
+    texture: PictureTexture,
     pixels: [usize; 2],
     pub(super) tool: ViewportTool,
     wind_drag: Option<WindDrag>,
@@ -78,14 +76,14 @@ impl Viewport {
         let drawn = session.picture().map_or(size, |(picture, _)| picture.size);
         let frame = on_pixels(fit(size, response.rect), drawn, scale);
         painter.add(around(response.rect, frame, SURROUND));
-        if let Some((texture, _)) = &self.texture {
+        if let Some(texture) = self.texture.id() {
             let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-            painter.image(texture.id(), frame, whole, Color32::WHITE);
+            painter.image(texture, frame, whole, Color32::WHITE);
         }
         self.handle_pointer(ui, session, &response, frame);
         self.paint_handles(session, &painter, frame);
-        if self.curves && curves_ui::has_any(selection) {
-            curves_ui::curves_ui(ui, session, selection, response.rect);
+        if self.curves && curve_overlay::has_any(selection) {
+            curve_overlay::curve_overlay_ui(ui, session, selection, response.rect);
         }
     }
 
@@ -101,7 +99,7 @@ impl Viewport {
                 .on_hover_text("What is dragged leaves keyframes; time passes while you blow or drag things");
             ui.toggle_value(&mut session.draft, "Draft")
                 .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
-            if curves_ui::has_any(selection) {
+            if curve_overlay::has_any(selection) {
                 ui.toggle_value(&mut self.curves, "Curves")
                     .on_hover_text("The curves of what is chosen, on the picture");
             }
@@ -112,17 +110,8 @@ impl Viewport {
 
     /// Uploads a new picture to the texture. Returns the size of the scene's picture.
     pub(super) fn upload_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
-        let (picture, drawn) = session.picture()?;
-        if self.texture.as_ref().is_none_or(|(_, shown)| *shown != drawn) {
-            let image = color_image(picture);
-            match &mut self.texture {
-                Some((texture, shown)) => {
-                    texture.set(image, TextureOptions::LINEAR);
-                    *shown = drawn;
-                }
-                None => self.texture = Some((ui.ctx().load_texture("picture", image, TextureOptions::LINEAR), drawn)),
-            }
-        }
+        let (picture, serial) = session.picture()?;
+        self.texture.upload(ui.ctx(), "picture", picture, serial);
         Some(picture.scene_size)
     }
 

@@ -10,7 +10,11 @@ mod tool;
 
 use std::sync::Arc;
 
-use bansho::{aurora::shapes::Form, scene::operation::Operation};
+use bansho::{
+    aurora::{AuroraParameters, shapes::Form},
+    base::{parameters::Value, phenomenon::kind::Describe},
+    scene::operation::Operation,
+};
 
 use self::{
     plane::{Plane, Side},
@@ -40,6 +44,9 @@ pub(crate) struct AuroraEditor {
 }
 
 impl AuroraEditor {
+    /// The kind of phenomenon that it edits.
+    pub(crate) const KIND: &'static str = AuroraParameters::KEY;
+
     /// Shows the editor of aurora `index`.
     pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {
         if self.index != index {
@@ -152,7 +159,7 @@ impl AuroraEditor {
 
     /// Applies an edit of the shapes, or shows the error at `at`. Returns whether it was applied.
     fn change(&mut self, session: &mut Session, label: &str, operations: &[Operation], at: Pos2) -> bool {
-        match session.edit_shapes(label, operations, self.index) {
+        match edit_shapes(session, label, operations, self.index) {
             Ok(drawing) => {
                 self.shape_error = None;
                 self.read = Some((session.document.revision(), Ok(Arc::new(drawing))));
@@ -182,4 +189,30 @@ impl AuroraEditor {
             },
         );
     }
+}
+
+/// Applies `operations` to the shapes of aurora `index`. Returns its shapes.
+///
+/// # Errors
+/// The resulting shapes are invalid; nothing is changed then.
+pub(crate) fn edit_shapes(
+    session: &mut Session,
+    label: &str,
+    operations: &[Operation],
+    index: usize,
+) -> Result<AuroraDrawing, ShapeEditError> {
+    let assets = session.assets().clone();
+    let drawing = session.document.edit_shapes(label, operations, index, &assets)?;
+    session.set_notice(None);
+    Ok(drawing)
+}
+
+/// Replaces the sheets of the first shape of aurora `index` by the strokes of the SVG file that the scene calls `name`.
+///
+/// # Errors
+/// There is no such aurora, or the strokes make no valid shape.
+pub(crate) fn import_drawing(session: &mut Session, index: usize, name: Value) -> Result<(), ShapeEditError> {
+    let drawing = AuroraDrawing::read(session.document.values(), index, session.assets())?;
+    edit_shapes(session, "drawing", &drawing.trace(name), index)?;
+    Ok(())
 }

@@ -6,7 +6,7 @@ use bansho::Assets;
 
 use super::reply::Reply;
 use crate::{
-    document::{ReportedProblem, Revision},
+    document::{PhenomenonId, ReportedProblem, Revision},
     player::{FrameRequest, Picture},
 };
 use js_sys::{Array, Uint8Array};
@@ -36,8 +36,11 @@ impl PageMessage {
             (&*request.name).into(),
             (&*request.text).into(),
         ];
-        let stages = request.stages.map_or(JsValue::NULL, |sheet| (sheet as f64).into());
-        head.into_iter().chain([frame, width, height]).chain(flags).chain([stages]).collect()
+        let stages = match request.stages {
+            Some(PhenomenonId { kind, index }) => [kind.into(), (index as f64).into()],
+            None => [JsValue::NULL; 2],
+        };
+        head.into_iter().chain([frame, width, height]).chain(flags).chain(stages).collect()
     }
 
     /// Reads a message; requests find their files in `assets`.
@@ -57,7 +60,7 @@ impl PageMessage {
                     exact: fields.flag()?,
                     draft: fields.flag()?,
                     full_quality: fields.flag()?,
-                    stages: fields.next()?.as_f64().map(|sheet| sheet as usize),
+                    stages: fields.phenomenon()?,
                 };
                 Self::Request(number, request)
             }
@@ -174,6 +177,12 @@ impl Fields {
 
     fn size(&mut self) -> Option<[usize; 2]> {
         Some([self.number()? as usize, self.number()? as usize])
+    }
+
+    /// A phenomenon's kind and index; both null for none.
+    fn phenomenon(&mut self) -> Option<Option<PhenomenonId>> {
+        let (kind, index) = (self.next()?.as_string(), self.next()?.as_f64());
+        Some(kind.zip(index).and_then(|(kind, index)| PhenomenonId::find(&kind, index as usize)))
     }
 
     fn bytes(&mut self) -> Option<Vec<u8>> {

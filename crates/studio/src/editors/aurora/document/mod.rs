@@ -21,6 +21,7 @@ use bansho::{
     base::{
         math::DVec2,
         parameters::{Parameters, ProblemKind, Reader, Table, Value},
+        phenomenon::kind::Describe,
     },
     scene::{
         ValuePath,
@@ -73,7 +74,7 @@ impl AuroraDrawing {
     /// # Errors
     /// There is no such aurora, or its parameters or shapes are faulty.
     pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, ShapeEditError> {
-        let place = ValuePath::root().key("aurora").index(index);
+        let place = ValuePath::root().key(AuroraParameters::KEY).index(index);
         let Some(Value::Table(table)) = place.find(root).map(|node| &node.value) else {
             return Err(ShapeEditError::Missing);
         };

@@ -6,9 +6,9 @@ use bansho::{
 };
 
 use crate::{
-    app::{
-        panels::inspector::words,
-        widgets::curve_editor::{self, CurveBounds},
+    app::widgets::{
+        curve_editor::{self, CurveBounds},
+        key_label,
     },
     session::{Session, selection::Selection},
 };
@@ -38,7 +38,7 @@ pub(crate) fn has_any(selection: &Selection) -> bool {
 }
 
 /// Shows them along the lower edge of the picture in `viewport`, row over row.
-pub(crate) fn curves_ui(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
+pub(crate) fn curve_overlay_ui(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
     let Some(descriptor) = selection.descriptor() else { return };
     let mut curves = Vec::new();
     collect_curves(&selection.place(), descriptor, &mut curves);
@@ -104,8 +104,8 @@ fn title(parameter: &Descriptor) -> String {
     let symbol = parameter.doc.split(',').next().filter(|symbol| symbol.len() <= 8 && symbol.contains('('));
     let symbol = symbol.or_else(|| parameter.doc.split(',').next().filter(|symbol| symbol.starts_with("1 - ")));
     match symbol {
-        Some(symbol) => format!("{symbol}  {}", words(parameter.key)),
-        None => words(parameter.key),
+        Some(symbol) => format!("{symbol}  {}", key_label(parameter.key)),
+        None => key_label(parameter.key),
     }
 }
 
