@@ -82,7 +82,7 @@ impl Painter {
     }
 
     /// Discards the framebuffer: the next frame paints everything.
-    pub fn forget(&mut self) {
+    pub fn invalidate(&mut self) {
         self.tile_grid = TileGrid::default();
     }
 

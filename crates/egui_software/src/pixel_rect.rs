@@ -39,7 +39,8 @@ impl PixelRect {
         }
     }
 
-    pub(super) fn words(self) -> [u64; 2] {
+    /// The rectangle as words for a hash.
+    pub(super) fn hash_words(self) -> [u64; 2] {
         let pair = |a: i32, b: i32| u64::from(a as u32) << 32 | u64::from(b as u32);
         [pair(self.left, self.top), pair(self.right, self.bottom)]
     }

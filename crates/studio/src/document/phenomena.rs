@@ -1,4 +1,4 @@
-//! The phenomena of a scene as a list: add, duplicate, hide, show alone.
+//! The list of the phenomena of a scene, and the operations on it: add, duplicate, hide, solo.
 
 use bansho::{
     KINDS,
@@ -43,14 +43,14 @@ pub struct PhenomenonEntry {
     pub id: PhenomenonId,
     /// Its name.
     pub name: String,
-    /// Whether it is drawn.
+    /// Whether it is shown.
     pub enabled: bool,
 }
 
 impl Document {
     /// All phenomena, kind by kind in the order of the file.
     pub fn phenomena(&self) -> Vec<PhenomenonEntry> {
-        let mut listed = Vec::new();
+        let mut entries = Vec::new();
         for entry in &self.values().entries {
             let Some(kind) = KINDS.iter().find(|kind| kind.key == entry.key) else { continue };
             let Value::List(items) = &entry.node.value else { continue };
@@ -58,9 +58,9 @@ impl Document {
                 Value::Table(table) => Some((index, table)),
                 _ => None,
             });
-            listed.extend(tables.map(|(index, table)| describe(PhenomenonId { kind: kind.key, index }, table)));
+            entries.extend(tables.map(|(index, table)| describe(PhenomenonId { kind: kind.key, index }, table)));
         }
-        listed
+        entries
     }
 }
 
@@ -75,14 +75,14 @@ fn describe(id: PhenomenonId, table: &Table) -> PhenomenonEntry {
     PhenomenonEntry { id, name, enabled }
 }
 
-/// A name that none of `listed` has: `wanted`, or `wanted` with a number.
-fn free_name(wanted: &str, listed: &[PhenomenonEntry]) -> String {
-    let taken = |name: &str| listed.iter().any(|other| other.name == name);
+/// A name that none of `entries` has: `wanted`, or `wanted` with a number.
+fn free_name(wanted: &str, entries: &[PhenomenonEntry]) -> String {
+    let taken = |name: &str| entries.iter().any(|other| other.name == name);
     if !taken(wanted) {
         return wanted.to_owned();
     }
-    // Of one more name than there are phenomena, one is free.
-    let numbered = (2..listed.len() + 3).map(|number| format!("{wanted} {number}"));
+    // One more candidate than there are phenomena, so that one is free.
+    let numbered = (2..entries.len() + 3).map(|number| format!("{wanted} {number}"));
     numbered.into_iter().find(|name| !taken(name)).unwrap_or_default()
 }
 
@@ -97,7 +97,7 @@ pub mod operations {
         vec![Operation::Append { place: ValuePath::root().key(kind), value: Value::Table(table) }]
     }
 
-    /// Adds a phenomenon like `original` under a name of its own.
+    /// Adds a copy of `original` with a unique name.
     pub fn duplicate(document: &Document, original: &PhenomenonEntry) -> Vec<Operation> {
         let Some(Value::Table(table)) = original.id.path().find(document.values()).map(|node| &node.value) else {
             return Vec::new();
@@ -109,17 +109,17 @@ pub mod operations {
         vec![Operation::Append { place: ValuePath::root().key(original.id.kind), value: Value::Table(copy) }]
     }
 
-    /// Draws it, or does not.
-    pub fn set_enabled(listed: &PhenomenonEntry, enabled: bool) -> Operation {
-        let place = listed.id.path().key("enabled");
-        match (enabled, listed.enabled) {
-            // Being drawn is the default.
-            (true, false) => Operation::Remove { place },
-            _ => Operation::Set { place, value: Value::Bool(enabled) },
+    /// Shows or hides a phenomenon.
+    pub fn set_enabled(entry: &PhenomenonEntry, enabled: bool) -> Operation {
+        let path = entry.id.path().key("enabled");
+        match (enabled, entry.enabled) {
+            // Shown is the default.
+            (true, false) => Operation::Remove { place: path },
+            _ => Operation::Set { place: path, value: Value::Bool(enabled) },
         }
     }
 
-    /// Draws only this one; all, where it is the only one already.
+    /// Shows only `chosen`, or all phenomena if it is the only one shown.
     pub fn solo(document: &Document, chosen: &PhenomenonEntry) -> Vec<Operation> {
         let all = document.phenomena();
         let alone = all.iter().all(|each| each.enabled == (each == chosen));

@@ -7,7 +7,7 @@ use bansho::{
 };
 
 use super::{
-    files::{self, ExternalChange, Recent},
+    files::{self, ExternalChange, RecentFiles},
     *,
 };
 use crate::document::{
@@ -182,11 +182,11 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
     assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
-    assert_eq!(files::external_change(&document, &path), ExternalChange::Same);
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Unchanged);
     fs::write(&path, "bansho = 2\n").unwrap();
     assert_eq!(files::external_change(&document, &path), ExternalChange::Changed("bansho = 2\n".into()));
     fs::remove_file(&path).unwrap();
-    assert_eq!(files::external_change(&document, &path), ExternalChange::Gone);
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Deleted);
     document.set_file_missing(true);
     assert!(document.is_dirty() && !document.is_modified(), "what lies nowhere is not saved");
     let text = document.text().clone();
@@ -200,7 +200,7 @@ fn saving_is_whole_and_outside_edits_are_seen() {
 #[test]
 fn what_is_rescued_spoils_nothing_that_was_rescued_before() {
     let folder = tempfile::tempdir().unwrap();
-    let rescued = |text: &str| files::rescue(text, &folder.path().join("fire.toml")).unwrap();
+    let rescued = |text: &str| files::save_rescue_copy(text, &folder.path().join("fire.toml")).unwrap();
     let names = ["x", "y", "x"].map(rescued).map(|path| path.file_name().unwrap().to_owned());
     assert_eq!(names, ["fire.rescued.toml", "fire.rescued 2.toml", "fire.rescued.toml"]);
     assert_eq!(fs::read_to_string(folder.path().join("fire.rescued.toml")).unwrap(), "x");
@@ -210,11 +210,11 @@ fn what_is_rescued_spoils_nothing_that_was_rescued_before() {
 fn recent_files_are_remembered_the_last_first() {
     let folder = tempfile::tempdir().unwrap();
     let list = folder.path().join("recent");
-    let mut recent = Recent::read(list.clone());
+    let mut recent = RecentFiles::read(list.clone());
     for name in ["a.toml", "b.toml", "a.toml"] {
-        recent.note(&folder.path().join(name)).unwrap();
+        recent.add(&folder.path().join(name)).unwrap();
     }
-    assert_eq!(Recent::read(list), recent);
+    assert_eq!(RecentFiles::read(list), recent);
     let names: Vec<_> = recent.paths().iter().map(|path| path.file_name().unwrap()).collect();
     assert_eq!(names, ["a.toml", "b.toml"]);
 }
@@ -226,14 +226,14 @@ fn unsaved_work_outlives_its_studio_but_a_living_ones_is_left_alone() {
     let other = Autosave::begin(folder.path(), "studio").unwrap();
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    autosave.keep(&document, Some("scenes/fire.toml".as_ref())).unwrap();
-    other.keep(&scene(), None).unwrap();
+    autosave.save(&document, Some("scenes/fire.toml".as_ref())).unwrap();
+    other.save(&scene(), None).unwrap();
     assert_eq!(autosave::recoverable(folder.path()), [], "both are running");
     drop(autosave);
     let found = autosave::recoverable(folder.path());
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].origin.as_str(), found[0].text.as_str()), ("scenes/fire.toml", &**document.text()));
-    found[0].forget();
+    found[0].discard();
     assert_eq!(autosave::recoverable(folder.path()), []);
 }
 
@@ -243,9 +243,9 @@ fn work_that_ended_well_leaves_nothing_behind() {
     let autosave = Autosave::begin(folder.path(), "studio").unwrap();
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    autosave.keep(&document, None).unwrap();
+    autosave.save(&document, None).unwrap();
     document.undo();
-    autosave.keep(&document, None).unwrap();
+    autosave.save(&document, None).unwrap();
     autosave.end();
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

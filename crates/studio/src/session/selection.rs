@@ -12,7 +12,7 @@ use crate::document::{Document, PhenomenonId, descriptors};
 pub(crate) struct Selection {
     /// The table's name in scene files.
     pub(crate) key: &'static str,
-    /// Which of that name, where there may be many.
+    /// Its index, if the scene may have several tables of that name.
     pub(crate) index: Option<usize>,
 }
 
@@ -23,7 +23,7 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// The first phenomenon, if there is one.
+    /// The first phenomenon of `document`, or a shared table where it has none.
     pub(crate) fn first_of(document: &Document) -> Self {
         let first = document.phenomena().into_iter().next();
         first.map_or_else(Self::default, |entry| entry.id.into())
@@ -41,9 +41,9 @@ impl Selection {
     }
 
     /// Its path in the document.
-    pub(crate) fn place(&self) -> ValuePath {
-        let place = ValuePath::root().key(self.key);
-        self.index.map_or(place.clone(), |index| place.index(index))
+    pub(crate) fn path(&self) -> ValuePath {
+        let path = ValuePath::root().key(self.key);
+        self.index.map_or(path.clone(), |index| path.index(index))
     }
 
     /// Its title.

@@ -1,4 +1,4 @@
-//! Files that the scene names: relinked, or added by dropping them on the window.
+//! Assets of the scene: relinked to other files, or added by dropping files on the window.
 
 use std::path::Path;
 
@@ -20,18 +20,18 @@ const MESHES: [&str; 2] = ["glb", "gltf"];
 const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
 
 impl Session {
-    /// Lets `place` name the file `file`.
-    pub fn relink(&mut self, place: &ValuePath, file: &Path) {
-        let value = self.named(file);
-        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
+    /// Sets `parameter` to the file `file`.
+    pub fn relink(&mut self, parameter: &ValuePath, file: &Path) {
+        let value = self.relative_name(file);
+        self.edit("relink", &[Operation::Set { place: parameter.clone(), value }]);
         self.reload_assets();
     }
 
     /// `file` as the scene names it: relative to its folder where it lies there.
-    fn named(&self, file: &Path) -> Value {
+    fn relative_name(&self, file: &Path) -> Value {
         let folder = folder(self.path.as_deref());
-        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(whole)).unwrap_or(file);
+        let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(absolute)).unwrap_or(file);
         Value::Text(relative.to_string_lossy().replace('\\', "/"))
     }
 
@@ -39,18 +39,18 @@ impl Session {
     /// picture as the plate.
     pub(super) fn drop_file(&mut self, file: &Path, selection: &Selection) {
         let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        // It may be another file of a name that was read before.
+        // A file of the same name may have been read before.
         self.reload_assets();
         self.document.end_step();
-        let name = self.named(file);
+        let name = self.relative_name(file);
         if editors::import_file(self, selection, &extension, name.clone()) {
             return;
         }
         if MESHES.contains(&extension.as_str()) {
             self.add_mesh(selection, name);
         } else if PICTURES.contains(&extension.as_str()) {
-            let place = ValuePath::root().key("plate").key("image");
-            self.edit("plate", &[Operation::Set { place, value: name }]);
+            let parameter = ValuePath::root().key("plate").key("image");
+            self.edit("plate", &[Operation::Set { place: parameter, value: name }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let reason =

@@ -13,7 +13,7 @@ use crate::{
 
 use eframe::egui::{self, Ui};
 
-/// Shows the panel; `selection` is what is chosen.
+/// Shows the panel and updates `selection`.
 pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     ui.horizontal(|ui| {
         ui.heading("Scene");
@@ -36,7 +36,7 @@ pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selec
             let response = row_ui(ui, selection, own.clone(), &format!("{} {}", shared.key, index + 1));
             response.context_menu(|ui| {
                 if ui.button("Remove").clicked() {
-                    session.edit("remove", &[Operation::Remove { place: own.place() }]);
+                    session.edit("remove", &[Operation::Remove { place: own.path() }]);
                     *selection = Selection::default();
                 }
             });
@@ -66,8 +66,8 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
         ui.separator();
         for shared in SHARED_TABLES.iter().filter(|table| table.many) {
             if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
-                let place = ValuePath::root().key(shared.key);
-                session.edit("add", &[Operation::Append { place, value: Value::Table(Table::default()) }]);
+                let path = ValuePath::root().key(shared.key);
+                session.edit("add", &[Operation::Append { place: path, value: Value::Table(Table::default()) }]);
                 ui.close();
             }
         }
@@ -110,21 +110,21 @@ fn phenomenon_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Select
     }
 }
 
-/// A field for its name, applied when the field loses the focus: a partial name may equal another's.
+/// A field for the name. It is applied when the field loses the focus, since a partly typed name may equal that of another phenomenon.
 fn rename_ui(ui: &mut Ui, session: &mut Session, entry: &PhenomenonEntry) {
-    let kept = ui.scope_id().with("name");
-    let mut name = ui.data(|data| data.get_temp::<String>(kept)).unwrap_or_else(|| entry.name.clone());
+    let draft_id = ui.scope_id().with("name");
+    let mut name = ui.data(|data| data.get_temp::<String>(draft_id)).unwrap_or_else(|| entry.name.clone());
     ui.horizontal(|ui| {
         let label = ui.label("Name").id;
         let field = ui.add(egui::TextEdit::singleline(&mut name).desired_width(120.0)).labelled_by(label);
         if field.changed() {
-            ui.data_mut(|data| data.insert_temp(kept, name.clone()));
+            ui.data_mut(|data| data.insert_temp(draft_id, name.clone()));
         }
         if field.lost_focus() {
-            ui.data_mut(|data| data.remove::<String>(kept));
+            ui.data_mut(|data| data.remove::<String>(draft_id));
             if !name.trim().is_empty() && name != entry.name {
-                let place = entry.id.path().key("name");
-                session.edit("rename", &[Operation::Set { place, value: Value::Text(name.trim().to_owned()) }]);
+                let path = entry.id.path().key("name");
+                session.edit("rename", &[Operation::Set { place: path, value: Value::Text(name.trim().to_owned()) }]);
                 ui.close();
             }
         }

@@ -174,11 +174,11 @@ fn sheets_and_points_are_linked_by_dragging() {
     assert!(text(&mut harness).contains("link = [{ from = 1, to = 2 }]"), "{}", text(&mut harness));
     link(&mut harness, at(source, 0.5, 0.4), at(target, 0.5, 0.4));
     link(&mut harness, at(target, 0.3, 0.4), at(target, 0.5, 0.4));
-    let linked = drawing(&mut harness).linked(1);
+    let linked = drawing(&mut harness).linked_points(1);
     assert_eq!(linked.len(), 1, "{}", text(&mut harness));
     assert!(text(&mut harness).contains("to = 1, at = 0.2"), "{}", text(&mut harness));
     click(&mut harness, at(target, 0.5, 0.4));
-    assert!(drawing(&mut harness).linked(1).is_empty(), "{}", text(&mut harness));
+    assert!(drawing(&mut harness).linked_points(1).is_empty(), "{}", text(&mut harness));
 }
 
 #[test]

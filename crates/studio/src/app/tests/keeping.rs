@@ -142,7 +142,7 @@ fn crashed(height: &str) -> tempfile::TempDir {
     let kept = Autosave::begin(&home.path().join("unsaved"), "studio").unwrap();
     let mut document = Document::new("fire.toml", SCENE);
     document.replace("typing", &SCENE.replace("height = 0.9", &format!("height = {height}")));
-    kept.keep(&document, None).unwrap();
+    kept.save(&document, None).unwrap();
     // Dropped without its end.
     home
 }

@@ -90,7 +90,7 @@ impl TestRenderer for Software {
         };
         let (pixels, changed) = show(&mut self.painter);
         let same = show(&mut self.painter).1;
-        self.painter.forget();
+        self.painter.invalidate();
         let (anew, all) = show(&mut self.painter);
         let whole = PixelRect { left: 0, top: 0, right: size[0] as i32, bottom: size[1] as i32 };
         if !same.is_empty() || all != [whole] || pixels != anew {

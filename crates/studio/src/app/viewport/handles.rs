@@ -16,8 +16,8 @@ use crate::{
 /// A draggable position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Handle {
-    /// The parameter of the position.
-    pub(super) place: ValuePath,
+    /// The path of the position's parameter.
+    pub(super) path: ValuePath,
     /// The origin of its parameter, m.
     pub(super) origin: DVec3,
     /// Its position at the current time, m.
@@ -30,7 +30,7 @@ pub(super) struct Handle {
 pub(super) fn handles(session: &Session) -> Vec<Handle> {
     let mut handles = positioned_handles(session);
     if session.recording {
-        handles.retain(|handle| keyframes::animatable(&handle.place));
+        handles.retain(|handle| keyframes::animatable(&handle.path));
     }
     handles
 }
@@ -41,7 +41,7 @@ fn positioned_handles(session: &Session) -> Vec<Handle> {
     let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.stands());
     let mut handles: Vec<Handle> = lights
         .map(|(index, light)| Handle {
-            place: ValuePath::root().key("light").index(index).key("position"),
+            path: ValuePath::root().key("light").index(index).key("position"),
             origin: DVec3::ZERO,
             point: DVec3::from(light.position.at(time)),
             name: format!("light {}", index + 1),
@@ -53,19 +53,19 @@ fn positioned_handles(session: &Session) -> Vec<Handle> {
         let Some(hints) = kind.and_then(|kind| kind.editor_hints.position_handles) else { continue };
         let own = entry.id.path().key(hints.key);
         let origin = position(root, &own, time);
-        handles.push(Handle { place: own, origin: DVec3::ZERO, point: origin, name: entry.name.clone() });
+        handles.push(Handle { path: own, origin: DVec3::ZERO, point: origin, name: entry.name.clone() });
         let Some(items) = hints.items else { continue };
         let list = entry.id.path().key(items);
         let count = match list.find(root).map(|node| &node.value) {
             Some(Value::List(items)) => items.len(),
             _ => 0,
         };
-        // The implied item is at the position of the phenomenon; only while recording does it get a handle of its own.
+        // The implied item is at the position of the phenomenon. It has a handle of its own only while recording.
         let unstated = usize::from(session.recording && count == 0);
         handles.extend((0..count + unstated).map(|index| {
             let own = list.index(index).key(hints.key);
             let point = origin + position(root, &own, time);
-            Handle { place: own, origin, point, name: format!("{} {items} {}", entry.name, index + 1) }
+            Handle { path: own, origin, point, name: format!("{} {items} {}", entry.name, index + 1) }
         }));
     }
     handles

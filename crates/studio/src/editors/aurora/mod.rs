@@ -35,12 +35,13 @@ pub(crate) struct AuroraEditor {
     /// The shape that is edited.
     target: usize,
     /// The sheet that the next stroke replaces; `None` for a new sheet.
-    next: Option<usize>,
+    next_sheet: Option<usize>,
     drag: DragState,
     /// The shape that is dragged on the timeline.
     shape_drag: Option<shape_timeline::ShapeDrag>,
     shape_error: Option<(String, Pos2)>,
-    read: Option<(Revision, Result<Arc<AuroraDrawing>, String>)>,
+    /// The shapes of a revision, or why there are none.
+    cached: Option<(Revision, Result<Arc<AuroraDrawing>, String>)>,
 }
 
 impl AuroraEditor {
@@ -72,12 +73,12 @@ impl AuroraEditor {
     /// The shapes of the current revision.
     fn drawing(&mut self, session: &Session) -> Result<Arc<AuroraDrawing>, String> {
         let revision = session.document.revision();
-        if let Some((_, read)) = self.read.as_ref().filter(|(of, _)| *of == revision) {
+        if let Some((_, read)) = self.cached.as_ref().filter(|(cached, _)| *cached == revision) {
             return read.clone();
         }
         let read = AuroraDrawing::read(session.document.values(), self.index, session.assets());
         let read = read.map(Arc::new).map_err(|shape_error| shape_error.to_string());
-        self.read = Some((revision, read.clone()));
+        self.cached = Some((revision, read.clone()));
         read
     }
 
@@ -119,14 +120,14 @@ impl AuroraEditor {
         if ui.link(text).on_hover_text("Click for another; or click a sheet of the drawing").clicked() && count > 0 {
             let next = self.target_sheet(drawing).map_or(0, |sheet| sheet + 1);
             let new = self.target == 0 && next >= count;
-            self.next = (!new).then_some(next % count);
+            self.next_sheet = (!new).then_some(next % count);
         }
     }
 
     /// The sheet that a stroke replaces. The first shape accepts new sheets; the number of the others follows from the transitions.
     fn target_sheet(&self, drawing: &AuroraDrawing) -> Option<usize> {
         let count = drawing.lines(self.target).len();
-        match self.next {
+        match self.next_sheet {
             _ if !drawing.is_stated() => None,
             Some(next) => Some(next.min(count.saturating_sub(1))),
             None if self.target == 0 => None,
@@ -137,7 +138,7 @@ impl AuroraEditor {
     /// Selects the sheet after the one that was drawn.
     fn select_next_sheet(&mut self, drawing: &AuroraDrawing) {
         let count = drawing.lines(self.target).len().max(1);
-        self.next = self.target_sheet(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
+        self.next_sheet = self.target_sheet(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
     }
 
     fn planes_ui(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
@@ -162,7 +163,7 @@ impl AuroraEditor {
         match edit_shapes(session, label, operations, self.index) {
             Ok(drawing) => {
                 self.shape_error = None;
-                self.read = Some((session.document.revision(), Ok(Arc::new(drawing))));
+                self.cached = Some((session.document.revision(), Ok(Arc::new(drawing))));
                 true
             }
             Err(shape_error) => {
