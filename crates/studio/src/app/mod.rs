@@ -25,7 +25,7 @@ use crate::{
 use panels::{inspector::Inspector, problems::ProblemAction, stages::StagesSection, text::TextPanel};
 pub use widgets::picture_texture::color_image;
 
-/// The whole window.
+/// The window and its state.
 pub struct Studio {
     session: Session,
     selection: Selection,

@@ -196,7 +196,7 @@ impl Session {
         match self.document.edit(label, operations) {
             Ok(()) => self.notice = None,
             Err(EditError::Syntax(reason)) => {
-                self.notice = Some(format!("the text is not TOML; mend it or undo first: {reason}"));
+                self.notice = Some(format!("the text is not TOML; correct it or undo first: {reason}"));
             }
             Err(error) => self.notice = Some(error.to_string()),
         }

@@ -135,7 +135,7 @@ impl Files {
             }
         });
         ui.separator();
-        if ui.button("Render still").on_hover_text("This frame, as bansho render makes it").clicked() {
+        if ui.button("Render still").on_hover_text("This frame, as bansho render draws it").clicked() {
             self.render(session, true);
         }
         if ui.button("Render shot").on_hover_text("All frames, into out/ beside the scene").clicked() {
@@ -204,10 +204,10 @@ impl Files {
             ExternalChange::Unchanged => session.document.set_file_missing(!path.exists()),
             ExternalChange::Deleted => {
                 session.document.set_file_missing(true);
-                session.set_notice(Some(format!("{}: the file is gone; saving writes it anew", path.display())));
+                session.set_notice(Some(format!("{}: the file is gone; saving creates it again", path.display())));
             }
             ExternalChange::Unreadable(reason) => {
-                let notice = format!("{}: another program wrote what cannot be read: {reason}", path.display());
+                let notice = format!("{}: another program wrote text that cannot be read: {reason}", path.display());
                 session.set_notice(Some(notice));
             }
             ExternalChange::Changed(_) if session.document.is_modified() => {

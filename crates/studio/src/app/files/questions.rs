@@ -73,7 +73,7 @@ impl Question {
             #[cfg(not(target_arch = "wasm32"))]
             Self::Open(dialog) => return dialog.ui(ui, "Open which scene?"),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Relink { dialog, .. } => return dialog.ui(ui, "Which file in its stead?"),
+            Self::Relink { dialog, .. } => return dialog.ui(ui, "Replace it by which file?"),
             #[cfg(not(target_arch = "wasm32"))]
             Self::SaveAs { dialog, .. } => {
                 // A double-click only chooses the name, since saving over a file needs another question.

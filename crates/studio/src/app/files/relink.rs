@@ -27,7 +27,7 @@ impl Session {
         self.reload_assets();
     }
 
-    /// `file` as the scene names it: relative to its folder where it lies there.
+    /// The name of `file` in the scene: relative to the scene's folder if it is in that folder.
     fn relative_name(&self, file: &Path) -> Value {
         let folder = folder(self.path.as_deref());
         let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
@@ -54,7 +54,7 @@ impl Session {
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let reason =
-                "scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) are taken";
+                "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) can be added";
             self.set_notice(Some(format!("{name}: {reason}")));
         }
     }

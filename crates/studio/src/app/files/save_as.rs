@@ -28,7 +28,7 @@ pub(super) enum SaveAsError {
     Media(#[from] MediaError),
     /// Relative paths must be adjusted, but the text cannot be edited.
     #[error(
-        "the scene names files, and their paths cannot be made right for another folder: {0}; mend the text, or undo first"
+        "the scene names files, and their paths cannot be adjusted to another folder: {0}; correct the text, or undo first"
     )]
     Edit(#[from] EditError),
 }

@@ -35,7 +35,7 @@ pub(crate) fn problems_ui(ui: &mut Ui, session: &Session) -> Option<ProblemActio
                         action = problem.span.clone().map(ProblemAction::ShowInText);
                     }
                     let missing = matches!(problem.kind, ProblemKind::Asset(_));
-                    if missing && ui.small_button("Relink").on_hover_text("Choose another file in its stead").clicked()
+                    if missing && ui.small_button("Relink").on_hover_text("Choose another file to replace it").clicked()
                     {
                         action = Some(ProblemAction::Relink(parse_path(&problem.path)));
                     }

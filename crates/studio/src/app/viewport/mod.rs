@@ -93,16 +93,16 @@ impl Viewport {
             ui.selectable_value(&mut self.tool, ViewportTool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
             ui.selectable_value(&mut self.tool, ViewportTool::Wind, "Blow")
-                .on_hover_text("Drag to blow: the drag is the wind");
+                .on_hover_text("Drag to set the wind to the direction and length of the drag");
             ui.selectable_value(&mut self.tool, ViewportTool::MoveHandles, "Place")
                 .on_hover_text("Drag lamps, flames and burners");
             ui.toggle_value(&mut session.recording, "Record")
-                .on_hover_text("What is dragged leaves keyframes; time passes while you blow or drag things");
+                .on_hover_text("Dragging sets keyframes; playback runs during drags of wind and handles");
             ui.toggle_value(&mut session.draft, "Draft")
-                .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
+                .on_hover_text("Simulates with fewer particles, for faster feedback; rendering always uses all");
             if curve_overlay::has_any(selection) {
                 ui.toggle_value(&mut self.curves, "Curves")
-                    .on_hover_text("The curves of what is chosen, on the picture");
+                    .on_hover_text("The curves of the selection, on the picture");
             }
             ui.separator();
             exposure_ui(ui, session);
@@ -239,7 +239,7 @@ fn exposure_ui(ui: &mut Ui, session: &mut Session) {
     if ui.add(drag).labelled_by(label).changed() {
         session.set("exposure", &path, Value::Number((ev100 * 100.0).round() / 100.0));
     }
-    if ui.small_button("Auto").on_hover_text("Exposure chosen from what the scene holds").clicked() {
+    if ui.small_button("Auto").on_hover_text("Automatic exposure of the scene").clicked() {
         session.set("exposure", &path, Value::Text("auto".into()));
     }
 }

@@ -106,7 +106,7 @@ fn rotate(offset: DVec3, [azimuth, elevation]: [f64; 2]) -> DVec3 {
 
 /// The wind, m/s, of a drag by `drag` viewport heights: in the image plane, as in the paper.
 pub(super) fn wind_of_drag(drag: DVec2, camera: &Camera) -> DVec3 {
-    /// Wind of a drag over the whole height, m/s.
+    /// Wind of a drag over the height of the viewport, m/s.
     const WIND_PER_HEIGHT_M_PER_S: f64 = 8.0;
     let along = camera.world_from_camera.x_axis * drag.x - camera.world_from_camera.y_axis * drag.y;
     along * WIND_PER_HEIGHT_M_PER_S

@@ -62,7 +62,7 @@ impl AuroraEditor {
                 }
                 Err(reason) => {
                     ui.colored_label(ui.visuals().warn_fg_color, reason);
-                    ui.weak("Mend the text or undo (Ctrl+Z); the shapes come back then.");
+                    ui.weak("Correct the text or undo (Ctrl+Z) to see the shapes again.");
                     return;
                 }
             }
@@ -104,7 +104,7 @@ impl AuroraEditor {
                 }
             })
             .response
-            .on_hover_text("A named form in stead of the yellow sheet");
+            .on_hover_text("Replaces the yellow sheet by a named form");
             ui.separator();
             self.next_stroke_ui(ui, drawing);
         });

@@ -40,13 +40,13 @@ pub(super) fn shape_timeline_ui(
 
 /// Buttons for the shape on the right map.
 fn buttons_ui(editor: &mut AuroraEditor, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
-    if ui.button("Add shape").on_hover_text("One more shape after the last, to be drawn over it").clicked() {
+    if ui.button("Add shape").on_hover_text("Appends a copy of the last shape, to be drawn over").clicked() {
         add(editor, ui, session, drawing);
         return;
     }
     let several = drawing.arrivals().len() > 1;
     let remove = ui.add_enabled(several, egui::Button::new("Remove shape"));
-    if remove.on_hover_text("Without the shape that is shown on the right").clicked() {
+    if remove.on_hover_text("Removes the shape that is shown on the right").clicked() {
         let removal = drawing.remove_shape(editor.target);
         editor.change(session, "remove shape", &removal, ui.cursor().min);
         return;
