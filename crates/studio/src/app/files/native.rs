@@ -127,7 +127,7 @@ impl Files {
         if ui.button("Save as…").clicked() {
             self.ask_where_to_save(session, None);
         }
-        ui.menu_button("RecentFiles", |ui| {
+        ui.menu_button("Recent", |ui| {
             for path in self.platform.recent.paths().to_vec() {
                 if ui.button(path.display().to_string()).clicked() {
                     self.open(session, path);

@@ -113,7 +113,7 @@ fn invalid_edits_are_refused_with_the_reason() {
     choose(&mut harness, "Merge");
     click(&mut harness, at(source, 0.1, 0.5));
     click(&mut harness, at(source, 0.3, 0.3));
-    harness.get_by_label_contains("ring");
+    harness.get_by_label_contains("to a ring");
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn sheets_and_points_are_linked_by_dragging() {
     link(&mut harness, at(target, 0.3, 0.4), at(target, 0.5, 0.4));
     let linked = drawing(&mut harness).linked_points(1);
     assert_eq!(linked.len(), 1, "{}", text(&mut harness));
-    assert!(text(&mut harness).contains("to = 1, at = 0.2"), "{}", text(&mut harness));
+    assert!(text(&mut harness).contains("to = 1, from_length_fraction = 0.2"), "{}", text(&mut harness));
     click(&mut harness, at(target, 0.5, 0.4));
     assert!(drawing(&mut harness).linked_points(1).is_empty(), "{}", text(&mut harness));
 }
