@@ -53,8 +53,7 @@ impl Session {
             self.edit("plate", &[Operation::Set { place: parameter, value: name }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
-            let reason =
-                "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) can be added";
+            let reason = "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) can be added";
             self.set_notice(Some(format!("{name}: {reason}")));
         }
     }
