@@ -8,6 +8,7 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
+        editor_hints::{DraftLimit, EditorHints},
         kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
@@ -41,6 +42,8 @@ impl Describe for AuroraParameters {
         "rays.contrast",
         "folds.amplitude_km",
     ];
+    const EDITOR_HINTS: EditorHints =
+        EditorHints { draft_limits: &[DraftLimit { key: "particles.count", max: 24_000 }], ..EditorHints::NONE };
     const IN_THE_SKY: bool = true;
     // View from the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky is darker than the curtains.
     const SCENE_DEFAULTS: &'static str = "\

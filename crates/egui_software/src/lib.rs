@@ -12,6 +12,7 @@
 
 mod app;
 mod blend;
+mod pixel_rect;
 mod primitives;
 mod raster;
 mod surface;
@@ -25,9 +26,9 @@ pub mod window;
 use egui::{ClippedPrimitive, TexturesDelta, epaint::Primitive};
 
 pub use app::App;
+pub use pixel_rect::PixelRect;
 use primitives::{DrawPrimitive, Viewport};
 use textures::Textures;
-pub use tiles::PixelRect;
 use tiles::TileGrid;
 
 /// Rasterizes egui's meshes into a retained framebuffer: only what changed since the previous frame is painted.
@@ -81,7 +82,7 @@ impl Painter {
     }
 
     /// Discards the framebuffer: the next frame paints everything.
-    pub fn forget(&mut self) {
+    pub fn invalidate(&mut self) {
         self.tile_grid = TileGrid::default();
     }
 

@@ -7,9 +7,9 @@ use egui::{
 
 use super::{
     blend::{Rgba, multiply},
+    pixel_rect::{PixelRect, SUBPIXELS},
     textures::{Texture, Textures},
-    tiles::PixelRect,
-    triangle::{Corner, SUBPIXELS, Triangle},
+    triangle::{Corner, Triangle},
 };
 
 /// Images whose texels align with pixels within this fraction of a texel are copied without filtering: the error is half of 1/255 at most.
@@ -32,13 +32,29 @@ pub(super) enum Shape {
     Fill(Rgba),
     /// One texel per pixel; `origin` is the texel of pixel (0, 0).
     Texels { texture: usize, origin: [i64; 2], tint: Rgba },
-    /// A scaled image: `from` is the texture coordinate of the center of pixel (0, 0), `step` the increment per pixel, texels.
-    Picture { texture: usize, from: [f64; 2], step: [f64; 2], tint: Rgba },
+    /// A scaled image.
+    Picture { texture: usize, mapping: TexelMapping, tint: Rgba },
     /// The pixels inside a triangle.
     Triangle { texture: usize, triangle: Triangle },
 }
 
-/// The framebuffer that is painted on.
+/// The texture coordinates of pixel centers, a linear function along each axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TexelMapping {
+    /// The texture coordinate of the center of pixel (0, 0), texels.
+    origin: [f64; 2],
+    /// Increment per pixel, texels.
+    step: [f64; 2],
+}
+
+impl TexelMapping {
+    /// The texture coordinate along `axis` of the center of a pixel.
+    pub(super) fn texel(&self, pixel: i32, axis: usize) -> f32 {
+        (self.origin[axis] + f64::from(pixel) * self.step[axis]) as f32
+    }
+}
+
+/// The framebuffer that is painted.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Viewport {
     pub(super) pixels_per_point: f32,
@@ -60,7 +76,7 @@ impl Viewport {
             indices = rest;
             let Some(first) = self.corners(mesh, [*a, *b, *c], texture) else { continue };
             if let [d, e, f, beyond @ ..] = rest
-                && is_half(&first)
+                && may_be_half_rectangle(&first)
                 && let Some(second) = self.corners(mesh, [*d, *e, *f], texture)
                 && let Some([low, high]) = rectangle(&first, &second)
             {
@@ -102,9 +118,10 @@ impl Viewport {
 }
 
 /// Whether a triangle may be half of a rectangle: two of its sides are parallel to the axes.
-fn is_half([a, b, c]: &[Corner; 3]) -> bool {
-    let level = |axis: usize| a.at[axis] == b.at[axis] || b.at[axis] == c.at[axis] || c.at[axis] == a.at[axis];
-    level(0) && level(1)
+fn may_be_half_rectangle([a, b, c]: &[Corner; 3]) -> bool {
+    let has_aligned_side =
+        |axis: usize| a.at[axis] == b.at[axis] || b.at[axis] == c.at[axis] || c.at[axis] == a.at[axis];
+    has_aligned_side(0) && has_aligned_side(1)
 }
 
 /// The minimum and maximum corner of the rectangle that two triangles form, where all corners have one color and each texture coordinate
@@ -124,8 +141,8 @@ fn rectangle(first: &[Corner; 3], second: &[Corner; 3]) -> Option<[Corner; 2]> {
         }
     }
     // Bit masks of the rectangle corners that each triangle has: each must lack exactly one, opposite to the one that the other lacks.
-    let mut seen = [0_u8; 2];
-    for (triangle, seen) in all.into_iter().zip(&mut seen) {
+    let mut masks = [0_u8; 2];
+    for (triangle, mask) in all.into_iter().zip(&mut masks) {
         for corner in triangle {
             let mut corner_bits = 0;
             for axis in 0..2 {
@@ -135,22 +152,22 @@ fn rectangle(first: &[Corner; 3], second: &[Corner; 3]) -> Option<[Corner; 2]> {
                 }
                 corner_bits |= u8::from(corner.at[axis] == high.at[axis]) << axis;
             }
-            *seen |= 1 << corner_bits;
+            *mask |= 1 << corner_bits;
         }
     }
-    let [lacks, other_lacks] = seen.map(|seen| !seen & 15);
+    let [lacks, other_lacks] = masks.map(|mask| !mask & 15);
     let opposite = |mask: u8| 1 << (3 - mask.trailing_zeros());
-    let fit = lacks.count_ones() == 1 && other_lacks.count_ones() == 1 && opposite(lacks) == other_lacks;
-    fit.then_some([low, high])
+    let is_rectangle = lacks.count_ones() == 1 && other_lacks.count_ones() == 1 && opposite(lacks) == other_lacks;
+    is_rectangle.then_some([low, high])
 }
 
-/// What the primitives of one mesh share.
+/// The inputs that all primitives of a mesh have in common.
 struct MeshContext<'a> {
     clip: PixelRect,
     id: TextureId,
     slot: usize,
     texture: &'a Texture,
-    /// The color at (0, 0).
+    /// The color at texture coordinate (0, 0).
     first_texel: Rgba,
 }
 
@@ -175,7 +192,7 @@ impl MeshContext<'_> {
             Shape::Fill(color) => mix_hash(0, [u64::from(u32::from_le_bytes(color))]),
             _ => hash_vertices(self.id, [low, high]),
         };
-        Some(DrawPrimitive { area, shape, hash: mix_hash(hash, area.words()) })
+        Some(DrawPrimitive { area, shape, hash: mix_hash(hash, area.hash_words()) })
     }
 
     fn texel(&self, corner: &Corner) -> Rgba {
@@ -183,13 +200,14 @@ impl MeshContext<'_> {
     }
 
     fn picture(&self, low: &Corner, high: &Corner, tint: Rgba) -> Shape {
-        let (mut from, mut step, mut origin) = ([0.0; 2], [0.0; 2], [0; 2]);
+        let mut mapping = TexelMapping { origin: [0.0; 2], step: [0.0; 2] };
+        let mut origin = [0; 2];
         let mut exact = true;
         for axis in 0..2 {
             let [start, end] = [low.at[axis], high.at[axis]].map(|at| f64::from(at) / f64::from(SUBPIXELS));
             let [first, last] = [low.texel[axis], high.texel[axis]].map(f64::from);
-            step[axis] = (last - first) / (end - start);
-            from[axis] = first + (0.5 - start) * step[axis];
+            mapping.step[axis] = (last - first) / (end - start);
+            mapping.origin[axis] = first + (0.5 - start) * mapping.step[axis];
             let nearest = (first - start).round();
             exact &=
                 (first - start - nearest).abs() <= TEXEL_TOLERANCE && (last - end - nearest).abs() <= TEXEL_TOLERANCE;
@@ -198,7 +216,7 @@ impl MeshContext<'_> {
         if exact {
             Shape::Texels { texture: self.slot, origin, tint }
         } else {
-            Shape::Picture { texture: self.slot, from, step, tint }
+            Shape::Picture { texture: self.slot, mapping, tint }
         }
     }
 
@@ -206,7 +224,7 @@ impl MeshContext<'_> {
     fn triangle(&self, corners: [Corner; 3]) -> Option<DrawPrimitive> {
         let triangle = Triangle::new(corners, |corner| self.texel(corner))?;
         let area = triangle.bounds().within(self.clip);
-        let hash = mix_hash(hash_vertices(self.id, &corners), area.words());
+        let hash = mix_hash(hash_vertices(self.id, &corners), area.hash_words());
         (!area.is_empty()).then_some(DrawPrimitive {
             area,
             shape: Shape::Triangle { texture: self.slot, triangle },
@@ -215,7 +233,7 @@ impl MeshContext<'_> {
     }
 }
 
-/// Mixes `words` into `hash` (multiply and fold, as wyhash does).
+/// Mixes `words` into `hash`: multiply and fold, as wyhash does.
 pub(super) fn mix_hash(hash: u64, words: impl IntoIterator<Item = u64>) -> u64 {
     let mut hash = hash;
     for word in words {

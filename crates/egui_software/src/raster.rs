@@ -4,9 +4,9 @@ use egui::Color32;
 
 use super::{
     blend::{Rgba, blend_over, blend_over_f32, blend_tinted_over, pack_xrgb},
-    primitives::{DrawPrimitive, Shape},
+    pixel_rect::PixelRect,
+    primitives::{DrawPrimitive, Shape, TexelMapping},
     textures::{FilterTaps, Texture, Textures},
-    tiles::PixelRect,
     triangle::{Coloring, Triangle},
 };
 
@@ -49,9 +49,9 @@ impl TilePixels<'_> {
                     self.texels(area, texture, *origin, *tint);
                 }
             }
-            Shape::Picture { texture, from, step, tint } => {
+            Shape::Picture { texture, mapping, tint } => {
                 if let Some(texture) = textures.get(*texture) {
-                    self.picture(area, texture, [*from, *step], *tint);
+                    self.picture(area, texture, mapping, *tint);
                 }
             }
             Shape::Triangle { texture, triangle } => {
@@ -64,7 +64,7 @@ impl TilePixels<'_> {
 
     fn texels(&mut self, area: PixelRect, texture: &Texture, origin: [i64; 2], tint: Rgba) {
         let width = area.right - area.left;
-        // Clamped, so that the sums below cannot overflow; wrapping handles texels outside of the texture.
+        // Clamped, so that the sums below cannot overflow. Texels outside of the texture are wrapped.
         let texel = |pixel: i32, axis: usize| (i64::from(pixel) + origin[axis]).clamp(-1 << 30, 1 << 30) as i32;
         let first = texel(area.left, 0);
         let within = first >= 0 && (first + width) as usize <= texture.size()[0];
@@ -84,15 +84,14 @@ impl TilePixels<'_> {
         }
     }
 
-    fn picture(&mut self, area: PixelRect, texture: &Texture, [from, step]: [[f64; 2]; 2], tint: Rgba) {
-        let coordinate = |pixel: i32, axis: usize| (from[axis] + f64::from(pixel) * step[axis]) as f32;
+    fn picture(&mut self, area: PixelRect, texture: &Texture, mapping: &TexelMapping, tint: Rgba) {
         let mut columns = [FilterTaps::default(); TILE_WIDTH];
         for (column, x) in columns.iter_mut().zip(area.left..area.right) {
-            *column = texture.taps(coordinate(x, 0), 0);
+            *column = texture.taps(mapping.texel(x, 0), 0);
         }
         let plain = tint == WHITE && texture.is_opaque();
         for y in area.top..area.bottom {
-            let rows = texture.taps(coordinate(y, 1), 1);
+            let rows = texture.taps(mapping.texel(y, 1), 1);
             let pixels = self.row(y, area.left, area.right);
             if plain {
                 copy_bilinear_row(pixels, &columns, rows, texture);
@@ -128,7 +127,7 @@ impl TilePixels<'_> {
                     Coloring::Plain(texel) | Coloring::Blended(texel) => texel.map(f32::from),
                     Coloring::Textured => texture.at(coordinates.map(at)),
                 };
-                // Rounding may leave the range.
+                // Rounding errors may exceed the range.
                 let color = colors.map(|channel| at(channel).clamp(0.0, 255.0));
                 *pixel = blend_over_f32(*pixel, tinted(texel, color));
             }
@@ -137,7 +136,7 @@ impl TilePixels<'_> {
 }
 
 /// Whether `primitive` is opaque everywhere in `area`, so that all primitives below it can be skipped.
-pub(super) fn hides(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) -> bool {
+pub(super) fn occludes(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) -> bool {
     if primitive.area.within(area) != area {
         return false;
     }
@@ -178,7 +177,7 @@ fn copy(row: &mut [u32], texels: &[Color32]) {
 
 fn blend_row(row: &mut [u32], texels: &[Color32], tint: Rgba) {
     for (pixel, texel) in row.iter_mut().zip(texels) {
-        // Most of a glyph's box is empty.
+        // Most texels of a glyph's rectangle are transparent.
         if *texel != Color32::TRANSPARENT {
             *pixel = blend_tinted_over(*pixel, texel.to_array(), tint);
         }

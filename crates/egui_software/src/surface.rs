@@ -27,7 +27,7 @@ impl WindowSurface {
     /// Copies `changed` from `painter` to a window of `size` pixels, or everything where the content of the buffer is undefined.
     ///
     /// # Errors
-    /// The system takes no pixels.
+    /// The system does not accept the pixels.
     pub(super) fn present(
         &mut self,
         painter: &Painter,
@@ -57,8 +57,8 @@ impl WindowSurface {
         Ok(())
     }
 
-    /// The system has lost the content of the window.
-    pub(super) fn forget(&mut self) {
+    /// Discards the content of the buffers, after the system has lost that of the window.
+    pub(super) fn invalidate(&mut self) {
         self.size = [0; 2];
     }
 

@@ -55,7 +55,7 @@ impl Textures {
         });
         let entry = &mut self.textures[slot];
         match (delta.pos, entry) {
-            (Some(at), Some(texture)) => texture.set_part(at, image, delta.options),
+            (Some(at), Some(texture)) => texture.set_region(at, image, delta.options),
             (Some(_), None) => {
                 self.slots.remove(&id);
             }
@@ -115,8 +115,8 @@ impl Texture {
         &self.image.pixels[row * width..][..width]
     }
 
-    /// Whether texels from `from` to `to`, with a margin of `around` texels, changed since the last frame.
-    pub(super) fn has_changed(&self, [from, to]: [[f32; 2]; 2], around: f32) -> bool {
+    /// Whether texels between two corners, with a margin of `margin` texels, changed since the last frame.
+    pub(super) fn has_changed(&self, [from, to]: [[f32; 2]; 2], margin: f32) -> bool {
         if !self.any_changed {
             return false;
         }
@@ -124,9 +124,9 @@ impl Texture {
         let mut ranges = [[0, 0]; 2];
         for axis in 0..2 {
             let last = self.image.size[axis] as f32 - 1.0;
-            // A repeating texture may show any of its texels.
+            // With a repeating texture, any texel may be visible.
             let [low, high] = if self.options.wrap_mode == TextureWrapMode::ClampToEdge {
-                [from[axis].min(to[axis]) - around, from[axis].max(to[axis]) + around].map(|at| at.clamp(0.0, last))
+                [from[axis].min(to[axis]) - margin, from[axis].max(to[axis]) + margin].map(|at| at.clamp(0.0, last))
             } else {
                 [0.0, last]
             };
@@ -154,7 +154,7 @@ impl Texture {
     }
 
     /// Copies `image` into the texture at `at`, clipped to the texture.
-    fn set_part(&mut self, at: [usize; 2], image: &ColorImage, options: TextureOptions) {
+    fn set_region(&mut self, at: [usize; 2], image: &ColorImage, options: TextureOptions) {
         let size = self.image.size;
         if at[0] >= size[0] || at[1] >= size[1] {
             return;
@@ -220,7 +220,7 @@ impl Texture {
         self.bilinear(self.taps(at[0], 0), self.taps(at[1], 1))
     }
 
-    /// The same, rounded.
+    /// The filtered color at `at`, texels, rounded.
     pub(super) fn sample_rounded(&self, at: [f32; 2]) -> Rgba {
         self.at(at).map(|channel| (channel + 0.5) as u8)
     }

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::{
+    pixel_rect::PixelRect,
     primitives::{DrawPrimitive, Shape, mix_hash},
-    raster::{TILE_WIDTH, TilePixels, hides},
+    raster::{TILE_WIDTH, TilePixels, occludes},
     textures::Textures,
-    triangle::SUBPIXELS,
 };
 
 /// Height of a tile, pixels.
@@ -14,48 +14,6 @@ const TILE_HEIGHT: usize = 32;
 
 /// With fewer changed tiles than this, waking other threads takes longer than painting.
 const PARALLEL_TILES_MIN: usize = 4;
-
-/// A half-open rectangle of pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelRect {
-    /// The first column.
-    pub left: i32,
-    /// The first row.
-    pub top: i32,
-    /// One past the last column.
-    pub right: i32,
-    /// One past the last row.
-    pub bottom: i32,
-}
-
-impl PixelRect {
-    /// Whether it contains no pixel.
-    pub fn is_empty(self) -> bool {
-        self.left >= self.right || self.top >= self.bottom
-    }
-
-    /// The pixels whose centers lie in the half-open box from `low` to `high`, subpixels.
-    pub(super) fn covering(low: [i32; 2], high: [i32; 2]) -> Self {
-        let first = |at: i32| (at - SUBPIXELS / 2 + SUBPIXELS - 1).div_euclid(SUBPIXELS);
-        let ([left, top], [right, bottom]) = (low.map(first), high.map(first));
-        Self { left, top, right, bottom }
-    }
-
-    /// The intersection.
-    pub(super) fn within(self, other: Self) -> Self {
-        Self {
-            left: self.left.max(other.left),
-            top: self.top.max(other.top),
-            right: self.right.min(other.right),
-            bottom: self.bottom.min(other.bottom),
-        }
-    }
-
-    pub(super) fn words(self) -> [u64; 2] {
-        let pair = |a: i32, b: i32| u64::from(a as u32) << 32 | u64::from(b as u32);
-        [pair(self.left, self.top), pair(self.right, self.bottom)]
-    }
-}
 
 /// All tiles of a framebuffer, row by row.
 #[derive(Default)]
@@ -73,7 +31,7 @@ struct Tile {
     painted_hash: Option<u64>,
     /// The hash of this frame's primitives.
     pending_hash: u64,
-    /// Whether texels that it shows changed since it was painted.
+    /// Whether texels in it changed since it was painted.
     stale: bool,
     /// Indices of the primitives that touch it.
     primitives: Vec<u32>,
@@ -179,19 +137,19 @@ impl TileGrid {
 impl Tile {
     fn paint(&mut self, primitives: &[DrawPrimitive], textures: &Textures) {
         let primitive = |number: &u32| &primitives[*number as usize];
-        let hidden = self.primitives.iter().rposition(|number| hides(primitive(number), self.area, textures));
+        let occluder = self.primitives.iter().rposition(|number| occludes(primitive(number), self.area, textures));
         let mut pixels = TilePixels { area: self.area, rows: &mut self.pixels };
-        if hidden.is_none() {
+        if occluder.is_none() {
             pixels.clear();
         }
-        for number in &self.primitives[hidden.unwrap_or(0)..] {
+        for number in &self.primitives[occluder.unwrap_or(0)..] {
             pixels.paint(primitive(number), textures);
         }
         (self.painted_hash, self.stale) = (Some(self.pending_hash), false);
     }
 }
 
-/// Whether texels changed that `primitive` shows in `area`.
+/// Whether texels of `primitive` in `area` changed.
 fn has_changed(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) -> bool {
     let (Shape::Texels { texture, .. } | Shape::Picture { texture, .. } | Shape::Triangle { texture, .. }) =
         primitive.shape
@@ -208,9 +166,8 @@ fn has_changed(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) 
             texture.has_changed(ends.map(|end| [0, 1].map(|axis| texel(end, axis))), 0.0)
         }
         // Bilinear filtering reads the neighboring texels.
-        Shape::Picture { from, step, .. } => {
-            let texel = |end: [i32; 2], axis: usize| (from[axis] + f64::from(end[axis]) * step[axis]) as f32;
-            texture.has_changed(ends.map(|end| [0, 1].map(|axis| texel(end, axis))), 1.0)
+        Shape::Picture { mapping, .. } => {
+            texture.has_changed(ends.map(|end| [0, 1].map(|axis| mapping.texel(end[axis], axis))), 1.0)
         }
         Shape::Triangle { triangle, .. } => texture.has_changed(triangle.texels, 1.0),
     }

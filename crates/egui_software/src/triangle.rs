@@ -3,11 +3,8 @@
 
 use super::{
     blend::{Rgba, multiply},
-    tiles::PixelRect,
+    pixel_rect::{PixelRect, SUBPIXELS},
 };
-
-/// Subpixels per pixel.
-pub(super) const SUBPIXELS: i32 = 256;
 
 /// Coordinates are clamped to this, pixels, so that edge functions do not overflow.
 const MAX_COORDINATE: f32 = 1048576.0;
@@ -25,7 +22,7 @@ pub(super) struct Corner {
 impl Corner {
     /// At `pixels`, which must not be NaN.
     pub(super) fn at(pixels: [f32; 2], texel: [f32; 2], color: Rgba) -> Self {
-        // By a cast: without SSE4.1, `round` is a function call.
+        // Rounded by a cast, since `round` is a function call without SSE4.1.
         let snapped = |at: f32| {
             let subpixels = at.clamp(-MAX_COORDINATE, MAX_COORDINATE) * SUBPIXELS as f32;
             (subpixels + 0.5_f32.copysign(subpixels)) as i32
@@ -54,10 +51,10 @@ pub(super) struct Triangle {
     pub(super) texels: [[f32; 2]; 2],
 }
 
-/// An edge function: `along` x + `down` y + `offset` is not negative inside.
+/// An edge function: `step_x` x + `step_y` y + `offset` is not negative inside.
 struct Edge {
-    along: i64,
-    down: i64,
+    step_x: i64,
+    step_y: i64,
     offset: i64,
 }
 
@@ -87,8 +84,8 @@ impl Triangle {
         } else {
             Coloring::Textured
         };
-        let seen = color != Coloring::Plain([0; 4]);
-        seen.then_some(Self { corners, color, texels })
+        let is_visible = color != Coloring::Plain([0; 4]);
+        is_visible.then_some(Self { corners, color, texels })
     }
 
     /// Its bounding box.
@@ -113,9 +110,9 @@ impl Triangle {
         let (first, second) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let area = first[0] * second[1] - first[1] * second[0];
         let (by_first, by_second) = (at_b - at_a, at_c - at_a);
-        let across = (by_first * second[1] - by_second * first[1]) / area;
-        let down = (by_second * first[0] - by_first * second[0]) / area;
-        Plane { across, down, origin: at_a + (0.5 - a[0]) * across + (0.5 - a[1]) * down }
+        let step_x = (by_first * second[1] - by_second * first[1]) / area;
+        let step_y = (by_second * first[0] - by_first * second[0]) / area;
+        Plane { step_x, step_y, origin: at_a + (0.5 - a[0]) * step_x + (0.5 - a[1]) * step_y }
     }
 }
 
@@ -132,7 +129,7 @@ fn edge(a: [i64; 2], b: [i64; 2]) -> Edge {
     let half = i64::from(SUBPIXELS / 2);
     let owns_boundary = dy < 0 || (dy == 0 && dx > 0);
     let offset = dx * (half - a[1]) - dy * (half - a[0]) - i64::from(!owns_boundary);
-    Edge { along: -dy * i64::from(SUBPIXELS), down: dx * i64::from(SUBPIXELS), offset }
+    Edge { step_x: -dy * i64::from(SUBPIXELS), step_y: dx * i64::from(SUBPIXELS), offset }
 }
 
 /// The pixels whose centers lie inside a triangle.
@@ -145,12 +142,12 @@ impl Coverage {
     pub(super) fn span(&self, y: i32, left: i32, right: i32) -> [i32; 2] {
         let (mut from, mut to) = (i64::from(left), i64::from(right));
         for edge in &self.edges {
-            let value = edge.down * i64::from(y) + edge.offset;
-            match edge.along {
+            let value = edge.step_y * i64::from(y) + edge.offset;
+            match edge.step_x {
                 0 if value < 0 => return [left, left],
                 0 => {}
-                along @ 1.. => from = from.max(-value.div_euclid(along)),
-                along => to = to.min(value.div_euclid(-along) + 1),
+                step_x @ 1.. => from = from.max(-value.div_euclid(step_x)),
+                step_x => to = to.min(value.div_euclid(-step_x) + 1),
             }
         }
         // A span that is not empty lies within `left..right`.
@@ -161,8 +158,8 @@ impl Coverage {
     pub(super) fn contains_rect(&self, area: PixelRect) -> bool {
         let [x, y] = [[area.left, area.right - 1], [area.top, area.bottom - 1]].map(|ends| ends.map(i64::from));
         self.edges.iter().all(|edge| {
-            let least = |slope: i64, ends: [i64; 2]| (slope * ends[0]).min(slope * ends[1]);
-            least(edge.along, x) + least(edge.down, y) + edge.offset >= 0
+            let minimum = |slope: i64, ends: [i64; 2]| (slope * ends[0]).min(slope * ends[1]);
+            minimum(edge.step_x, x) + minimum(edge.step_y, y) + edge.offset >= 0
         })
     }
 }
@@ -170,8 +167,8 @@ impl Coverage {
 /// A vertex attribute, linear in screen space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
-    across: f64,
-    down: f64,
+    step_x: f64,
+    step_y: f64,
     /// The value at the center of pixel (0, 0).
     origin: f64,
 }
@@ -179,7 +176,7 @@ pub(super) struct Plane {
 impl Plane {
     /// The value at the center of pixel `x` of row `y`, and its increment per pixel to the right.
     pub(super) fn row(&self, x: i32, y: i32) -> [f32; 2] {
-        let start = self.origin + f64::from(x) * self.across + f64::from(y) * self.down;
-        [start as f32, self.across as f32]
+        let start = self.origin + f64::from(x) * self.step_x + f64::from(y) * self.step_y;
+        [start as f32, self.step_x as f32]
     }
 }

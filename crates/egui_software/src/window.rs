@@ -21,11 +21,11 @@ use super::{Painter, app::App, surface::WindowSurface};
 /// Shortest time between two frames.
 const MIN_FRAME_INTERVAL: Duration = Duration::from_millis(8);
 
-/// Largest texture side that egui is told, texels.
-const LARGEST_TEXTURE: usize = 8192;
+/// Largest texture side that is reported to egui, texels.
+const MAX_TEXTURE_SIDE: usize = 8192;
 
-/// Builds the application once the egui context can request repaints.
-pub type Build = Box<dyn FnOnce(&egui::Context) -> Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>>;
+/// Creates the application once the egui context can request repaints.
+pub type AppCreator = Box<dyn FnOnce(&egui::Context) -> Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>>;
 
 /// Why there is no window.
 #[derive(Debug, thiserror::Error)]
@@ -37,18 +37,18 @@ pub enum WindowError {
     #[error("no window: {0}")]
     Open(#[from] OsError),
     /// The system offers no pixel buffer.
-    #[error("a window that shows nothing: {0}")]
+    #[error("the window cannot be painted: {0}")]
     WindowSurface(#[from] softbuffer::SoftBufferError),
     /// The application cannot be built.
     #[error(transparent)]
     App(#[from] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// Runs the application that `build` makes in a window, until it closes.
+/// Runs the application that `build` creates in a window, until it closes.
 ///
 /// # Errors
 /// No window can be opened, or the application cannot be built.
-pub fn run(viewport: egui::ViewportBuilder, build: Build) -> Result<(), WindowError> {
+pub fn run(viewport: egui::ViewportBuilder, build: AppCreator) -> Result<(), WindowError> {
     let events = EventLoop::<RepaintRequest>::with_user_event().build()?;
     let ctx = egui::Context::default();
     ctx.set_embed_viewports(false);
@@ -59,11 +59,13 @@ pub fn run(viewport: egui::ViewportBuilder, build: Build) -> Result<(), WindowEr
     runner.failed.map_or(Ok(()), Err)
 }
 
-/// A repaint at a time, requested after `seen` passes of egui.
+/// A requested repaint.
 #[derive(Debug)]
 struct RepaintRequest {
+    /// When it is due.
     at: Instant,
-    seen: u64,
+    /// Number of passes of egui at the request.
+    pass_nr: u64,
 }
 
 fn request_repaints_with(ctx: &egui::Context, proxy: EventLoopProxy<RepaintRequest>) {
@@ -74,7 +76,7 @@ fn request_repaints_with(ctx: &egui::Context, proxy: EventLoopProxy<RepaintReque
         {
             let at = Instant::now().checked_add(info.delay);
             // The event loop may have ended; a time beyond the range of `Instant` never comes.
-            let _ = at.map(|at| proxy.send_event(RepaintRequest { at, seen: info.current_cumulative_pass_nr }));
+            let _ = at.map(|at| proxy.send_event(RepaintRequest { at, pass_nr: info.current_cumulative_pass_nr }));
         }
     });
 }
@@ -83,7 +85,7 @@ fn request_repaints_with(ctx: &egui::Context, proxy: EventLoopProxy<RepaintReque
 struct Runner {
     ctx: egui::Context,
     viewport: egui::ViewportBuilder,
-    build: Option<Build>,
+    build: Option<AppCreator>,
     open: Option<OpenWindow>,
     /// When the next frame is due.
     next_repaint: Option<Instant>,
@@ -98,7 +100,7 @@ struct OpenWindow {
     info: ViewportInfo,
     painter: Painter,
     window_surface: WindowSurface,
-    /// Requests to cut, copy and paste.
+    /// Pending requests to cut, copy and paste.
     actions: Vec<ActionRequested>,
     /// Start of the last frame.
     last: Instant,
@@ -117,8 +119,14 @@ impl Runner {
         let window = Arc::new(egui_winit::create_window(&self.ctx, events, &viewport)?);
         let window_surface = WindowSurface::new(events.owned_display_handle(), window.clone())?;
         let scale = Some(window.scale_factor() as f32);
-        let state =
-            State::new(self.ctx.clone(), ViewportId::ROOT, events, scale, events.system_theme(), Some(LARGEST_TEXTURE));
+        let state = State::new(
+            self.ctx.clone(),
+            ViewportId::ROOT,
+            events,
+            scale,
+            events.system_theme(),
+            Some(MAX_TEXTURE_SIDE),
+        );
         let mut info = ViewportInfo::default();
         egui_winit::update_viewport_info(&mut info, &self.ctx, &window, true);
         let app = build(&self.ctx)?;
@@ -156,10 +164,10 @@ impl Runner {
         });
     }
 
-    /// Paints a frame; with `whole`, the system has lost the content of the window.
-    fn frame(&mut self, events: &ActiveEventLoop, whole: bool) {
+    /// Paints a frame. `content_lost` says whether the system has lost the content of the window.
+    fn frame(&mut self, events: &ActiveEventLoop, content_lost: bool) {
         let Some(open) = &mut self.open else { return };
-        match open.frame(&self.ctx, events, whole) {
+        match open.frame(&self.ctx, events, content_lost) {
             Ok(AfterFrame::Close) => self.close(events),
             Ok(AfterFrame::Repaint) => self.schedule(Instant::now()),
             Ok(AfterFrame::Sleep) => {}
@@ -187,7 +195,12 @@ enum AfterFrame {
 }
 
 impl OpenWindow {
-    fn frame(&mut self, ctx: &egui::Context, events: &ActiveEventLoop, whole: bool) -> Result<AfterFrame, WindowError> {
+    fn frame(
+        &mut self,
+        ctx: &egui::Context,
+        events: &ActiveEventLoop,
+        content_lost: bool,
+    ) -> Result<AfterFrame, WindowError> {
         self.last = Instant::now();
         egui_winit::update_viewport_info(&mut self.info, ctx, &self.window, false);
         let mut input = self.state.take_egui_input(&self.window);
@@ -203,8 +216,8 @@ impl OpenWindow {
         let changed = self.painter.paint(&primitives, output.pixels_per_point, size);
         self.painter.free_textures(&mut output.textures_delta);
         self.window.pre_present_notify();
-        if whole {
-            self.window_surface.forget();
+        if content_lost {
+            self.window_surface.invalidate();
         }
         self.window_surface.present(&self.painter, &changed, size)?;
         if std::mem::take(&mut self.first) {
@@ -267,10 +280,10 @@ impl ApplicationHandler<RepaintRequest> for Runner {
         self.paint_if_due(events);
     }
 
-    fn user_event(&mut self, _events: &ActiveEventLoop, RepaintRequest { at, seen }: RepaintRequest) {
+    fn user_event(&mut self, _events: &ActiveEventLoop, RepaintRequest { at, pass_nr }: RepaintRequest) {
         // Requests made before the last frames are satisfied by them.
         let passes = self.ctx.cumulative_pass_nr_for(ViewportId::ROOT);
-        if passes == seen || passes == seen + 1 {
+        if passes == pass_nr || passes == pass_nr + 1 {
             self.schedule(at);
         }
     }
@@ -288,8 +301,8 @@ impl ApplicationHandler<RepaintRequest> for Runner {
         match &event {
             WindowEvent::RedrawRequested => {
                 // Where the system does not pace frames, a redraw request means that the content was lost.
-                let whole = !open.vsync;
-                self.frame(events, whole);
+                let content_lost = !open.vsync;
+                self.frame(events, content_lost);
                 return;
             }
             WindowEvent::CloseRequested => {

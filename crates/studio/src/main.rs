@@ -1,4 +1,4 @@
-//! The program `bansho-studio`: a window on a scene, or the same in a page.
+//! The program `bansho-studio`: a native window, or a canvas in a web page.
 
 #[cfg(target_arch = "wasm32")]
 fn main() {

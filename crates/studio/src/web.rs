@@ -7,18 +7,18 @@ use bansho_studio::{
     app::{Session, Studio, function_keys},
     document::Document,
     player::{Player, PolledPlayer, WorkerPlayer},
-    scenes::examples::Bundle,
+    scenes::examples::BundledAssets,
 };
 use eframe::egui::{self, Context};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use web_sys::{Event, HtmlCanvasElement, KeyboardEvent, Window};
 
-/// The example without a fragment.
+/// The example that is shown without a fragment.
 const FIRST: &str = "campfire";
 
 pub(super) async fn main() {
     if let Err(reason) = start().await {
-        say(&format!("The studio cannot start here: {reason:?}. It needs WebGPU or WebGL 2."));
+        show_status(&format!("The studio cannot start here: {reason:?}. It needs WebGPU or WebGL 2."));
     }
 }
 
@@ -27,24 +27,26 @@ async fn start() -> Result<(), JsValue> {
     let document = window.document().ok_or("there is no page")?;
     let canvas = document.get_element_by_id("studio").ok_or("there is no canvas")?;
     let canvas: HtmlCanvasElement = canvas.dyn_into()?;
-    keep_keys_from_browser(&window)?;
+    prevent_default_keys(&window)?;
     let named = window.location().hash()?.trim_start_matches('#').to_owned();
     let build = move |creation: &eframe::CreationContext| {
         let ctx = creation.egui_ctx.clone();
         let session = Session::new(scene(&named), None, player(ctx), no_folder);
-        let page = Page { studio: Studio::new(session, None), told: String::new(), unsaved: ask_before_leaving() };
+        let page =
+            Page { studio: Studio::new(session, None), shown_notice: String::new(), unsaved: ask_before_leaving() };
         Ok(Box::new(page) as Box<dyn eframe::App>)
     };
     eframe::WebRunner::new().start(canvas, eframe::WebOptions::default(), Box::new(build)).await?;
-    say("");
+    show_status("");
     Ok(())
 }
 
-/// The studio, and what the page around its canvas must know of it.
+/// The studio, and the state of the page around its canvas.
 struct Page {
     studio: Studio,
-    /// What the user was told last.
-    told: String,
+    /// The message in the page.
+    shown_notice: String,
+    /// Whether the browser asks before the page is left.
     unsaved: Rc<Cell<bool>>,
 }
 
@@ -54,9 +56,9 @@ impl eframe::App for Page {
         self.unsaved.set(self.studio.has_unfinished_work());
         let session = self.studio.session();
         let notice = session.notice().unwrap_or_default();
-        if self.told != notice {
-            notice.clone_into(&mut self.told);
-            // Screen readers see no canvas.
+        if self.shown_notice != notice {
+            notice.clone_into(&mut self.shown_notice);
+            // Screen readers do not read the canvas.
             write("notice", notice);
         }
     }
@@ -66,38 +68,38 @@ impl eframe::App for Page {
     }
 }
 
-/// Whether work would be lost where the page is left, to be kept up to date: the browser asks first then.
+/// Lets the browser ask before the page is left while the returned flag is set.
 fn ask_before_leaving() -> Rc<Cell<bool>> {
     let unsaved = Rc::new(Cell::new(false));
-    let asked = unsaved.clone();
-    let ask = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
-        if asked.get() {
+    let is_unsaved = unsaved.clone();
+    let on_before_unload = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
+        if is_unsaved.get() {
             event.prevent_default();
         }
     });
     if let Some(window) = web_sys::window() {
-        window.set_onbeforeunload(Some(ask.as_ref().unchecked_ref()));
+        window.set_onbeforeunload(Some(on_before_unload.as_ref().unchecked_ref()));
     }
-    // It asks for as long as the page is open.
-    ask.forget();
+    // The callback lives as long as the page.
+    on_before_unload.forget();
     unsaved
 }
 
-/// Keeps from the browser those function keys that do something here: F12 would open its tools besides.
-fn keep_keys_from_browser(window: &Window) -> Result<(), JsValue> {
-    let keep = Closure::<dyn FnMut(KeyboardEvent)>::new(|event: KeyboardEvent| {
+/// Prevents the browser's default action for the function keys that the studio uses: F12 would open the developer tools.
+fn prevent_default_keys(window: &Window) -> Result<(), JsValue> {
+    let on_key_down = Closure::<dyn FnMut(KeyboardEvent)>::new(|event: KeyboardEvent| {
         let plain = !(event.ctrl_key() || event.alt_key() || event.meta_key());
         if plain && function_keys().any(|key| key == event.key()) {
             event.prevent_default();
         }
     });
-    window.add_event_listener_with_callback_and_bool("keydown", keep.as_ref().unchecked_ref(), true)?;
-    // It listens for as long as the page is open.
-    keep.forget();
+    window.add_event_listener_with_callback_and_bool("keydown", on_key_down.as_ref().unchecked_ref(), true)?;
+    // The callback lives as long as the page.
+    on_key_down.forget();
     Ok(())
 }
 
-/// A worker, or slices of the page's own time where the browser gives none.
+/// A player in a worker, or one in time slices of the page if the browser cannot start workers.
 fn player(ctx: Context) -> Box<dyn Player> {
     match WorkerPlayer::start(move || ctx.request_repaint()) {
         Ok(player) => Box::new(player),
@@ -115,11 +117,11 @@ fn scene(name: &str) -> Document {
 
 /// A page has no folders.
 fn no_folder(_: &Path) -> Arc<dyn Assets> {
-    Arc::new(Bundle::default())
+    Arc::new(BundledAssets::default())
 }
 
-/// Tells the user, in the middle of the page.
-fn say(text: &str) {
+/// Shows `text` in the middle of the page.
+fn show_status(text: &str) {
     write("status", text);
 }
 

@@ -7,7 +7,10 @@ use crate::{
     parameters::{BuildError, Parameter, Parameters, ProblemKind, Reader, Table, TableDescriptor},
 };
 
-use super::Phenomenon;
+use super::{
+    Phenomenon,
+    editor_hints::{EditorHints, StageView},
+};
 
 /// What a phenomenon is built with, besides its own parameters.
 #[derive(Clone, Copy)]
@@ -32,6 +35,9 @@ pub trait CheckedParameters: Send + Sync {
 
     /// See [`Describe::check_particle_budget`].
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError>;
+
+    /// See [`Describe::stage_view`].
+    fn stage_view(&self) -> Option<StageView>;
 
     /// Builds the phenomenon.
     ///
@@ -58,6 +64,8 @@ pub struct PhenomenonKind {
     pub placement_keys: &'static [&'static str],
     /// The most important keys; those in sub-tables and lists of tables are separated by dots.
     pub first_keys: &'static [&'static str],
+    /// What interactive editors know of it besides its parameters.
+    pub editor_hints: EditorHints,
 }
 
 /// Keys that every phenomenon has besides its own.
@@ -75,6 +83,8 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     const PLACEMENT_KEYS: &'static [&'static str] = &[];
     /// The most important keys, with which a short new scene begins; dots separate tables and lists of tables (`burners.diameter`).
     const FIRST_KEYS: &'static [&'static str] = &[];
+    /// See [`PhenomenonKind::editor_hints`].
+    const EDITOR_HINTS: EditorHints = EditorHints::NONE;
 
     /// Checks the number of its particles together with the `others` of the scene, since the number of all phenomena together is limited by memory, and
     /// returns the total.
@@ -83,6 +93,11 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
     /// There are more than fit.
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
         Ok(others)
+    }
+
+    /// How the stage that these parameters select is shown alone; `None` where the phenomenon has no stages. See [`EditorHints::stage_key`].
+    fn stage_view(&self) -> Option<StageView> {
+        None
     }
 
     /// Builds the phenomenon.
@@ -100,6 +115,7 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         scene_defaults: Self::SCENE_DEFAULTS,
         placement_keys: Self::PLACEMENT_KEYS,
         first_keys: Self::FIRST_KEYS,
+        editor_hints: Self::EDITOR_HINTS,
     };
 }
 
@@ -120,6 +136,10 @@ impl<P: Describe> CheckedParameters for Described<P> {
 
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
         self.0.check_particle_budget(others)
+    }
+
+    fn stage_view(&self) -> Option<StageView> {
+        self.0.stage_view()
     }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {

@@ -1,6 +1,7 @@
 //! The interface between phenomena (fire, rain, aurora, ...) and the renderer.
 
 pub(crate) mod aov;
+pub mod editor_hints;
 pub mod kind;
 pub mod strip;
 pub mod surroundings;

@@ -9,20 +9,20 @@ const GREY: Color32 = Color32::from_rgba_premultiplied(100, 100, 100, 100);
 /// GREY once over black.
 const ONCE: u32 = 0x0064_6464;
 
-/// A net of triangles with corners in random places, which covers the window and overlaps nowhere.
-fn net(seed: u64, grid: f32) -> Vec<[f32; 2]> {
+/// A mesh of triangles with random corners, which covers the window without overlaps.
+fn triangle_mesh(seed: u64, grid: f32) -> Vec<[f32; 2]> {
     let mut random = random(seed);
     let [across, down] = [10, 6];
     let mut corners = Vec::new();
     for y in 0..=down {
         for x in 0..=across {
             let inside = |at: i32, last: i32| f32::from(u8::from(at > 0 && at < last));
-            let place = |at: i32, last: i32, side: f32, moved: f32| {
+            let position = |at: i32, last: i32, side: f32, moved: f32| {
                 let moved = 0.4 * (moved - 0.5) * inside(at, last);
                 ((at as f32 + moved) / last as f32 * side * grid).round() / grid
             };
-            let place = [place(x, across, SIZE[0] as f32, random()), place(y, down, SIZE[1] as f32, random())];
-            corners.push(place);
+            let corner = [position(x, across, SIZE[0] as f32, random()), position(y, down, SIZE[1] as f32, random())];
+            corners.push(corner);
         }
     }
     let corner = |x: i32, y: i32| corners[(y * (across + 1) + x) as usize];
@@ -30,7 +30,7 @@ fn net(seed: u64, grid: f32) -> Vec<[f32; 2]> {
     for y in 0..down {
         for x in 0..across {
             let [a, b, c, d] = [corner(x, y), corner(x + 1, y), corner(x, y + 1), corner(x + 1, y + 1)];
-            // Some clockwise, some not.
+            // With either orientation.
             all.extend(if random() < 0.5 { [a, b, c, b, c, d] } else { [a, d, c, a, b, d] });
         }
     }
@@ -39,18 +39,18 @@ fn net(seed: u64, grid: f32) -> Vec<[f32; 2]> {
 
 #[test]
 fn triangles_that_share_edges_paint_every_pixel_once() {
-    // Also with corners in the very middles of pixels and on their borders.
+    // Also with corners at pixel centers and on pixel borders.
     for (seed, grid) in [(1, 256.0), (2, 256.0), (3, 2.0), (4, 1.0), (5, 10_000.0)] {
-        let (pixels, _) = painted(&mut painter(), [triangles(GREY, &net(seed, grid))]);
+        let (pixels, _) = painted(&mut painter(), [triangles(GREY, &triangle_mesh(seed, grid))]);
         assert!(pixels.iter().all(|pixel| *pixel == ONCE), "corners on 1/{grid} of pixels");
     }
 }
 
 #[test]
-fn rectangles_are_what_their_two_triangles_are() {
+fn rectangles_equal_their_two_triangles() {
     let mut random = random(7);
     for _ in 0..60 {
-        let mut side = |most: f32| (random() * (most + 20.0) - 10.0) * 256.0;
+        let mut side = |max: f32| (random() * (max + 20.0) - 10.0) * 256.0;
         let corners = [[side(150.0), side(70.0)], [side(150.0), side(70.0)]].map(|at| at.map(|at| at.round() / 256.0));
         let rect = Rect::from_two_pos(corners[0].into(), corners[1].into());
         let whole = rectangle(rect, GREY);
@@ -58,10 +58,10 @@ fn rectangles_are_what_their_two_triangles_are() {
         let (one, _) = painted(&mut painter(), [whole]);
         let (two, _) = painted(&mut painter(), halves);
         assert_eq!(one, two, "{rect:?}");
-        let middles = |from: f32, to: f32, side: u32| {
+        let centers = |from: f32, to: f32, side: u32| {
             (0..side).filter(|pixel| (from..to).contains(&(*pixel as f32 + 0.5))).count()
         };
-        let expected = middles(rect.min.x, rect.max.x, SIZE[0]) * middles(rect.min.y, rect.max.y, SIZE[1]);
+        let expected = centers(rect.min.x, rect.max.x, SIZE[0]) * centers(rect.min.y, rect.max.y, SIZE[1]);
         assert_eq!(one.iter().filter(|pixel| **pixel == ONCE).count(), expected, "{rect:?}");
     }
 }
@@ -76,17 +76,17 @@ fn colors_are_linear_between_corners() {
     }
     let (pixels, _) = painted(&mut painter(), [mesh]);
     for (x, y) in [(0, 0), (99, 20), (20, 60), (130, 30)] {
-        // The value in a pixel's middle, rounded up from the half.
+        // The value at the pixel's center; halves are rounded up.
         assert_eq!(pixel(&pixels, x, y), (x + 1) << 16 | (y + 1) << 8, "({x}, {y})");
     }
-    assert_eq!(pixel(&pixels, 149, 60), 0, "beyond the slope");
+    assert_eq!(pixel(&pixels, 149, 60), 0, "outside of the triangle");
 }
 
 #[test]
 fn nothing_is_painted_beyond_a_clip() {
     let mut painter = painter();
     let clip = Rect::from_min_max(pos2(10.4, 20.5), pos2(90.6, 60.4));
-    for mesh in [rectangle(EVERYWHERE, Color32::WHITE), triangles(Color32::WHITE, &net(1, 256.0))] {
+    for mesh in [rectangle(EVERYWHERE, Color32::WHITE), triangles(Color32::WHITE, &triangle_mesh(1, 256.0))] {
         painter.paint(&[within(clip, mesh)], 1.0, SIZE);
         let pixels = pixels(&painter);
         for y in 0..SIZE[1] {
@@ -96,7 +96,7 @@ fn nothing_is_painted_beyond_a_clip() {
             }
         }
     }
-    // Of twice the points there are twice the pixels.
+    // With two pixels per point.
     painter.paint(&[within(clip, rectangle(EVERYWHERE, Color32::WHITE))], 2.0, SIZE);
     let pixels = pixels(&painter);
     assert_eq!([pixel(&pixels, 20, 40), pixel(&pixels, 21, 41), pixel(&pixels, 20, 41)], [0, 0x00ff_ffff, 0]);
@@ -107,7 +107,7 @@ fn nothing_is_painted_beyond_a_clip() {
 }
 
 #[test]
-fn what_is_no_triangle_paints_nothing() {
+fn degenerate_triangles_paint_nothing() {
     let nowhere = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX];
     let mut meshes = vec![
         triangles(GREY, &[[5.0, 5.0], [5.0, 5.0], [5.0, 5.0]]),
@@ -123,7 +123,7 @@ fn what_is_no_triangle_paints_nothing() {
 }
 
 #[test]
-fn what_is_huge_covers_the_window() {
+fn huge_triangles_cover_the_window() {
     for far in [1e4, 1e6, 1e9, f32::MAX, f32::INFINITY] {
         let (pixels, _) = painted(&mut painter(), [triangles(GREY, &[[-far, -far], [far, -far], [0.0, far]])]);
         assert!(pixels.iter().all(|pixel| *pixel == ONCE), "{far}");
@@ -136,7 +136,7 @@ fn what_is_huge_covers_the_window() {
 }
 
 #[test]
-fn only_what_changed_is_painted_again() {
+fn only_changed_tiles_are_repainted() {
     let ground = || rectangle(EVERYWHERE, Color32::from_gray(40));
     let spot = |x: f32| rectangle(Rect::from_min_size(pos2(x, 40.0), vec2(5.0, 5.0)), Color32::RED);
     let mut painter = painter();
@@ -149,5 +149,5 @@ fn only_what_changed_is_painted_again() {
     assert_eq!(where_moved, [tile(0, 64), tile(128, 150)]);
     assert_eq!([pixel(&moved, 12, 42), pixel(&moved, 132, 42)], [0x0028_2828, 0x00ff_0000]);
     let (_, below) = painted(&mut painter, [spot(130.0), ground()]);
-    assert_eq!(below, [tile(128, 150)], "what lies above hides it");
+    assert_eq!(below, [tile(128, 150)], "the ground hides the spot");
 }

@@ -1,4 +1,4 @@
-//! Small meshes, whose pixels are known.
+//! Small meshes with known pixels.
 
 mod coverage;
 mod textures;
@@ -13,14 +13,14 @@ use egui::{
 
 use super::{Painter, PixelRect};
 
-/// The window of these tests, pixels: tiles at the right and at the bottom are not whole.
+/// The size of the framebuffer, pixels. The tiles at the right and the bottom are cut.
 const SIZE: [u32; 2] = [150, 70];
 
 const EVERYWHERE: Rect = Rect { min: pos2(-1e9, -1e9), max: pos2(1e9, 1e9) };
 
 const FONT: TextureId = TextureId::Managed(0);
 
-/// A painter that has egui's own texture, which is white at (0, 0).
+/// A painter with egui's font texture, which is white at (0, 0).
 fn painter() -> Painter {
     let mut painter = Painter::default();
     set(&mut painter, FONT, None, ColorImage::filled([8, 8], Color32::WHITE));
@@ -57,7 +57,7 @@ fn within(clip_rect: Rect, mesh: Mesh) -> ClippedPrimitive {
     ClippedPrimitive { clip_rect, primitive: Primitive::Mesh(mesh) }
 }
 
-/// All pixels after `meshes` were painted over what is there, and where that was.
+/// Paints `meshes`. Returns all pixels, and the rectangles that were painted.
 fn painted(painter: &mut Painter, meshes: impl IntoIterator<Item = Mesh>) -> (Vec<u32>, Vec<PixelRect>) {
     let primitives: Vec<ClippedPrimitive> = meshes.into_iter().map(|mesh| within(EVERYWHERE, mesh)).collect();
     let changed = painter.paint(&primitives, 1.0, SIZE);
@@ -76,7 +76,7 @@ fn pixel(pixels: &[u32], x: u32, y: u32) -> u32 {
     pixels[(y * SIZE[0] + x) as usize]
 }
 
-/// Numbers from 0 to before 1 that follow from `seed`.
+/// Random numbers in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed;
     move || {

@@ -1,4 +1,4 @@
-//! Pictures, and letters, which are small pictures.
+//! Textured meshes.
 
 use egui::{TextureFilter, TextureOptions, TextureWrapMode, pos2, vec2};
 
@@ -14,7 +14,7 @@ fn image(size: [usize; 2], seed: u64, alpha: u8) -> ColorImage {
     ColorImage::new(size, pixels.collect())
 }
 
-/// All of the picture in `rect`.
+/// A rectangle with the picture.
 fn shown(rect: Rect, uv: Rect, tint: Color32) -> Mesh {
     let mut mesh = Mesh::with_texture(PICTURE);
     mesh.add_rect_with_uv(rect, uv, tint);
@@ -29,7 +29,7 @@ fn pack_xrgb(color: Color32) -> u32 {
 }
 
 #[test]
-fn a_picture_of_its_own_size_is_shown_as_it_is() {
+fn an_unscaled_picture_is_copied() {
     let (mut painter, picture) = (painter(), image([90, 50], 1, 255));
     set(&mut painter, PICTURE, None, picture.clone());
     // Partly outside of the window, too.
@@ -48,7 +48,7 @@ fn a_picture_of_its_own_size_is_shown_as_it_is() {
 }
 
 #[test]
-fn a_picture_of_another_size_is_mixed_as_its_two_triangles_mix_it() {
+fn a_scaled_picture_equals_its_two_triangles() {
     for (seed, alpha) in [(3, 255), (4, 120)] {
         let mut painter = painter();
         set(&mut painter, PICTURE, None, image([23, 17], seed, alpha));
@@ -76,13 +76,13 @@ fn the_middle_between_two_texels_is_their_mean() {
     set(&mut painter, PICTURE, None, ColorImage::new([2, 1], texels));
     let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(8.0, 4.0));
     let (pixels, _) = painted(&mut painter, [shown(rect, WHOLE, Color32::WHITE)]);
-    // Middles of pixels are at 1/8, 3/8... of a texel.
+    // Pixel centers are at 1/8, 3/8... of a texel.
     let row: Vec<u32> = (0..8).map(|x| pixel(&pixels, x, 1) & 255).collect();
     assert_eq!(row, [0, 0, 25, 75, 125, 175, 200, 200]);
 }
 
 #[test]
-fn textures_end_or_repeat_as_they_are_told() {
+fn textures_are_wrapped() {
     let row = |wrap_mode: TextureWrapMode| {
         let mut painter = painter();
         let texels = [10, 20, 30].map(Color32::from_gray).to_vec();
@@ -100,22 +100,22 @@ fn textures_end_or_repeat_as_they_are_told() {
 }
 
 #[test]
-fn only_tiles_of_changed_texels_are_painted_again() {
+fn only_tiles_of_changed_texels_are_repainted() {
     let (mut painter, picture) = (painter(), image([150, 70], 1, 255));
     let mesh = || [shown(Rect::from_min_size(Pos2::ZERO, vec2(150.0, 70.0)), WHOLE, Color32::WHITE)];
     set(&mut painter, PICTURE, None, picture.clone());
     painted(&mut painter, mesh());
-    // The same picture, sent once more.
+    // The same picture again.
     set(&mut painter, PICTURE, None, picture.clone());
     assert!(painted(&mut painter, mesh()).1.is_empty());
-    // A new one, which is another in one place.
+    // A picture with one changed texel.
     let mut other = picture.clone();
     other.pixels[150 * 40 + 20] = Color32::RED;
     set(&mut painter, PICTURE, None, other.clone());
     let (pixels, changed) = painted(&mut painter, mesh());
     assert_eq!(changed, [PixelRect { left: 0, top: 32, right: 64, bottom: 64 }]);
     assert_eq!(pixel(&pixels, 20, 40), 0x00ff_0000);
-    // A part, which reaches over the edge of what is there.
+    // A region that exceeds the texture.
     set(&mut painter, PICTURE, Some([140, 66]), ColorImage::filled([30, 30], Color32::GREEN));
     let (pixels, changed) = painted(&mut painter, mesh());
     assert_eq!(changed, [PixelRect { left: 128, top: 64, right: 150, bottom: 70 }]);
@@ -123,14 +123,14 @@ fn only_tiles_of_changed_texels_are_painted_again() {
         assert_eq!(pixel(&pixels, x, y), pack_xrgb(picture.pixels[(y * 150 + x) as usize]));
     }
     assert_eq!([pixel(&pixels, 140, 66), pixel(&pixels, 149, 69)], [0x0000_ff00; 2]);
-    // Parts of nothing, or beyond everything, change nothing.
+    // Regions outside of the texture, or of no texture, change nothing.
     set(&mut painter, PICTURE, Some([150, 0]), ColorImage::filled([3, 3], Color32::GREEN));
     set(&mut painter, TextureId::Managed(77), Some([0, 0]), ColorImage::filled([3, 3], Color32::GREEN));
     assert!(painted(&mut painter, mesh()).1.is_empty());
 }
 
 #[test]
-fn a_texture_that_is_given_up_is_not_shown_any_more() {
+fn a_freed_texture_is_not_painted() {
     let mut painter = painter();
     set(&mut painter, PICTURE, None, image([150, 70], 1, 255));
     let mesh = || [shown(Rect::from_min_size(Pos2::ZERO, vec2(150.0, 70.0)), WHOLE, Color32::WHITE)];

@@ -10,6 +10,7 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
+        editor_hints::{DraftLimit, EditorHints, MeshImport, PositionHandles},
         kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
@@ -41,6 +42,12 @@ impl Describe for FlameParticlesParameters {
         "burners.diameter",
         "burners.heat_release_kw",
     ];
+    const EDITOR_HINTS: EditorHints = EditorHints {
+        draft_limits: &[DraftLimit { key: "particles", max: 4_000 }],
+        position_handles: Some(PositionHandles { key: "position", items: Some("burners") }),
+        mesh_import: Some(MeshImport { list: "burners", shape_key: "shape", shape: "mesh", file_key: "file" }),
+        ..EditorHints::NONE
+    };
     const SCENE_DEFAULTS: &'static str = "\
         camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
         wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";

@@ -7,13 +7,14 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
+        editor_hints::{EditorHints, PositionHandles, StageView},
         kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{Publication, Surroundings},
     },
 };
 
-use super::{FlameSheetParameters, model::FlameSheet, render, render::aovs::AOVS};
+use super::{FlameSheetParameters, Stage, model::FlameSheet, render, render::aovs::AOVS};
 
 impl Describe for FlameSheetParameters {
     const KEY: &'static str = "flame_sheet";
@@ -32,6 +33,18 @@ impl Describe for FlameSheetParameters {
         "sparks.rate",
         "smoke.optical_depth",
     ];
+    const EDITOR_HINTS: EditorHints = EditorHints {
+        position_handles: Some(PositionHandles { key: "position", items: Some("instances") }),
+        stage_key: Some("stage"),
+        ..EditorHints::NONE
+    };
+
+    fn stage_view(&self) -> Option<StageView> {
+        // Before colors are assigned, gray levels are fractions of the highest luminance.
+        let highest = self.color.luminance.bounds()[1].max(f64::MIN_POSITIVE);
+        let is_gray = !matches!(self.stage, Stage::Colored | Stage::Flame);
+        Some(StageView { size_m: [self.width, self.height], white_luminance: is_gray.then_some(highest) })
+    }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match FlameSheet::new(self.clone(), context.name, context.seed, context.loop_s) {

@@ -6,7 +6,7 @@ use eframe::egui::{Context, Panel, ThemePreference, Ui};
 
 use crate::session::settings_store::SettingsStore;
 
-/// Sizes of the panels and what is open.
+/// Sizes of panels and window, open panels, and the theme.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     store: SettingsStore,
@@ -21,11 +21,8 @@ const NAME: &str = "layout";
 /// Width and height of the window.
 const WINDOW: [&str; 2] = ["window width", "window height"];
 
-/// Smaller sizes are ignored: the window is being opened or minimized. Points.
-const SMALLEST: f32 = 200.0;
-
-/// The panel at the bottom, whose size is its height.
-const AURORA: &str = "aurora";
+/// Smaller window sizes are ignored, since the window is being opened or minimized. Points.
+const MIN_WINDOW_SIZE: f32 = 200.0;
 
 /// Key of the theme: 0 as the system's, 1 dark, 2 light.
 const THEME: &str = "theme";
@@ -53,11 +50,30 @@ impl Layout {
         self.values.insert(key.to_owned(), value.round());
     }
 
-    /// Shows `panel` with its stored size, or the default size, and records its size.
-    pub(super) fn panel_ui(&mut self, key: &str, panel: Panel, default: f32, ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
-        let sideways = key != AURORA;
+    /// Shows `panel` at the left or right with its stored width, or `default`, and records its width. Points.
+    pub(super) fn side_panel_ui(
+        &mut self,
+        key: &str,
+        panel: Panel,
+        default: f32,
+        ui: &mut Ui,
+        add: impl FnOnce(&mut Ui),
+    ) {
         let shown = panel.default_size(self.get(key, default)).show(ui, add).response.rect;
-        self.set(key, if sideways { shown.width() } else { shown.height() });
+        self.set(key, shown.width());
+    }
+
+    /// Shows `panel` at the bottom with its stored height, or `default`, and records its height. Points.
+    pub(super) fn bottom_panel_ui(
+        &mut self,
+        key: &str,
+        panel: Panel,
+        default: f32,
+        ui: &mut Ui,
+        add: impl FnOnce(&mut Ui),
+    ) {
+        let shown = panel.default_size(self.get(key, default)).show(ui, add).response.rect;
+        self.set(key, shown.height());
     }
 
     /// Applies the stored theme; dark by default.
@@ -86,18 +102,18 @@ impl Layout {
 
     /// Records the size of the window, unless it is maximized.
     pub(super) fn record_window_size(&mut self, ctx: &Context) {
-        let (size, fills) = ctx.input(|input| {
+        let (size, is_maximized) = ctx.input(|input| {
             let viewport = input.viewport();
-            let fills = viewport.maximized.unwrap_or(false) || viewport.fullscreen.unwrap_or(false);
-            (input.content_rect().size(), fills)
+            let is_maximized = viewport.maximized.unwrap_or(false) || viewport.fullscreen.unwrap_or(false);
+            (input.content_rect().size(), is_maximized)
         });
-        if !fills && size.min_elem() >= SMALLEST {
+        if !is_maximized && size.min_elem() >= MIN_WINDOW_SIZE {
             self.set(WINDOW[0], size.x);
             self.set(WINDOW[1], size.y);
         }
     }
 
-    /// Stores the layout if it changed. Where storing fails, the next start has the default.
+    /// Stores the layout if it changed. If that fails, the next start has the previous layout.
     pub(super) fn save(&mut self) {
         if self.values == self.stored {
             return;
@@ -116,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_layout_is_there_again_at_the_next_start() {
+    fn a_layout_is_restored_at_the_next_start() {
         let home = tempfile::tempdir().unwrap();
         let store = SettingsStore::new(Some(home.path().to_path_buf()));
         let mut layout = Layout::read(store.clone());

@@ -3,10 +3,13 @@
 use eframe::egui::{self, ThemePreference, Ui};
 
 use super::Studio;
-use crate::{document::files::autosave::RecoveredWork, scenes::new_scene::NEW_SCENES};
+use crate::{
+    document::files::autosave::RecoveredWork,
+    scenes::new_scene::{NEW_SCENES, NewScene},
+};
 
 impl Studio {
-    /// The menu bar.
+    /// Shows the menu bar.
     pub(super) fn menu_ui(&mut self, ui: &mut Ui) {
         egui::MenuBar::new().ui(ui, |ui| {
             ui.menu_button("File", |ui| self.file_menu_ui(ui));
@@ -20,7 +23,7 @@ impl Studio {
 
     fn file_menu_ui(&mut self, ui: &mut Ui) {
         ui.menu_button("New", |ui| {
-            for (name, text) in NEW_SCENES {
+            for NewScene { name, text } in NEW_SCENES {
                 if ui.button(name).clicked() {
                     self.files.open_bundled(&mut self.session, "scene", text);
                 }
@@ -62,9 +65,10 @@ impl Studio {
 
     /// The last undo steps, newest first: a click undoes that step and all after it.
     fn undo_list_ui(&mut self, ui: &mut Ui) {
-        const LISTED: usize = 20;
+        /// Maximum number of listed steps.
+        const MAX_LISTED: usize = 20;
         let document = &mut self.session.document;
-        let labels: Vec<String> = document.undo_labels().take(LISTED).map(str::to_owned).collect();
+        let labels: Vec<String> = document.undo_labels().take(MAX_LISTED).map(str::to_owned).collect();
         if labels.is_empty() {
             ui.weak("nothing was done");
         }
@@ -111,7 +115,7 @@ impl Studio {
             ui.separator();
             for recovered in self.files.unsaved.recovered.clone() {
                 if ui.button(format!("Not wanted: {}", name(&recovered))).clicked() {
-                    self.files.unsaved.forget(&recovered);
+                    self.files.unsaved.discard(&recovered);
                 }
             }
         })

@@ -1,4 +1,4 @@
-//! The window: panels around a viewport, over one [`Session`].
+//! The window: panels around a viewport, which show and edit one [`Session`].
 
 mod files;
 mod layout;
@@ -18,46 +18,37 @@ use eframe::egui;
 pub use self::shortcuts::function_keys;
 use self::{files::Files, layout::Layout, viewport::Viewport};
 pub use super::session::{AssetsForFolder, Session};
-pub use crate::editors::flame_sheet::stages_ui::color_image;
 use crate::{
-    editors::{aurora::AuroraEditor, flame_sheet::stages_ui::StagesView},
+    editors::KindEditors,
     session::{selection::Selection, settings_store::SettingsStore},
 };
-use panels::{inspector::Inspector, problems::ProblemAction, text::TextPanel};
+use panels::{inspector::Inspector, problems::ProblemAction, stages::StagesSection, text::TextPanel};
+pub use widgets::picture_texture::color_image;
 
-/// The kind of phenomenon with an editor of shapes.
-const KIND_WITH_SHAPES: &str = "aurora";
-
-/// The kind of phenomenon with burners.
-const KIND_WITH_BURNERS: &str = "flame_particles";
-
-/// The kind of phenomenon with pictures of its stages.
-const KIND_WITH_STAGES: &str = "flame_sheet";
-
-/// The whole window.
+/// The window and its state.
 pub struct Studio {
     session: Session,
     selection: Selection,
     viewport: Viewport,
-    aurora: AuroraEditor,
-    stages: StagesView,
+    editors: KindEditors,
+    stages: StagesSection,
     inspector: Inspector,
     text: TextPanel,
     files: Files,
     visible_panels: VisiblePanels,
     layout: Layout,
-    /// Which of the documents that were opened is shown.
+    /// [`Session::opened`] of the document that is shown.
     opened: u64,
-    /// What has the keys.
-    field: Option<egui::Id>,
+    /// The widget with the keyboard focus.
+    focused: Option<egui::Id>,
 }
 
-/// How large the window was when it was closed last, or is at first, points of the screen.
+/// The size of the window when it was last closed, or the default size, points.
 pub fn window_size(home: Option<&std::path::Path>) -> [f32; 2] {
     Layout::read(SettingsStore::new(home.map(Into::into))).window_size()
 }
 
-/// Which parts of the window are open.
+/// Which panels are open.
 #[derive(Clone, Copy, Debug, Default)]
 struct VisiblePanels {
     text: bool,
@@ -67,7 +58,7 @@ struct VisiblePanels {
 }
 
 impl Studio {
-    /// A window on `session`. `home` is the folder for settings, recent files and autosaves; without it, nothing is stored.
+    /// A window that shows `session`. `home` is the folder for settings, recent files and autosaves; without it, nothing is stored.
     pub fn new(session: Session, home: Option<std::path::PathBuf>) -> Self {
         let selection = Selection::first_of(&session.document);
         let store = SettingsStore::new(home);
@@ -76,15 +67,15 @@ impl Studio {
             session,
             selection,
             viewport: Viewport::default(),
-            aurora: AuroraEditor::default(),
-            stages: StagesView::default(),
+            editors: KindEditors::default(),
+            stages: StagesSection::default(),
             inspector: Inspector::default(),
             text: TextPanel::default(),
             files: Files::new(&store),
             visible_panels: VisiblePanels { text: layout.get("text shown", 0.0) > 0.0, ..VisiblePanels::default() },
             layout,
             opened: 0,
-            field: None,
+            focused: None,
         }
     }
 
@@ -110,7 +101,7 @@ impl Studio {
             self.layout.apply_theme(ui.ctx());
         }
         let (now, dragging) = time_and_dragging(ui);
-        // Polled first, so that a new picture is shown in this frame.
+        // Polled first, so that a new picture is shown in the same frame.
         self.session.poll_player(now, dragging);
         self.begin_undo_steps(ui.ctx());
         self.handle_shortcuts(ui.ctx());
@@ -124,9 +115,9 @@ impl Studio {
         } else {
             self.panels_ui(ui);
         }
-        let bare = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
+        let transparent = egui::Frame::central_panel(ui.style()).fill(egui::Color32::TRANSPARENT);
         egui::CentralPanel::default()
-            .frame(bare)
+            .frame(transparent)
             .show(ui, |ui| self.viewport.ui(ui, &mut self.session, &self.selection));
         if self.visible_panels.shortcuts {
             shortcuts::shortcuts_ui(ui.ctx(), &mut self.visible_panels.shortcuts);
@@ -138,23 +129,24 @@ impl Studio {
         self.request_frame(ui);
     }
 
-    /// Resets the selection after a scene was opened, or where the selected table is gone.
+    /// Resets the selection after a scene was opened or the selected table was removed.
     fn reset_on_open(&mut self) {
         let gone =
-            self.selection.index.is_some() && self.selection.place().find(self.session.document.values()).is_none();
+            self.selection.index.is_some() && self.selection.path().find(self.session.document.values()).is_none();
         if self.opened != self.session.opened || gone {
             self.opened = self.session.opened;
             self.selection = Selection::first_of(&self.session.document);
-            self.aurora = AuroraEditor::default();
+            self.editors = KindEditors::default();
         }
     }
 
     fn panels_ui(&mut self, ui: &mut egui::Ui) {
         self.side_panels_ui(ui);
-        if let (KIND_WITH_SHAPES, Some(index)) = (self.selection.key, self.selection.index) {
-            let panel = egui::Panel::bottom("aurora").resizable(true);
-            let Self { aurora, session, layout, .. } = self;
-            layout.panel_ui("aurora", panel, 420.0, ui, |ui| aurora.ui(ui, session, index));
+        let selected = self.selection.phenomenon();
+        if let Some(phenomenon) = selected.filter(|selected| self.editors.has_editor(selected.kind)) {
+            let panel = egui::Panel::bottom(phenomenon.kind).resizable(true);
+            let Self { editors, session, layout, .. } = self;
+            layout.bottom_panel_ui(phenomenon.kind, panel, 420.0, ui, |ui| editors.ui(ui, session, phenomenon));
         }
     }
 
@@ -164,52 +156,52 @@ impl Studio {
                 self.visible_panels.text = true;
                 self.text.jump_to(span);
             }
-            Some(ProblemAction::Relink(place)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, place),
+            Some(ProblemAction::Relink(parameter)) => self.files.ask_to_relink(ui.ctx(), &mut self.session, parameter),
             None => {}
         }
         let Self { session, selection, text, stages, inspector, layout, visible_panels, .. } = self;
-        layout.panel_ui("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
+        layout.side_panel_ui("scene", egui::Panel::left("scene"), 200.0, ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| panels::scene::scene_ui(ui, session, selection));
         });
         if visible_panels.text {
-            layout.panel_ui("text", egui::Panel::right("text"), 380.0, ui, |ui| text.ui(ui, session));
+            layout.side_panel_ui("text", egui::Panel::right("text"), 380.0, ui, |ui| text.ui(ui, session));
         }
-        layout.panel_ui("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
+        layout.side_panel_ui("inspector", egui::Panel::right("inspector"), 330.0, ui, |ui| {
             session.stages = None;
-            if let (KIND_WITH_STAGES, Some(index)) = (selection.key, selection.index) {
-                stages.ui(ui, session, index);
+            if let Some(phenomenon) = selection.phenomenon() {
+                stages.ui(ui, session, phenomenon);
             }
-            // Wide rows scroll: otherwise they would widen the panel, which widens the rows.
+            // Wide rows scroll. Otherwise they would widen the panel, which would widen the rows.
             egui::ScrollArea::both().auto_shrink(false).show(ui, |ui| inspector.ui(ui, session, selection));
         });
     }
 
     /// Starts an undo step at a press or a change of focus: a drag, the edits in one field, or one turn of the wheel are one step.
     fn begin_undo_steps(&mut self, ctx: &egui::Context) {
-        let field = ctx.memory(egui::Memory::focused);
-        let (pressed, held) = ctx.input(|input| (input.pointer.any_pressed(), input.pointer.any_down()));
-        if pressed || (self.field != field && !held) {
+        let focused = ctx.memory(egui::Memory::focused);
+        let (pressed, is_down) = ctx.input(|input| (input.pointer.any_pressed(), input.pointer.any_down()));
+        if pressed || (self.focused != focused && !is_down) {
             self.session.document.end_step();
         }
-        self.field = field;
+        self.focused = focused;
     }
 
     /// Ends the undo step once nothing is pressed, typed in or scrolled.
     fn end_undo_steps(&mut self, ui: &egui::Ui) {
         /// Scrolling with shorter pauses is one step, s.
-        const TURN_S: f32 = 0.5;
+        const SCROLL_PAUSE_S: f32 = 0.5;
         let typing = ui.ctx().egui_wants_keyboard_input();
-        let (held, turned) = ui.input(|input| {
-            let turned = input.is_scrolling() || input.time_since_last_scroll() < TURN_S;
-            (input.pointer.any_down(), turned)
+        let (is_down, is_scrolling) = ui.input(|input| {
+            let is_scrolling = input.is_scrolling() || input.time_since_last_scroll() < SCROLL_PAUSE_S;
+            (input.pointer.any_down(), is_scrolling)
         });
-        if held || typing {
+        if is_down || typing {
             return;
         }
-        if !turned {
+        if !is_scrolling {
             self.session.document.end_step();
         }
-        // A page is closed without notice.
+        // A web page is closed without notice.
         if cfg!(target_arch = "wasm32") {
             self.layout.save();
         }
@@ -220,15 +212,15 @@ impl Studio {
         if let Some(sleep_s) = self.session.advance_time(now, self.viewport.pixels(), dragging) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(sleep_s));
         }
-        self.session.wait(now, dragging);
+        self.session.wait_for_picture(now, dragging);
         self.viewport.upload_picture(ui, &self.session);
     }
 }
 
 /// The time, s, and whether something is being dragged.
 fn time_and_dragging(ui: &egui::Ui) -> (f64, bool) {
-    let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
-    (now, held && ui.ctx().dragged_id().is_some())
+    let (now, is_down) = ui.input(|input| (input.time, input.pointer.any_down()));
+    (now, is_down && ui.ctx().dragged_id().is_some())
 }
 
 #[cfg(not(target_arch = "wasm32"))]

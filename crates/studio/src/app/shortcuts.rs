@@ -14,15 +14,15 @@ pub(super) enum Action {
     RenderStill,
     RenderShot,
     PlayPause,
-    FrameBack,
-    FrameOn,
+    StepBack,
+    StepForward,
     FirstFrame,
     Text,
     PictureOnly,
     Shortcuts,
 }
 
-/// A key, its action and the action's name.
+/// A key combination, its action, and the action's name.
 pub(super) struct Shortcut {
     pub(super) keys: KeyboardShortcut,
     pub(super) action: Action,
@@ -37,7 +37,7 @@ const fn plain(key: Key, action: Action, name: &'static str) -> Shortcut {
     Shortcut { keys: KeyboardShortcut::new(Modifiers::NONE, key), action, name }
 }
 
-/// All of them. Longer combinations come first, since a shorter one is part of them.
+/// All shortcuts. Longer combinations come first, since they include shorter ones.
 pub(super) const SHORTCUTS: [Shortcut; 14] = [
     Shortcut {
         keys: KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z),
@@ -48,7 +48,7 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
     with_command(Key::Y, Action::Redo, "Redo"),
     with_command(Key::S, Action::Save, "Save"),
     with_command(Key::O, Action::Open, "Open"),
-    // Browsers keep Ctrl+T for themselves.
+    // Browsers reserve Ctrl+T.
     plain(Key::F2, Action::Text, "Show or hide the text"),
     Shortcut {
         keys: KeyboardShortcut::new(Modifiers::SHIFT, Key::F12),
@@ -57,20 +57,20 @@ pub(super) const SHORTCUTS: [Shortcut; 14] = [
     },
     plain(Key::F12, Action::RenderStill, "Render the still"),
     plain(Key::Space, Action::PlayPause, "Play or pause"),
-    plain(Key::ArrowLeft, Action::FrameBack, "Frame back"),
-    plain(Key::ArrowRight, Action::FrameOn, "Frame on"),
+    plain(Key::ArrowLeft, Action::StepBack, "Frame back"),
+    plain(Key::ArrowRight, Action::StepForward, "Frame on"),
     plain(Key::Home, Action::FirstFrame, "First frame"),
     plain(Key::F, Action::PictureOnly, "Only the picture, or everything"),
     plain(Key::Questionmark, Action::Shortcuts, "These shortcuts"),
 ];
 
 impl Studio {
-    /// Performs the actions of pressed keys. While a text field has the focus, plain keys belong to it.
+    /// Performs the actions of pressed keys. While a text field has the focus, it receives the keys without modifiers.
     pub(super) fn handle_shortcuts(&mut self, ctx: &Context) {
         let typing = ctx.egui_wants_keyboard_input();
         for shortcut in &SHORTCUTS {
-            let mine = !typing || shortcut.keys.modifiers.command || is_function(shortcut.keys.logical_key);
-            if mine && ctx.input_mut(|input| pressed(input, shortcut)) {
+            let applies = !typing || shortcut.keys.modifiers.command || is_function_key(shortcut.keys.logical_key);
+            if applies && ctx.input_mut(|input| pressed(input, shortcut)) {
                 self.perform(ctx, shortcut.action);
             }
         }
@@ -93,8 +93,8 @@ impl Studio {
             Action::RenderStill => self.files.render_still(ctx, &mut self.session),
             Action::RenderShot => self.files.render_shot(ctx, &mut self.session),
             Action::PlayPause => transport.set_playing(!transport.is_playing()),
-            Action::FrameBack => transport.step(-1),
-            Action::FrameOn => transport.step(1),
+            Action::StepBack => transport.step(-1),
+            Action::StepForward => transport.step(1),
             Action::FirstFrame => transport.go_to(*transport.range().start()),
             Action::Text => self.visible_panels.text = !self.visible_panels.text,
             Action::PictureOnly => self.visible_panels.picture_only = !self.visible_panels.picture_only,
@@ -103,22 +103,23 @@ impl Studio {
     }
 }
 
-fn is_function(key: Key) -> bool {
+fn is_function_key(key: Key) -> bool {
     (Key::F1..=Key::F35).contains(&key)
 }
 
-/// Function keys of the list, as browsers call them. A page must keep these from its browser, which opens its own tools by F12.
+/// The function keys among the shortcuts, as browsers call them. A web page must prevent the browser's default action for them: F12 opens
+/// the developer tools.
 pub fn function_keys() -> impl Iterator<Item = &'static str> {
-    SHORTCUTS.iter().map(|shortcut| shortcut.keys.logical_key).filter(|key| is_function(*key)).map(Key::name)
+    SHORTCUTS.iter().map(|shortcut| shortcut.keys.logical_key).filter(|key| is_function_key(*key)).map(Key::name)
 }
 
-/// A question mark needs Shift on many keyboards and not on others.
+/// Whether `shortcut` was pressed. A question mark needs Shift on many keyboards and not on others.
 fn pressed(input: &mut egui::InputState, shortcut: &Shortcut) -> bool {
     let shifted = KeyboardShortcut::new(Modifiers::SHIFT, shortcut.keys.logical_key);
     input.consume_shortcut(&shortcut.keys) || (shortcut.action == Action::Shortcuts && input.consume_shortcut(&shifted))
 }
 
-/// The window that lists them.
+/// Shows the window that lists the shortcuts.
 pub(super) fn shortcuts_ui(ctx: &Context, open: &mut bool) {
     egui::Window::new("Shortcuts").open(open).resizable(false).show(ctx, |ui| {
         egui::Grid::new("shortcuts").num_columns(2).striped(true).show(ui, |ui| {
@@ -136,15 +137,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_key_is_one_that_browsers_give_to_no_page() {
-        // Chromium's and Firefox's, with or without Shift: another window, another tab, no tab.
-        let kept = [Key::N, Key::T, Key::W];
-        // Help, search, reload, the address, a cursor, the whole screen: pages are used to leave these to the browser.
-        let browsers_own = [Key::F1, Key::F3, Key::F5, Key::F6, Key::F7, Key::F11];
+    fn no_shortcut_is_reserved_by_browsers() {
+        // Reserved by Chromium and Firefox, with or without Shift: new window, new tab, close tab.
+        let reserved = [Key::N, Key::T, Key::W];
+        // Help, search, reload, address bar, caret browsing, full screen: by convention pages leave these to the browser.
+        let conventional = [Key::F1, Key::F3, Key::F5, Key::F6, Key::F7, Key::F11];
         for Shortcut { keys, name, .. } in &SHORTCUTS {
             let key = keys.logical_key;
-            assert!(!keys.modifiers.command || !kept.contains(&key), "{name}");
-            assert!(!browsers_own.contains(&key), "{name}");
+            assert!(!keys.modifiers.command || !reserved.contains(&key), "{name}");
+            assert!(!conventional.contains(&key), "{name}");
         }
         assert_eq!(function_keys().collect::<Vec<_>>(), ["F2", "F12", "F12"]);
     }

@@ -8,7 +8,7 @@ use crate::{
     session::Session,
 };
 
-/// Shows the line.
+/// Shows the status line.
 pub(super) fn status_ui(ui: &mut Ui, session: &mut Session, files: &mut Files) {
     ui.horizontal(|ui| {
         if session.is_busy() {
@@ -22,7 +22,7 @@ pub(super) fn status_ui(ui: &mut Ui, session: &mut Session, files: &mut Files) {
             if picture.draft {
                 ui.weak("draft").on_hover_text("Simulated with fewer particles than the scene has; see Draft above");
             }
-            if !picture.exact && ui.link("live state").on_hover_text(LIVE).clicked() {
+            if !picture.exact && ui.link("live state").on_hover_text(LIVE_STATE_HELP).clicked() {
                 session.redraw_exact();
             }
         }
@@ -32,14 +32,14 @@ pub(super) fn status_ui(ui: &mut Ui, session: &mut Session, files: &mut Files) {
         if let Some([done, total]) = files.progress() {
             render_progress_ui(ui, files, done, total);
         }
-        if session.has_panicked() && ui.button("Retry").on_hover_text(RETRY).clicked() {
+        if session.has_panicked() && ui.button("Retry").on_hover_text(RETRY_HELP).clicked() {
             session.set_notice(None);
             session.retry();
         }
         if let Some(notice) = session.notice() {
             let notice = notice.to_owned();
             ui.colored_label(ui.visuals().warn_fg_color, &notice);
-            if icon::button(ui, Icon::Cross, "Dismiss").clicked() {
+            if icon::button_ui(ui, Icon::Cross, "Dismiss").clicked() {
                 session.set_notice(None);
             }
         }
@@ -52,13 +52,13 @@ fn render_progress_ui(ui: &mut Ui, files: &mut Files, done: usize, total: usize)
     ui.label(text);
     let fraction = done as f32 / total.max(1) as f32;
     ui.add(ProgressBar::new(fraction).desired_width(90.0).desired_height(8.0));
-    if icon::button(ui, Icon::Cross, "Stop rendering").clicked() {
+    if icon::button_ui(ui, Icon::Cross, "Stop rendering").clicked() {
         files.stop_rendering();
     }
 }
 
-const LIVE: &str = "What is simulated went on from where it was when the scene changed. \
-    Click to see what the scene leads to from its beginning, as it will be rendered.";
+const LIVE_STATE_HELP: &str = "The simulation continued from its state when the scene changed. \
+    Click to simulate the scene from its first frame, as it will be rendered.";
 
-const RETRY: &str =
-    "This frame panicked, and is not drawn again by itself; other frames are. Click to draw it once more.";
+const RETRY_HELP: &str =
+    "This frame panicked and is not drawn again automatically; other frames are. Click to draw it once more.";

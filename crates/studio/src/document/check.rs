@@ -1,4 +1,4 @@
-//! From text to a plan, with every fault at its line.
+//! Checks the text of a scene: parses, builds and plans it, and locates its problems in the text.
 
 use std::sync::Arc;
 
@@ -15,80 +15,83 @@ use bansho::{
     },
 };
 
-/// The scene as `bansho render` draws it unless it is told otherwise.
+use super::descriptors;
+
+/// The scene with the default options of `bansho render`.
 fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
     let options = SceneOptions { implied_backdrop: true, ..SceneOptions::default() };
     let scene = Scene::parse(name, text, KINDS)?.adapted(&options);
-    scene.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+    scene.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))
 }
 
-/// A scene without faults: built, and planned.
+/// A valid scene, built and planned.
 #[derive(Clone)]
 pub struct PlannedScene {
-    /// What it shows.
+    /// The built scene.
     pub compiled: Arc<CompiledScene>,
-    /// How it is drawn.
+    /// Size, frames, camera and exposure.
     pub plan: Arc<Plan>,
 }
 
-/// Builds and plans the scene `text`, which may take a while.
+/// Builds and plans the scene `text`, which may take seconds.
 ///
 /// # Errors
-/// Every fault of the text and of the assets it names.
+/// All problems of the text and of the assets that it names.
 pub fn check(name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<PlannedScene, SceneError> {
     Checker::default().check(name, text, assets)
 }
 
-/// Checks the states of a scene one after another: each builds only what it changed.
+/// Checks successive revisions of a scene. Each check builds only what changed since the one before.
 #[derive(Default)]
 pub struct Checker {
-    /// The last good one.
-    good: Option<Arc<CompiledScene>>,
-    /// The last good draft.
-    draft: Option<Arc<CompiledScene>>,
+    /// The last valid scene.
+    last_scene: Option<Arc<CompiledScene>>,
+    /// The last valid draft.
+    last_draft: Option<Arc<CompiledScene>>,
 }
 
 impl Checker {
     /// Builds and plans the scene `text`.
     ///
     /// # Errors
-    /// Every fault of the text and of the assets it names.
+    /// All problems of the text and of the assets that it names.
     pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<PlannedScene, SceneError> {
-        let compiled = build(name, text, assets, &mut self.good)?;
+        let compiled = build(name, text, assets, &mut self.last_scene)?;
         let plan = Plan::new(&compiled, &PlanOptions::default());
-        let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
+        let plan = plan.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))?;
         Ok(PlannedScene { compiled, plan })
     }
 
-    /// A draft of the scene `text`, which is simulated with fewer particles; `None` where no fewer would do.
+    /// A draft of the scene `text`: the same scene with parameters lowered to the draft limits of their kinds, so that it is faster to
+    /// simulate. `None` where no parameter is above its limit.
     ///
     /// # Errors
-    /// As [`check`](Self::check); faults are those of the scene itself.
+    /// As [`check`](Self::check); the problems are those of the scene itself.
     pub fn check_draft(
         &mut self,
         name: &str,
         text: &str,
         assets: &Arc<dyn Assets>,
     ) -> Option<Result<PlannedScene, SceneError>> {
-        let fewer = fewer_particles(&values(text).ok()?);
-        let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
-        let whole = self.check(name, text, assets);
-        let planned = |whole: PlannedScene| {
-            let compiled = build(name, &draft, assets, &mut self.draft)?;
+        let operations = draft_operations(&values(text).ok()?);
+        let draft = operation::apply(text, &operations).ok().filter(|_| !operations.is_empty())?;
+        let full = self.check(name, text, assets);
+        let plan_draft = |full: PlannedScene| {
+            let compiled = build(name, &draft, assets, &mut self.last_draft)?;
             let plan = Plan::with_exposure_and_loop_start(
                 compiled.scene().clone(),
                 &PlanOptions::default(),
-                whole.plan.exposure_ev100,
+                full.plan.exposure_ev100,
                 0,
             );
-            let plan = plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))?;
+            let plan = plan.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))?;
             Ok(PlannedScene { compiled, plan })
         };
-        Some(whole.and_then(planned))
+        Some(full.and_then(plan_draft))
     }
 }
 
-/// Builds the scene `text` with what the `last` one has in common with it, in whose stead it then is.
+/// Builds the scene `text` and reuses what it has in common with `last`, which it then replaces.
 fn build(
     name: &str,
     text: &str,
@@ -102,16 +105,19 @@ fn build(
     Ok(compiled)
 }
 
-/// A fault that another [`check`] found, in words.
+/// The result of a [`check`] in a web worker, as it is sent to the page: the exposure, or the problems.
+pub type CheckReport = Result<f32, Vec<ReportedProblem>>;
+
+/// A problem that a check in another process found, as text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReportedProblem {
-    /// The bytes of the text that it is about, if it lies anywhere.
+    /// The byte range in the text, if the problem has one.
     pub span: Option<Span>,
     /// The parameter.
     pub path: String,
     /// What is wrong.
     pub reason: String,
-    /// The asset that cannot be had, if that is what is wrong.
+    /// The asset that cannot be loaded, if that is the problem.
     pub asset: Option<String>,
 }
 
@@ -127,8 +133,8 @@ impl From<&Problem> for ReportedProblem {
 }
 
 impl From<ReportedProblem> for Problem {
-    fn from(found: ReportedProblem) -> Self {
-        let ReportedProblem { span, path, reason, asset } = found;
+    fn from(reported: ReportedProblem) -> Self {
+        let ReportedProblem { span, path, reason, asset } = reported;
         let kind = match asset {
             Some(path) => ProblemKind::Asset(AssetError { path, problem: AssetProblem::Reported(reason) }),
             None => ProblemKind::Conflict(reason),
@@ -137,60 +143,49 @@ impl From<ReportedProblem> for Problem {
     }
 }
 
-/// The plan of the scene `text` where another [`check`] found its exposure, or its faults. Nothing is built, so that it takes a moment.
+/// The plan of the scene `text` after a check in another process. Nothing is built, so that it takes milliseconds.
 ///
 /// # Errors
-/// Every fault of the text, or what the other check found.
-pub fn recheck(name: &str, text: &str, found: Result<f32, Vec<ReportedProblem>>) -> Result<Arc<Plan>, SceneError> {
+/// All problems of the text, or the reported ones.
+pub fn plan_from_report(name: &str, text: &str, report: CheckReport) -> Result<Arc<Plan>, SceneError> {
     let scene = parse(name, text)?;
-    match found {
+    match report {
         Ok(ev100) => {
             let plan = Plan::with_exposure_and_loop_start(scene, &PlanOptions::default(), ev100, 0);
-            plan.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
+            plan.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))
         }
-        Err(found) => {
-            let problems = found.into_iter().map(Problem::from).collect();
+        Err(problems) => {
+            let problems = problems.into_iter().map(Problem::from).collect();
             Err(SceneError { file: name.to_owned(), text: text.to_owned(), problems, omitted: 0 })
         }
     }
 }
 
-/// What a draft makes do with: a kind of phenomenon, the key of its number of particles, and how many.
-const DRAFT: [(&str, &[&str], i64); 2] =
-    [("aurora", &["particles", "count"], 24_000), ("flame_particles", &["particles"], 4_000)];
-
-fn fewer_particles(root: &Table) -> Vec<Operation> {
+/// The operations that lower the parameters of the scene `root` to the limits of a draft. Empty where none is above its limit.
+fn draft_operations(root: &Table) -> Vec<Operation> {
     let mut operations = Vec::new();
-    for (kind, keys, most) in DRAFT {
-        let Some(Value::List(all)) = root.get(kind).map(|node| &node.value) else { continue };
+    for kind in KINDS {
+        let Some(Value::List(all)) = root.get(kind.key).map(|node| &node.value) else { continue };
         for index in 0..all.len() {
-            let place = keys.iter().fold(ValuePath::root().key(kind).index(index), |place, key| place.key(key));
-            let stated = place.find(root).and_then(|node| node.value.as_number());
-            if stated.or_else(|| usual(kind, keys)).is_some_and(|count| count > most as f64) {
-                operations.push(Operation::Set { place, value: Value::Integer(most) });
+            for limit in kind.editor_hints.draft_limits {
+                let path = descriptors::within(&ValuePath::root().key(kind.key).index(index), limit.key);
+                if effective_number(root, &path).is_some_and(|number| number > limit.max as f64) {
+                    operations.push(Operation::Set { place: path, value: Value::Integer(limit.max) });
+                }
             }
         }
     }
     operations
 }
 
-/// The default of a number of `kind`.
-fn usual(kind: &str, keys: &[&str]) -> Option<f64> {
-    let kind = KINDS.iter().find(|own| own.key == kind)?;
-    let (last, way) = keys.split_last()?;
-    let table = way.iter().try_fold((kind.table)(), |table, key| {
-        let parameter = table.parameters.iter().find(|parameter| parameter.key == *key)?;
-        match &parameter.kind {
-            bansho::base::parameters::Kind::Table(inner) => Some(inner()),
-            _ => None,
-        }
-    })?;
-    let parameter = table.parameters.iter().find(|parameter| parameter.key == *last)?;
-    parameter.default.as_ref()?.as_number()
+/// The number at `path` of the scene `root`, or the parameter's default.
+fn effective_number(root: &Table, path: &ValuePath) -> Option<f64> {
+    let stated = path.find(root).and_then(|node| node.value.as_number());
+    stated.or_else(|| descriptors::descriptor(path)?.default.as_ref()?.as_number())
 }
 
-/// A fault that only planning shows, which lies in no one line.
-fn unplaced(name: &str, text: &str, reason: String) -> SceneError {
+/// A problem that was found while planning and has no position in the text.
+fn error_without_span(name: &str, text: &str, reason: String) -> SceneError {
     let problem = Problem { span: None, path: String::new(), kind: ProblemKind::Conflict(reason) };
     SceneError { file: name.to_owned(), text: text.to_owned(), problems: vec![problem], omitted: 0 }
 }
@@ -208,7 +203,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::scenes::examples::Bundle;
+    use crate::scenes::examples::BundledAssets;
 
     fn draft(text: &str) -> Option<Result<PlannedScene, SceneError>> {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
@@ -218,21 +213,22 @@ mod tests {
     #[test]
     fn a_draft_has_fewer_particles_where_there_are_many() {
         let many = "bansho = 2\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
-        let fewer = fewer_particles(&values(many).unwrap());
-        let places: Vec<String> = fewer.iter().map(|operation| operation.place().to_string()).collect();
-        assert_eq!(places, ["aurora.0.particles.count", "flame_particles.0.particles"]);
+        let operations = draft_operations(&values(many).unwrap());
+        let mut paths: Vec<String> = operations.iter().map(|operation| operation.place().to_string()).collect();
+        paths.sort();
+        assert_eq!(paths, ["aurora.0.particles.count", "flame_particles.0.particles"]);
         assert!(draft("bansho = 2\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
         assert!(draft("bansho = 2\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());
     }
 
-    /// The files of the examples, and how often a mesh was read: each time a flame that burns on it is made.
+    /// The files of the examples. It counts how often a mesh was read, which is once for each construction of a flame that burns on it.
     #[derive(Default)]
-    struct Counting {
-        bundle: Bundle,
+    struct CountingAssets {
+        bundle: BundledAssets,
         meshes: AtomicUsize,
     }
 
-    impl Assets for Counting {
+    impl Assets for CountingAssets {
         fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
             self.bundle.picture(path, frame)
         }
@@ -252,17 +248,17 @@ mod tests {
     }
 
     #[test]
-    fn only_what_changed_is_made_again() {
+    fn only_what_changed_is_rebuilt() {
         let burner =
             "[[flame_particles]]\nparticles = 99\nburners = [{ shape = \"mesh\", file = \"meshes/ring.glb\" }]\n";
-        let counting = Arc::new(Counting::default());
+        let counting = Arc::new(CountingAssets::default());
         let assets: Arc<dyn Assets> = counting.clone();
         let mut checker = Checker::default();
         let mut made = |rest: &str| {
             let before = counting.meshes.load(Ordering::Relaxed);
             let text = format!("bansho = 2\n{burner}{rest}");
             let plan = checker.check("scene", &text, &assets);
-            let alone = check("scene", &text, &(Arc::new(Bundle::default()) as Arc<dyn Assets>));
+            let alone = check("scene", &text, &(Arc::new(BundledAssets::default()) as Arc<dyn Assets>));
             assert_eq!(plan.map(|own| own.plan.exposure_ev100).ok(), alone.map(|own| own.plan.exposure_ev100).ok());
             counting.meshes.load(Ordering::Relaxed) - before
         };
@@ -275,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_those_of_the_scene_itself() {
+    fn problems_of_a_draft_are_those_of_the_scene() {
         let text = "bansho = 2\n[[flame_particles]]\nparticles = 9000\nno_such_key = 1\n";
         let error = draft(text).and_then(Result::err).unwrap();
         assert_eq!(error.text, text);
@@ -283,28 +279,28 @@ mod tests {
     }
 
     #[test]
-    fn what_another_check_found_gives_the_same_plan_without_its_work() {
+    fn a_report_gives_the_same_plan_as_the_check() {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
         let text = "bansho = 2\n[picture]\nframes = 9\n[[flame_sheet]]\n";
         let first = check("scene", text, &assets).unwrap().plan;
-        let again = recheck("scene", text, Ok(first.exposure_ev100)).unwrap();
+        let again = plan_from_report("scene", text, Ok(first.exposure_ev100)).unwrap();
         assert_eq!((again.exposure_ev100, again.frames()), (first.exposure_ev100, 0..9));
-        let faulty = recheck("scene", "bansho = 2\n[[flame_shet]]\n", Err(Vec::new())).err().unwrap();
+        let faulty = plan_from_report("scene", "bansho = 2\n[[flame_shet]]\n", Err(Vec::new())).err().unwrap();
         assert!(faulty.to_string().contains("flame_shet"));
     }
 
     #[test]
-    fn faults_that_another_check_found_are_told_in_its_words_and_made_by_nobody_again() {
+    fn reported_problems_keep_their_messages_and_nothing_is_rebuilt() {
         let text = "bansho = 2\n[plate]\nimage = \"gone.png\"\n[[flame_particles]]\nburners = [{ shape = \"mesh\", file = \"meshes/ring.glb\" }]\n";
-        let counting = Arc::new(Counting::default());
+        let counting = Arc::new(CountingAssets::default());
         let assets: Arc<dyn Assets> = counting.clone();
         let error = check("scene", text, &assets).err().unwrap();
-        let found: Vec<ReportedProblem> = error.problems.iter().map(ReportedProblem::from).collect();
+        let reported: Vec<ReportedProblem> = error.problems.iter().map(ReportedProblem::from).collect();
         let made = counting.meshes.load(Ordering::Relaxed);
-        let told = recheck("scene", text, Err(found)).err().unwrap();
+        let again = plan_from_report("scene", text, Err(reported)).err().unwrap();
         assert_eq!(counting.meshes.load(Ordering::Relaxed), made);
-        assert_eq!(told.to_string(), error.to_string());
-        assert!(told.to_string().contains("gone.png: no such file"));
-        assert!(matches!(told.problems[0].kind, ProblemKind::Asset(_)), "it can be relinked");
+        assert_eq!(again.to_string(), error.to_string());
+        assert!(again.to_string().contains("gone.png: no such file"));
+        assert!(matches!(again.problems[0].kind, ProblemKind::Asset(_)), "it can be relinked");
     }
 }

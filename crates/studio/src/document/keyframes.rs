@@ -1,79 +1,62 @@
-//! Values keyed over time, as a scene states them.
+//! Keyframed values, as a scene states them.
 
 use bansho::{
-    KINDS,
     base::{
         math::{
             DVec3,
             curve::{Curve, Interpolation},
         },
-        parameters::{Descriptor, InterpolationName, Kind, Node, Table, TableDescriptor, Value},
+        parameters::{Descriptor, InterpolationName, Node, Table, Value},
     },
-    scene::{SHARED_TABLES, Segment, ValuePath},
+    scene::ValuePath,
 };
 
-/// Whether what stands at `place` of a scene may be keyed over time.
-pub(crate) fn animatable(place: &ValuePath) -> bool {
-    let keys: Vec<&str> = place.segments().iter().filter_map(key).collect();
-    let [root, inner @ .., last] = keys.as_slice() else { return false };
-    let shared = SHARED_TABLES.iter().find(|table| table.key == *root).map(|table| (table.table)());
-    let table = shared.or_else(|| KINDS.iter().find(|kind| kind.key == *root).map(|kind| (kind.table)()));
-    let within = |table: &'static TableDescriptor, key: &&str| table_of(&parameter(table, key)?.kind);
-    let table = table.and_then(|table| inner.iter().try_fold(table, within));
-    table.and_then(|table| parameter(table, last)).is_some_and(Descriptor::animatable)
+use super::descriptors::descriptor;
+
+/// Whether the value at `path` of a scene may be keyframed over time.
+pub(crate) fn animatable(path: &ValuePath) -> bool {
+    descriptor(path).is_some_and(Descriptor::animatable)
 }
 
-/// Items of a list are alike.
-fn key(segment: &Segment) -> Option<&str> {
-    match segment {
-        Segment::Key(key) => Some(key),
-        Segment::Index(_) => None,
-    }
-}
-
-fn parameter(table: &'static TableDescriptor, key: &str) -> Option<&'static Descriptor> {
-    table.parameters.iter().find(|parameter| parameter.key == key)
-}
-
-fn table_of(kind: &Kind) -> Option<&'static TableDescriptor> {
-    match kind {
-        Kind::Table(table) => Some(table()),
-        Kind::List { item, .. } => table_of(item),
-        _ => None,
-    }
-}
-
-/// Whether `value` is keyed: `{ keys = [[seconds, value], ...] }`.
+/// Whether `value` is keyframed: `{ keys = [[seconds, value], ...] }`.
 pub(crate) fn is_keyed(value: &Value) -> bool {
     matches!(value, Value::Table(table) if table.get("keys").is_some())
 }
 
-/// The keys of a keyed value, (s, value), as far as they are well formed.
-pub(crate) fn keys(value: &Value) -> Vec<(f64, &Value)> {
+/// A keyframe.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Keyframe<'a> {
+    /// Time, s.
+    pub(crate) time_s: f64,
+    pub(crate) value: &'a Value,
+}
+
+/// The keyframes of `value` that are well formed; empty for a constant.
+pub(crate) fn keyframes(value: &Value) -> Vec<Keyframe<'_>> {
     let Value::Table(table) = value else { return Vec::new() };
     let Some(Value::List(items)) = table.get("keys").map(|node| &node.value) else { return Vec::new() };
-    items.iter().filter_map(pair).collect()
+    items.iter().filter_map(keyframe).collect()
 }
 
-fn pair(item: &Node) -> Option<(f64, &Value)> {
+fn keyframe(item: &Node) -> Option<Keyframe<'_>> {
     let Value::List(pair) = &item.value else { return None };
     let [time, value] = pair.as_slice() else { return None };
-    Some((time.value.as_number()?, &value.value))
+    Some(Keyframe { time_s: time.value.as_number()?, value: &value.value })
 }
 
-/// What `value` is at `time`: itself, or what its keys come to. `None` where those are faulty.
-pub(crate) fn at(value: &Value, time: f64) -> Option<Value> {
+/// `value` at `time`, s: a constant unchanged, keyframes interpolated. `None` where the keyframes are invalid.
+pub(crate) fn evaluate_at(value: &Value, time: f64) -> Option<Value> {
     if !is_keyed(value) {
         return Some(value.clone());
     }
-    let keys = keys(value);
+    let keyframes = keyframes(value);
     let interpolation = interpolation(value);
     let number = |component: Option<usize>| {
-        let point = |(time, value): &(f64, &Value)| Some([*time, self::component(value, component)?]);
-        let points: Vec<[f64; 2]> = keys.iter().map(point).collect::<Option<_>>()?;
+        let point = |key: &Keyframe| Some([key.time_s, self::component(key.value, component)?]);
+        let points: Vec<[f64; 2]> = keyframes.iter().map(point).collect::<Option<_>>()?;
         Some(Curve::new(points, interpolation).ok()?.eval(time))
     };
-    match keys.first()?.1 {
+    match keyframes.first()?.value {
         Value::List(items) => {
             let components: Vec<f64> = (0..items.len()).map(|index| number(Some(index))).collect::<Option<_>>()?;
             Some(Value::numbers(components))
@@ -82,9 +65,9 @@ pub(crate) fn at(value: &Value, time: f64) -> Option<Value> {
     }
 }
 
-/// The three numbers at `place` of the scene `root` at `time`, if it states them.
-pub(crate) fn vector(root: &Table, place: &ValuePath, time: f64) -> Option<DVec3> {
-    let Value::List(items) = at(&place.find(root)?.value, time)? else { return None };
+/// The vector at `path` of the scene `root` at `time`, s; `None` where the scene does not state it.
+pub(crate) fn vector(root: &Table, path: &ValuePath, time: f64) -> Option<DVec3> {
+    let Value::List(items) = evaluate_at(&path.find(root)?.value, time)? else { return None };
     let numbers: Vec<f64> = items.iter().map(|item| item.value.as_number()).collect::<Option<_>>()?;
     Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?))
 }
@@ -111,9 +94,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_know_whether_they_may_be_keyed() {
+    fn some_parameters_are_animatable() {
         let within =
-            |root: &str, keys: &[&str]| keys.iter().fold(ValuePath::root().key(root), |place, key| place.key(key));
+            |root: &str, keys: &[&str]| keys.iter().fold(ValuePath::root().key(root), |path, key| path.key(key));
         assert!(animatable(&within("wind", &["velocity"])) && animatable(&within("camera", &["position"])));
         assert!(animatable(&ValuePath::root().key("light").index(3).key("position")));
         assert!(animatable(&ValuePath::root().key("flame_sheet").index(0).key("color").key("luminance")));

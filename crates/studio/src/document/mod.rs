@@ -1,6 +1,7 @@
-//! The scene as text: edits that keep comments, undo, problems with their lines, and the last good plan.
+//! The scene as text: edits that keep comments, undo, problems with their lines, and the last valid plan.
 
 mod check;
+pub(crate) mod descriptors;
 pub mod files;
 mod history;
 pub(crate) mod keyframes;
@@ -25,9 +26,9 @@ use bansho::{
     },
 };
 
-pub use check::{Checker, PlannedScene, ReportedProblem, check, recheck};
-pub use named_files::named_files;
-pub use phenomena::{PhenomenonEntry, operations};
+pub use check::{CheckReport, Checker, PlannedScene, ReportedProblem, check, plan_from_report};
+pub use named_files::{FileReference, named_files};
+pub use phenomena::{PhenomenonEntry, PhenomenonId, operations};
 
 use history::History;
 
@@ -50,19 +51,20 @@ pub struct Document {
     saved: Arc<str>,
     /// Whether its file was deleted.
     file_missing: bool,
-    /// Its first revision.
-    first: Revision,
+    first_revision: Revision,
     revision: Revision,
     history: History,
     values: Table,
-    syntax: Option<Problem>,
+    syntax_problem: Option<Problem>,
     check_state: CheckState,
 }
 
 /// The result of the last check.
 #[derive(Default)]
 struct CheckState {
-    of: Option<Revision>,
+    /// The checked revision.
+    revision: Option<Revision>,
+    /// The last valid plan.
     plan: Option<Arc<Plan>>,
     error: Option<Arc<SceneError>>,
 }
@@ -71,17 +73,17 @@ impl Document {
     /// A document with this text, unchanged so far; `name` is what errors call it.
     pub fn new(name: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
         let text = text.into();
-        let first = Revision::next();
+        let first_revision = Revision::next();
         let mut document = Self {
             name: name.into(),
             saved: text.clone(),
             file_missing: false,
             text,
-            first,
-            revision: first,
+            first_revision,
+            revision: first_revision,
             history: History::default(),
             values: Table::default(),
-            syntax: None,
+            syntax_problem: None,
             check_state: CheckState::default(),
         };
         document.parse();
@@ -110,7 +112,7 @@ impl Document {
 
     /// Whether `revision` is or was a revision of this document.
     pub fn includes_revision(&self, revision: Revision) -> bool {
-        (self.first..=self.revision).contains(&revision)
+        (self.first_revision..=self.revision).contains(&revision)
     }
 
     /// The values of the text, or of the last text that was valid TOML.
@@ -134,23 +136,23 @@ impl Document {
     }
 
     /// Records whether its file was deleted.
-    pub fn set_file_missing(&mut self, gone: bool) {
-        self.file_missing = gone;
+    pub fn set_file_missing(&mut self, missing: bool) {
+        self.file_missing = missing;
     }
 
-    /// The last good plan.
+    /// The last valid plan.
     pub fn plan(&self) -> Option<&Arc<Plan>> {
         self.check_state.plan.as_ref()
     }
 
-    /// The problems of the text, if they are known.
+    /// The problems found by the last check, if there are any.
     pub fn error(&self) -> Option<&Arc<SceneError>> {
         self.check_state.error.as_ref()
     }
 
     /// Whether the current revision has been checked.
     pub fn is_checked(&self) -> bool {
-        self.check_state.of == Some(self.revision)
+        self.check_state.revision == Some(self.revision)
     }
 
     /// Sets the result of [`check`] for `revision`; results of older revisions are ignored.
@@ -158,7 +160,7 @@ impl Document {
         if revision != self.revision {
             return;
         }
-        self.check_state.of = Some(revision);
+        self.check_state.revision = Some(revision);
         match outcome {
             Ok(plan) => {
                 self.check_state.plan = Some(plan);
@@ -174,7 +176,7 @@ impl Document {
         self.set_check_result(self.revision, outcome);
     }
 
-    /// Applies `operations` as an undo step. Successive edits with the same label, as those of a dragged slider, are one step until [`end_step`](Self::end_step).
+    /// Applies `operations` as an undo step. Successive edits with the same label, such as those of a dragged slider, are one step until [`end_step`](Self::end_step).
     ///
     /// # Errors
     /// The text is not TOML, or an operation's path does not exist; nothing is changed then.
@@ -190,7 +192,7 @@ impl Document {
         self.history.record(label, &self.text, &text);
         if *text != *self.text {
             (self.text, self.revision) = (text.into(), Revision::next());
-            (self.values, self.syntax) = (values, None);
+            (self.values, self.syntax_problem) = (values, None);
         }
     }
 
@@ -252,14 +254,14 @@ impl Document {
         match values(&self.text) {
             Ok(values) => {
                 self.values = values;
-                self.syntax = None;
+                self.syntax_problem = None;
             }
-            Err(problem) => self.syntax = Some(problem),
+            Err(problem) => self.syntax_problem = Some(problem),
         }
     }
 
     /// The TOML syntax error, if there is one; operations cannot be applied then.
     pub fn syntax_problem(&self) -> Option<&Problem> {
-        self.syntax.as_ref()
+        self.syntax_problem.as_ref()
     }
 }

@@ -1,4 +1,4 @@
-//! The files that a scene names, with the paths of the parameters that name them.
+//! The files that a scene refers to, with the parameters that name them.
 
 use bansho::{
     KINDS,
@@ -6,19 +6,28 @@ use bansho::{
     scene::{SHARED_TABLES, ValuePath},
 };
 
-/// Each parameter of the scene `root` that names a file, and the name.
-pub fn named_files(root: &Table) -> Vec<(ValuePath, String)> {
+/// A parameter that names a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileReference {
+    /// The path of the parameter.
+    pub parameter: ValuePath,
+    /// The file, as the scene names it.
+    pub file: String,
+}
+
+/// All parameters of the scene `root` that name files.
+pub fn named_files(root: &Table) -> Vec<FileReference> {
     let shared = SHARED_TABLES.iter().map(|table| (table.key, (table.table)()));
     let kinds = KINDS.iter().map(|kind| (kind.key, (kind.table)()));
     let mut found = Vec::new();
     for (key, descriptor) in shared.chain(kinds) {
-        let place = ValuePath::root().key(key);
+        let path = ValuePath::root().key(key);
         match root.get(key).map(|node| &node.value) {
-            Some(Value::Table(table)) => in_table(&place, table, descriptor, &mut found),
+            Some(Value::Table(table)) => collect_from_table(&path, table, descriptor, &mut found),
             Some(Value::List(items)) => {
                 for (index, item) in items.iter().enumerate() {
                     if let Value::Table(table) = &item.value {
-                        in_table(&place.index(index), table, descriptor, &mut found);
+                        collect_from_table(&path.index(index), table, descriptor, &mut found);
                     }
                 }
             }
@@ -28,24 +37,24 @@ pub fn named_files(root: &Table) -> Vec<(ValuePath, String)> {
     found
 }
 
-fn in_table(place: &ValuePath, table: &Table, descriptor: &TableDescriptor, found: &mut Vec<(ValuePath, String)>) {
+fn collect_from_table(path: &ValuePath, table: &Table, descriptor: &TableDescriptor, found: &mut Vec<FileReference>) {
     for parameter in &descriptor.parameters {
         if let Some(node) = table.get(parameter.key) {
-            in_value(&place.key(parameter.key), node, &parameter.kind, found);
+            collect_from_value(&path.key(parameter.key), node, &parameter.kind, found);
         }
     }
 }
 
-fn in_value(place: &ValuePath, node: &Node, kind: &Kind, found: &mut Vec<(ValuePath, String)>) {
+fn collect_from_value(path: &ValuePath, node: &Node, kind: &Kind, found: &mut Vec<FileReference>) {
     match (kind, &node.value) {
-        (Kind::Asset, Value::Text(name)) => found.push((place.clone(), name.clone())),
-        (Kind::Optional(inner) | Kind::Auto(inner), _) => in_value(place, node, inner, found),
+        (Kind::Asset, Value::Text(name)) => found.push(FileReference { parameter: path.clone(), file: name.clone() }),
+        (Kind::Optional(inner) | Kind::Auto(inner), _) => collect_from_value(path, node, inner, found),
         (Kind::List { item, .. }, Value::List(items)) => {
             for (index, node) in items.iter().enumerate() {
-                in_value(&place.index(index), node, item, found);
+                collect_from_value(&path.index(index), node, item, found);
             }
         }
-        (Kind::Table(descriptor), Value::Table(table)) => in_table(place, table, descriptor(), found),
+        (Kind::Table(descriptor), Value::Table(table)) => collect_from_table(path, table, descriptor(), found),
         _ => {}
     }
 }
@@ -57,13 +66,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plates_meshes_and_drawings_are_found_where_they_stand() {
+    fn plates_meshes_and_drawings_are_found_with_their_paths() {
         let text = "bansho = 2\n[plate]\nimage = \"a.png\"\n[[obstacle]]\nfile = \"b.glb\"\n[[aurora]]\n[[aurora]]\n\
             [[aurora.shapes]]\nsheets = [{ form = \"arc\" }, { svg_file = \"c.svg\" }]\n";
-        let found: Vec<(String, String)> =
-            named_files(&values(text).unwrap()).into_iter().map(|(place, name)| (place.to_string(), name)).collect();
-        let wanted =
+        let found = named_files(&values(text).unwrap()).into_iter();
+        let found: Vec<_> = found.map(|FileReference { parameter, file }| (parameter.to_string(), file)).collect();
+        let expected =
             [("plate.image", "a.png"), ("obstacle.0.file", "b.glb"), ("aurora.1.shapes.0.sheets.1.svg_file", "c.svg")];
-        assert_eq!(found, wanted.map(|(place, name)| (place.to_owned(), name.to_owned())));
+        assert_eq!(found, expected.map(|(path, name)| (path.to_owned(), name.to_owned())));
     }
 }

@@ -1,37 +1,56 @@
-//! The phenomena of a scene as a list: add, duplicate, hide, show alone.
+//! The list of the phenomena of a scene, and the operations on it: add, duplicate, hide, solo.
 
 use bansho::{
     KINDS,
     base::parameters::{Table, Value},
-    scene::{ValuePath, operation::Operation},
+    scene::{Segment, ValuePath, operation::Operation},
 };
 
-use super::Document;
+use super::{Document, descriptors};
 
-/// A phenomenon as the text lists it; it need not be without faults.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhenomenonEntry {
+/// A phenomenon of a scene: its kind, and its index among the phenomena of that kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PhenomenonId {
     /// Its kind, such as `rain`.
     pub kind: &'static str,
-    /// Which of its kind.
+    /// Its index in the list of its kind.
     pub index: usize,
-    /// Its name.
-    pub name: String,
-    /// Whether it is drawn.
-    pub enabled: bool,
 }
 
-impl PhenomenonEntry {
-    /// Where it stands.
-    pub fn place(&self) -> ValuePath {
+impl PhenomenonId {
+    /// Phenomenon `index` of the kind called `kind` in scene files, if there is such a kind.
+    pub fn find(kind: &str, index: usize) -> Option<Self> {
+        descriptors::phenomenon_kind(kind).map(|kind| Self { kind: kind.key, index })
+    }
+
+    /// The path of its table.
+    pub fn path(self) -> ValuePath {
         ValuePath::root().key(self.kind).index(self.index)
     }
+}
+
+/// Whether a list without items at `path` is equivalent to a list with one item that has default values.
+pub(crate) fn implies_one_item(path: &ValuePath) -> bool {
+    let [Segment::Key(kind), Segment::Index(_), Segment::Key(list)] = path.segments() else { return false };
+    let handles = descriptors::phenomenon_kind(kind).and_then(|kind| kind.editor_hints.position_handles);
+    handles.and_then(|handles| handles.items).is_some_and(|items| items == list)
+}
+
+/// A phenomenon as the text lists it. Its parameters may be invalid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhenomenonEntry {
+    /// Its kind and index.
+    pub id: PhenomenonId,
+    /// Its name.
+    pub name: String,
+    /// Whether it is shown.
+    pub enabled: bool,
 }
 
 impl Document {
     /// All phenomena, kind by kind in the order of the file.
     pub fn phenomena(&self) -> Vec<PhenomenonEntry> {
-        let mut listed = Vec::new();
+        let mut entries = Vec::new();
         for entry in &self.values().entries {
             let Some(kind) = KINDS.iter().find(|kind| kind.key == entry.key) else { continue };
             let Value::List(items) = &entry.node.value else { continue };
@@ -39,30 +58,31 @@ impl Document {
                 Value::Table(table) => Some((index, table)),
                 _ => None,
             });
-            listed.extend(tables.map(|(index, table)| describe(kind.key, index, table)));
+            entries.extend(tables.map(|(index, table)| describe(PhenomenonId { kind: kind.key, index }, table)));
         }
-        listed
+        entries
     }
 }
 
-fn describe(kind: &'static str, index: usize, table: &Table) -> PhenomenonEntry {
+fn describe(id: PhenomenonId, table: &Table) -> PhenomenonEntry {
+    let PhenomenonId { kind, index } = id;
     let name = match table.get("name").map(|node| &node.value) {
         Some(Value::Text(name)) => name.clone(),
         _ if index == 0 => kind.to_owned(),
         _ => format!("{kind} {}", index + 1),
     };
     let enabled = table.get("enabled").is_none_or(|node| node.value != Value::Bool(false));
-    PhenomenonEntry { kind, index, name, enabled }
+    PhenomenonEntry { id, name, enabled }
 }
 
-/// A name that none of `listed` has: `wanted`, or `wanted` with a number.
-fn free_name(wanted: &str, listed: &[PhenomenonEntry]) -> String {
-    let taken = |name: &str| listed.iter().any(|other| other.name == name);
+/// A name that none of `entries` has: `wanted`, or `wanted` with a number.
+fn free_name(wanted: &str, entries: &[PhenomenonEntry]) -> String {
+    let taken = |name: &str| entries.iter().any(|other| other.name == name);
     if !taken(wanted) {
         return wanted.to_owned();
     }
-    // Of one more name than there are phenomena, one is free.
-    let numbered = (2..listed.len() + 3).map(|number| format!("{wanted} {number}"));
+    // One more candidate than there are phenomena, so that one is free.
+    let numbered = (2..entries.len() + 3).map(|number| format!("{wanted} {number}"));
     numbered.into_iter().find(|name| !taken(name)).unwrap_or_default()
 }
 
@@ -77,29 +97,29 @@ pub mod operations {
         vec![Operation::Append { place: ValuePath::root().key(kind), value: Value::Table(table) }]
     }
 
-    /// Adds a phenomenon like `original` under a name of its own.
+    /// Adds a copy of `original` with a unique name.
     pub fn duplicate(document: &Document, original: &PhenomenonEntry) -> Vec<Operation> {
-        let Some(Value::Table(table)) = original.place().find(document.values()).map(|node| &node.value) else {
+        let Some(Value::Table(table)) = original.id.path().find(document.values()).map(|node| &node.value) else {
             return Vec::new();
         };
         let mut copy = Table::default();
         copy.push("name", Value::Text(free_name(&original.name, &document.phenomena())));
         let others = table.entries.iter().filter(|entry| entry.key != "name");
         others.for_each(|entry| copy.push(entry.key.clone(), entry.node.value.clone()));
-        vec![Operation::Append { place: ValuePath::root().key(original.kind), value: Value::Table(copy) }]
+        vec![Operation::Append { place: ValuePath::root().key(original.id.kind), value: Value::Table(copy) }]
     }
 
-    /// Draws it, or does not.
-    pub fn set_enabled(listed: &PhenomenonEntry, enabled: bool) -> Operation {
-        let place = listed.place().key("enabled");
-        match (enabled, listed.enabled) {
-            // Being drawn is the default.
-            (true, false) => Operation::Remove { place },
-            _ => Operation::Set { place, value: Value::Bool(enabled) },
+    /// Shows or hides a phenomenon.
+    pub fn set_enabled(entry: &PhenomenonEntry, enabled: bool) -> Operation {
+        let path = entry.id.path().key("enabled");
+        match (enabled, entry.enabled) {
+            // Shown is the default.
+            (true, false) => Operation::Remove { place: path },
+            _ => Operation::Set { place: path, value: Value::Bool(enabled) },
         }
     }
 
-    /// Draws only this one; all, where it is the only one already.
+    /// Shows only `chosen`, or all phenomena if it is the only one shown.
     pub fn solo(document: &Document, chosen: &PhenomenonEntry) -> Vec<Operation> {
         let all = document.phenomena();
         let alone = all.iter().all(|each| each.enabled == (each == chosen));

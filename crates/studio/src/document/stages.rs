@@ -1,4 +1,4 @@
-//! How a flame sheet comes to be, stage by stage: plans of small pictures that show it alone, in the middle.
+//! Intermediate stages of a phenomenon, where its kind has some: plans of small pictures that show each stage alone, in the middle.
 
 use std::sync::Arc;
 
@@ -7,10 +7,10 @@ use bansho::{
     base::{
         camera::CameraParameters,
         color::ev100_of_white_luminance,
-        parameters::{Auto, Parameters, Reader, Table, Value},
-        phenomenon::kind::Describe,
+        math,
+        parameters::{Auto, Kind, Table, Value},
+        phenomenon::editor_hints::StageView,
     },
-    fire::sheet::{FlameSheetParameters, Stage},
     scene::{
         Instance, PlateParameters, Scene, ValuePath,
         operation::{self, Operation},
@@ -18,55 +18,65 @@ use bansho::{
     },
 };
 
-use super::PlannedScene;
+use super::{PhenomenonId, PlannedScene, descriptors};
 
 /// Size of a stage's picture, pixels.
 const SIZE: [usize; 2] = [112, 112];
 
-/// Vertical field of view, degrees: narrow, for a flat square is shown.
-const FIELD: f64 = 20.0;
+/// Vertical field of view, degrees. It is narrow, since flat pictures are shown.
+const VERTICAL_FOV_DEG: f64 = 20.0;
 
-/// Height of the picture, as a share of the sheet's.
-const AROUND: f64 = 1.08;
+/// Height of the picture as a multiple of the height of what it shows.
+const MARGIN_FACTOR: f64 = 1.08;
 
-/// What the stages are called in a scene, in their order; the finished flame is none of them.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    Stage::CHOICES.iter().map(|choice| choice.name).filter(|name| *name != Stage::Flame.name())
+/// The names of the stages of `kind` in a scene, in order, without the finished phenomenon. Empty where the kind has no stages.
+pub fn names(kind: &str) -> Vec<&'static str> {
+    let key = descriptors::phenomenon_kind(kind).and_then(|kind| kind.editor_hints.stage_key);
+    let parameter = key.and_then(|key| descriptors::descriptor(&ValuePath::root().key(kind).key(key)));
+    let Some((Kind::Choice(choices), default)) = parameter.map(|own| (&own.kind, &own.default)) else {
+        return Vec::new();
+    };
+    let is_default = |name: &str| matches!(default, Some(Value::Text(default)) if default == name);
+    choices.iter().map(|choice| choice.name).filter(|name| !is_default(name)).collect()
 }
 
-/// Plans of the stages of flame sheet `index` of the scene `text`; `None` where it is faulty or has no such sheet.
-pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<PlannedScene>> {
+/// Plans of the stages of `phenomenon` in the scene `text`; `None` where the scene has errors or no such phenomenon.
+pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, phenomenon: PhenomenonId) -> Option<Vec<PlannedScene>> {
     let root = values(text).ok()?;
-    names().map(|stage| plan(name, [text, stage], &root, assets, index)).collect()
+    let plan = |stage: &str| {
+        let scene = stage_scene(name, &stage_text(text, &root, phenomenon, stage)?, phenomenon)?;
+        let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
+        let plan = Plan::new(&compiled, &PlanOptions { size: Some(SIZE), ..PlanOptions::default() }).ok()?;
+        Some(PlannedScene { compiled, plan: Arc::new(plan) })
+    };
+    names(phenomenon.kind).into_iter().map(plan).collect()
 }
 
-fn plan(
-    name: &str,
-    [text, stage]: [&str; 2],
-    root: &Table,
-    assets: &Arc<dyn Assets>,
-    index: usize,
-) -> Option<PlannedScene> {
-    let place = ValuePath::root().key(FlameSheetParameters::KEY).index(index);
-    let Value::Table(table) = &place.find(root)?.value else { return None };
-    let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
-    let stated = |key: &str| place.key(key).find(root).is_some();
-    let mut operations = vec![
-        Operation::Set { place: place.key("stage"), value: Value::Text(stage.to_owned()) },
-        Operation::Set { place: place.key("position"), value: Value::numbers([0.0; 3]) },
-    ];
-    operations.extend(stated("instances").then(|| Operation::Remove { place: place.key("instances") }));
-    let scene = Scene::parse(name, &operation::apply(text, &operations).ok()?, KINDS).ok()?;
-    let mut sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
-    let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
+/// The scene `text` with `phenomenon` at the origin, once, at `stage`.
+fn stage_text(text: &str, root: &Table, phenomenon: PhenomenonId, stage: &str) -> Option<String> {
+    let hints = descriptors::phenomenon_kind(phenomenon.kind)?.editor_hints;
+    let path = phenomenon.path();
+    let stage = Value::Text(stage.to_owned());
+    let mut operations = vec![Operation::Set { place: path.key(hints.stage_key?), value: stage }];
+    if let Some(handles) = hints.position_handles {
+        operations.push(Operation::Set { place: path.key(handles.key), value: Value::numbers([0.0; 3]) });
+        let items = handles.items.map(|items| path.key(items)).filter(|items| items.find(root).is_some());
+        operations.extend(items.map(|place| Operation::Remove { place }));
+    }
+    operation::apply(text, &operations).ok()
+}
+
+/// The scene `text` with `phenomenon` alone, in front of a camera that shows all of it.
+fn stage_scene(name: &str, text: &str, phenomenon: PhenomenonId) -> Option<Scene> {
+    let scene = Scene::parse(name, text, KINDS).ok()?;
+    let mut of_kind = scene.instances.iter().filter(|instance| instance.kind.key == phenomenon.kind);
+    let alone = Instance { enabled: true, ..of_kind.nth(phenomenon.index)?.clone() };
+    let StageView { size_m, white_luminance } = alone.parameters.stage_view()?;
     let mut picture = scene.picture.clone();
-    // Grays are shares of the full luminance.
-    let full = sheet.color.luminance.bounds()[1].max(f64::MIN_POSITIVE);
-    let colored = stage == Stage::Colored.name();
-    picture.exposure_ev100 = if colored { Auto::Auto } else { Auto::Set(ev100_of_white_luminance(full)) };
+    picture.exposure_ev100 = white_luminance.map_or(Auto::Auto, |white| Auto::Set(ev100_of_white_luminance(white)));
     let scene = Scene {
         picture,
-        camera: camera(sheet.width, sheet.height),
+        camera: camera(size_m),
         plate: PlateParameters::default(),
         sky: None,
         ground: None,
@@ -75,22 +85,18 @@ fn plan(
         instances: vec![alone],
         ..scene
     };
-    let options = PlanOptions { size: Some(SIZE), ..PlanOptions::default() };
-    let scene = scene.adapted(&SceneOptions::default()).ok()?;
-    let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
-    let plan = Arc::new(Plan::new(&compiled, &options).ok()?);
-    Some(PlannedScene { compiled, plan })
+    scene.adapted(&SceneOptions::default()).ok()
 }
 
-/// A camera before a sheet at the origin that sees all of it.
-fn camera(width: f64, height: f64) -> CameraParameters {
-    let [across, up] = SIZE.map(|side| side as f64);
-    let seen = AROUND * height.max(width * up / across);
-    let away = 0.5 * seen / bansho::base::math::tan(0.5 * FIELD.to_radians());
+/// A camera that shows a rectangle of `width` x `height` m that stands at the origin.
+fn camera([width, height]: [f64; 2]) -> CameraParameters {
+    let [columns, rows] = SIZE.map(|side| side as f64);
+    let visible_height = MARGIN_FACTOR * height.max(width * rows / columns);
+    let distance = 0.5 * visible_height / math::tan(0.5 * VERTICAL_FOV_DEG.to_radians());
     CameraParameters {
-        position: [0.0, 0.5 * height, away].into(),
+        position: [0.0, 0.5 * height, distance].into(),
         target: [0.0, 0.5 * height, 0.0].into(),
-        vertical_fov_deg: FIELD.into(),
+        vertical_fov_deg: VERTICAL_FOV_DEG.into(),
         ..CameraParameters::default()
     }
 }
@@ -105,15 +111,17 @@ mod tests {
     fn each_stage_shows_that_sheet_alone() {
         let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
         let text = "bansho = 2\n[[rain]]\n[[flame_sheet]]\n[[flame_sheet]]\nname = \"second\"\nenabled = false\nheight = 3.0\n";
-        let plans = plans("scene", text, &assets, 1).unwrap();
-        assert_eq!(names().collect::<Vec<_>>(), ["texture", "thresholded", "sharpened", "colored"]);
+        let sheet = |index: usize| PhenomenonId { kind: "flame_sheet", index };
+        let plans = plans("scene", text, &assets, sheet(1)).unwrap();
+        assert_eq!(names("flame_sheet"), ["texture", "thresholded", "sharpened", "colored"]);
+        assert!(names("rain").is_empty() && names("camera").is_empty());
         assert_eq!(plans.len(), 4);
         for PlannedScene { plan, .. } in &plans {
             let names: Vec<&str> = plan.scene().instances.iter().map(|instance| instance.name.as_str()).collect();
             assert_eq!((names, plan.size()), (vec!["second"], SIZE));
             assert_eq!(plan.scene().camera.target.at(0.0), [0.0, 1.5, 0.0]);
         }
-        assert!(super::plans("scene", text, &assets, 2).is_none());
-        assert!(super::plans("scene", "bansho = 2\n[[flame_shet]]\n", &assets, 0).is_none());
+        assert!(super::plans("scene", text, &assets, sheet(2)).is_none());
+        assert!(super::plans("scene", "bansho = 2\n[[flame_shet]]\n", &assets, sheet(0)).is_none());
     }
 }

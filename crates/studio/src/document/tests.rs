@@ -7,7 +7,7 @@ use bansho::{
 };
 
 use super::{
-    files::{self, ExternalChange, Recent},
+    files::{self, ExternalChange, RecentFiles},
     *,
 };
 use crate::document::{
@@ -38,7 +38,7 @@ fn height(value: f64) -> Operation {
 }
 
 #[test]
-fn edits_are_undone_and_done_again_one_by_one() {
+fn edits_are_undone_and_redone() {
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
     document.end_step();
@@ -54,7 +54,7 @@ fn edits_are_undone_and_done_again_one_by_one() {
 }
 
 #[test]
-fn what_a_drag_does_is_one_step() {
+fn a_drag_is_one_undo_step() {
     let mut document = scene();
     for step in 1..=50 {
         document.edit("height", &[height(f64::from(step) * 0.1)]).unwrap();
@@ -65,7 +65,7 @@ fn what_a_drag_does_is_one_step() {
 }
 
 #[test]
-fn an_open_step_can_be_abandoned_as_if_it_had_never_been() {
+fn an_open_step_can_be_discarded() {
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
     document.discard_step("blow");
@@ -80,7 +80,7 @@ fn an_open_step_can_be_abandoned_as_if_it_had_never_been() {
 }
 
 #[test]
-fn a_new_edit_after_undoing_forgets_what_was_undone() {
+fn an_edit_after_undo_clears_the_redo_steps() {
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
     document.undo();
@@ -90,7 +90,7 @@ fn a_new_edit_after_undoing_forgets_what_was_undone() {
 }
 
 #[test]
-fn it_is_dirty_until_saved_or_undone_to_what_was_saved() {
+fn it_is_dirty_until_saved_or_undone() {
     let mut document = scene();
     assert!(!document.is_dirty());
     document.edit("height", &[height(1.0)]).unwrap();
@@ -100,7 +100,7 @@ fn it_is_dirty_until_saved_or_undone_to_what_was_saved() {
 }
 
 #[test]
-fn faults_keep_the_last_good_plan_and_say_where_they_are() {
+fn problems_have_lines_and_keep_the_last_valid_plan() {
     let mut document = scene();
     document.check_now(&assets());
     let good = document.plan().unwrap().clone();
@@ -118,7 +118,7 @@ fn faults_keep_the_last_good_plan_and_say_where_they_are() {
 }
 
 #[test]
-fn stale_news_is_no_news() {
+fn stale_check_results_are_ignored() {
     let mut document = scene();
     let before = document.revision();
     document.edit("height", &[height(1.0)]).unwrap();
@@ -127,7 +127,7 @@ fn stale_news_is_no_news() {
 }
 
 #[test]
-fn text_that_is_no_toml_keeps_its_last_values_and_refuses_operations() {
+fn invalid_toml_keeps_the_last_values_and_refuses_operations() {
     let mut document = scene();
     document.replace("typing", "bansho = ");
     assert!(document.syntax_problem().is_some());
@@ -169,11 +169,11 @@ fn solo_hides_all_others_and_shows_them_again() {
     assert_eq!(enabled(&document), [false, true]);
     let back = operations::solo(&document, &document.phenomena()[1]);
     document.edit("solo", &back).unwrap();
-    assert_eq!(**document.text(), *SCENE, "as if nothing had been");
+    assert_eq!(**document.text(), *SCENE, "the text is unchanged");
 }
 
 #[test]
-fn saving_is_whole_and_outside_edits_are_seen() {
+fn saving_is_atomic_and_external_changes_are_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("deep").join("fire.toml");
     let mut document = scene();
@@ -182,13 +182,13 @@ fn saving_is_whole_and_outside_edits_are_seen() {
     files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
     assert_eq!(fs::read_to_string(&path).unwrap(), **document.text());
-    assert_eq!(files::external_change(&document, &path), ExternalChange::Same);
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Unchanged);
     fs::write(&path, "bansho = 2\n").unwrap();
     assert_eq!(files::external_change(&document, &path), ExternalChange::Changed("bansho = 2\n".into()));
     fs::remove_file(&path).unwrap();
-    assert_eq!(files::external_change(&document, &path), ExternalChange::Gone);
+    assert_eq!(files::external_change(&document, &path), ExternalChange::Deleted);
     document.set_file_missing(true);
-    assert!(document.is_dirty() && !document.is_modified(), "what lies nowhere is not saved");
+    assert!(document.is_dirty() && !document.is_modified(), "a scene without a file is unsaved");
     let text = document.text().clone();
     files::save(&mut document, &path, text).unwrap();
     assert!(!document.is_dirty());
@@ -198,54 +198,54 @@ fn saving_is_whole_and_outside_edits_are_seen() {
 }
 
 #[test]
-fn what_is_rescued_spoils_nothing_that_was_rescued_before() {
+fn rescue_copies_do_not_overwrite_each_other() {
     let folder = tempfile::tempdir().unwrap();
-    let rescued = |text: &str| files::rescue(text, &folder.path().join("fire.toml")).unwrap();
+    let rescued = |text: &str| files::save_rescue_copy(text, &folder.path().join("fire.toml")).unwrap();
     let names = ["x", "y", "x"].map(rescued).map(|path| path.file_name().unwrap().to_owned());
     assert_eq!(names, ["fire.rescued.toml", "fire.rescued 2.toml", "fire.rescued.toml"]);
     assert_eq!(fs::read_to_string(folder.path().join("fire.rescued.toml")).unwrap(), "x");
 }
 
 #[test]
-fn recent_files_are_remembered_the_last_first() {
+fn recent_files_are_stored_newest_first() {
     let folder = tempfile::tempdir().unwrap();
     let list = folder.path().join("recent");
-    let mut recent = Recent::read(list.clone());
+    let mut recent = RecentFiles::read(list.clone());
     for name in ["a.toml", "b.toml", "a.toml"] {
-        recent.note(&folder.path().join(name)).unwrap();
+        recent.add(&folder.path().join(name)).unwrap();
     }
-    assert_eq!(Recent::read(list), recent);
+    assert_eq!(RecentFiles::read(list), recent);
     let names: Vec<_> = recent.paths().iter().map(|path| path.file_name().unwrap()).collect();
     assert_eq!(names, ["a.toml", "b.toml"]);
 }
 
 #[test]
-fn unsaved_work_outlives_its_studio_but_a_living_ones_is_left_alone() {
+fn unsaved_work_of_closed_studios_is_recoverable() {
     let folder = tempfile::tempdir().unwrap();
     let autosave = Autosave::begin(folder.path(), "studio").unwrap();
     let other = Autosave::begin(folder.path(), "studio").unwrap();
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    autosave.keep(&document, Some("scenes/fire.toml".as_ref())).unwrap();
-    other.keep(&scene(), None).unwrap();
+    autosave.save(&document, Some("scenes/fire.toml".as_ref())).unwrap();
+    other.save(&scene(), None).unwrap();
     assert_eq!(autosave::recoverable(folder.path()), [], "both are running");
     drop(autosave);
     let found = autosave::recoverable(folder.path());
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].origin.as_str(), found[0].text.as_str()), ("scenes/fire.toml", &**document.text()));
-    found[0].forget();
+    found[0].discard();
     assert_eq!(autosave::recoverable(folder.path()), []);
 }
 
 #[test]
-fn work_that_ended_well_leaves_nothing_behind() {
+fn closing_removes_the_autosave() {
     let folder = tempfile::tempdir().unwrap();
     let autosave = Autosave::begin(folder.path(), "studio").unwrap();
     let mut document = scene();
     document.edit("height", &[height(1.0)]).unwrap();
-    autosave.keep(&document, None).unwrap();
+    autosave.save(&document, None).unwrap();
     document.undo();
-    autosave.keep(&document, None).unwrap();
+    autosave.save(&document, None).unwrap();
     autosave.end();
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -7,11 +7,11 @@ use super::{USAGE, renderer_choice::RendererChoice};
 /// The parsed arguments.
 #[derive(Debug, PartialEq)]
 pub(super) struct Arguments {
-    pub(super) painter: RendererChoice,
+    pub(super) renderer: RendererChoice,
     pub(super) mode: Mode,
 }
 
-/// What to do.
+/// The mode of the program.
 #[derive(Debug, PartialEq)]
 pub(super) enum Mode {
     Help,
@@ -25,9 +25,9 @@ impl Arguments {
     /// Reads the program's arguments.
     ///
     /// # Errors
-    /// What is to be told where they make no sense.
+    /// The message for invalid arguments.
     pub(super) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, String> {
-        let mut painter = RendererChoice::default();
+        let mut renderer = RendererChoice::default();
         let mut rest = Vec::new();
         let mut arguments = arguments.into_iter();
         while let Some(argument) = arguments.next() {
@@ -37,9 +37,9 @@ impl Arguments {
                     let name = arguments
                         .next()
                         .ok_or_else(|| format!("error: --painter needs one of {}", RendererChoice::NAMES))?;
-                    painter = RendererChoice::named(&name.to_string_lossy())?;
+                    renderer = RendererChoice::named(&name.to_string_lossy())?;
                 }
-                Some(value) if value.starts_with('=') => painter = RendererChoice::named(&value[1..])?,
+                Some(value) if value.starts_with('=') => renderer = RendererChoice::named(&value[1..])?,
                 _ => rest.push(argument),
             }
         }
@@ -58,7 +58,7 @@ impl Arguments {
             [scene] => Mode::Scene(Some(scene.into())),
             _ => return Err(USAGE.to_owned()),
         };
-        Ok(Self { painter, mode })
+        Ok(Self { renderer, mode })
     }
 }
 
@@ -66,27 +66,27 @@ impl Arguments {
 mod tests {
     use super::*;
 
-    fn asked(arguments: &[&str]) -> Result<Arguments, String> {
+    fn parsed(arguments: &[&str]) -> Result<Arguments, String> {
         Arguments::parse(arguments.iter().map(OsString::from))
     }
 
     #[test]
-    fn the_painter_is_named_anywhere() {
+    fn the_renderer_may_be_named_at_any_position() {
         let scene = Mode::Scene(Some("a.toml".into()));
-        assert_eq!(asked(&["a.toml"]), Ok(Arguments { painter: RendererChoice::Auto, mode: scene }));
+        assert_eq!(parsed(&["a.toml"]), Ok(Arguments { renderer: RendererChoice::Auto, mode: scene }));
         for arguments in [["--painter", "software", "a.toml"], ["a.toml", "--painter", "software"]] {
-            assert_eq!(asked(&arguments).unwrap().painter, RendererChoice::Software);
+            assert_eq!(parsed(&arguments).unwrap().renderer, RendererChoice::Software);
         }
-        let bench = asked(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
-        assert_eq!(bench, Arguments { painter: RendererChoice::Gpu, mode: Mode::BenchWindow("rain".into()) });
+        let bench = parsed(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
+        assert_eq!(bench, Arguments { renderer: RendererChoice::Gpu, mode: Mode::BenchWindow("rain".into()) });
     }
 
     #[test]
-    fn what_makes_no_sense_is_told_in_one_error() {
+    fn invalid_arguments_are_one_error() {
         let expected = "error: --painter is one of auto, gpu, software, not `pencil`";
-        assert_eq!(asked(&["--painter", "pencil"]).unwrap_err(), expected);
-        assert_eq!(asked(&["--painter"]).unwrap_err(), "error: --painter needs one of auto, gpu, software");
-        assert!(asked(&["--pencil"]).unwrap_err().starts_with("error: --pencil means nothing here\n"));
-        assert_eq!(asked(&["a.toml", "b.toml"]).unwrap_err(), USAGE);
+        assert_eq!(parsed(&["--painter", "pencil"]).unwrap_err(), expected);
+        assert_eq!(parsed(&["--painter"]).unwrap_err(), "error: --painter needs one of auto, gpu, software");
+        assert!(parsed(&["--pencil"]).unwrap_err().starts_with("error: --pencil means nothing here\n"));
+        assert_eq!(parsed(&["a.toml", "b.toml"]).unwrap_err(), USAGE);
     }
 }

@@ -20,7 +20,7 @@ use self::{
     arguments::{Arguments, Mode},
     renderer_choice::RendererChoice,
 };
-use bansho_egui_software::window::Build;
+use bansho_egui_software::window::AppCreator;
 use eframe::egui;
 
 mod arguments;
@@ -39,12 +39,12 @@ pub(super) fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(message) => return fail(&message),
     };
-    let painter = arguments.painter;
+    let renderer = arguments.renderer;
     match arguments.mode {
         Mode::Help => say(USAGE),
         Mode::Bench(wanted) => bench(&wanted),
-        Mode::BenchWindow(wanted) => bench_window(painter, wanted),
-        Mode::Scene(scene) => match run(painter, scene) {
+        Mode::BenchWindow(wanted) => bench_window(renderer, wanted),
+        Mode::Scene(scene) => match run(renderer, scene) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => fail(&format!("error: {error}")),
         },
@@ -54,31 +54,31 @@ pub(super) fn main() -> ExitCode {
 /// Measures the studio on the phenomena whose name contains `wanted`.
 fn bench(wanted: &str) -> ExitCode {
     for speed in bench::measure(wanted) {
-        let bench::Speed { name, frames_per_s, advance_s, draw_s, answer_s } = match speed {
+        let bench::Speed { name, frames_per_s, advance_s, draw_s, latency_s } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
-        let [advance, draw, answer] = [advance_s, draw_s, answer_s].map(|seconds| 1000.0 * seconds);
+        let [advance, draw, latency] = [advance_s, draw_s, latency_s].map(|seconds| 1000.0 * seconds);
         say(&format!(
             "{name:24} {frames_per_s:6.1} pictures/s ({advance:5.1} ms simulated, {draw:5.1} ms drawn), \
-             19 of 20 changes show within {answer:4.0} ms"
+             19 of 20 changes show within {latency:4.0} ms"
         ));
     }
     ExitCode::SUCCESS
 }
 
-/// The same with the window.
-fn bench_window(painter: RendererChoice, wanted: String) -> ExitCode {
+/// Measures the window on the phenomena whose name contains `wanted`.
+fn bench_window(renderer: RendererChoice, wanted: String) -> ExitCode {
     let (sender, results) = mpsc::channel();
-    let build: Build = Box::new(move |ctx| {
+    let build: AppCreator = Box::new(move |ctx| {
         let session = session(ctx, Document::new("scene", FLAME_SHEET), None)?;
         Ok(Box::new(bench::WindowBench::new(session, &wanted, sender)))
     });
-    if let Err(error) = painter.show(viewport(window_size(None)), build) {
+    if let Err(error) = renderer.show(viewport(window_size(None)), build) {
         return fail(&format!("error: {error}"));
     }
     for speed in results {
-        let bench::WindowSpeed { name, frames_per_s, played_size, answer_s, size } = match speed {
+        let bench::WindowSpeed { name, frames_per_s, played_size, latency_s, size } = match speed {
             Ok(speed) => speed,
             Err(error) => return fail(&format!("error: {error}")),
         };
@@ -86,7 +86,7 @@ fn bench_window(painter: RendererChoice, wanted: String) -> ExitCode {
         say(&format!(
             "{name:24} {frames_per_s:6.1} pictures/s of {width} x {height}, \
              19 of 20 changes painted at {whole_width} x {whole_height} within {:4.0} ms",
-            1000.0 * answer_s
+            1000.0 * latency_s
         ));
     }
     ExitCode::SUCCESS
@@ -104,20 +104,20 @@ fn fail(message: &str) -> ExitCode {
     ExitCode::FAILURE
 }
 
-fn run(painter: RendererChoice, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
-    let (opened, fault) = match scene.as_deref().map(files::open).transpose() {
+fn run(renderer: RendererChoice, scene: Option<PathBuf>) -> Result<(), Box<dyn std::error::Error>> {
+    let (opened, error) = match scene.as_deref().map(files::open).transpose() {
         Ok(opened) => (opened, None),
         Err(error) => (None, Some(error.to_string())),
     };
-    let build: Build = Box::new(move |ctx| {
-        // Where there is no such scene, the window says so and has another.
+    let build: AppCreator = Box::new(move |ctx| {
+        // If the scene cannot be opened, the window shows the error and another scene.
         let scene = scene.filter(|_| opened.is_some());
         let document = opened.unwrap_or_else(|| Document::new("scene", FLAME_SHEET));
         let mut session = session(ctx, document, scene)?;
-        session.set_notice(fault);
+        session.set_notice(error);
         Ok(Box::new(Studio::new(session, home())))
     });
-    painter.show(viewport(window_size(home().as_deref())), build)
+    renderer.show(viewport(window_size(home().as_deref())), build)
 }
 
 fn viewport(size: [f32; 2]) -> egui::ViewportBuilder {

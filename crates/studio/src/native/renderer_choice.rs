@@ -1,9 +1,9 @@
-//! What paints the window: eframe with a GPU where there is one, else the software rasterizer, which is much faster than a software
+//! The renderer of the window: eframe with a GPU if there is one, else the software rasterizer, which is much faster than a software
 //! Vulkan driver.
 
 use bansho_egui_software::{
     App,
-    window::{self, Build, WindowError},
+    window::{self, AppCreator, WindowError},
 };
 use eframe::{
     egui::{self, ViewportBuilder},
@@ -24,7 +24,7 @@ impl RendererChoice {
     pub(super) const NAMES: &str = "auto, gpu, software";
 
     /// # Errors
-    /// There is no renderer `name`; the message.
+    /// There is no renderer `name`; the error is a message.
     pub(super) fn named(name: &str) -> Result<Self, String> {
         match name {
             "auto" => Ok(Self::Auto),
@@ -34,15 +34,15 @@ impl RendererChoice {
         }
     }
 
-    /// Shows what `build` makes in a window until that closes.
+    /// Runs the application that `build` creates in a window until it closes.
     ///
     /// # Errors
-    /// There is no window, or nothing to show.
-    pub(super) fn show(self, viewport: ViewportBuilder, build: Build) -> Result<(), Box<dyn std::error::Error>> {
+    /// The window cannot be opened, or the application cannot be created.
+    pub(super) fn show(self, viewport: ViewportBuilder, build: AppCreator) -> Result<(), Box<dyn std::error::Error>> {
         match self {
             // Only eframe's window supports screen readers.
-            Self::Auto if cfg!(feature = "accessibility") || has_gpu() => by_gpu(viewport, build),
-            Self::Gpu => by_gpu(viewport, build),
+            Self::Auto if cfg!(feature = "accessibility") || has_gpu() => run_with_gpu(viewport, build),
+            Self::Gpu => run_with_gpu(viewport, build),
             Self::Auto | Self::Software => Ok(window::run(viewport, build).map_err(with_hint)?),
         }
     }
@@ -55,16 +55,16 @@ fn has_gpu() -> bool {
     adapters.iter().any(|adapter| adapter.get_info().device_type != wgpu::DeviceType::Cpu)
 }
 
-fn by_gpu(viewport: ViewportBuilder, build: Build) -> Result<(), Box<dyn std::error::Error>> {
+fn run_with_gpu(viewport: ViewportBuilder, build: AppCreator) -> Result<(), Box<dyn std::error::Error>> {
     // Dithering would add noise to the picture.
     let options = eframe::NativeOptions { viewport, dithering: false, ..eframe::NativeOptions::default() };
     let build = |creation: &eframe::CreationContext| {
-        let program = build(&creation.egui_ctx)?;
-        Ok(Box::new(GpuApp(program)) as Box<dyn eframe::App>)
+        let app = build(&creation.egui_ctx)?;
+        Ok(Box::new(GpuApp(app)) as Box<dyn eframe::App>)
     };
     let title = options.viewport.title.clone().unwrap_or_default();
-    let told = |error: eframe::Error| format!("{error}; `--painter software` needs no GPU");
-    Ok(eframe::run_native(&title, options, Box::new(build)).map_err(told)?)
+    let with_hint = |error: eframe::Error| format!("{error}; `--painter software` needs no GPU");
+    Ok(eframe::run_native(&title, options, Box::new(build)).map_err(with_hint)?)
 }
 
 /// The error, and what to do where there is no display.
@@ -85,7 +85,7 @@ impl eframe::App for GpuApp {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let mut wait_until_presented = || {
             if let Some(state) = frame.wgpu_render_state() {
-                // A lost device is reported where it is used next.
+                // A lost device is reported at its next use.
                 let _ = state.device.poll(PollType::wait_indefinitely());
             }
         };

@@ -14,7 +14,7 @@ use bansho::{
 };
 
 use super::{Event, FrameRequest, Picture, snapshot_cache::SnapshotCache};
-use crate::document::{Checker, PlannedScene, Revision, stages};
+use crate::document::{Checker, PhenomenonId, PlannedScene, Revision, stages};
 use web_time::Instant;
 
 /// Why a request has no picture.
@@ -23,7 +23,7 @@ pub(super) enum RequestError {
     /// No picture can be drawn, or it was stopped.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The picture fits no file.
+    /// The picture cannot be encoded as a PNG.
     #[error(transparent)]
     Media(#[from] MediaError),
 }
@@ -35,14 +35,14 @@ impl RequestError {
     }
 }
 
-/// What is kept from one request to the next.
+/// The state that is kept between requests.
 #[derive(Default)]
 pub(super) struct Engine {
-    /// The revision that was checked last.
+    /// The last check.
     checked: Option<Checked>,
     checker: Checker,
-    /// The last good scene, planned at its own size, and whether it is a draft.
-    scene: Option<(PlannedScene, bool)>,
+    /// The last valid scene.
+    current: Option<CurrentScene>,
     shot: Option<OpenShot>,
     /// The shot of full-quality frames; each continues from the frame before.
     full_quality: Option<(PlannedScene, Shot)>,
@@ -50,17 +50,25 @@ pub(super) struct Engine {
     stages: StageShots,
 }
 
-/// A checked revision with its assets, and whether a draft was asked for.
+/// The inputs of a check.
 struct Checked {
     revision: Revision,
     assets: Arc<dyn Assets>,
+    /// Whether a draft was requested.
     draft: bool,
+}
+
+/// A valid scene, planned at its own size.
+#[derive(Clone)]
+struct CurrentScene {
+    scene: PlannedScene,
+    is_draft: bool,
 }
 
 /// An open shot, with the plan and the size that it was last planned for.
 struct OpenShot {
     shot: Shot,
-    of: PlannedScene,
+    scene: PlannedScene,
     size: [usize; 2],
 }
 
@@ -86,20 +94,20 @@ impl Engine {
             let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
             self.checked = Some(Checked { revision: request.revision, assets: assets.clone(), draft });
             if let Ok(scene) = &outcome {
-                self.scene = Some((scene.clone(), is_draft));
+                self.current = Some(CurrentScene { scene: scene.clone(), is_draft });
             }
             emit(Event::Checked { revision: request.revision, outcome: outcome.map(|scene| scene.plan) });
         }
-        let Some((scene, draft)) = self.scene.clone() else { return Ok(()) };
+        let Some(CurrentScene { scene, is_draft }) = self.current.clone() else { return Ok(()) };
         if request.full_quality {
             let number = request.number.unwrap_or(scene.plan.frames().start);
-            emit(Event::FullQualityFrame { number, png: self.finish(&scene, number, observer)? });
+            emit(Event::FullQualityFrame { number, png: self.full_quality_png(&scene, number, observer)? });
             return Ok(());
         }
         let picture = self.draw(&scene, request, observer)?;
-        emit(Event::Drawn(Picture { draft, ..picture }));
-        if let Some(sheet) = request.stages {
-            self.stages.set_scene(&scene, sheet, request);
+        emit(Event::Drawn(Picture { draft: is_draft, ..picture }));
+        if let Some(phenomenon) = request.stages {
+            self.stages.set_scene(&scene, phenomenon, request);
             for (stage, opened) in self.stages.shots.iter_mut().enumerate() {
                 let picture =
                     opened.draw(request, request.number.unwrap_or(scene.plan.frames().start), &mut None, observer)?;
@@ -112,14 +120,19 @@ impl Engine {
     /// Discards the shots after a panic in one.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn reset_after_panic(&mut self) {
-        *self = Self { checked: self.checked.take(), scene: self.scene.take(), ..Self::default() };
+        *self = Self { checked: self.checked.take(), current: self.current.take(), ..Self::default() };
     }
 
-    /// The file of the finished frame `number`. Where it was stopped, or the last one ended, it goes on.
-    fn finish(&mut self, scene: &PlannedScene, number: i64, observer: &dyn Observer) -> Result<Vec<u8>, RequestError> {
-        let begun = self.full_quality.take().filter(|(of, _)| Arc::ptr_eq(&of.plan, &scene.plan));
-        let (_, shot) = self.full_quality.insert(match begun {
-            Some(begun) => begun,
+    /// The full-quality frame `number` as a PNG. It continues a cancelled frame, or from the frame before.
+    fn full_quality_png(
+        &mut self,
+        scene: &PlannedScene,
+        number: i64,
+        observer: &dyn Observer,
+    ) -> Result<Vec<u8>, RequestError> {
+        let open = self.full_quality.take().filter(|(own, _)| Arc::ptr_eq(&own.plan, &scene.plan));
+        let (_, shot) = self.full_quality.insert(match open {
+            Some(open) => open,
             None => (scene.clone(), Shot::open(scene.compiled.clone(), scene.plan.clone())),
         });
         let frame = bansho::draw(shot, number, observer)?;
@@ -136,13 +149,13 @@ impl Engine {
     ) -> Result<Picture, RenderError> {
         let number = request.number.unwrap_or(scene.plan.frames().start);
         let size = fit_within(scene.plan.size(), request.within);
-        let opened = open(&mut self.shot, scene, size, request.exact);
+        let opened = open_or_replan(&mut self.shot, scene, size, request.exact);
         opened.draw(request, number, &mut Some(&mut self.snapshots), observer)
     }
 }
 
 impl OpenShot {
-    /// Draws frame `number`, by way of the nearest of `snapshots` where there are any.
+    /// Draws frame `number`, from the nearest of `snapshots` if there are any.
     fn draw(
         &mut self,
         request: &FrameRequest,
@@ -150,11 +163,11 @@ impl OpenShot {
         snapshots: &mut Option<&mut SnapshotCache>,
         observer: &dyn Observer,
     ) -> Result<Picture, RenderError> {
-        let Self { shot, of, size } = self;
+        let Self { shot, scene, size } = self;
         let began = Instant::now();
-        snapshots.iter_mut().for_each(|snapshots| snapshots.seek(&of.compiled, shot, number));
+        snapshots.iter_mut().for_each(|snapshots| snapshots.seek(&scene.compiled, shot, number));
         shot.advance(number, observer)?;
-        snapshots.iter_mut().for_each(|snapshots| snapshots.store(&of.compiled, shot, number));
+        snapshots.iter_mut().for_each(|snapshots| snapshots.store(&scene.compiled, shot, number));
         let advanced = Instant::now();
         shot.draw(observer)?;
         let mut frame = shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
@@ -164,7 +177,7 @@ impl OpenShot {
             revision: request.revision,
             number,
             size: *size,
-            scene_size: of.plan.size(),
+            scene_size: scene.plan.size(),
             pixels,
             exact: shot.is_exact(),
             draft: false,
@@ -174,42 +187,49 @@ impl OpenShot {
     }
 }
 
-/// Shots of the stages of a flame sheet.
+/// Shots of the stages of a phenomenon.
 #[derive(Default)]
 struct StageShots {
-    /// Of which scene and which sheet.
-    of: Option<(PlannedScene, usize)>,
+    /// The scene, and the phenomenon in it.
+    source: Option<(PlannedScene, PhenomenonId)>,
     shots: Vec<OpenShot>,
 }
 
 impl StageShots {
-    fn set_scene(&mut self, scene: &PlannedScene, sheet: usize, request: &FrameRequest) {
-        if self.of.as_ref().is_some_and(|(of, own)| Arc::ptr_eq(&of.plan, &scene.plan) && *own == sheet) {
+    fn set_scene(&mut self, scene: &PlannedScene, phenomenon: PhenomenonId, request: &FrameRequest) {
+        let is_same =
+            |(own, id): &(PlannedScene, PhenomenonId)| Arc::ptr_eq(&own.plan, &scene.plan) && *id == phenomenon;
+        if self.source.as_ref().is_some_and(is_same) {
             return;
         }
-        // Of a text with faults there are none; the last pictures stay.
-        let plans = stages::plans(&request.name, &request.text, &request.assets, sheet).unwrap_or_default();
-        let open = |of: PlannedScene| OpenShot {
-            shot: Shot::open(of.compiled.clone(), of.plan.clone()),
-            size: of.plan.size(),
-            of,
+        // A text with errors has no plans; the last pictures stay.
+        let plans = stages::plans(&request.name, &request.text, &request.assets, phenomenon).unwrap_or_default();
+        let open = |scene: PlannedScene| OpenShot {
+            shot: Shot::open(scene.compiled.clone(), scene.plan.clone()),
+            size: scene.plan.size(),
+            scene,
         };
         self.shots = plans.into_iter().map(open).collect();
-        self.of = Some((scene.clone(), sheet));
+        self.source = Some((scene.clone(), phenomenon));
     }
 }
 
-/// The shot of `scene` at `size`: the one there is where it can go on, else a new one.
-fn open<'a>(slot: &'a mut Option<OpenShot>, scene: &PlannedScene, size: [usize; 2], exact: bool) -> &'a mut OpenShot {
-    let is_of = |opened: &OpenShot| Arc::ptr_eq(&opened.of.plan, &scene.plan);
-    let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && is_of(opened)));
+/// The shot of `scene` at `size`: the open one if it can continue, else a new one.
+fn open_or_replan<'a>(
+    slot: &'a mut Option<OpenShot>,
+    scene: &PlannedScene,
+    size: [usize; 2],
+    exact: bool,
+) -> &'a mut OpenShot {
+    let is_same_scene = |opened: &OpenShot| Arc::ptr_eq(&opened.scene.plan, &scene.plan);
+    let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && is_same_scene(opened)));
     let (compiled, plan) = (scene.compiled.clone(), || Arc::new(scene.plan.at_size(size)));
     let opened = match usable {
-        None => OpenShot { shot: Shot::open(compiled, plan()), of: scene.clone(), size },
-        Some(opened) if is_of(&opened) && opened.size == size => opened,
+        None => OpenShot { shot: Shot::open(compiled, plan()), scene: scene.clone(), size },
+        Some(opened) if is_same_scene(&opened) && opened.size == size => opened,
         Some(mut opened) => {
             opened.shot.replan(compiled, plan());
-            OpenShot { of: scene.clone(), size, ..opened }
+            OpenShot { scene: scene.clone(), size, ..opened }
         }
     };
     slot.insert(opened)
@@ -235,9 +255,9 @@ fn to_display_pixels(frame: &mut Frame) -> Vec<[u8; 4]> {
 
 /// The frame as a PNG with the default options of `bansho render`.
 fn encode_png(frame: &Frame) -> Result<Vec<u8>, MediaError> {
-    let to_display_pixels = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
+    let image = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let fingerprint = fingerprint::of_png(frame.header.fingerprint, BitDepth::Eight, AlphaConvention::Encoded);
-    png::encode(&to_display_pixels, &fingerprint, PngEffort::default(), Path::new("still.png"))
+    png::encode(&image, &fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 
 #[cfg(test)]
@@ -247,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_that_fits_no_file_is_told_of() {
+    fn a_picture_too_large_for_a_png_is_an_error() {
         let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
         let scene = crate::document::check("scene", "bansho = 2\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
         let mut shot = Shot::open(scene.compiled, scene.plan);

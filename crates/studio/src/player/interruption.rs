@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use bansho::{Observer, Stage};
 
-/// Asks `stop` whether to stop, and tells it whether the shot is being advanced rather than drawn.
+/// Cancels work when `stop` returns true. Its argument is whether the shot is being advanced rather than drawn.
 pub(super) struct Interruption<F> {
     advancing: AtomicBool,
     stop: F,
@@ -15,20 +15,20 @@ impl<F: Fn(bool) -> bool + Send + Sync> Interruption<F> {
         Self { advancing: AtomicBool::new(false), stop }
     }
 
-    fn note(&self, stage: Stage, under_way: bool) {
+    fn set_advancing(&self, stage: Stage, active: bool) {
         if stage == Stage::Advance {
-            self.advancing.store(under_way, Ordering::Relaxed);
+            self.advancing.store(active, Ordering::Relaxed);
         }
     }
 }
 
 impl<F: Fn(bool) -> bool + Send + Sync> Observer for Interruption<F> {
     fn begin(&self, stage: Stage) {
-        self.note(stage, true);
+        self.set_advancing(stage, true);
     }
 
     fn end(&self, stage: Stage) {
-        self.note(stage, false);
+        self.set_advancing(stage, false);
     }
 
     fn cancelled(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Renders frames of a document off the window's thread, and keeps the playback time.
 //!
-//! The window states which frame it wants ([`FrameRequest`]); only the newest request counts. Natively `ThreadPlayer` serves it on a
+//! The window requests a frame ([`FrameRequest`]); only the newest request is served. Natively `ThreadPlayer` serves it on a
 //! thread with a rayon pool. In a web page `WorkerPlayer` passes it to a worker, in which [`PolledPlayer`] works in time slices
 //! between two messages. All report [`Event`]s.
 //!
@@ -24,7 +24,7 @@ use std::{sync::Arc, time::Duration};
 
 use bansho::{Assets, Plan, SceneError};
 
-use crate::document::Revision;
+use crate::document::{PhenomenonId, Revision};
 
 pub use polled::PolledPlayer;
 pub use preview_size::{FrameTiming, PreviewScale};
@@ -43,7 +43,7 @@ pub struct FrameRequest {
     pub name: String,
     /// Its text.
     pub text: Arc<str>,
-    /// Where its plates, meshes and drawings are read from.
+    /// The source of its plates, meshes and drawings.
     pub assets: Arc<dyn Assets>,
     /// The frame number; `None` for the scene's first frame.
     pub number: Option<i64>,
@@ -51,18 +51,18 @@ pub struct FrameRequest {
     pub within: [usize; 2],
     /// Whether the simulation state must be exact: the one that the scene leads to from its first frame.
     pub exact: bool,
-    /// Whether it may be simulated with fewer particles.
+    /// Whether it may be a draft, which is simulated with fewer particles.
     pub draft: bool,
-    /// Whether the finished picture is wanted, as `bansho render` writes it, in place of one for a window.
+    /// Whether the full-quality PNG that `bansho render` writes is requested instead of a preview.
     pub full_quality: bool,
-    /// The flame sheet whose stages are wanted besides.
-    pub stages: Option<usize>,
+    /// The phenomenon whose stages are drawn too.
+    pub stages: Option<PhenomenonId>,
 }
 
 /// A rendered preview.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// The requested revision. Where it has problems, the last good plan is shown.
+    /// The requested revision. If it has problems, the picture is of the last valid scene.
     pub revision: Revision,
     /// The frame.
     pub number: i64,
@@ -84,18 +84,18 @@ pub struct Picture {
 
 /// What a player reports.
 pub enum Event {
-    /// A state of the document was checked.
+    /// A revision of the document was checked.
     Checked {
-        /// Which.
+        /// The revision.
         revision: Revision,
-        /// Its plan, or its faults.
+        /// Its plan, or its problems.
         outcome: Result<Arc<Plan>, SceneError>,
     },
-    /// A picture is there.
+    /// A preview was drawn.
     Drawn(Picture),
-    /// A small picture of a stage of the flame sheet that was asked for, which of [`stages`](crate::document::stages::names).
+    /// A small picture of a stage of the requested phenomenon: its index in [`stages::names`](crate::document::stages::names).
     Stage(usize, Picture),
-    /// The finished picture of a frame is there.
+    /// A full-quality frame was drawn.
     FullQualityFrame {
         /// The frame.
         number: i64,
@@ -104,24 +104,24 @@ pub enum Event {
     },
     /// No picture could be drawn.
     Failed {
-        /// Of which state.
+        /// The requested revision.
         revision: Revision,
-        /// Why.
+        /// The error.
         reason: String,
     },
     /// A phenomenon panicked, which is a bug in it.
     Panicked {
-        /// Of which state.
+        /// The requested revision.
         revision: Revision,
-        /// At which frame; the scene's first where it is left out.
+        /// The frame; `None` for the scene's first frame.
         number: Option<i64>,
-        /// What it said.
+        /// The panic's message.
         message: String,
     },
 }
 
 impl Event {
-    /// The revision of the document that it is about.
+    /// The revision of the document that the event belongs to.
     pub fn revision(&self) -> Option<Revision> {
         match self {
             Self::Checked { revision, .. } | Self::Failed { revision, .. } | Self::Panicked { revision, .. } => {
@@ -134,30 +134,30 @@ impl Event {
 }
 
 /// The message of a panic.
-fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no reason given".into())
 }
 
 /// Serves frame requests.
 pub trait Player {
-    /// Requests a frame, in place of any request before.
+    /// Requests a frame, which replaces any earlier request.
     fn request(&mut self, request: FrameRequest);
 
-    /// What happened since the last time. A player without threads works here: it cuts simulations short, but neither a check nor a
-    /// drawing, which take as long as the scene makes them.
+    /// The events since the last call. A player without threads works in this call: it limits the time of simulations, but neither of checks
+    /// nor of drawing.
     fn poll(&mut self) -> Vec<Event>;
 
-    /// Waits until there is something to [`poll`](Self::poll), for `at_most` so long. Players of pages never wait.
-    fn wait(&mut self, _at_most: Duration) {}
+    /// Waits until there are events to [`poll`](Self::poll), up to `timeout`. Players in web pages do not wait.
+    fn wait(&mut self, _timeout: Duration) {}
 
     /// Whether a request is not finished yet.
     fn is_busy(&self) -> bool;
 
-    /// Takes the bytes of a file that no folder holds. Only players that work elsewhere need them: others find the file in
-    /// the assets of a request.
+    /// Adds the content of a file that is in no folder. Only players in another process need it: others find the file in the assets of a
+    /// request.
     fn add_file(&mut self, _name: &str, _bytes: &[u8]) {}
 
-    /// Whether nothing more happens unless it is polled.
+    /// Whether it only works while it is polled.
     fn needs_polling(&self) -> bool;
 }

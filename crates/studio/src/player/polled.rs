@@ -1,4 +1,4 @@
-//! A player without threads: it works in time slices whenever it is polled.
+//! A player without threads, which works in time slices whenever it is polled.
 
 use std::time::Duration;
 
@@ -6,11 +6,10 @@ use web_time::Instant;
 
 use super::{Event, FrameRequest, Player, engine::Engine, interruption::Interruption};
 
-/// Longest simulation time between two polls; drawing comes on top, and
-/// [`PreviewScale`](super::PreviewScale) keeps that as short.
+/// Longest simulation time per poll. Drawing is added to it; [`PreviewScale`](super::PreviewScale) keeps that about as short.
 const TIME_SLICE: Duration = Duration::from_millis(40);
 
-/// Works while it is polled.
+/// A player that works while it is polled.
 #[derive(Default)]
 pub struct PolledPlayer {
     engine: Engine,

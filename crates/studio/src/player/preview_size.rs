@@ -1,9 +1,9 @@
-//! Adaptive preview resolution: full size where the machine is fast enough, smaller where it is not and a smaller size helps.
+//! Adaptive preview resolution: full size if the machine is fast enough, else smaller if a smaller size is faster.
 
-/// Scales of the window's sides that a preview may have, the largest first.
+/// Scales of a preview relative to the viewport, the largest first.
 const SCALES: [f64; 7] = [1.0, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
 
-/// Where no size meets the target, a larger picture may take this many times the time of the smallest.
+/// If no size meets the target, a larger picture may take this many times the time of the smallest.
 const WORTHWHILE_FACTOR: f64 = 1.5;
 
 /// A larger scale is chosen only if it takes at most this fraction of the target, so that sizes do not oscillate (hysteresis).
@@ -11,24 +11,26 @@ const HEADROOM: f64 = 0.7;
 
 /// Chooses the scale of previews by a cost model.
 ///
-/// Drawing n pixels takes `fixed + each n` seconds: preparing streaks and particles does not depend on the size. Pictures of two sizes
-/// determine both terms; at one size only their sum is known, and both are scaled by it.
+/// Drawing n pixels takes `fixed_s + per_pixel_s n`: preparing streaks and particles does not depend on the size. Pictures of two sizes
+/// determine both terms. Further pictures of the same size only determine the sum, so both terms are scaled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PreviewScale {
     step: usize,
     /// The fitted cost model, once a picture was timed.
-    known: Option<CostModel>,
+    model: Option<CostModel>,
 }
 
 /// Cost of drawing a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CostModel {
-    /// s.
-    fixed: f64,
-    /// s a pixel.
-    each: f64,
-    /// The last picture: pixels, and time to draw, s.
-    last: [f64; 2],
+    /// Time that does not depend on the size, s.
+    fixed_s: f64,
+    /// Time per pixel, s.
+    per_pixel_s: f64,
+    /// Pixels of the last picture.
+    last_pixels: f64,
+    /// Time to draw the last picture, s.
+    last_s: f64,
 }
 
 /// Timing of a frame.
@@ -44,22 +46,23 @@ pub struct FrameTiming {
 
 impl CostModel {
     /// The model updated by a picture of `pixels` that took `draw_s`.
-    fn after(known: Option<Self>, pixels: f64, draw_s: f64) -> Self {
-        let last = [pixels, draw_s];
-        let Some(Self { fixed, each, last: [before, before_s] }) = known else {
-            return Self { fixed: 0.0, each: draw_s / pixels, last };
+    fn updated(previous: Option<Self>, pixels: f64, draw_s: f64) -> Self {
+        let with = |fixed_s: f64, per_pixel_s: f64| Self { fixed_s, per_pixel_s, last_pixels: pixels, last_s: draw_s };
+        let Some(Self { fixed_s, per_pixel_s, last_pixels, last_s }) = previous else {
+            return with(0.0, draw_s / pixels);
         };
-        if before == pixels {
-            // The machine is busier, or there is more to draw.
-            let grown = draw_s / (fixed + each * pixels).max(f64::MIN_POSITIVE);
-            return Self { fixed: fixed * grown, each: each * grown, last };
+        if last_pixels == pixels {
+            // The load of the machine or the content of the scene changed.
+            let factor = draw_s / (fixed_s + per_pixel_s * pixels).max(f64::MIN_POSITIVE);
+            return with(fixed_s * factor, per_pixel_s * factor);
         }
-        let each = ((before_s - draw_s) / (before - pixels)).clamp(0.0, draw_s / pixels);
-        Self { fixed: draw_s - each * pixels, each, last }
+        let per_pixel_s = ((last_s - draw_s) / (last_pixels - pixels)).clamp(0.0, draw_s / pixels);
+        with(draw_s - per_pixel_s * pixels, per_pixel_s)
     }
 
+    /// The predicted time to draw `pixels`, s.
     fn seconds(&self, pixels: f64) -> f64 {
-        self.fixed + self.each * pixels
+        self.fixed_s + self.per_pixel_s * pixels
     }
 }
 
@@ -72,11 +75,11 @@ impl PreviewScale {
     /// Records the timing of a preview at the current scale; `target_s` is the wanted time, s.
     pub fn record(&mut self, timing: FrameTiming, target_s: f64) {
         let pixels = timing.pixels.max(1) as f64;
-        let cost = CostModel::after(self.known, pixels, timing.draw_s);
-        self.known = Some(cost);
-        let present = self.scale();
+        let cost = CostModel::updated(self.model, pixels, timing.draw_s);
+        self.model = Some(cost);
+        let current = self.scale();
         let seconds = |step: usize| {
-            let ratio = SCALES[step] / present;
+            let ratio = SCALES[step] / current;
             timing.advance_s + cost.seconds(pixels * ratio * ratio)
         };
         let worthwhile = |step: usize, headroom: f64| {
@@ -96,7 +99,7 @@ impl PreviewScale {
 mod tests {
     use super::*;
 
-    /// The shares that a pace comes to where drawing 1e6 pixels takes `fixed` and `whole` more, s.
+    /// The chosen scales where drawing 1e6 pixels takes `fixed` + `whole`, s.
     fn scales(advance_s: f64, fixed: f64, whole: f64, pictures: usize) -> Vec<f64> {
         let mut preview_scale = PreviewScale::default();
         let mut scales = Vec::new();

@@ -61,7 +61,7 @@ impl Progress {
     }
 }
 
-/// The job that renders `text` as if it lay in `path`, into `out/` beside that: all frames that are not there already, or only `number`.
+/// The job that renders `text` as if it were the file `path`, into `out/` beside it: all frames that do not exist yet, or only `number`.
 pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
     let scene = SceneFile {
         name: path.display().to_string(),
@@ -76,10 +76,10 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
 }
 
 impl RenderJob {
-    /// Starts `job`; `wake` is called whenever something changed.
+    /// Starts `job`; `wake` is called after every frame and at the end.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     pub fn start(job: Job, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let progress = Arc::new(Progress {
             total: AtomicUsize::new(0),
@@ -105,17 +105,17 @@ impl RenderJob {
         [&self.progress.done, &self.progress.total].map(|count| count.load(Ordering::Relaxed))
     }
 
-    /// Asks it to stop; whole frames stay.
+    /// Requests it to stop; finished frames stay.
     pub fn stop(&self) {
         self.progress.stop.store(true, Ordering::Relaxed);
     }
 
-    /// The first file, or why there is none, once it has ended.
+    /// The first written file, or the error, once the job has ended.
     pub fn finished(&mut self) -> Option<Result<PathBuf, JobFailure>> {
         let worker = self.worker.take_if(|worker| worker.is_finished())?;
         Some(match worker.join() {
             Ok(result) => result.map_err(JobFailure::Failed),
-            Err(panic) => Err(JobFailure::Panicked(super::panic_text(panic.as_ref()))),
+            Err(panic) => Err(JobFailure::Panicked(super::panic_message(panic.as_ref()))),
         })
     }
 }

@@ -4,15 +4,16 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use bansho::{CompiledScene, Shot};
 
-/// Most bytes of snapshots.
+/// Maximum size of all snapshots, bytes.
 const MAX_BYTES: usize = 256 << 20;
-/// Frames between two snapshots.
-const FRAMES_APART: i64 = 10;
+/// Smallest number of frames between two snapshots.
+const MIN_FRAME_DISTANCE: i64 = 10;
 
 /// Snapshots of one scene, by frame.
 #[derive(Default)]
 pub(super) struct SnapshotCache {
-    of: Option<(Arc<CompiledScene>, [u8; 32])>,
+    /// The scene, and its state fingerprint.
+    scene: Option<(Arc<CompiledScene>, [u8; 32])>,
     by_frame: BTreeMap<i64, Vec<u8>>,
     bytes: usize,
     /// The current frame of the shot.
@@ -20,14 +21,14 @@ pub(super) struct SnapshotCache {
 }
 
 impl SnapshotCache {
-    /// Restores the last snapshot up to frame `number` where the shot is beyond that frame.
+    /// Restores the last snapshot up to frame `number` if the shot is beyond that frame.
     pub(super) fn seek(&mut self, compiled: &Arc<CompiledScene>, shot: &mut Shot, number: i64) {
         self.set_scene(compiled);
         if self.last.is_none_or(|last| last <= number) {
             return;
         }
         if let Some((_, state)) = self.by_frame.range(..=number).next_back() {
-            // Where restoring fails, the shot is unchanged and restarts.
+            // If restoring fails, the shot is unchanged and restarts.
             let _ = shot.restore(state);
         }
     }
@@ -36,7 +37,7 @@ impl SnapshotCache {
     pub(super) fn store(&mut self, compiled: &Arc<CompiledScene>, shot: &Shot, number: i64) {
         self.set_scene(compiled);
         self.last = Some(number);
-        let near = self.by_frame.range(number - FRAMES_APART + 1..=number).next().is_some();
+        let near = self.by_frame.range(number - MIN_FRAME_DISTANCE + 1..=number).next().is_some();
         if near || !shot.is_exact() || self.bytes >= MAX_BYTES {
             return;
         }
@@ -45,16 +46,16 @@ impl SnapshotCache {
         self.by_frame.insert(number, state);
     }
 
-    /// Drops the snapshots where the scene has another state fingerprint.
+    /// Drops the snapshots if the scene has another state fingerprint.
     fn set_scene(&mut self, compiled: &Arc<CompiledScene>) {
-        if self.of.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, compiled)) {
+        if self.scene.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, compiled)) {
             return;
         }
-        let of = compiled.state_fingerprint();
-        if self.of.as_ref().is_none_or(|(_, own)| *own != of) {
+        let fingerprint = compiled.state_fingerprint();
+        if self.scene.as_ref().is_none_or(|(_, own)| *own != fingerprint) {
             self.bytes = 0;
             self.by_frame.clear();
         }
-        self.of = Some((compiled.clone(), of));
+        self.scene = Some((compiled.clone(), fingerprint));
     }
 }

@@ -50,7 +50,7 @@ fn picture(events: Vec<Event>) -> Picture {
     drawn.expect("a picture")
 }
 
-/// What `bansho render` would show of the frame, over black.
+/// The frame of `bansho render`, over black.
 fn rendered(text: &str, number: i64) -> Vec<[u8; 4]> {
     rendered_with_alpha(text, number, true)
 }
@@ -70,10 +70,10 @@ fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
 }
 
 #[test]
-fn a_picture_of_the_scenes_size_is_the_one_that_is_rendered() {
+fn a_preview_at_full_size_equals_the_rendered_frame() {
     let mut engine = engine::Engine::default();
     for (text, number) in [(SCENE, 7), (STEPPED, 9), (STEPPED, 3)] {
-        let request = FrameRequest { revision: bumped(text), ..request(text, number) };
+        let request = FrameRequest { revision: new_revision(text), ..request(text, number) };
         let drawn = picture(process(&mut engine, &request));
         assert!(drawn.exact || text == STEPPED);
         let exact = picture(process(&mut engine, &FrameRequest { exact: true, ..request }));
@@ -83,13 +83,13 @@ fn a_picture_of_the_scenes_size_is_the_one_that_is_rendered() {
     }
 }
 
-/// A revision of its own for each text.
-fn bumped(text: &str) -> crate::document::Revision {
+/// A new revision.
+fn new_revision(text: &str) -> crate::document::Revision {
     Document::new("", text).revision()
 }
 
 #[test]
-fn another_document_is_judged_and_the_same_one_only_once() {
+fn each_revision_is_checked_once() {
     let mut engine = engine::Engine::default();
     let checked = |events: Vec<Event>| events.iter().filter(|event| matches!(event, Event::Checked { .. })).count();
     let first = request(SCENE, 0);
@@ -99,14 +99,14 @@ fn another_document_is_judged_and_the_same_one_only_once() {
 }
 
 #[test]
-fn small_windows_get_small_pictures_of_the_same_proportions() {
+fn small_windows_get_small_pictures_with_the_same_aspect_ratio() {
     let drawn =
         picture(process(&mut engine::Engine::default(), &FrameRequest { within: [32, 400], ..request(SCENE, 0) }));
     assert_eq!((drawn.size, drawn.scene_size, drawn.pixels.len()), ([32, 18], [64, 36], 32 * 18));
 }
 
 #[test]
-fn going_back_in_time_comes_to_the_same_picture() {
+fn seeking_back_draws_the_same_picture() {
     let mut engine = engine::Engine::default();
     let first = picture(process(&mut engine, &request(STEPPED, 11)));
     process(&mut engine, &request(STEPPED, 19));
@@ -115,28 +115,28 @@ fn going_back_in_time_comes_to_the_same_picture() {
 }
 
 #[test]
-fn a_changed_wind_goes_on_from_where_the_flame_is_and_says_so() {
+fn a_changed_wind_continues_from_the_current_state() {
     let mut engine = engine::Engine::default();
     process(&mut engine, &request(STEPPED, 10));
     let text = format!("{STEPPED}[wind]\nvelocity = [2.0, 0, 0]\n");
-    let blown = FrameRequest { revision: bumped(&text), ..request(&text, 11) };
+    let blown = FrameRequest { revision: new_revision(&text), ..request(&text, 11) };
     assert!(!picture(process(&mut engine, &blown)).exact);
     let exact = picture(process(&mut engine, &FrameRequest { exact: true, ..blown }));
     assert!(exact.exact && exact.pixels == rendered(&text, 11));
 }
 
 #[test]
-fn faults_are_judged_and_the_last_good_scene_is_drawn() {
+fn with_problems_the_last_valid_scene_is_drawn() {
     let mut engine = engine::Engine::default();
     let good = picture(process(&mut engine, &request(SCENE, 4)));
-    let faulty = FrameRequest { revision: bumped(SCENE), ..request("bansho = 2\n[[flame_shet]]\n", 4) };
+    let faulty = FrameRequest { revision: new_revision(SCENE), ..request("bansho = 2\n[[flame_shet]]\n", 4) };
     let events = process(&mut engine, &faulty);
     assert!(matches!(&events[0], Event::Checked { outcome: Err(error), .. } if error.problems.len() == 1));
     assert!(picture(events).pixels == good.pixels);
 }
 
 #[test]
-fn slices_come_to_the_same_picture() {
+fn time_slices_draw_the_same_picture() {
     let mut player = PolledPlayer::default();
     player.request(request(STEPPED, 9));
     let mut events = Vec::new();
@@ -153,7 +153,7 @@ fn wait(player: &mut ThreadPlayer, woken: &mpsc::Receiver<()>) -> Vec<Event> {
 }
 
 #[test]
-fn the_newest_wish_wins() {
+fn only_the_newest_request_is_served() {
     let (sender, woken) = mpsc::channel();
     let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
     for number in 0..20 {
@@ -167,14 +167,14 @@ fn the_newest_wish_wins() {
         });
         drawn.extend(numbers);
     }
-    assert!(drawn.len() < 20, "wishes in between are left out: {drawn:?}");
+    assert!(drawn.len() < 20, "older requests are skipped: {drawn:?}");
     assert!(drawn.is_sorted());
 }
 
-/// Assets whose maker made a mistake.
-pub(crate) struct PanickedFrames;
+/// Assets that panic.
+pub(crate) struct PanickingAssets;
 
-impl Assets for PanickedFrames {
+impl Assets for PanickingAssets {
     fn picture(&self, _: &str, _: i64) -> Result<Arc<Plate>, AssetError> {
         panic!("broken on purpose")
     }
@@ -193,14 +193,14 @@ impl Assets for PanickedFrames {
 }
 
 #[test]
-fn a_panic_is_told_and_the_player_lives_on() {
+fn a_panic_is_reported_and_the_player_continues() {
     let (sender, woken) = mpsc::channel();
     let mut player = ThreadPlayer::start(move || sender.send(()).unwrap_or_default()).unwrap();
     let text = format!("{SCENE}[plate]\nimage = \"plate.png\"\n");
-    player.request(FrameRequest { assets: Arc::new(PanickedFrames), ..request(&text, 0) });
+    player.request(FrameRequest { assets: Arc::new(PanickingAssets), ..request(&text, 0) });
     let events = wait(&mut player, &woken);
     assert!(matches!(&events[..], [Event::Panicked { message, .. }] if message == "broken on purpose"));
-    player.request(FrameRequest { revision: bumped(&text), ..request(SCENE, 0) });
+    player.request(FrameRequest { revision: new_revision(&text), ..request(SCENE, 0) });
     while !wait(&mut player, &woken).iter().any(|event| matches!(event, Event::Drawn(_))) {}
 }
 
@@ -212,7 +212,7 @@ fn playing() -> Transport {
 }
 
 #[test]
-fn frames_come_when_they_are_due_and_the_one_before_was_shown() {
+fn frames_follow_when_they_are_due_and_the_previous_was_shown() {
     let mut transport = playing();
     assert_eq!(transport.number(), 10);
     assert!(!transport.tick(5.0, true) && !transport.tick(5.09, true));
@@ -285,7 +285,7 @@ fn a_still_is_the_file_that_render_writes() {
     for (text, number, name) in [(SCENE, 5, "scene.0005.png"), (&before, -5, "scene.-0005.png")] {
         let file = file_of(text, folder.path(), number);
         assert_eq!(file, folder.path().join("out/scene").join(name));
-        let full_quality = FrameRequest { full_quality: true, revision: bumped(text), ..request(text, number) };
+        let full_quality = FrameRequest { full_quality: true, revision: new_revision(text), ..request(text, number) };
         let events = process(&mut engine::Engine::default(), &full_quality);
         let written = std::fs::read(&file).unwrap();
         let same = |event: &Event| matches!(event, Event::FullQualityFrame { number: own, png } if *own == number && *png == written);
@@ -298,7 +298,7 @@ fn a_still_is_the_file_that_render_writes() {
 }
 
 #[test]
-fn a_panic_while_rendering_is_told_in_its_own_words() {
+fn a_panic_while_rendering_keeps_its_message() {
     let folder = tempfile::tempdir().unwrap();
     let job = render_job::job(SCENE, &folder.path().join("scene.toml"), Some(5));
     let mut render_job = render_job::RenderJob::start(job, || panic!("broken on purpose")).unwrap();
@@ -312,7 +312,7 @@ fn a_panic_while_rendering_is_told_in_its_own_words() {
 }
 
 #[test]
-fn finished_pictures_that_go_on_from_one_another_are_those_that_are_rendered() {
+fn successive_full_quality_frames_equal_single_ones() {
     let finished = |engine: &mut engine::Engine, number: i64| {
         let events = process(engine, &FrameRequest { full_quality: true, ..request(STEPPED, number) });
         events.into_iter().find_map(|event| match event {
@@ -335,12 +335,12 @@ fn difference(a: &Picture, b: &Picture) -> f64 {
 }
 
 #[test]
-fn rain_that_a_slider_changes_keeps_its_drops() {
+fn rain_keeps_its_drops_while_its_rate_changes() {
     let text =
         |rain: &str| format!("bansho = 2\n[picture]\nsize = [160, 90]\n[sky]\nkind = \"overcast\"\n[[rain]]\n{rain}\n");
     let mut engine = engine::Engine::default();
     let mut drawn =
-        |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 7) }));
+        |text: &str| picture(process(&mut engine, &FrameRequest { revision: new_revision(text), ..request(text, 7) }));
     let steady = drawn(&text("rate_mm_per_h = 20.0"));
     let other_drops = difference(&steady, &drawn(&text("rate_mm_per_h = 20.0").replace("size", "seed = 9\nsize")));
     assert!(other_drops > 0.1, "{other_drops}");
@@ -349,7 +349,7 @@ fn rain_that_a_slider_changes_keeps_its_drops() {
 }
 
 #[test]
-fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
+fn rain_does_not_pop_while_diameters_or_shutter_change() {
     let text = |shutter: &str, first: &str| {
         format!(
             "bansho = 2\n[picture]\nsize = [160, 90]\n[camera]\nposition = [0.0, 1.2, 4.0]\n\
@@ -359,7 +359,7 @@ fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
     };
     let mut engine = engine::Engine::default();
     let mut drawn =
-        |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 7) }));
+        |text: &str| picture(process(&mut engine, &FrameRequest { revision: new_revision(text), ..request(text, 7) }));
     let steady = drawn(&text("0.02", "1.0"));
     let other_drops = difference(&steady, &drawn(&text("0.02", "1.0").replace("size = [160", "seed = 9\nsize = [160")));
     assert!(other_drops > 0.1, "{other_drops}");
@@ -370,14 +370,15 @@ fn rain_whose_drops_or_shutter_a_slider_changes_does_not_pop() {
 }
 
 #[test]
-fn rain_that_is_blown_late_keeps_its_drops_too() {
+fn rain_keeps_its_drops_while_the_wind_changes() {
     let text = |wind: &str| {
         let sky = "[sky]\nkind = \"overcast\"\n[wind]\ngust = 0.0\nvelocity = ";
         format!("bansho = 2\n[picture]\nsize = [160, 90]\nframes = 900\n{sky}[{wind}, 0.0, 0.0]\n[[rain]]\n")
     };
     let mut engine = engine::Engine::default();
-    let mut drawn =
-        |text: &str| picture(process(&mut engine, &FrameRequest { revision: bumped(text), ..request(text, 899) }));
+    let mut drawn = |text: &str| {
+        picture(process(&mut engine, &FrameRequest { revision: new_revision(text), ..request(text, 899) }))
+    };
     let steady = drawn(&text("2.0"));
     let other_drops = difference(&steady, &drawn(&text("2.0").replace("size", "seed = 9\nsize")));
     // After 30 s, drops that were carried from time 0 would stand 15 cm elsewhere.
@@ -386,14 +387,14 @@ fn rain_that_is_blown_late_keeps_its_drops_too() {
 }
 
 #[test]
-fn waiting_ends_with_what_is_waited_for() {
+fn a_wait_ends_with_the_picture() {
     let mut player = ThreadPlayer::start(|| {}).unwrap();
     for number in 0..20 {
         let began = std::time::Instant::now();
         player.request(request(SCENE, number));
         let mut pictures = 0;
         while player.is_busy() {
-            // The picture comes a moment before the player rests, which no wait must miss.
+            // The picture is reported shortly before the player is idle; no wait must miss either.
             player.wait(Duration::from_secs(20));
             pictures += player.poll().iter().filter(|event| matches!(event, Event::Drawn(_))).count();
         }

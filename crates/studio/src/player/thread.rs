@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use super::{Event, FrameRequest, Player, engine::Engine, interruption::Interruption, panic_text};
+use super::{Event, FrameRequest, Player, engine::Engine, interruption::Interruption, panic_message};
 
 /// Renders on a thread of its own, in a rayon pool with one thread per core.
 pub struct ThreadPlayer {
@@ -62,10 +62,10 @@ impl RequestSlot {
 }
 
 impl ThreadPlayer {
-    /// Starts the thread; `wake` is called from it whenever there is something to [`poll`](Player::poll).
+    /// Starts the thread; `wake` is called from it whenever there are events to [`poll`](Player::poll).
     ///
     /// # Errors
-    /// The system gives no threads.
+    /// The system cannot start threads.
     pub fn start(wake: impl Fn() + Send + 'static) -> Result<Self, StartError> {
         let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("draw {index}")).build()?;
         let slot = Arc::new(RequestSlot::default());
@@ -76,7 +76,7 @@ impl ThreadPlayer {
                 pool.install(move || {
                     work(&slot, &mut |event| {
                         let wakes = event.is_some();
-                        // Nobody listens any more when the window is closing.
+                        // The receiver is dropped when the window closes.
                         let _ = sender.send(event);
                         if wakes {
                             wake();
@@ -92,37 +92,37 @@ impl ThreadPlayer {
 
 /// Why a player cannot start.
 #[derive(Debug, thiserror::Error)]
-#[error("the system gives no threads to draw on: {0}")]
+#[error("the system cannot start threads for drawing: {0}")]
 pub enum StartError {
-    /// For the pool.
+    /// Of the rayon pool.
     Pool(#[from] rayon::ThreadPoolBuildError),
-    /// For the player itself.
+    /// Of the player.
     Thread(#[from] std::io::Error),
 }
 
 /// Serves requests until the player closes. Obsolete work is cancelled: a simulation at once, since it resumes where it stopped;
 /// a drawing only if the drawing before it was not cancelled too, so that continuous dragging still shows pictures.
-fn work(slot: &RequestSlot, tell: &mut dyn FnMut(Option<Event>)) {
+fn work(slot: &RequestSlot, send: &mut dyn FnMut(Option<Event>)) {
     let mut engine = Engine::default();
     let mut must_draw = false;
     while let Some((request, number)) = slot.take() {
-        let watch = Interruption::new(|advancing| slot.is_obsolete(number, advancing || !must_draw));
+        let interruption = Interruption::new(|advancing| slot.is_obsolete(number, advancing || !must_draw));
         let outcome =
-            catch_unwind(AssertUnwindSafe(|| engine.process(&request, &watch, &mut |event| tell(Some(event)))));
+            catch_unwind(AssertUnwindSafe(|| engine.process(&request, &interruption, &mut |event| send(Some(event)))));
         slot.done.store(number, Ordering::Relaxed);
         must_draw = matches!(&outcome, Ok(Err(error)) if error.is_stop());
         match outcome {
             Ok(Ok(())) => {}
             Ok(Err(error)) if error.is_stop() => {}
-            Ok(Err(error)) => tell(Some(Event::Failed { revision: request.revision, reason: error.to_string() })),
+            Ok(Err(error)) => send(Some(Event::Failed { revision: request.revision, reason: error.to_string() })),
             Err(panic) => {
                 engine.reset_after_panic();
-                let message = panic_text(panic.as_ref());
-                tell(Some(Event::Panicked { revision: request.revision, number: request.number, message }));
+                let message = panic_message(panic.as_ref());
+                send(Some(Event::Panicked { revision: request.revision, number: request.number, message }));
             }
         }
-        // Wakes those who wait: no more events come of this request.
-        tell(None);
+        // Ends a wait: this request has no more events.
+        send(None);
     }
 }
 
@@ -140,9 +140,9 @@ impl Player for ThreadPlayer {
         std::mem::take(&mut self.waited).into_iter().chain(self.events.try_iter().flatten()).collect()
     }
 
-    fn wait(&mut self, at_most: Duration) {
+    fn wait(&mut self, timeout: Duration) {
         if self.waited.is_empty() {
-            self.waited.extend(self.events.recv_timeout(at_most).ok().flatten());
+            self.waited.extend(self.events.recv_timeout(timeout).ok().flatten());
         }
     }
 
@@ -161,7 +161,7 @@ impl Drop for ThreadPlayer {
         drop(self.slot.request());
         self.slot.request_added.notify_one();
         if let Some(worker) = self.worker.take() {
-            // Panics of phenomena are caught; nothing is left to tell.
+            // Panics of phenomena were caught and reported.
             let _ = worker.join();
         }
     }

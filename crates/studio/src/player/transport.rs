@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-/// Where in the shot the window is.
+/// The playback state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transport {
     frames: RangeInclusive<i64>,
@@ -10,20 +10,20 @@ pub struct Transport {
     fps: f64,
     number: i64,
     playing: bool,
-    /// Whether it stops at the end of the range rather than begins it again.
+    /// Whether playback stops at the end of the range instead of looping.
     once: bool,
-    /// When the present frame was due, s.
-    due: Option<f64>,
+    /// The time at which the current frame was due, s.
+    due_s: Option<f64>,
 }
 
 impl Default for Transport {
     fn default() -> Self {
-        Self { frames: 0..=0, range: None, fps: 30.0, number: 0, playing: false, once: false, due: None }
+        Self { frames: 0..=0, range: None, fps: 30.0, number: 0, playing: false, once: false, due_s: None }
     }
 }
 
 impl Transport {
-    /// Takes the frames and the rate of a shot; stays where it is if that is still a frame of it.
+    /// Sets the frames and the frame rate of the shot. The current frame stays if the shot still has it.
     pub fn set_shot(&mut self, frames: RangeInclusive<i64>, fps: f64) {
         self.fps = fps;
         if self.frames != frames {
@@ -38,12 +38,12 @@ impl Transport {
         self.frames.clone()
     }
 
-    /// The frame that is shown.
+    /// The current frame.
     pub fn number(&self) -> i64 {
         self.number
     }
 
-    /// When the frame that is shown begins, s from the shot's beginning.
+    /// The time at which the current frame begins, s from the start of the shot.
     pub fn time_s(&self) -> f64 {
         (self.number - self.frames.start()) as f64 / self.fps
     }
@@ -53,22 +53,22 @@ impl Transport {
         1.0 / self.fps
     }
 
-    /// Whether time passes.
+    /// Whether it plays.
     pub fn is_playing(&self) -> bool {
         self.playing
     }
 
-    /// Lets time pass, or stops it.
+    /// Plays or pauses.
     pub fn set_playing(&mut self, playing: bool) {
-        (self.playing, self.once, self.due) = (playing, false, None);
+        (self.playing, self.once, self.due_s) = (playing, false, None);
     }
 
-    /// Lets time pass up to the end of the range and no further, as for a recording.
+    /// Plays up to the end of the range and stops there, as for a recording.
     pub fn play_to_the_end(&mut self) {
-        (self.playing, self.once, self.due) = (true, true, None);
+        (self.playing, self.once, self.due_s) = (true, true, None);
     }
 
-    /// The range that is played; the whole shot unless one was set.
+    /// The range that is played: the whole shot unless one was set.
     pub fn range(&self) -> RangeInclusive<i64> {
         self.range.clone().unwrap_or_else(|| self.frames.clone())
     }
@@ -78,44 +78,44 @@ impl Transport {
         self.range = range.and_then(|range| self.within_shot(&range));
     }
 
-    /// The part of `range` that the shot has; `None` where that is nothing, or all of it.
+    /// The intersection of `range` and the shot; `None` if it is empty or the whole shot.
     fn within_shot(&self, range: &RangeInclusive<i64>) -> Option<RangeInclusive<i64>> {
-        let part = *range.start().max(self.frames.start())..=*range.end().min(self.frames.end());
-        (!part.is_empty() && part != self.frames).then_some(part)
+        let common = *range.start().max(self.frames.start())..=*range.end().min(self.frames.end());
+        (!common.is_empty() && common != self.frames).then_some(common)
     }
 
-    /// Goes to frame `number`, or to the nearest of the shot.
+    /// Seeks to frame `number`, clamped to the shot.
     pub fn go_to(&mut self, number: i64) {
         self.number = number.clamp(*self.frames.start(), *self.frames.end());
-        self.due = None;
+        self.due_s = None;
     }
 
-    /// Goes so many frames on or back and stops there.
+    /// Pauses and moves by a number of frames.
     pub fn step(&mut self, by: i64) {
         self.playing = false;
         self.go_to(self.number.saturating_add(by));
     }
 
-    /// Lets time pass up to `now`, s. Only where the present frame was `shown` does the next come; frames that are late by
-    /// then are left out, up to `MOST_LEFT_OUT`, beyond which playing is slower than life. Whether another frame is due.
+    /// Advances playback to `now`, s. The next frame follows only once the current frame was `shown`. Frames that are late then are skipped,
+    /// up to `MAX_SKIPPED_FRAMES`; beyond that, playback is slower than real time. Returns whether the frame changed.
     pub fn tick(&mut self, now: f64, shown: bool) -> bool {
-        const MOST_LEFT_OUT: i64 = 3;
+        const MAX_SKIPPED_FRAMES: i64 = 3;
         if !self.playing {
             return false;
         }
-        let due = *self.due.get_or_insert(now);
+        let due = *self.due_s.get_or_insert(now);
         let late = ((now - due) * self.fps).floor() as i64;
         if !shown || late < 1 {
             return false;
         }
-        let on = late.min(1 + MOST_LEFT_OUT);
-        self.due = Some(if late > on { now } else { due + on as f64 / self.fps });
-        if self.once && self.number + on >= *self.range().end() {
+        let advance = late.min(1 + MAX_SKIPPED_FRAMES);
+        self.due_s = Some(if late > advance { now } else { due + advance as f64 / self.fps });
+        if self.once && self.number + advance >= *self.range().end() {
             self.go_to(*self.range().end());
             self.set_playing(false);
             return true;
         }
-        self.number = self.wrapped(self.number + on);
+        self.number = self.wrapped(self.number + advance);
         true
     }
 
@@ -130,7 +130,7 @@ impl Transport {
 
     /// How long the window may sleep before the next frame is due, s.
     pub fn sleep_s(&self, now: f64) -> Option<f64> {
-        let due = self.due.filter(|_| self.playing)?;
+        let due = self.due_s.filter(|_| self.playing)?;
         Some((due + 1.0 / self.fps - now).max(0.0))
     }
 }

@@ -1,4 +1,4 @@
-//! The files that scenes of the page name: those of the examples, embedded in the program, and those that were added.
+//! Assets in memory: the files of the example scenes, embedded in the program, and files that the user added.
 
 use std::{path::Path, sync::Arc};
 
@@ -13,70 +13,70 @@ use bansho::{
 
 /// The embedded files, and files added by the user.
 #[derive(Clone, Debug, Default)]
-pub struct Bundle {
+pub struct BundledAssets {
     added_files: Vec<(String, Arc<[u8]>)>,
 }
 
-impl Bundle {
-    /// Adds the file `name`, in place of any of that name.
+impl BundledAssets {
+    /// Adds the file `name`, which replaces an added file of that name.
     pub fn add_file(&mut self, name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) {
         let name = name.into();
         self.added_files.retain(|(other, _)| *other != name);
         self.added_files.push((name, bytes.into()));
     }
 
-    /// The files that were given, by name.
+    /// The added files, with their names.
     pub fn added_files(&self) -> &[(String, Arc<[u8]>)] {
         &self.added_files
     }
 
-    /// The bytes of the file `name`, if it is one of these.
+    /// The bytes of the file `name`, if it is embedded or was added.
     pub fn bytes(&self, name: &str) -> Option<&[u8]> {
-        let added_files = self.added_files.iter().find(|(own, _)| own == name).map(|(_, bytes)| bytes.as_ref());
-        added_files.or_else(|| bansho_example_scenes::asset(name))
+        let added = self.added_files.iter().find(|(added, _)| added == name).map(|(_, bytes)| bytes.as_ref());
+        added.or_else(|| bansho_example_scenes::asset(name))
     }
 
-    fn found(&self, name: &str) -> Result<&[u8], AssetError> {
+    fn require(&self, name: &str) -> Result<&[u8], AssetError> {
         self.bytes(name).ok_or_else(|| error(name, AssetProblem::Missing))
     }
 
-    /// These files, with `files` for all that they lack.
+    /// These files, and `files` for all other names.
     pub fn overlay_on(self, files: Arc<dyn Assets>) -> OverlayAssets {
         OverlayAssets { bundle: self, files }
     }
 }
 
-/// A [`Bundle`] layered over other assets.
+/// A [`BundledAssets`] layered over other assets.
 pub struct OverlayAssets {
-    bundle: Bundle,
+    bundle: BundledAssets,
     files: Arc<dyn Assets>,
 }
 
 impl OverlayAssets {
-    fn of(&self, name: &str) -> &dyn Assets {
+    fn source(&self, name: &str) -> &dyn Assets {
         if self.bundle.bytes(name).is_some() { &self.bundle } else { self.files.as_ref() }
     }
 }
 
 impl Assets for OverlayAssets {
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
-        self.of(path).picture(path, frame)
+        self.source(path).picture(path, frame)
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
-        self.of(path).mesh(path)
+        self.source(path).mesh(path)
     }
 
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
-        self.of(path).drawing(path)
+        self.source(path).drawing(path)
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
-        self.of(path).text(path)
+        self.source(path).text(path)
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
-        self.of(path).digest(path, frame)
+        self.source(path).digest(path, frame)
     }
 }
 
@@ -88,15 +88,15 @@ fn extension(name: &str) -> &str {
     Path::new(name).extension().and_then(|extension| extension.to_str()).unwrap_or_default()
 }
 
-impl Assets for Bundle {
+impl Assets for BundledAssets {
     fn picture(&self, path: &str, _frame: i64) -> Result<Arc<Picture>, AssetError> {
-        let picture = decode_picture(self.found(path)?, extension(path), MemoryLimit::default());
+        let picture = decode_picture(self.require(path)?, extension(path), MemoryLimit::default());
         picture.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
-        let beside = |name: &str, _: u64| self.found(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
-        let mesh = decode_mesh(self.found(path)?, extension(path), &beside, MemoryLimit::default());
+        let buffer = |name: &str, _: u64| self.require(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
+        let mesh = decode_mesh(self.require(path)?, extension(path), &buffer, MemoryLimit::default());
         mesh.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
@@ -105,13 +105,13 @@ impl Assets for Bundle {
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
-        let text = std::str::from_utf8(self.found(path)?);
+        let text = std::str::from_utf8(self.require(path)?);
         text.map(Arc::from).map_err(|_| error(path, AssetProblem::Damaged("it is not UTF-8".into())))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
-        self.found(path)?;
-        // Within one run a name stands for the same bytes until another is given, which makes other assets.
+        self.require(path)?;
+        // The name suffices: within a process its content never changes, unless a file is added, which creates a new bundle.
         let mut named = MemoryAssets::default();
         named.insert_text(path, "");
         named.digest(path, frame)
@@ -126,8 +126,8 @@ mod tests {
     use crate::document::check;
 
     #[test]
-    fn all_examples_find_what_they_name() {
-        let assets: Arc<dyn Assets> = Arc::new(Bundle::default());
+    fn all_examples_find_their_files() {
+        let assets: Arc<dyn Assets> = Arc::new(BundledAssets::default());
         for ExampleScene { name, text, .. } in SCENES {
             let scene = bansho::compile_scene(name, text, assets.clone());
             assert!(scene.is_ok(), "{name}: {:?}", scene.err());
@@ -137,8 +137,8 @@ mod tests {
     }
 
     #[test]
-    fn given_files_come_first_and_others_are_missing() {
-        let mut bundle = Bundle::default();
+    fn added_files_are_found_and_others_are_missing() {
+        let mut bundle = BundledAssets::default();
         assert_eq!(bundle.text("drawing.svg").unwrap_err().problem, AssetProblem::Missing);
         bundle.add_file("drawing.svg", *b"<svg/>");
         assert_eq!(&*bundle.text("drawing.svg").unwrap(), "<svg/>");

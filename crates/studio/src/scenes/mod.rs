@@ -1,4 +1,4 @@
-//! The example scenes within the program, and what new scenes begin with.
+//! The embedded assets of the example scenes, and the templates of new scenes.
 
 pub mod examples;
 pub mod new_scene;

@@ -1,12 +1,21 @@
 //! Templates of new scenes: one phenomenon, and what it needs to be visible.
 
-/// Templates by name.
-pub const NEW_SCENES: [(&str, &str); 5] = [
-    ("Flame sheet", FLAME_SHEET),
-    ("Particle flame", PARTICLE_FLAME),
-    ("Rain", RAIN),
-    ("Aurora", AURORA),
-    ("Nothing", "bansho = 2\n"),
+/// A template of a new scene.
+#[derive(Clone, Copy, Debug)]
+pub struct NewScene {
+    /// Its name in the menu.
+    pub name: &'static str,
+    /// The text of the scene.
+    pub text: &'static str,
+}
+
+/// All templates, in the order of the menu.
+pub const NEW_SCENES: [NewScene; 5] = [
+    NewScene { name: "Flame sheet", text: FLAME_SHEET },
+    NewScene { name: "Particle flame", text: PARTICLE_FLAME },
+    NewScene { name: "Rain", text: RAIN },
+    NewScene { name: "Aurora", text: AURORA },
+    NewScene { name: "Nothing", text: "bansho = 2\n" },
 ];
 
 /// The template for a studio started without a scene.
@@ -57,7 +66,7 @@ rate_mm_per_h = 20.0
 distance = 6.0
 ";
 
-/// The view to the north, where the default shapes are.
+/// A view to the north, where the default shapes are.
 const AURORA: &str = "\
 bansho = 2
 
@@ -92,8 +101,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_beginning_but_nothing_is_a_scene_that_shows_something() {
-        for (name, text) in NEW_SCENES {
+    fn every_template_but_the_empty_one_shows_something() {
+        for NewScene { name, text } in NEW_SCENES {
             let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
             let quick = text.replace("[[aurora]]", "[[aurora]]\nparticles = { count = 2000 }");
             let scene = Arc::new(parse_scene(name, &quick).unwrap().adapted(&SceneOptions::default()).unwrap());

@@ -1,6 +1,6 @@
 //! An open document with its file, its player and the playback time. No widgets.
 //!
-//! Per frame of the window: [`Session::poll_player`] takes in the player's events, the panels edit the document, and
+//! Per frame of the window: [`Session::poll_player`] handles the player's events, the panels edit the document, and
 //! [`Session::advance_time`] advances the playback and requests the next picture.
 
 pub(crate) mod selection;
@@ -23,22 +23,21 @@ use bansho::{
 };
 
 use crate::{
-    document::{Document, Revision, keyframes},
-    editors::aurora::document::{AuroraDrawing, ShapeEditError},
+    document::{Document, PhenomenonId, Revision, keyframes},
     player::{Event, FrameRequest, FrameTiming, Picture, Player, PreviewScale, Transport},
-    scenes::examples::Bundle,
+    scenes::examples::BundledAssets,
 };
 use status::{FrameRate, PanickedFrames};
 
 use web_time::Instant;
 
-/// Makes the asset source for a scene in a folder. A scene without a file looks in the bundled and the added files first.
+/// Creates the asset source for a scene in a folder. For a scene without a file, bundled and added files take precedence over it.
 pub type AssetsForFolder = fn(&Path) -> Arc<dyn Assets>;
 
 /// Longest wait for a picture within a frame of the window; not noticed while dragging.
 const MAX_WAIT: Duration = Duration::from_millis(40);
 
-/// The table of the camera.
+/// Key of the camera's table.
 const CAMERA: &str = "camera";
 
 /// A document that is open, with its player.
@@ -55,26 +54,27 @@ pub struct Session {
     pub opened: u64,
     /// Whether pictures may be simulated with fewer particles than the scene has.
     pub draft: bool,
-    /// The flame sheet whose stages are shown.
-    pub stages: Option<usize>,
+    /// The phenomenon whose stages are shown.
+    pub stages: Option<PhenomenonId>,
     /// Whether to autosave at once.
     pub autosave_now: bool,
     player: Box<dyn Player>,
     assets_for_folder: AssetsForFolder,
-    bundle: Bundle,
+    bundle: BundledAssets,
     assets: Arc<dyn Assets>,
     preview_scale: PreviewScale,
     picture: Option<Picture>,
-    drawn: u64,
+    /// Serial number of the last picture, those of stages included.
+    serial: u64,
     /// Pictures of the stages, each with its serial number.
     stage_pictures: Vec<(Picture, u64)>,
     last_request: Option<LastRequest>,
-    /// Frames that panicked; they are not drawn again.
+    /// Frames that panicked; they are not serial again.
     panicked_frames: PanickedFrames,
     notice: Option<String>,
     frame_rate: FrameRate,
     /// A time to seek to once the scene is checked, s.
-    seek: Option<f64>,
+    seek_s: Option<f64>,
 }
 
 /// The last request.
@@ -84,7 +84,7 @@ struct LastRequest {
     number: Option<i64>,
     within: [usize; 2],
     draft: bool,
-    stages: Option<usize>,
+    stages: Option<PhenomenonId>,
 }
 
 impl Session {
@@ -95,7 +95,7 @@ impl Session {
         player: Box<dyn Player>,
         assets_for_folder: AssetsForFolder,
     ) -> Self {
-        let bundle = Bundle::default();
+        let bundle = BundledAssets::default();
         Self {
             assets: assets(&bundle, path.as_deref(), assets_for_folder),
             bundle,
@@ -112,39 +112,39 @@ impl Session {
             assets_for_folder,
             preview_scale: PreviewScale::default(),
             picture: None,
-            drawn: 0,
+            serial: 0,
             last_request: None,
             panicked_frames: PanickedFrames::default(),
             notice: None,
             frame_rate: FrameRate::default(),
-            seek: None,
+            seek_s: None,
         }
     }
 
-    /// Opens another document in place of this one.
+    /// Opens another document in path of this one.
     pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
         self.assets = assets(&self.bundle, path.as_deref(), self.assets_for_folder);
         (self.document, self.path) = (document, path);
         (self.picture, self.last_request, self.panicked_frames, self.notice) =
             (None, None, PanickedFrames::default(), None);
         (self.stages, self.stage_pictures, self.preview_scale) = (None, Vec::new(), PreviewScale::default());
-        (self.transport, self.seek, self.frame_rate) = (Transport::default(), None, FrameRate::default());
+        (self.transport, self.seek_s, self.frame_rate) = (Transport::default(), None, FrameRate::default());
         self.opened += 1;
     }
 
     /// Reads all assets again, after one was replaced.
     pub fn reload_assets(&mut self) {
         self.assets = assets(&self.bundle, self.path.as_deref(), self.assets_for_folder);
-        // Another file may not cause the panic.
+        // The new files may not cause the panic.
         self.retry();
     }
 
-    /// Draws frames that panicked again.
+    /// Draws frames that panicked once more.
     pub fn retry(&mut self) {
         (self.last_request, self.panicked_frames) = (None, PanickedFrames::default());
     }
 
-    /// Adds a file by its bytes, where there is no folder.
+    /// Adds a file by its content, as in a web page, which has no folders.
     pub fn add_file(&mut self, name: &str, bytes: Vec<u8>) {
         self.player.add_file(name, &bytes);
         self.bundle.add_file(name, bytes);
@@ -153,12 +153,12 @@ impl Session {
 
     /// The last picture, with its serial number.
     pub fn picture(&self) -> Option<(&Picture, u64)> {
-        self.picture.as_ref().map(|picture| (picture, self.drawn))
+        self.picture.as_ref().map(|picture| (picture, self.serial))
     }
 
-    /// The last picture of a stage of the selected flame sheet, with its serial number.
+    /// The last picture of a stage of the phenomenon whose stages are shown, with its serial number.
     pub fn stage(&self, stage: usize) -> Option<(&Picture, u64)> {
-        self.stage_pictures.get(stage).map(|(picture, drawn)| (picture, *drawn))
+        self.stage_pictures.get(stage).map(|(picture, serial)| (picture, *serial))
     }
 
     /// The last good plan.
@@ -196,30 +196,15 @@ impl Session {
         match self.document.edit(label, operations) {
             Ok(()) => self.notice = None,
             Err(EditError::Syntax(reason)) => {
-                self.notice = Some(format!("the text is not TOML; mend it or undo first: {reason}"));
+                self.notice = Some(format!("the text is not TOML; correct it or undo first: {reason}"));
             }
             Err(error) => self.notice = Some(error.to_string()),
         }
     }
 
-    /// Applies `operations` to the shapes of aurora `index`. Returns its shapes.
-    ///
-    /// # Errors
-    /// The resulting shapes are invalid; nothing is changed then.
-    pub fn edit_shapes(
-        &mut self,
-        label: &str,
-        operations: &[Operation],
-        index: usize,
-    ) -> Result<AuroraDrawing, ShapeEditError> {
-        let drawing = self.document.edit_shapes(label, operations, index, &self.assets)?;
-        self.notice = None;
-        Ok(drawing)
-    }
-
-    /// Seeks to the frame at `time`, s, again once the scene is checked, since an edit may make the shot longer.
+    /// Seeks to the frame at `time`, s. It seeks again once the scene is checked, since an edit may make the shot longer.
     pub fn go_to_time(&mut self, time: f64) {
-        self.seek = (!self.document.is_checked()).then_some(time);
+        self.seek_s = (!self.document.is_checked()).then_some(time);
         self.seek_now(time);
     }
 
@@ -233,36 +218,36 @@ impl Session {
         &self.assets
     }
 
-    /// Sets the value at `place`. Where it is animated, sets a keyframe at the current time; while recording, wherever keyframes are allowed.
-    pub fn set(&mut self, label: &str, place: &ValuePath, value: Value) {
-        self.set_all(label, [(place.clone(), value)]);
+    /// Sets the value at `path`. If it is keyframed, or may be while recording, sets a keyframe at the current time.
+    pub fn set(&mut self, label: &str, path: &ValuePath, value: Value) {
+        self.set_all(label, [(path.clone(), value)]);
     }
 
     /// Sets several values in one undo step.
     pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (ValuePath, Value)>) {
-        let keyed =
-            |place: &ValuePath| place.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
-        let operation = |(place, value): (ValuePath, Value)| {
-            if keyed(&place) || (self.recording && keyframes::animatable(&place)) {
-                self.keyframe(&place, value)
+        let is_keyed =
+            |path: &ValuePath| path.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
+        let operation = |(path, value): (ValuePath, Value)| {
+            if is_keyed(&path) || (self.recording && keyframes::animatable(&path)) {
+                self.keyframe_operation(&path, value)
             } else {
-                Operation::Set { place, value }
+                Operation::Set { place: path, value }
             }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
         self.edit_keeping_view(label, operations);
     }
 
-    /// Sets a keyframe of `value` at `place` at the current time.
-    pub fn key(&mut self, place: &ValuePath, value: Value) {
-        let key = self.keyframe(place, value);
-        self.edit_keeping_view("key", vec![key]);
+    /// Sets a keyframe of `value` at `path` at the current time.
+    pub fn set_keyframe(&mut self, path: &ValuePath, value: Value) {
+        let operation = self.keyframe_operation(path, value);
+        self.edit_keeping_view("key", vec![operation]);
     }
 
-    /// The value at `place` that the scene derives where the text does not state it and it is not the parameter's default: a camera
-    /// without a target may look up at the sky.
-    pub fn implied_value(&self, place: &ValuePath) -> Option<Value> {
-        let [Segment::Key(root), Segment::Key(key)] = place.segments() else { return None };
+    /// The value at `path` that the scene derives where the text does not state it, and that may differ from the parameter's default: a
+    /// camera without a target may look up at the sky.
+    pub fn implied_value(&self, path: &ValuePath) -> Option<Value> {
+        let [Segment::Key(root), Segment::Key(key)] = path.segments() else { return None };
         let camera = &self.plan().filter(|_| root == CAMERA)?.scene().camera;
         camera.to_table().get(key).map(|node| node.value.clone())
     }
@@ -272,25 +257,25 @@ impl Session {
     fn edit_keeping_view(&mut self, label: &str, operations: Vec<Operation>) {
         let camera = ValuePath::root().key(CAMERA);
         let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
-        let told = [&position, &target].map(|place| place.find(self.document.values()).is_some());
-        let tells = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
-        let usual = CameraParameters::default().to_table();
+        let stated = [&position, &target].map(|path| path.find(self.document.values()).is_some());
+        let changes_view = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
+        let defaults = CameraParameters::default().to_table();
         let mut all = Vec::new();
-        if tells && told == [false; 2] {
-            for (place, key) in [(position, "position"), (target, "target"), (field, "vertical_fov_deg")] {
-                let stated = place.find(self.document.values()).is_some();
-                let present =
-                    self.implied_value(&place).filter(|value| usual.get(key).is_none_or(|node| node.value != *value));
-                all.extend(present.filter(|_| !stated).map(|value| Operation::Set { place, value }));
+        if changes_view && stated == [false; 2] {
+            for (path, key) in [(position, "position"), (target, "target"), (field, "vertical_fov_deg")] {
+                let stated = path.find(self.document.values()).is_some();
+                let derived =
+                    self.implied_value(&path).filter(|value| defaults.get(key).is_none_or(|node| node.value != *value));
+                all.extend(derived.filter(|_| !stated).map(|value| Operation::Set { place: path, value }));
             }
         }
         all.extend(operations);
         self.edit(label, &all);
     }
 
-    /// The operation that sets a keyframe at `place` at the current time.
-    pub fn keyframe(&self, place: &ValuePath, value: Value) -> Operation {
-        Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
+    /// The operation that sets a keyframe at `path` at the current time.
+    pub fn keyframe_operation(&self, path: &ValuePath, value: Value) -> Operation {
+        Operation::SetKeyframe { place: path.clone(), time: self.transport.time_s(), value }
     }
 
     /// [`poll_player`](Self::poll_player), then [`advance_time`](Self::advance_time).
@@ -299,7 +284,7 @@ impl Session {
         self.advance_time(now, viewport, dragging)
     }
 
-    /// Handles the player's events. While `dragging`, latency matters more than size.
+    /// Handles the player's events. While `dragging`, low latency is preferred over large pictures.
     pub fn poll_player(&mut self, now: f64, dragging: bool) {
         for event in self.player.poll() {
             self.handle_event(event, now, dragging);
@@ -321,15 +306,15 @@ impl Session {
         self.transport.sleep_s(now).filter(|_| !self.is_busy())
     }
 
-    /// Waits up to 40 ms for a picture of a scene that is quick to draw, so that the change and its picture appear in the same
-    /// frame of the window. While playing it does not wait: rendering and painting overlap then.
-    pub fn wait(&mut self, now: f64, dragging: bool) {
+    /// Waits up to 40 ms for the picture if the last one took less, so that an edit and its picture appear in the same frame of the
+    /// window. While playing it does not wait: rendering and painting overlap then.
+    pub fn wait_for_picture(&mut self, now: f64, dragging: bool) {
         let began = Instant::now();
         let quick =
             self.picture.as_ref().is_some_and(|picture| picture.draw_s + picture.advance_s < MAX_WAIT.as_secs_f64());
         while quick && !self.transport.is_playing() && self.is_busy() {
-            let Some(left) = MAX_WAIT.checked_sub(began.elapsed()) else { return };
-            self.player.wait(left);
+            let Some(remaining) = MAX_WAIT.checked_sub(began.elapsed()) else { return };
+            self.player.wait(remaining);
             self.poll_player(now, dragging);
         }
     }
@@ -344,7 +329,7 @@ impl Session {
             draft: self.draft,
             stages: self.stages.filter(|_| !interactive || self.is_quick()),
         };
-        // While interactive, a frame is not drawn again for another size.
+        // While interactive, a frame is not serial again for another size.
         let same = |last: LastRequest| {
             last == LastRequest { within: if interactive { last.within } else { last_request.within }, ..last_request }
         };
@@ -355,8 +340,9 @@ impl Session {
         self.send(last_request, false);
     }
 
-    /// Whether the scene is quick enough to draw the stages too.
+    /// Whether the scene is drawn fast enough to draw the stages too.
     fn is_quick(&self) -> bool {
+        /// Longest time of a picture, s.
         const QUICK_S: f64 = 0.05;
         self.picture.as_ref().is_none_or(|picture| picture.draw_s + picture.advance_s < QUICK_S)
     }
@@ -373,7 +359,7 @@ impl Session {
         self.player.request(request);
     }
 
-    /// The request for the full-quality frame `number`, for a player of its own.
+    /// The request for the full-quality frame `number`, for another player than this session's.
     pub fn full_quality_request(&self, number: i64) -> FrameRequest {
         let revision = self.document.revision();
         let last_request = LastRequest { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
@@ -411,15 +397,15 @@ impl Session {
             return;
         }
         match event {
-            Event::Checked { revision, outcome } => self.checked(revision, outcome),
-            Event::Drawn(picture) => self.show(picture, now, dragging),
+            Event::Checked { revision, outcome } => self.apply_check(revision, outcome),
+            Event::Drawn(picture) => self.show_picture(picture, now, dragging),
             Event::Stage(stage, picture) => {
-                self.drawn += 1;
+                self.serial += 1;
                 let stages = &mut self.stage_pictures;
-                if let Some(own) = stages.get_mut(stage) {
-                    *own = (picture, self.drawn);
+                if let Some(shown) = stages.get_mut(stage) {
+                    *shown = (picture, self.serial);
                 } else {
-                    stages.push((picture, self.drawn));
+                    stages.push((picture, self.serial));
                 }
             }
             Event::Failed { revision, reason } if revision == self.document.revision() => self.notice = Some(reason),
@@ -427,9 +413,9 @@ impl Session {
             Event::Failed { .. } | Event::FullQualityFrame { .. } => {}
             Event::Panicked { revision, number, message } => {
                 if revision == self.document.revision() {
-                    // A scene that was checked panics at some frames only.
-                    let checked = self.plan().filter(|_| self.document.is_checked());
-                    let frame = checked.map(|plan| number.unwrap_or(plan.frames().start));
+                    // A valid scene panics at some frames only.
+                    let plan = self.plan().filter(|_| self.document.is_checked());
+                    let frame = plan.map(|plan| number.unwrap_or(plan.frames().start));
                     self.panicked_frames.record(revision, frame);
                 }
                 self.transport.set_playing(false);
@@ -438,29 +424,29 @@ impl Session {
         }
     }
 
-    /// The notice for a phenomenon that panicked with `message`; the work is saved at once.
+    /// The message for a phenomenon that panicked with `message`. The work is saved at once.
     pub(super) fn panic_message(&mut self, message: &str) -> String {
         self.autosave_now = true;
-        format!("a phenomenon panicked, which is a bug in it: {message}{}", self.rescue())
+        format!("a phenomenon panicked, which is a bug in it: {message}{}", self.save_rescue_copy())
     }
 
-    /// Saves the work beside its file after a panic, and says so.
+    /// Saves a copy of the scene beside its file after a panic. Returns a sentence about it.
     #[cfg(not(target_arch = "wasm32"))]
-    fn rescue(&self) -> String {
+    fn save_rescue_copy(&self) -> String {
         let Some(path) = self.path.as_ref().filter(|_| self.document.is_dirty()) else { return String::new() };
-        match crate::document::files::rescue(self.document.text(), path) {
-            Ok(beside) => format!("; the scene was saved as {}", beside.display()),
+        match crate::document::files::save_rescue_copy(self.document.text(), path) {
+            Ok(copy) => format!("; the scene was saved as {}", copy.display()),
             Err(error) => format!("; the scene could not be saved beside its file: {error}"),
         }
     }
 
-    /// In a browser, the autosave keeps the work.
+    /// In a browser, the autosave stores the scene.
     #[cfg(target_arch = "wasm32")]
-    fn rescue(&self) -> String {
+    fn save_rescue_copy(&self) -> String {
         if self.document.is_dirty() { "; the browser keeps the scene".into() } else { String::new() }
     }
 
-    fn checked(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
+    fn apply_check(&mut self, revision: Revision, outcome: Result<Arc<Plan>, bansho::SceneError>) {
         self.document.set_check_result(revision, outcome);
         if let Some(plan) = self.document.plan() {
             let frames = plan.frames();
@@ -472,12 +458,12 @@ impl Session {
                 self.transport.go_to(frames.start);
             }
         }
-        if let Some(time) = self.seek.take_if(|_| self.document.is_checked()) {
+        if let Some(time) = self.seek_s.take_if(|_| self.document.is_checked()) {
             self.seek_now(time);
         }
     }
 
-    fn show(&mut self, picture: Picture, now: f64, dragging: bool) {
+    fn show_picture(&mut self, picture: Picture, now: f64, dragging: bool) {
         /// Target time of a preview while dragging, s.
         const DRAG_TARGET_S: f64 = 0.05;
         if dragging || self.transport.is_playing() {
@@ -486,13 +472,13 @@ impl Session {
             self.preview_scale.record(FrameTiming { pixels: width * height, draw_s, advance_s }, target);
             self.frame_rate.record_frame(now);
         }
-        self.drawn += 1;
+        self.serial += 1;
         self.picture = Some(picture);
     }
 }
 
-/// The asset source of a scene in `path`.
-fn assets(bundle: &Bundle, path: Option<&Path>, assets_for_folder: AssetsForFolder) -> Arc<dyn Assets> {
+/// The asset source of a scene in the file `path`.
+fn assets(bundle: &BundledAssets, path: Option<&Path>, assets_for_folder: AssetsForFolder) -> Arc<dyn Assets> {
     let files = assets_for_folder(folder(path));
     if path.is_some() { files } else { Arc::new(bundle.clone().overlay_on(files)) }
 }

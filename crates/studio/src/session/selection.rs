@@ -1,19 +1,18 @@
 //! What is selected: a table of the scene, whose parameters the inspector shows.
 
 use bansho::{
-    KINDS,
     base::parameters::TableDescriptor,
     scene::{SHARED_TABLES, ValuePath},
 };
 
-use crate::document::Document;
+use crate::document::{Document, PhenomenonId, descriptors};
 
 /// A selected table of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Selection {
     /// The table's name in scene files.
     pub(crate) key: &'static str,
-    /// Which of that name, where there may be many.
+    /// Its index, if the scene may have several tables of that name.
     pub(crate) index: Option<usize>,
 }
 
@@ -24,29 +23,34 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// The first phenomenon, if there is one.
+    /// The first phenomenon of `document`, or a shared table where it has none.
     pub(crate) fn first_of(document: &Document) -> Self {
         let first = document.phenomena().into_iter().next();
-        first.map_or_else(Self::default, |listed| Self { key: listed.kind, index: Some(listed.index) })
+        first.map_or_else(Self::default, |entry| entry.id.into())
     }
 
-    /// Which of `kind` it is, or the first where it is something else.
-    pub(crate) fn index_of(&self, kind: &str) -> usize {
-        self.index.filter(|_| self.key == kind).unwrap_or_default()
+    /// The selected phenomenon; `None` where a shared table is selected.
+    pub(crate) fn phenomenon(&self) -> Option<PhenomenonId> {
+        PhenomenonId::find(self.key, self.index?)
+    }
+
+    /// The selected phenomenon if it is of `kind`, else the first of that kind.
+    pub(crate) fn phenomenon_of(&self, kind: &'static str) -> PhenomenonId {
+        let selected = self.phenomenon().filter(|selected| selected.kind == kind);
+        selected.unwrap_or(PhenomenonId { kind, index: 0 })
     }
 
     /// Its path in the document.
-    pub(crate) fn place(&self) -> ValuePath {
-        let place = ValuePath::root().key(self.key);
-        self.index.map_or(place.clone(), |index| place.index(index))
+    pub(crate) fn path(&self) -> ValuePath {
+        let path = ValuePath::root().key(self.key);
+        self.index.map_or(path.clone(), |index| path.index(index))
     }
 
     /// Its title.
     pub(crate) fn title(&self, document: &Document) -> String {
-        let listed =
-            document.phenomena().into_iter().find(|listed| Some(listed.index) == self.index && listed.kind == self.key);
-        match (listed, self.index) {
-            (Some(listed), _) => listed.name,
+        let entry = document.phenomena().into_iter().find(|entry| Some(entry.id) == self.phenomenon());
+        match (entry, self.index) {
+            (Some(entry), _) => entry.name,
             (None, Some(index)) => format!("{} {}", self.key, index + 1),
             (None, None) => self.key.to_owned(),
         }
@@ -54,7 +58,12 @@ impl Selection {
 
     /// Its parameters.
     pub(crate) fn descriptor(&self) -> Option<&'static TableDescriptor> {
-        let shared = SHARED_TABLES.iter().find(|table| table.key == self.key).map(|table| (table.table)());
-        shared.or_else(|| KINDS.iter().find(|kind| kind.key == self.key).map(|kind| (kind.table)()))
+        descriptors::table_descriptor(self.key)
+    }
+}
+
+impl From<PhenomenonId> for Selection {
+    fn from(PhenomenonId { kind, index }: PhenomenonId) -> Self {
+        Self { key: kind, index: Some(index) }
     }
 }

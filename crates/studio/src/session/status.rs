@@ -14,7 +14,7 @@ pub(crate) struct PanickedFrames {
 }
 
 impl PanickedFrames {
-    /// Records that `revision` panicked at `frame`, or altogether.
+    /// Records that `revision` panicked at `frame`; without one, at all frames.
     pub(crate) fn record(&mut self, revision: Revision, frame: Option<i64>) {
         if self.revision != Some(revision) {
             *self = Self { revision: Some(revision), ..Self::default() };

@@ -11,49 +11,55 @@ use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
 
-/// Files that arrived, by name.
-pub(super) type Inbox = Rc<RefCell<Vec<(String, Vec<u8>)>>>;
+/// A file that was chosen or dropped.
+pub(super) struct ReceivedFile {
+    pub(super) name: String,
+    pub(super) bytes: Vec<u8>,
+}
 
-/// Asks the user for a file, which comes into `inbox` later.
+/// Files that were read and not handled yet.
+pub(super) type Inbox = Rc<RefCell<Vec<ReceivedFile>>>;
+
+/// Opens the browser's file chooser. The chosen file is added to `inbox` once it is read.
 ///
 /// # Errors
-/// The page cannot ask.
+/// The page cannot open the chooser.
 pub(super) fn ask_for_file(inbox: &Inbox, ctx: &Context) -> Result<(), JsValue> {
     let input: HtmlInputElement = element("input")?;
     input.set_type("file");
     let (inbox, ctx, chosen) = (inbox.clone(), ctx.clone(), input.clone());
-    let taken = Closure::once_into_js(move || {
+    let on_change = Closure::once_into_js(move || {
         let Some(file) = chosen.files().and_then(|files| files.get(0)) else { return };
         spawn_local(async move {
             if let Ok(bytes) = bytes_of(&file).await {
-                inbox.borrow_mut().push((file.name(), bytes));
+                inbox.borrow_mut().push(ReceivedFile { name: file.name(), bytes });
                 ctx.request_repaint();
             }
         });
     });
-    input.set_onchange(Some(taken.unchecked_ref()));
+    input.set_onchange(Some(on_change.unchecked_ref()));
     input.click();
     Ok(())
 }
 
-/// Takes a file that was dropped on the page into `inbox`, once it is read.
-pub(super) fn take_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Context) {
+/// Adds a file that was dropped on the page to `inbox`, once it is read.
+pub(super) fn receive_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Context) {
     let (inbox, ctx) = (inbox.clone(), ctx.clone());
     spawn_local(async move {
         if let Ok(bytes) = file.bytes_async().await {
-            inbox.borrow_mut().push((file.path().display().to_string(), bytes));
+            inbox.borrow_mut().push(ReceivedFile { name: file.path().display().to_string(), bytes });
             ctx.request_repaint();
         }
     });
 }
 
-/// The bytes of a file in browser memory, since wasm memory is small.
+/// The content of a file in the memory of the browser, since WebAssembly memory is small.
 #[derive(Default)]
 pub(super) struct BlobParts(js_sys::Array);
 
 impl BlobParts {
-    /// A file that is made already.
-    pub(super) fn of(bytes: &[u8]) -> Self {
+    /// A file with this content.
+    pub(super) fn new(bytes: &[u8]) -> Self {
         Self(js_sys::Array::of1(&js_sys::Uint8Array::from(bytes)))
     }
 }
@@ -69,10 +75,10 @@ impl Write for BlobParts {
     }
 }
 
-/// Hands a file called `name` to the user.
+/// Downloads a file called `name`.
 ///
 /// # Errors
-/// The page cannot make files.
+/// The page cannot create files.
 pub(super) fn download(name: &str, parts: &BlobParts) -> Result<(), JsValue> {
     let blob = Blob::new_with_u8_array_sequence(&parts.0)?;
     let url = Url::create_object_url_with_blob(&blob)?;

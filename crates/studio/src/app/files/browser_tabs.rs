@@ -14,35 +14,36 @@ use crate::{document::files::autosave::RecoveredWork, session::settings_store::S
 /// The autosaves of all tabs.
 pub(super) struct BrowserTabs {
     store: SettingsStore,
-    /// The prefix of all names.
-    beginning: &'static str,
+    /// The first word of all names.
+    prefix: &'static str,
     /// The name of this tab.
     own: String,
     /// Work of closed tabs; filled once the browser has listed the locks.
     found: Rc<RefCell<Vec<RecoveredWork>>>,
-    looked: bool,
+    /// Whether the search for work of closed tabs was started.
+    searched: bool,
 }
 
 impl BrowserTabs {
-    /// Takes a name that begins with `beginning`.
-    pub(super) fn begin(store: SettingsStore, beginning: &'static str) -> Self {
-        let own = format!("{beginning} {:.0} {:.0}", js_sys::Date::now(), 1e9 * js_sys::Math::random());
-        // Without a lock the work is offered to other pages too.
-        let _ = hold(&own);
-        Self { store, beginning, own, found: Rc::default(), looked: false }
+    /// Starts autosaving under a new name with the first word `prefix`.
+    pub(super) fn begin(store: SettingsStore, prefix: &'static str) -> Self {
+        let own = format!("{prefix} {:.0} {:.0}", js_sys::Date::now(), 1e9 * js_sys::Math::random());
+        // Without a lock, the work is offered to other tabs too.
+        let _ = hold_lock(&own);
+        Self { store, prefix, own, found: Rc::default(), searched: false }
     }
 
-    /// Work of closed tabs, once it is known.
-    pub(super) fn found(&mut self, ctx: &Context) -> Vec<RecoveredWork> {
-        if !std::mem::replace(&mut self.looked, true) {
-            let kept = self.store.names(self.beginning).into_iter().filter(|name| *name != self.own).collect();
-            spawn_local(look(self.store.clone(), kept, self.found.clone(), ctx.clone()));
+    /// Work of closed tabs that was found since the last call.
+    pub(super) fn take_found(&mut self, ctx: &Context) -> Vec<RecoveredWork> {
+        if !std::mem::replace(&mut self.searched, true) {
+            let stored = self.store.names(self.prefix).into_iter().filter(|name| *name != self.own).collect();
+            spawn_local(search(self.store.clone(), stored, self.found.clone(), ctx.clone()));
         }
         self.found.take()
     }
 
-    /// Keeps `work`, or nothing; whether it could.
-    pub(super) fn keep(&self, work: Option<&str>) -> bool {
+    /// Stores `work`, or removes the stored work. Returns whether that succeeded.
+    pub(super) fn store(&self, work: Option<&str>) -> bool {
         match work {
             Some(work) => self.store.write(&self.own, work),
             None => {
@@ -53,12 +54,12 @@ impl BrowserTabs {
     }
 }
 
-/// Finds those of the works `kept` that no living page holds.
-async fn look(store: SettingsStore, kept: Vec<String>, found: Rc<RefCell<Vec<RecoveredWork>>>, ctx: Context) {
-    let held = held().await.unwrap_or_default();
-    let dead = kept.into_iter().filter(|name| !held.contains(name));
-    let work = dead.filter_map(|name| {
-        Some(RecoveredWork { kept_in: name.clone().into(), ..RecoveredWork::of(&store.read(&name)?)? })
+/// Finds those of the `stored` names whose locks no open tab holds.
+async fn search(store: SettingsStore, stored: Vec<String>, found: Rc<RefCell<Vec<RecoveredWork>>>, ctx: Context) {
+    let held = held_locks().await.unwrap_or_default();
+    let of_closed_tabs = stored.into_iter().filter(|name| !held.contains(name));
+    let work = of_closed_tabs.filter_map(|name| {
+        Some(RecoveredWork { stored_as: name.clone().into(), ..RecoveredWork::decode(&store.read(&name)?)? })
     });
     found.borrow_mut().extend(work);
     ctx.request_repaint();
@@ -73,19 +74,19 @@ fn method(of: &JsValue, name: &str) -> Result<Function, JsValue> {
     Reflect::get(of, &name.into())?.dyn_into()
 }
 
-/// Holds the lock `name` until the page is gone.
-fn hold(name: &str) -> Result<(), JsValue> {
+/// Holds the lock `name` until the page is closed.
+fn hold_lock(name: &str) -> Result<(), JsValue> {
     let locks = locks()?;
     let forever = Closure::once_into_js(|| JsValue::from(Promise::new(&mut |_, _| {})));
     method(&locks, "request")?.call2(&locks, &name.into(), &forever)?;
     Ok(())
 }
 
-/// The names of all locks that are held.
-async fn held() -> Result<Vec<String>, JsValue> {
+/// The names of all held locks.
+async fn held_locks() -> Result<Vec<String>, JsValue> {
     let locks = locks()?;
-    let asked: Promise = method(&locks, "query")?.call0(&locks)?.dyn_into()?;
-    let answer = JsFuture::from(asked).await?;
+    let query: Promise = method(&locks, "query")?.call0(&locks)?.dyn_into()?;
+    let answer = JsFuture::from(query).await?;
     let held: Array = Reflect::get(&answer, &"held".into())?.dyn_into()?;
     Ok(held.iter().filter_map(|lock| Reflect::get(&lock, &"name".into()).ok()?.as_string()).collect())
 }

@@ -11,7 +11,7 @@ pub(super) struct FileDialog {
     name: String,
     /// The extensions of listed files.
     extensions: &'static [&'static str],
-    /// What the folder holds: folders first, then files.
+    /// The entries of the folder: folders first, then files.
     entries: Vec<Entry>,
 }
 
@@ -21,9 +21,10 @@ enum Entry {
     File(String),
 }
 
+/// Extensions of scenes.
 const SCENES: &[&str] = &[".toml"];
 
-/// Files that scenes name.
+/// Extensions of assets: plates, drawings and meshes.
 const ASSETS: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".svg", ".glb", ".gltf"];
 
 impl FileDialog {
@@ -36,13 +37,13 @@ impl FileDialog {
         dialog
     }
 
-    /// The same with a name to begin with.
+    /// The same dialog with an initial name.
     #[must_use]
     pub(super) fn with_name(self, name: String) -> Self {
         Self { name, ..self }
     }
 
-    /// The same for what scenes name.
+    /// The same dialog for assets.
     #[must_use]
     pub(super) fn for_assets(self) -> Self {
         let mut dialog = Self { extensions: ASSETS, ..self };
@@ -50,12 +51,12 @@ impl FileDialog {
         dialog
     }
 
-    /// What is chosen; a whole path may be typed as the name.
+    /// The chosen file. A path may be typed as the name.
     pub(super) fn path(&self) -> PathBuf {
         self.folder.join(self.name.trim())
     }
 
-    /// A folder that cannot be read looks empty.
+    /// Reads the entries of the folder; none where it cannot be read.
     fn read(&mut self) {
         let found = std::fs::read_dir(&self.folder).into_iter().flatten().filter_map(Result::ok);
         let entry = |found: std::fs::DirEntry| {
@@ -63,8 +64,8 @@ impl FileDialog {
             if found.path().is_dir() {
                 return Some(Entry::Folder(name));
             }
-            let ending = name.to_ascii_lowercase();
-            self.extensions.iter().any(|own| ending.ends_with(own)).then_some(Entry::File(name))
+            let lowercase = name.to_ascii_lowercase();
+            self.extensions.iter().any(|extension| lowercase.ends_with(extension)).then_some(Entry::File(name))
         };
         self.entries = found.filter_map(entry).collect();
         self.entries.sort();

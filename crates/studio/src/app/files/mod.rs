@@ -1,5 +1,5 @@
-//! Opening, saving, rendering to files, autosave, and the dialogs that ask first. `native` has the parts for a file system, `web` those
-//! for a browser: both define `PlatformFiles` and the same methods of [`Files`].
+//! Opening, saving, rendering to files, autosave, and the dialogs for them. `native` is for file systems, `web` for browsers: both define
+//! `PlatformFiles` and the same methods of [`Files`].
 
 #[cfg(target_arch = "wasm32")]
 pub(crate) mod browser_io;
@@ -47,24 +47,24 @@ impl Files {
         Self { question: None, unsaved: UnsavedWork::new(store), closing: false, platform: PlatformFiles::new(store) }
     }
 
-    /// Opens a bundled scene, after asking where that would lose work.
+    /// Opens a bundled scene, after a question if there is unsaved work.
     pub(super) fn open_bundled(&mut self, session: &mut Session, name: &str, text: &str) {
         self.open_text(session, name, text.to_owned(), None);
     }
 
-    /// Opens a scene that was read, after asking where that would lose work.
+    /// Opens a scene that was read, after a question if there is unsaved work.
     fn open_text(&mut self, session: &mut Session, name: &str, text: String, path: Option<PathBuf>) {
         self.confirm_then(session, PendingAction::Open { name: name.to_owned(), text, path });
     }
 
-    /// Opens recovered work, after asking where that would lose work.
+    /// Opens recovered work, after a question if there is other unsaved work.
     pub(super) fn recover(&mut self, session: &mut Session, recovered: RecoveredWork) {
         self.confirm_then(session, PendingAction::Recover(recovered));
     }
 
     fn confirm_then(&mut self, session: &mut Session, action: PendingAction) {
         if session.document.is_dirty() {
-            self.question = Some(Question::Leave(action));
+            self.question = Some(Question::DiscardUnsaved(action));
         } else {
             self.proceed(session, action);
         }
@@ -78,12 +78,12 @@ impl Files {
         self.question_ui(ui, session);
     }
 
-    /// Closing with unsaved work asks first, and so does closing while pictures are rendered.
+    /// Asks before closing with unsaved work, or while frames are rendered.
     fn confirm_close(&mut self, ui: &Ui, session: &mut Session) {
-        let wants = ui.input(|input| input.viewport().close_requested());
+        let requested = ui.input(|input| input.viewport().close_requested());
         if self.closing {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
-        } else if wants && (session.document.is_dirty() || self.progress().is_some()) {
+        } else if requested && (session.document.is_dirty() || self.progress().is_some()) {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::CancelClose);
             self.confirm_then(session, PendingAction::Close);
         }
@@ -105,7 +105,7 @@ impl Files {
 
     fn apply_answer(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match question {
-            Question::Leave(action) => {
+            Question::DiscardUnsaved(action) => {
                 if answer == Answer::Save {
                     self.save_and(session, Some(action));
                 } else {
@@ -137,20 +137,20 @@ impl Files {
 
 /// Shows how rendering ended. After a panic the work is saved at once.
 fn report_end(session: &mut Session, ended: Result<String, JobFailure>) {
-    let told = match ended {
-        Ok(told) | Err(JobFailure::Failed(told)) => told,
+    let message = match ended {
+        Ok(message) | Err(JobFailure::Failed(message)) => message,
         Err(JobFailure::Panicked(message)) => session.panic_message(&message),
     };
-    session.set_notice(Some(told));
+    session.set_notice(Some(message));
 }
 
 /// Recovered work as an undoable edit of the file's current text.
 fn recovered_document(recovered: &RecoveredWork) -> (Document, Option<PathBuf>) {
-    let named = Some(&recovered.origin).filter(|origin| !origin.is_empty());
-    // A page has no file system.
-    let path = named.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
+    let origin = Some(&recovered.origin).filter(|origin| !origin.is_empty());
+    // A web page has no file system.
+    let path = origin.filter(|_| !cfg!(target_arch = "wasm32")).map(PathBuf::from);
     let saved = path.as_deref().and_then(|path| files::read(path).ok()).unwrap_or_default();
-    let mut document = Document::new(named.map_or("scene", String::as_str), saved);
+    let mut document = Document::new(origin.map_or("scene", String::as_str), saved);
     document.replace("recover", &recovered.text);
     document.end_step();
     (document, path)
@@ -161,12 +161,13 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{player::PolledPlayer, scenes::examples::Bundle};
+    use crate::{player::PolledPlayer, scenes::examples::BundledAssets};
 
     #[test]
-    fn a_panic_while_rendering_is_told_and_the_work_kept_at_once() {
+    fn a_panic_while_rendering_is_reported_and_the_work_saved_at_once() {
         let document = Document::new("scene", "bansho = 2\n");
-        let mut session = Session::new(document, None, Box::<PolledPlayer>::default(), |_| Arc::new(Bundle::default()));
+        let mut session =
+            Session::new(document, None, Box::<PolledPlayer>::default(), |_| Arc::new(BundledAssets::default()));
         report_end(&mut session, Err(JobFailure::Failed("the disk is full".into())));
         assert_eq!((session.notice(), session.autosave_now), (Some("the disk is full"), false));
         report_end(&mut session, Err(JobFailure::Panicked("broken on purpose".into())));

@@ -1,4 +1,4 @@
-//! Files on the disk: chosen, opened, saved, watched for what other programs do to them, and rendered.
+//! Files in the file system: opening, saving, watching for changes by other programs, and rendering.
 
 use std::{
     path::{Path, PathBuf},
@@ -14,7 +14,7 @@ use super::{
     report_end, save_as,
 };
 use crate::{
-    document::files::{self, ExternalChange, Recent, watch::FileWatcher},
+    document::files::{self, ExternalChange, RecentFiles, watch::FileWatcher},
     player::render_job::{self, RenderJob},
     session::{Session, selection::Selection, settings_store::SettingsStore},
 };
@@ -22,22 +22,22 @@ use eframe::egui::{Context, Ui};
 
 const BUSY: &str = "pictures are being rendered already; wait for them, or stop that with the cross beside its bar";
 
-/// What the window knows of the disk.
+/// The state of files in the file system.
 pub(super) struct PlatformFiles {
-    recent: Recent,
+    recent: RecentFiles,
     watch: Option<FileWatcher>,
     render_job: Option<RenderJob>,
 }
 
 impl PlatformFiles {
     pub(super) fn new(store: &SettingsStore) -> Self {
-        let recent = store.file("recent").map(Recent::read).unwrap_or_default();
+        let recent = store.file("recent").map(RecentFiles::read).unwrap_or_default();
         Self { recent, watch: None, render_job: None }
     }
 
     fn remember(&mut self, path: &Path) {
-        // A list that cannot be kept is right until the window closes.
-        let _ = self.recent.note(path);
+        // A list that cannot be stored stays valid until the window closes.
+        let _ = self.recent.add(path);
     }
 }
 
@@ -47,9 +47,10 @@ impl Files {
         self.question = Some(Question::Open(FileDialog::in_folder_of(session.path.as_deref())));
     }
 
-    /// Asks which file `place` shall name.
-    pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, place: ValuePath) {
-        self.question = Some(Question::Relink(place, FileDialog::in_folder_of(session.path.as_deref()).for_assets()));
+    /// Asks which file `parameter` shall name.
+    pub(in crate::app) fn ask_to_relink(&mut self, _ctx: &Context, session: &mut Session, parameter: ValuePath) {
+        let dialog = FileDialog::in_folder_of(session.path.as_deref()).for_assets();
+        self.question = Some(Question::Relink { parameter, dialog });
     }
 
     /// Saves, or asks where to.
@@ -57,17 +58,17 @@ impl Files {
         self.save_and(session, None);
     }
 
-    /// Saves, or asks where to, and goes to `action` once that is done.
+    /// Saves, or asks where to, and then performs `action`.
     pub(super) fn save_and(&mut self, session: &mut Session, action: Option<PendingAction>) {
         let Some(path) = session.path.clone() else { return self.ask_where_to_save(session, action) };
         match files::external_change(&session.document, &path) {
-            // What is there was never seen here.
+            // The text in the file is that of another program.
             ExternalChange::Changed(text) if *text != **session.document.text() => {
-                self.question = Some(Question::ChangedExternally(action));
+                self.question = Some(Question::ChangedExternally { then: action });
             }
             ExternalChange::Unreadable(reason) => {
-                let what = format!("What lies in {} cannot be read: {reason}", path.display());
-                self.question = Some(Question::Replace(path, what, action));
+                let message = format!("{} cannot be read: {reason}", path.display());
+                self.question = Some(Question::Replace { path, message, then: action });
             }
             _ => self.save_to(session, path, action),
         }
@@ -79,16 +80,16 @@ impl Files {
             None if session.document.name().ends_with(".toml") => session.document.name().to_owned(),
             None => "scene.toml".to_owned(),
         };
-        self.question =
-            Some(Question::SaveAs(FileDialog::in_folder_of(session.path.as_deref()).with_name(name), action));
+        let dialog = FileDialog::in_folder_of(session.path.as_deref()).with_name(name);
+        self.question = Some(Question::SaveAs { dialog, then: action });
     }
 
-    /// Saves to `path`, whose name shall end as those of scenes do, unless another file would be lost.
+    /// Saves to `path` with the extension of scenes, after a question if another file would be replaced.
     fn save_as(&mut self, session: &mut Session, path: PathBuf, action: Option<PendingAction>) {
-        let path = files::named_as_scene(path);
+        let path = files::with_scene_extension(path);
         if path.exists() && session.path.as_ref() != Some(&path) {
-            let what = format!("There is a file of that name: {}", path.display());
-            self.question = Some(Question::Replace(path, what, action));
+            let message = format!("There is a file of that name: {}", path.display());
+            self.question = Some(Question::Replace { path, message, then: action });
         } else {
             self.save_to(session, path, action);
         }
@@ -121,7 +122,7 @@ impl Files {
         }
     }
 
-    /// What the menu has for files on the disk.
+    /// The entries of the file menu for a file system.
     pub(in crate::app) fn menu_ui(&mut self, ui: &mut Ui, session: &mut Session) {
         if ui.button("Save as…").clicked() {
             self.ask_where_to_save(session, None);
@@ -134,7 +135,7 @@ impl Files {
             }
         });
         ui.separator();
-        if ui.button("Render still").on_hover_text("This frame, as bansho render makes it").clicked() {
+        if ui.button("Render still").on_hover_text("This frame, as bansho render draws it").clicked() {
             self.render(session, true);
         }
         if ui.button("Render shot").on_hover_text("All frames, into out/ beside the scene").clicked() {
@@ -145,7 +146,7 @@ impl Files {
         }
     }
 
-    /// Renders the present frame as `bansho render` does.
+    /// Renders the current frame as `bansho render` does.
     pub(in crate::app) fn render_still(&mut self, _ctx: &Context, session: &mut Session) {
         self.render(session, true);
     }
@@ -155,8 +156,8 @@ impl Files {
         self.render(session, false);
     }
 
-    /// Renders the present frame, or the whole shot, as `bansho render` does.
-    fn render(&mut self, session: &mut Session, full_quality: bool) {
+    /// Renders the current frame, or the whole shot, as `bansho render` does.
+    fn render(&mut self, session: &mut Session, still: bool) {
         let Some(path) = session.path.clone() else {
             session.set_notice(Some("save the scene first; pictures are written beside its name, in out/".into()));
             return;
@@ -165,10 +166,10 @@ impl Files {
             session.set_notice(Some(BUSY.into()));
             return;
         }
-        let number = full_quality.then(|| session.transport.number());
+        let number = still.then(|| session.transport.number());
         match RenderJob::start(render_job::job(session.document.text(), &path, number), || {}) {
             Ok(render_job) => self.platform.render_job = Some(render_job),
-            Err(error) => session.set_notice(Some(format!("the system gives no thread to render on: {error}"))),
+            Err(error) => session.set_notice(Some(format!("the system cannot start a thread for rendering: {error}"))),
         }
     }
 
@@ -196,21 +197,21 @@ impl Files {
             // Without a thread, the file is not watched.
             self.platform.watch = FileWatcher::start(&path, move || ctx.request_repaint()).ok();
         }
-        if !self.platform.watch.as_ref().is_some_and(FileWatcher::touched) {
+        if !self.platform.watch.as_ref().is_some_and(FileWatcher::take_modified) {
             return;
         }
         match files::external_change(&session.document, &path) {
-            ExternalChange::Same => session.document.set_file_missing(!path.exists()),
-            ExternalChange::Gone => {
+            ExternalChange::Unchanged => session.document.set_file_missing(!path.exists()),
+            ExternalChange::Deleted => {
                 session.document.set_file_missing(true);
-                session.set_notice(Some(format!("{}: the file is gone; saving writes it anew", path.display())));
+                session.set_notice(Some(format!("{}: the file is gone; saving creates it again", path.display())));
             }
             ExternalChange::Unreadable(reason) => {
-                let notice = format!("{}: another program wrote what cannot be read: {reason}", path.display());
+                let notice = format!("{}: another program wrote text that cannot be read: {reason}", path.display());
                 session.set_notice(Some(notice));
             }
             ExternalChange::Changed(_) if session.document.is_modified() => {
-                self.question = Some(Question::ChangedExternally(None));
+                self.question = Some(Question::ChangedExternally { then: None });
             }
             ExternalChange::Changed(text) => apply_external_change(session, &text),
         }
@@ -220,7 +221,7 @@ impl Files {
     fn handle_dropped_files(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         let dropped: Vec<PathBuf> =
             ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
-        let scene = dropped.iter().position(|path| files::is_named_as_scene(path));
+        let scene = dropped.iter().position(|path| files::has_scene_extension(path));
         match scene {
             Some(scene) => {
                 self.open(session, dropped[scene].clone());
@@ -244,33 +245,34 @@ impl Files {
     pub(super) fn apply_native_answer(&mut self, session: &mut Session, question: Question, answer: Answer) {
         match (question, answer) {
             (Question::Open(dialog), _) => self.open(session, dialog.path()),
-            (Question::Relink(place, dialog), _) => session.relink(&place, &dialog.path()),
-            (Question::SaveAs(dialog, action), _) => self.save_as(session, dialog.path(), action),
-            (Question::Replace(path, _, action), Answer::Do) => self.save_to(session, path, action),
-            (Question::Replace(_, _, action), _) => self.ask_where_to_save(session, action),
-            (Question::ChangedExternally(_), Answer::Do) => {
-                let there = session.path.as_ref().map(|path| files::external_change(&session.document, path));
-                // Read again: the other program may have written more since.
-                match there {
+            (Question::Relink { parameter, dialog }, _) => session.relink(&parameter, &dialog.path()),
+            (Question::SaveAs { dialog, then }, _) => self.save_as(session, dialog.path(), then),
+            (Question::Replace { path, then, .. }, Answer::Confirm) => self.save_to(session, path, then),
+            (Question::Replace { then, .. }, _) => self.ask_where_to_save(session, then),
+            (Question::ChangedExternally { .. }, Answer::Confirm) => {
+                let change = session.path.as_ref().map(|path| files::external_change(&session.document, path));
+                // Read again, since the other program may have written more.
+                match change {
                     Some(ExternalChange::Changed(text)) => apply_external_change(session, &text),
                     Some(ExternalChange::Unreadable(reason)) => session.set_notice(Some(reason)),
-                    Some(ExternalChange::Same | ExternalChange::Gone) | None => {}
+                    Some(ExternalChange::Unchanged | ExternalChange::Deleted) | None => {}
                 }
             }
-            (Question::ChangedExternally(action), Answer::Save) => {
+            (Question::ChangedExternally { then }, Answer::Save) => {
                 if let Some(path) = session.path.clone() {
-                    self.save_to(session, path, action);
+                    self.save_to(session, path, then);
                 }
             }
-            (Question::ChangedExternally(_), Answer::Cancel) | (Question::Leave(_) | Question::StopRendering, _) => {}
+            (Question::ChangedExternally { .. }, Answer::Cancel)
+            | (Question::DiscardUnsaved(_) | Question::StopRendering, _) => {}
         }
     }
 }
 
-/// Writes the scene to `path`; where it `moves` to another folder, with its paths adjusted.
+/// Writes the scene to `path`. If it is another file than before (`moves`), relative paths in the scene are adjusted.
 ///
 /// # Errors
-/// Why it cannot be saved there; it stays as it was.
+/// Why it cannot be saved there. The document is unchanged then.
 fn write(session: &mut Session, path: &Path, moves: bool) -> Result<(), String> {
     let text = if moves { save_as::with_moved_paths(session, path) } else { Ok(session.document.text().clone()) };
     let text = text.map_err(|error| error.to_string())?;

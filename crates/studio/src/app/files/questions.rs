@@ -10,55 +10,52 @@ use eframe::egui::Ui;
 use super::dialog::FileDialog;
 use crate::document::files::autosave::RecoveredWork;
 
-/// A question that waits for an answer.
+/// An open question.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     /// Which file to open.
     #[cfg(not(target_arch = "wasm32"))]
     Open(FileDialog),
-    /// Which file this place shall name.
+    /// Which file `parameter` shall name.
     #[cfg(not(target_arch = "wasm32"))]
-    Relink(ValuePath, FileDialog),
-    /// Which file to save to, and where to then.
+    Relink { parameter: ValuePath, dialog: FileDialog },
+    /// Which file to save to; `then` is performed after saving.
     #[cfg(not(target_arch = "wasm32"))]
-    SaveAs(FileDialog, Option<PendingAction>),
-    /// Whether this file may be replaced by what is saved, what is said of it, and where to then.
+    SaveAs { dialog: FileDialog, then: Option<PendingAction> },
+    /// Whether the file `path` may be replaced, with the reason for asking; `then` is performed after saving.
     #[cfg(not(target_arch = "wasm32"))]
-    Replace(PathBuf, String, Option<PendingAction>),
-    /// Whether unsaved work may be left, to open this or to close.
-    Leave(PendingAction),
-    /// Whether what is rendered may be stopped, to close.
+    Replace { path: PathBuf, message: String, then: Option<PendingAction> },
+    /// Whether to save or discard unsaved work before this action.
+    DiscardUnsaved(PendingAction),
+    /// Whether to stop rendering and close.
     StopRendering,
-    /// Whether to take what another program wrote, and where to once this is saved over it.
+    /// Whether to take the text of another program or save over it; `then` is performed after saving.
     #[cfg(not(target_arch = "wasm32"))]
-    ChangedExternally(Option<PendingAction>),
+    ChangedExternally { then: Option<PendingAction> },
 }
 
 /// What to do once unsaved work is saved or discarded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum PendingAction {
-    /// A scene, and where it lies if it lies anywhere.
-    Open {
-        name: String,
-        text: String,
-        path: Option<PathBuf>,
-    },
-    /// Recovered work.
+    /// Open a scene, with its file if it has one.
+    Open { name: String, text: String, path: Option<PathBuf> },
+    /// Open recovered work.
     Recover(RecoveredWork),
+    /// Close the window.
     Close,
 }
 
-/// What a question was answered with.
+/// The answer to a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    Do,
+    Confirm,
     Save,
     Cancel,
 }
 
 /// Shows the dialog. Returns the answer, if there is one.
 pub(super) fn answer_ui(ui: &mut Ui, question: &mut Question) -> Option<Answer> {
-    let mut chosen = question.body_ui(ui).then_some(Answer::Do);
+    let mut chosen = question.body_ui(ui).then_some(Answer::Confirm);
     ui.horizontal(|ui| {
         for (text, answer) in question.choices() {
             if ui.button(*text).clicked() {
@@ -72,46 +69,48 @@ pub(super) fn answer_ui(ui: &mut Ui, question: &mut Question) -> Option<Answer> 
 impl Question {
     /// The content of the dialog. Returns whether it gave an answer, as a double-click on a file does.
     fn body_ui(&mut self, ui: &mut Ui) -> bool {
-        let said = match self {
+        let text = match self {
             #[cfg(not(target_arch = "wasm32"))]
             Self::Open(dialog) => return dialog.ui(ui, "Open which scene?"),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Relink(_, dialog) => return dialog.ui(ui, "Which file in its stead?"),
+            Self::Relink { dialog, .. } => return dialog.ui(ui, "Replace it by which file?"),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::SaveAs(dialog, _) => {
-                // A double-click chooses a name, to be saved over only after a question.
+            Self::SaveAs { dialog, .. } => {
+                // A double-click only chooses the name, since saving over a file needs another question.
                 dialog.ui(ui, "Save as");
                 return false;
             }
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Replace(_, said, _) => said.as_str(),
-            Self::Leave(_) => "There is unsaved work.",
+            Self::Replace { message, .. } => message.as_str(),
+            Self::DiscardUnsaved(_) => "There is unsaved work.",
             Self::StopRendering => {
                 "Pictures are being rendered. Whole frames stay, and rendering the shot goes on from there."
             }
             #[cfg(not(target_arch = "wasm32"))]
-            Self::ChangedExternally(_) => "Another program changed the file, and there is unsaved work here.",
+            Self::ChangedExternally { .. } => "Another program changed the file, and there is unsaved work here.",
         };
-        ui.label(said);
+        ui.label(text);
         false
     }
 
-    /// Its answers, as its buttons say them.
+    /// The buttons and their answers.
     fn choices(&self) -> &'static [(&'static str, Answer)] {
-        use Answer::{Cancel, Do, Save};
+        use Answer::{Cancel, Confirm, Save};
         match self {
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Open(_) => &[("Open", Do), ("Cancel", Cancel)],
+            Self::Open(_) => &[("Open", Confirm), ("Cancel", Cancel)],
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Relink(..) => &[("Relink", Do), ("Cancel", Cancel)],
+            Self::Relink { .. } => &[("Relink", Confirm), ("Cancel", Cancel)],
             #[cfg(not(target_arch = "wasm32"))]
-            Self::SaveAs(..) => &[("Save", Do), ("Cancel", Cancel)],
+            Self::SaveAs { .. } => &[("Save", Confirm), ("Cancel", Cancel)],
             #[cfg(not(target_arch = "wasm32"))]
-            Self::Replace(..) => &[("Replace it", Do), ("Another name", Save), ("Cancel", Cancel)],
-            Self::Leave(_) => &[("Save", Save), ("Leave it", Do), ("Cancel", Cancel)],
-            Self::StopRendering => &[("Stop and close", Do), ("Cancel", Cancel)],
+            Self::Replace { .. } => &[("Replace it", Confirm), ("Another name", Save), ("Cancel", Cancel)],
+            Self::DiscardUnsaved(_) => &[("Save", Save), ("Leave it", Confirm), ("Cancel", Cancel)],
+            Self::StopRendering => &[("Stop and close", Confirm), ("Cancel", Cancel)],
             #[cfg(not(target_arch = "wasm32"))]
-            Self::ChangedExternally(_) => &[("Take theirs", Do), ("Save mine", Save), ("Decide later", Cancel)],
+            Self::ChangedExternally { .. } => {
+                &[("Take theirs", Confirm), ("Save mine", Save), ("Decide later", Cancel)]
+            }
         }
     }
 }

@@ -1,79 +1,81 @@
-//! Files that the scene names: relinked, or added by dropping them on the window.
+//! Assets of the scene: relinked to other files, or added by dropping files on the window.
 
 use std::path::Path;
 
 use bansho::{
+    KINDS,
     base::parameters::{Table, Value},
     scene::{ValuePath, operation::Operation},
 };
 
 use crate::{
-    app::{KIND_WITH_BURNERS, KIND_WITH_SHAPES},
-    editors::aurora::document::AuroraDrawing,
+    document::{PhenomenonId, descriptors},
+    editors,
     session::{Session, folder, selection::Selection},
 };
 
-/// What a file that is dropped becomes, by the ending of its name.
-const DRAWINGS: [&str; 1] = ["svg"];
+/// Extensions of mesh files.
 const MESHES: [&str; 2] = ["glb", "gltf"];
+/// Extensions of picture files.
 const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
 
 impl Session {
-    /// Lets `place` name the file `file`.
-    pub fn relink(&mut self, place: &ValuePath, file: &Path) {
-        let value = self.named(file);
-        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
+    /// Sets `parameter` to the file `file`.
+    pub fn relink(&mut self, parameter: &ValuePath, file: &Path) {
+        let value = self.relative_name(file);
+        self.edit("relink", &[Operation::Set { place: parameter.clone(), value }]);
         self.reload_assets();
     }
 
-    /// `file` as the scene names it: relative to its folder where it lies there.
-    fn named(&self, file: &Path) -> Value {
+    /// The name of `file` in the scene: relative to the scene's folder if it is in that folder.
+    fn relative_name(&self, file: &Path) -> Value {
         let folder = folder(self.path.as_deref());
-        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
-        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(whole)).unwrap_or(file);
+        let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+        let relative = file.strip_prefix(folder).or_else(|_| file.strip_prefix(absolute)).unwrap_or(file);
         Value::Text(relative.to_string_lossy().replace('\\', "/"))
     }
 
-    /// Adds a dropped file to the scene: a drawing becomes the first shape of the selected aurora, a mesh a burner of the selected flame,
-    /// a picture the plate.
+    /// Adds a dropped file to the scene: to the selected phenomenon where an editor or a [`MeshImport`](bansho::base::phenomenon::editor_hints::MeshImport) of its kind takes the file, and a
+    /// picture as the plate.
     pub(super) fn drop_file(&mut self, file: &Path, selection: &Selection) {
-        let ending = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        let is_one_of = |endings: &[&str]| endings.contains(&ending.as_str());
-        // It may be another file of a name that was read before.
+        let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        // A file of the same name may have been read before.
         self.reload_assets();
         self.document.end_step();
-        if is_one_of(&DRAWINGS) {
-            self.trace_drawing(file, selection.index_of(KIND_WITH_SHAPES));
-        } else if is_one_of(&MESHES) {
-            self.add_mesh_burner(file, selection.index_of(KIND_WITH_BURNERS));
-        } else if is_one_of(&PICTURES) {
-            let place = ValuePath::root().key("plate").key("image");
-            self.edit("plate", &[Operation::Set { place, value: self.named(file) }]);
+        let name = self.relative_name(file);
+        if editors::import_file(self, selection, &extension, name.clone()) {
+            return;
+        }
+        if MESHES.contains(&extension.as_str()) {
+            self.add_mesh(selection, name);
+        } else if PICTURES.contains(&extension.as_str()) {
+            let parameter = ValuePath::root().key("plate").key("image");
+            self.edit("plate", &[Operation::Set { place: parameter, value: name }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
-            let reason =
-                "scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) are taken";
+            let reason = "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) can be added";
             self.set_notice(Some(format!("{name}: {reason}")));
         }
     }
 
-    fn trace_drawing(&mut self, file: &Path, index: usize) {
-        let drawing = AuroraDrawing::read(self.document.values(), index, self.assets());
-        let traced = drawing.map(|drawing| drawing.trace(self.named(file)));
-        if let Err(reason) = traced.and_then(|traced| self.edit_shapes("drawing", &traced, index)) {
-            self.set_notice(Some(reason.to_string()));
-        }
-    }
-
-    fn add_mesh_burner(&mut self, file: &Path, index: usize) {
-        let flame = ValuePath::root().key(KIND_WITH_BURNERS).index(index);
-        if flame.find(self.document.values()).is_none() {
-            self.set_notice(Some("a mesh burns in a particle flame, which this scene lacks: add one first".into()));
+    /// Adds the mesh file that the scene calls `name` to the selected phenomenon, or to the first whose kind takes meshes.
+    fn add_mesh(&mut self, selection: &Selection, name: Value) {
+        let selected = selection.phenomenon().into_iter();
+        let first_of_kinds = KINDS.iter().map(|kind| PhenomenonId { kind: kind.key, index: 0 });
+        let import = |phenomenon: PhenomenonId| {
+            Some((phenomenon.path(), descriptors::phenomenon_kind(phenomenon.kind)?.editor_hints.mesh_import?))
+        };
+        let is_stated = |path: &ValuePath| path.find(self.document.values()).is_some();
+        let mut imports = selected.chain(first_of_kinds).filter_map(import);
+        let Some((path, import)) = imports.find(|(path, _)| is_stated(path)) else {
+            let kinds = KINDS.iter().filter(|kind| kind.editor_hints.mesh_import.is_some()).map(|kind| kind.key);
+            let kinds = kinds.collect::<Vec<_>>().join(" or ");
+            self.set_notice(Some(format!("a mesh is added to a {kinds}, which this scene lacks: add one first")));
             return;
-        }
-        let mut burner = Table::default();
-        burner.push("shape", Value::Text("mesh".into()));
-        burner.push("file", self.named(file));
-        self.edit("mesh", &[Operation::Append { place: flame.key("burners"), value: Value::Table(burner) }]);
+        };
+        let mut item = Table::default();
+        item.push(import.shape_key, Value::Text(import.shape.into()));
+        item.push(import.file_key, name);
+        self.edit("mesh", &[Operation::Append { place: path.key(import.list), value: Value::Table(item) }]);
     }
 }

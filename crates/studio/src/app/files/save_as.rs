@@ -16,32 +16,32 @@ use bansho::{
 };
 
 use crate::{
-    document::{files, named_files},
+    document::{FileReference, files, named_files},
     session::{Session, folder},
 };
 
 /// Why a scene cannot be saved in another folder.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum SaveAsError {
-    /// A file that must lie beside the scene cannot be written.
+    /// A bundled file cannot be written beside the scene.
     #[error(transparent)]
     Media(#[from] MediaError),
-    /// Its paths lead elsewhere from there, and cannot be changed.
+    /// Relative paths must be adjusted, but the text cannot be edited.
     #[error(
-        "the scene names files, and their paths cannot be made right for another folder: {0}; mend the text, or undo first"
+        "the scene names files, and their paths cannot be adjusted to another folder: {0}; correct the text, or undo first"
     )]
     Edit(#[from] EditError),
 }
 
-/// The scene's text as it must be in the file `to`, where all paths of it lead to the same files. The scene itself stays as it is.
+/// The scene's text for the file `to`, with relative paths adjusted so that they name the same files. The document is not changed.
 ///
 /// # Errors
-/// A file that must lie beside the scene cannot be written, or a path must be changed in a text that is no TOML.
+/// A bundled file cannot be written beside the scene, or a path must be adjusted in a text that is not TOML.
 pub(super) fn with_moved_paths(session: &Session, to: &Path) -> Result<Arc<str>, SaveAsError> {
     let before = folder(session.path.as_deref()).to_path_buf();
     let after = folder(Some(to)).to_path_buf();
     let mut operations = Vec::new();
-    for (place, name) in named_files(session.document.values()) {
+    for FileReference { parameter, file: name } in named_files(session.document.values()) {
         if Path::new(&name).is_absolute() {
             continue;
         }
@@ -51,39 +51,40 @@ pub(super) fn with_moved_paths(session: &Session, to: &Path) -> Result<Arc<str>,
             None => path_from_new_folder(&name, &before, &after),
         };
         if new != name {
-            operations.push(Operation::Set { place, value: Value::Text(new) });
+            operations.push(Operation::Set { place: parameter, value: Value::Text(new) });
         }
     }
     let text = session.document.text();
     Ok(if operations.is_empty() { text.clone() } else { operation::apply(text, &operations)?.into() })
 }
 
-/// Writes `bytes` as `name` into `folder`, or under a free name where another file has that; what it is called there.
+/// Writes `bytes` as `name` into `folder`, or under a numbered name where another file has that name. Returns the name.
 fn write_bundled_file(name: &str, bytes: &[u8], folder: &Path) -> Result<String, MediaError> {
     let (stem, ending) = name.split_at(name.rfind('.').unwrap_or(name.len()));
-    let file = files::write_beside(|which| folder.join(format!("{stem}{which}{ending}")), bytes)?;
-    let own = file.strip_prefix(folder).unwrap_or(&file);
-    Ok(own.to_string_lossy().replace('\\', "/"))
+    let file = files::write_to_free_name(|suffix| folder.join(format!("{stem}{suffix}{ending}")), bytes)?;
+    let relative = file.strip_prefix(folder).unwrap_or(&file);
+    Ok(relative.to_string_lossy().replace('\\', "/"))
 }
 
-/// What a scene in `after` calls the file that one in `before` calls `name`; the same where there is no such file.
+/// The path from the folder `after` to the file `name` in the folder `before`; `name` itself where there is no such file.
 fn path_from_new_folder(name: &str, before: &Path, after: &Path) -> String {
     let old = before.join(name);
-    let whole = |folder: &Path| {
+    let absolute = |folder: &Path| {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        // The scene's new folder may have to be made yet.
+        // The new folder may not exist yet.
         folder.canonicalize().or_else(|_| std::path::absolute(folder)).ok()
     };
-    // The file itself may be one of many, by a pattern.
+    // The name may be a pattern of frame numbers, so only its folder is checked.
     let found =
         old.parent().zip(old.file_name()).filter(|(folder, _)| folder.as_os_str().is_empty() || folder.is_dir());
-    let Some((file, after)) = found.and_then(|(folder, file)| Some((whole(folder)?.join(file), whole(after)?))) else {
+    let Some((file, after)) = found.and_then(|(folder, file)| Some((absolute(folder)?.join(file), absolute(after)?)))
+    else {
         return name.to_owned();
     };
     relative_path(&file, &after).to_string_lossy().replace('\\', "/")
 }
 
-/// The way from `folder` to `file`, both whole; `file` itself where they share nothing but a root.
+/// The relative path from `folder` to `file`, which are absolute; `file` itself where only the root is common.
 fn relative_path(file: &Path, folder: &Path) -> PathBuf {
     let shared = file.components().zip(folder.components()).take_while(|(one, other)| one == other);
     let (shared, names) = shared
@@ -102,15 +103,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ways_lead_up_and_down_or_are_whole() {
-        let way = |file: &str, folder: &str| relative_path(Path::new(file), Path::new(folder));
-        assert_eq!(way("/a/b/c.png", "/a/b"), Path::new("c.png"));
-        assert_eq!(way("/a/plates/c.png", "/a/b/d"), Path::new("../../plates/c.png"));
-        assert_eq!(way("/a/c.png", "/b"), Path::new("/a/c.png"));
+    fn relative_paths_go_up_and_down_or_are_absolute() {
+        let path = |file: &str, folder: &str| relative_path(Path::new(file), Path::new(folder));
+        assert_eq!(path("/a/b/c.png", "/a/b"), Path::new("c.png"));
+        assert_eq!(path("/a/plates/c.png", "/a/b/d"), Path::new("../../plates/c.png"));
+        assert_eq!(path("/a/c.png", "/b"), Path::new("/a/c.png"));
     }
 
     #[test]
-    fn what_is_write_bundled_file_spoils_no_other_file() {
+    fn bundled_files_replace_no_other_file() {
         let folder = tempfile::tempdir().unwrap();
         let lay = |bytes: &[u8]| write_bundled_file("plates/a.png", bytes, folder.path()).unwrap();
         assert_eq!([lay(b"one"), lay(b"one"), lay(b"two")], ["plates/a.png", "plates/a.png", "plates/a 2.png"]);

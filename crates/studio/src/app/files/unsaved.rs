@@ -24,19 +24,19 @@ const NAME: &str = "unsaved";
 
 /// The autosave of this session, and recovered work of others.
 pub(crate) struct UnsavedWork {
-    /// Work of a studio that did not end well.
+    /// Work of studios that crashed.
     pub(crate) recovered: Vec<RecoveredWork>,
-    /// Such work that is open again, to be forgotten once it is kept as this studio's own.
+    /// Recovered work that is open, to be discarded once it is saved as this studio's own.
     reopened: Vec<RecoveredWork>,
-    /// When something was kept last, s.
-    last_kept: f64,
-    /// What was kept last: a state of the document, and whether that was unsaved.
-    kept: Option<(Revision, bool)>,
+    /// The time of the last autosave, s.
+    last_saved_s: f64,
+    /// The last autosave: the revision of the document, and whether it was unsaved.
+    saved: Option<(Revision, bool)>,
     #[cfg(not(target_arch = "wasm32"))]
     autosave: Option<Autosave>,
-    /// Why nothing can be kept here, until the user was told.
+    /// Why autosave does not work, until the user was warned.
     #[cfg(not(target_arch = "wasm32"))]
-    untold: Option<String>,
+    pending_warning: Option<String>,
     #[cfg(target_arch = "wasm32")]
     tabs: BrowserTabs,
 }
@@ -46,92 +46,92 @@ impl UnsavedWork {
     pub(super) fn new(store: &SettingsStore) -> Self {
         let folder = store.file(NAME);
         let begun = folder.as_deref().map(|folder| Autosave::begin(folder, "studio")).transpose();
-        // Where nothing can be kept, the studio works without, and says so once there is something to keep.
-        let (autosave, untold) = match begun {
+        // Without autosave the studio warns once there is unsaved work.
+        let (autosave, pending_warning) = match begun {
             Ok(autosave) => (autosave, None),
             Err(error) => (None, Some(error.to_string())),
         };
         Self {
             recovered: folder.as_deref().map(autosave::recoverable).unwrap_or_default(),
             reopened: Vec::new(),
-            last_kept: 0.0,
-            kept: None,
+            last_saved_s: 0.0,
+            saved: None,
             autosave,
-            untold,
+            pending_warning,
         }
     }
 
     #[cfg(target_arch = "wasm32")]
     pub(super) fn new(store: &SettingsStore) -> Self {
         let tabs = BrowserTabs::begin(store.clone(), NAME);
-        Self { recovered: Vec::new(), reopened: Vec::new(), last_kept: 0.0, kept: None, tabs }
+        Self { recovered: Vec::new(), reopened: Vec::new(), last_saved_s: 0.0, saved: None, tabs }
     }
 
-    /// Keeps what changed, now and then; where nothing did, nothing is done and the window may rest.
+    /// Saves unsaved work at intervals if it changed; otherwise no repaint is requested.
     pub(super) fn poll_autosave(&mut self, ui: &Ui, session: &mut Session) {
         #[cfg(target_arch = "wasm32")]
-        self.recovered.extend(self.tabs.found(ui.ctx()));
+        self.recovered.extend(self.tabs.take_found(ui.ctx()));
         let at_once = std::mem::take(&mut session.autosave_now);
-        let present = (session.document.revision(), session.document.is_dirty());
-        if self.kept == Some(present) && !at_once {
+        let current = (session.document.revision(), session.document.is_dirty());
+        if self.saved == Some(current) && !at_once {
             return;
         }
-        let (now, held) = ui.input(|input| (input.time, input.pointer.any_down()));
-        let wait_s = self.last_kept + INTERVAL_S - now;
-        // What is under a hand may pass, as wind does that blows only while it is dragged.
-        if !at_once && present.1 && (held || wait_s > 0.0) {
+        let (now, is_down) = ui.input(|input| (input.time, input.pointer.any_down()));
+        let wait_s = self.last_saved_s + INTERVAL_S - now;
+        // A drag may be temporary, as that of the wind is.
+        if !at_once && current.1 && (is_down || wait_s > 0.0) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(wait_s.max(0.1)));
             return;
         }
-        self.last_kept = now;
-        if self.keep(session) {
-            self.reopened.drain(..).for_each(|reopened| forget(&reopened));
+        self.last_saved_s = now;
+        if self.save(session) {
+            self.reopened.drain(..).for_each(|reopened| discard(&reopened));
         }
-        // What cannot be kept is not tried again until it changes.
-        self.kept = Some(present);
+        // After an error, the next attempt is made after the next change.
+        self.saved = Some(current);
     }
 
-    /// Whether what is unsaved is kept now.
+    /// Saves unsaved work. Returns whether that succeeded.
     #[cfg(not(target_arch = "wasm32"))]
-    fn keep(&mut self, session: &mut Session) -> bool {
+    fn save(&mut self, session: &mut Session) -> bool {
         if session.document.is_dirty()
-            && let Some(reason) = self.untold.take()
+            && let Some(reason) = self.pending_warning.take()
         {
             session.set_notice(Some(format!("unsaved work is not kept here, so save it now and then: {reason}")));
         }
-        let kept = self.autosave.as_ref().map(|kept| kept.keep(&session.document, session.path.as_deref()));
-        if let Some(Err(error)) = &kept {
+        let saved = self.autosave.as_ref().map(|autosave| autosave.save(&session.document, session.path.as_deref()));
+        if let Some(Err(error)) = &saved {
             session.set_notice(Some(format!("unsaved work cannot be kept: {error}")));
         }
-        matches!(kept, Some(Ok(())))
+        matches!(saved, Some(Ok(())))
     }
 
-    /// Whether what is unsaved is kept now.
+    /// Saves unsaved work. Returns whether that succeeded.
     #[cfg(target_arch = "wasm32")]
-    fn keep(&mut self, session: &mut Session) -> bool {
+    fn save(&mut self, session: &mut Session) -> bool {
         let document = &session.document;
-        let work = document.is_dirty().then(|| autosave::kept(document.name(), document.text()));
-        let kept = self.tabs.keep(work.as_deref());
-        if !kept {
+        let work = document.is_dirty().then(|| autosave::encode(document.name(), document.text()));
+        let saved = self.tabs.store(work.as_deref());
+        if !saved {
             session.set_notice(Some("the browser keeps no unsaved work here; save it now and then".into()));
         }
-        kept
+        saved
     }
 
-    /// Keeps what was `recovered`, and is open again, as this studio's own work from now on.
+    /// Treats `recovered`, which was opened, as this studio's own work.
     pub(super) fn adopt(&mut self, recovered: RecoveredWork, session: &mut Session) {
         self.recovered.retain(|other| *other != recovered);
         self.reopened.push(recovered);
         session.autosave_now = true;
     }
 
-    /// Forgets work that is not wanted.
-    pub(crate) fn forget(&mut self, recovered: &RecoveredWork) {
-        forget(recovered);
+    /// Discards recovered work.
+    pub(crate) fn discard(&mut self, recovered: &RecoveredWork) {
+        discard(recovered);
         self.recovered.retain(|other| other != recovered);
     }
 
-    /// The window closed well.
+    /// Removes the autosave when the window closes.
     #[cfg(not(target_arch = "wasm32"))]
     pub(crate) fn end(&mut self) {
         if let Some(autosave) = self.autosave.take() {
@@ -139,17 +139,17 @@ impl UnsavedWork {
         }
     }
 
-    /// Pages end without being asked.
+    /// Web pages are closed without a call.
     #[cfg(target_arch = "wasm32")]
     pub(crate) fn end(&mut self) {}
 }
 
 #[cfg(not(target_arch = "wasm32"))]
-fn forget(recovered: &RecoveredWork) {
-    recovered.forget();
+fn discard(recovered: &RecoveredWork) {
+    recovered.discard();
 }
 
 #[cfg(target_arch = "wasm32")]
-fn forget(recovered: &RecoveredWork) {
-    SettingsStore::default().remove(&recovered.kept_in.to_string_lossy());
+fn discard(recovered: &RecoveredWork) {
+    SettingsStore::default().remove(&recovered.stored_as.to_string_lossy());
 }

@@ -9,7 +9,7 @@ use bansho::{
 
 use super::{
     Files,
-    browser_io::{self, BlobParts, Inbox},
+    browser_io::{self, BlobParts, Inbox, ReceivedFile},
     questions::PendingAction,
     report_end,
 };
@@ -21,9 +21,9 @@ use eframe::egui::{Context, Ui};
 
 /// The state of files in a page.
 pub(super) struct PlatformFiles {
-    /// Files that came by way of the browser.
+    /// Files that were chosen or dropped.
     inbox: Inbox,
-    /// The parameter that shall name the next file that arrives.
+    /// The parameter that is set to the next received file.
     relink: Option<ValuePath>,
     rendering: Option<Rendering>,
 }
@@ -54,9 +54,9 @@ impl Files {
         self.ask_for_file(ctx, session);
     }
 
-    /// Asks which file `place` shall name.
-    pub(in crate::app) fn ask_to_relink(&mut self, ctx: &Context, session: &mut Session, place: ValuePath) {
-        self.platform.relink = Some(place);
+    /// Asks which file `parameter` shall name.
+    pub(in crate::app) fn ask_to_relink(&mut self, ctx: &Context, session: &mut Session, parameter: ValuePath) {
+        self.platform.relink = Some(parameter);
         self.ask_for_file(ctx, session);
     }
 
@@ -66,15 +66,15 @@ impl Files {
         }
     }
 
-    /// Hands the scene to the browser, which saves it where it saves what it is given.
+    /// Downloads the scene.
     pub(in crate::app) fn save(&mut self, session: &mut Session) {
         self.save_and(session, None);
     }
 
-    /// Saves, and goes to `action` once that is done.
+    /// Downloads the scene, and then performs `action`.
     pub(super) fn save_and(&mut self, session: &mut Session, action: Option<PendingAction>) {
         let text = session.document.text().clone();
-        match browser_io::download(&format!("{}.toml", stem(session)), &BlobParts::of(text.as_bytes())) {
+        match browser_io::download(&format!("{}.toml", stem(session)), &BlobParts::new(text.as_bytes())) {
             Ok(()) => {
                 session.document.mark_saved(text);
                 action.into_iter().for_each(|action| self.proceed(session, action));
@@ -83,7 +83,7 @@ impl Files {
         }
     }
 
-    /// What the menu has for files of a page.
+    /// The entries of the file menu for a web page.
     pub(in crate::app) fn menu_ui(&mut self, ui: &mut Ui, session: &mut Session) {
         ui.separator();
         if ui.button("Render still").on_hover_text("The finished picture of this frame, as a PNG").clicked() {
@@ -94,20 +94,20 @@ impl Files {
         }
     }
 
-    /// Makes the present frame as `bansho render` does, to be saved once it is there.
+    /// Renders the current frame as `bansho render` does, and downloads it.
     pub(in crate::app) fn render_still(&mut self, ctx: &Context, session: &mut Session) {
         let number = session.transport.number();
         self.render(ctx, session, number, 1, None);
     }
 
-    /// Makes all frames as `bansho render` does, to be saved together once they are there.
+    /// Renders all frames as `bansho render` does, and downloads them as an archive.
     pub(in crate::app) fn render_shot(&mut self, ctx: &Context, session: &mut Session) {
         let frames = session.transport.frames();
         let total = (frames.end() - frames.start() + 1) as usize;
         self.render(ctx, session, *frames.start(), total, Some(ZipWriter::new(BlobParts::default())));
     }
 
-    /// Makes `total` frames from `first` on as `bansho render` does; those of a `shot` are saved together.
+    /// Renders `total` frames from `first` on as `bansho render` does. Those of a `shot` are collected in an archive.
     fn render(
         &mut self,
         ctx: &Context,
@@ -124,7 +124,7 @@ impl Files {
         }
         let ctx = ctx.clone();
         let Ok(mut player) = WorkerPlayer::start(move || ctx.request_repaint()) else {
-            session.set_notice(Some("the browser gives no worker to render in".into()));
+            session.set_notice(Some("the browser cannot start a worker for rendering".into()));
             return;
         };
         session.added_files().iter().for_each(|(name, bytes)| player.add_file(name, bytes));
@@ -134,12 +134,12 @@ impl Files {
             Some(Rendering { player, request, stem: stem(session).to_owned(), done: 0, total, shot });
     }
 
-    /// Frames that are rendered, and all; `None` where nothing is.
+    /// Number of frames rendered, and in total; `None` where nothing is rendered.
     pub(in crate::app) fn progress(&self) -> Option<[usize; 2]> {
         self.platform.rendering.as_ref().map(|rendering| [rendering.done, rendering.total])
     }
 
-    /// Stops what is rendered.
+    /// Stops rendering.
     pub(in crate::app) fn stop_rendering(&mut self) {
         self.platform.rendering = None;
     }
@@ -152,13 +152,12 @@ impl Files {
         }
     }
 
-    /// Handles files that arrived: a scene is opened, other files are added to the open scene.
+    /// Handles received files: a scene is opened, other files are added to the open scene.
     pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         self.poll_rendering(session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
-        dropped.into_iter().for_each(|file| browser_io::take_dropped(file, &self.platform.inbox, ui.ctx()));
-        let added_files = self.platform.inbox.take();
-        for (name, bytes) in added_files {
+        dropped.into_iter().for_each(|file| browser_io::receive_dropped(file, &self.platform.inbox, ui.ctx()));
+        for ReceivedFile { name, bytes } in self.platform.inbox.take() {
             if name.ends_with(".toml") {
                 match String::from_utf8(bytes) {
                     Ok(text) => self.open_text(session, &name, text, None),
@@ -168,7 +167,7 @@ impl Files {
             }
             session.add_file(&name, bytes);
             match self.platform.relink.take() {
-                Some(place) => session.relink(&place, Path::new(&name)),
+                Some(parameter) => session.relink(&parameter, Path::new(&name)),
                 None => session.drop_file(Path::new(&name), selection),
             }
         }
@@ -182,10 +181,12 @@ fn stem(session: &Session) -> &str {
 }
 
 impl Rendering {
-    /// Takes in what was finished and asks for what comes next; how it ended, once it has.
+    /// Collects finished frames and requests the next. Returns how rendering ended, once it has.
     fn poll(&mut self) -> Option<Result<String, JobFailure>> {
         self.player.poll().into_iter().find_map(|event| match event {
-            Event::FullQualityFrame { number, png } => self.take(number, &png).map_err(JobFailure::Failed).transpose(),
+            Event::FullQualityFrame { number, png } => {
+                self.add_frame(number, &png).map_err(JobFailure::Failed).transpose()
+            }
             Event::Checked { outcome: Err(error), .. } => {
                 Some(Err(JobFailure::Failed(format!("the scene has faults: {error}"))))
             }
@@ -195,11 +196,11 @@ impl Rendering {
         })
     }
 
-    /// Takes in the picture of frame `number`; what was saved, once that was the last.
-    fn take(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
+    /// Adds frame `number`. Returns a message once it was the last and the download has started.
+    fn add_frame(&mut self, number: i64, png: &[u8]) -> Result<Option<String>, String> {
         let name = naming::default_picture(&self.stem, number);
         self.done += 1;
-        let Some(shot) = &mut self.shot else { return save(&name, &BlobParts::of(png)).map(Some) };
+        let Some(shot) = &mut self.shot else { return save(&name, &BlobParts::new(png)).map(Some) };
         shot.add(&name, png).map_err(|error| error.to_string())?;
         if self.done < self.total {
             self.request.number = Some(number + 1);
@@ -211,7 +212,7 @@ impl Rendering {
     }
 }
 
-/// Hands a file to the browser; what the user is told.
+/// Downloads a file. Returns a message for the user.
 fn save(name: &str, parts: &BlobParts) -> Result<String, String> {
     match browser_io::download(name, parts) {
         Ok(()) => Ok(format!("rendered: {name}")),

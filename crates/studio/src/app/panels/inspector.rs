@@ -1,4 +1,4 @@
-//! The inspector: every parameter of the selected table, generated from the descriptors that parser, book and schema read too.
+//! The inspector: every parameter of the selected table, generated from the descriptors.
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
@@ -6,14 +6,12 @@ use bansho::{
 };
 
 use crate::{
-    app::{
-        viewport::handles::implies_one_item,
-        widgets::{
-            icon::{self, Icon},
-            value::{ValueEditor, initial_value},
-        },
+    app::widgets::{
+        icon::{self, Icon},
+        key_label,
+        value::{ValueEditor, initial_value},
     },
-    document::keyframes,
+    document::{keyframes, phenomena::implies_one_item},
     session::{Session, selection::Selection},
 };
 
@@ -26,10 +24,10 @@ pub(crate) struct Inspector {
 }
 
 impl Inspector {
-    /// Shows the parameters of `selection`: all, or those whose names or descriptions hold what is looked for.
+    /// Shows the parameters of `selection`: all, or those whose names or descriptions contain the search text.
     pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
         let Some(descriptor) = selection.descriptor() else { return };
-        let place = selection.place();
+        let path = selection.path();
         ui.heading(selection.title(&session.document));
         ui.weak(&descriptor.doc);
         ui.horizontal(|ui| {
@@ -38,15 +36,15 @@ impl Inspector {
             ui.add(field).labelled_by(label);
         });
         ui.separator();
-        if selection.index.is_some() && selection.place().find(session.document.values()).is_none() {
+        if selection.index.is_some() && selection.path().find(session.document.values()).is_none() {
             ui.label("It is not in the scene any more.");
             return;
         }
         let filter = SearchFilter::new(&self.filter);
-        if !filter.is_in(descriptor) {
+        if !filter.matches_table(descriptor) {
             ui.weak("Nothing here is called so.");
         }
-        table_ui(ui, session, &place, descriptor, &filter);
+        table_ui(ui, session, &path, descriptor, &filter);
     }
 }
 
@@ -58,38 +56,32 @@ impl SearchFilter {
         Self(text.trim().to_lowercase())
     }
 
-    fn is_everything(&self) -> bool {
+    fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// Whether a parameter, or any within it, matches.
-    fn is(&self, parameter: &Descriptor) -> bool {
-        let said = |text: &str| text.to_lowercase().contains(&self.0);
-        let within = match &parameter.kind {
-            Kind::Table(inner) => self.is_in(inner()),
-            Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.is_in(inner())),
+    fn matches(&self, parameter: &Descriptor) -> bool {
+        let contains = |text: &str| text.to_lowercase().contains(&self.0);
+        let inside = match &parameter.kind {
+            Kind::Table(inner) => self.matches_table(inner()),
+            Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.matches_table(inner())),
             _ => false,
         };
-        within || said(&words(parameter.key)) || said(&parameter.doc)
+        inside || contains(&key_label(parameter.key)) || contains(&parameter.doc)
     }
 
-    fn is_in(&self, table: &TableDescriptor) -> bool {
-        table.parameters.iter().any(|parameter| self.is(parameter))
+    fn matches_table(&self, table: &TableDescriptor) -> bool {
+        table.parameters.iter().any(|parameter| self.matches(parameter))
     }
 }
 
-fn table_ui(
-    ui: &mut Ui,
-    session: &mut Session,
-    place: &ValuePath,
-    descriptor: &TableDescriptor,
-    filter: &SearchFilter,
-) {
-    // Where the section itself matches, all of it is shown.
+fn table_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, descriptor: &TableDescriptor, filter: &SearchFilter) {
+    // A section that matches by its own name or description is shown as a whole.
     let all = SearchFilter(String::new());
-    let filter = if filter.is_in(descriptor) { filter } else { &all };
-    for parameter in descriptor.parameters.iter().filter(|parameter| filter.is(parameter)) {
-        let own = place.key(parameter.key);
+    let filter = if filter.matches_table(descriptor) { filter } else { &all };
+    for parameter in descriptor.parameters.iter().filter(|parameter| filter.matches(parameter)) {
+        let own = path.key(parameter.key);
         match &parameter.kind {
             Kind::Table(inner) => section_ui(ui, session, &own, parameter.key, inner(), filter),
             Kind::List { item, .. } => list_ui(ui, session, &own, parameter, item, filter),
@@ -99,20 +91,20 @@ fn table_ui(
 }
 
 /// A collapsing header that is open while searching.
-fn header(title: &str, place: &ValuePath, filter: &SearchFilter) -> CollapsingHeader {
-    CollapsingHeader::new(words(title)).id_salt(place).open((!filter.is_everything()).then_some(true))
+fn header(title: &str, path: &ValuePath, filter: &SearchFilter) -> CollapsingHeader {
+    CollapsingHeader::new(key_label(title)).id_salt(path).open((!filter.is_empty()).then_some(true))
 }
 
 fn section_ui(
     ui: &mut Ui,
     session: &mut Session,
-    place: &ValuePath,
+    path: &ValuePath,
     title: &str,
     descriptor: &TableDescriptor,
     filter: &SearchFilter,
 ) {
-    let shown = header(title, place, filter).show(ui, |ui| {
-        table_ui(ui, session, place, descriptor, filter);
+    let shown = header(title, path, filter).show(ui, |ui| {
+        table_ui(ui, session, path, descriptor, filter);
     });
     shown.header_response.on_hover_text(&descriptor.doc);
 }
@@ -121,60 +113,58 @@ fn section_ui(
 fn list_ui(
     ui: &mut Ui,
     session: &mut Session,
-    place: &ValuePath,
+    path: &ValuePath,
     parameter: &Descriptor,
     item: &Kind,
     filter: &SearchFilter,
 ) {
-    let shown = header(parameter.key, place, filter).show(ui, |ui| {
-        let stated = place.find(session.document.values()).map(|node| node.value.clone());
+    let shown = header(parameter.key, path, filter).show(ui, |ui| {
+        let stated = path.find(session.document.values()).map(|node| node.value.clone());
         let is_stated = stated.is_some();
         let items = match stated.or_else(|| parameter.default.clone()) {
             Some(Value::List(items)) => items,
             _ => Vec::new(),
         };
-        // An item of the default list can only be changed once the file states the list.
-        let state_list = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
+        // An item of a default list can only be changed after the scene states the list.
+        let state_list = Operation::Set { place: path.clone(), value: Value::List(items.clone()) };
         let before = if is_stated || items.is_empty() { Vec::new() } else { vec![state_list] };
-        if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(place), item) {
-            // A change to the implied item states it.
-            let implied = place.index(0);
+        if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(path), item) {
+            // Editing the implied item states it in the scene.
+            let implied = path.index(0);
             section_ui(ui, session, &implied, &format!("{implied}, as usual"), inner(), filter);
         }
         for (index, node) in items.iter().enumerate() {
-            list_item_ui(ui, session, &place.index(index), item, &node.value, filter, &before);
+            list_item_ui(ui, session, &path.index(index), item, &node.value, filter, &before);
         }
-        if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
-            let append = Operation::Append { place: place.clone(), value: initial_value(item) };
+        if ui.button(format!("Add to {}", key_label(parameter.key))).clicked() {
+            let append = Operation::Append { place: path.clone(), value: initial_value(item) };
             session.edit("add", &[before.as_slice(), &[append]].concat());
         }
     });
     shown.header_response.on_hover_text(&parameter.doc);
 }
 
-/// An item of a list; `before` must be applied before it can be changed.
+/// An item of a list. Every edit first applies the operations `before`, which state the list.
 fn list_item_ui(
     ui: &mut Ui,
     session: &mut Session,
-    place: &ValuePath,
+    path: &ValuePath,
     kind: &Kind,
     value: &Value,
     filter: &SearchFilter,
     before: &[Operation],
 ) {
     ui.horizontal(|ui| {
-        if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
-            session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
+        if icon::button_ui(ui, Icon::Cross, &format!("Remove {path}")).clicked() {
+            session.edit("remove", &[before, &[Operation::Remove { place: path.clone() }]].concat());
         }
         match kind {
-            Kind::Table(inner) => section_ui(ui, session, place, &place.to_string(), inner(), filter),
+            Kind::Table(inner) => section_ui(ui, session, path, &path.to_string(), inner(), filter),
             kind => {
-                let label = ui.label(place.to_string()).id;
+                let label = ui.label(path.to_string()).id;
                 if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).ui(ui, value) {
-                    session.edit(
-                        &place.to_string(),
-                        &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
-                    );
+                    session
+                        .edit(&path.to_string(), &[before, &[Operation::Set { place: path.clone(), value }]].concat());
                 }
             }
         }
@@ -182,13 +172,13 @@ fn list_item_ui(
 }
 
 /// One parameter: its name, its value at the current time, its keyframe button and its reset button.
-fn row_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor) {
-    let stated = place.find(session.document.values()).map(|node| node.value.clone());
+fn row_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, parameter: &Descriptor) {
+    let stated = path.find(session.document.values()).map(|node| node.value.clone());
     let time = session.transport.time_s();
-    let implied_value = session.implied_value(place).or_else(|| parameter.default.clone());
-    let present = stated.as_ref().or(implied_value.as_ref()).and_then(|value| keyframes::at(value, time));
-    let curve = matches!(parameter.kind, Kind::Curve { .. });
-    let name = RichText::new(words(parameter.key));
+    let implied_value = session.implied_value(path).or_else(|| parameter.default.clone());
+    let present = stated.as_ref().or(implied_value.as_ref()).and_then(|value| keyframes::evaluate_at(value, time));
+    let is_curve = matches!(parameter.kind, Kind::Curve { .. });
+    let name = RichText::new(key_label(parameter.key));
     let name = if stated.is_some() { name.strong() } else { name };
     ui.horizontal_wrapped(|ui| {
         let label = name_ui(ui, name).on_hover_text(help(parameter)).id;
@@ -196,25 +186,25 @@ fn row_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Des
             if ui.button("Set").labelled_by(label).clicked() {
                 session.edit(
                     parameter.key,
-                    &[Operation::Set { place: place.clone(), value: initial_value(&parameter.kind) }],
+                    &[Operation::Set { place: path.clone(), value: initial_value(&parameter.kind) }],
                 );
             }
             return;
         };
-        if curve {
-            reset_button_ui(ui, session, place, parameter, stated.is_some());
+        if is_curve {
+            reset_button_ui(ui, session, path, parameter, stated.is_some());
             ui.end_row();
         }
         let default = parameter.default.as_ref();
         let widget = ValueEditor { kind: &parameter.kind, unit: parameter.unit, label, default };
         if let Some(value) = widget.ui(ui, &present) {
-            session.set(parameter.key, place, value);
+            session.set(parameter.key, path, value);
         }
         if parameter.animatable() {
-            key_button_ui(ui, session, place, stated.as_ref(), present);
+            key_button_ui(ui, session, path, stated.as_ref(), present);
         }
-        if !curve {
-            reset_button_ui(ui, session, place, parameter, stated.is_some());
+        if !is_curve {
+            reset_button_ui(ui, session, path, parameter, stated.is_some());
         }
     });
 }
@@ -231,39 +221,34 @@ fn name_ui(ui: &mut Ui, name: RichText) -> Response {
     .inner
 }
 
-fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor, stated: bool) {
-    let name = format!("Default of {}", words(parameter.key));
-    if stated && icon::button(ui, Icon::Reset, &name).clicked() {
-        session.edit("default", &[Operation::Remove { place: place.clone() }]);
+fn reset_button_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, parameter: &Descriptor, stated: bool) {
+    let name = format!("Default of {}", key_label(parameter.key));
+    if stated && icon::button_ui(ui, Icon::Reset, &name).clicked() {
+        session.edit("default", &[Operation::Remove { place: path.clone() }]);
     }
 }
 
 /// A diamond that adds or removes the keyframe at the current time; filled where there is one.
-fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, stated: Option<&Value>, present: Value) {
+fn key_button_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, stated: Option<&Value>, present: Value) {
     let time = session.transport.time_s();
     let half = 0.5 * session.transport.frame_s();
-    let keys = stated.map(keyframes::keys).unwrap_or_default();
-    let here = keys.iter().map(|(own, _)| *own).find(|own| (own - time).abs() < half);
-    let (sign, doc) = match here {
-        Some(_) => (Icon::KeyHere, "Take out the key at this time"),
-        None if keys.is_empty() => (Icon::Key, "Key the value at this time"),
-        None => (Icon::Keyed, "Keyed; key the value at this time"),
+    let keys = stated.map(keyframes::keyframes).unwrap_or_default();
+    let here = keys.iter().map(|key| key.time_s).find(|key_s| (key_s - time).abs() < half);
+    let (icon, doc) = match here {
+        Some(_) => (Icon::KeyframeHere, "Take out the key at this time"),
+        None if keys.is_empty() => (Icon::Constant, "Key the value at this time"),
+        None => (Icon::Keyframed, "Keyed; key the value at this time"),
     };
-    if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
+    if icon::button_ui(ui, icon, &format!("{doc}: {path}")).clicked() {
         match here {
-            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: place.clone(), time }]),
-            None => session.key(place, present),
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: path.clone(), time }]),
+            None => session.set_keyframe(path, present),
         }
     }
 }
 
-/// What a parameter is, its unit and what it may be, as the book says it.
+/// The description of a parameter, its unit and the allowed values.
 fn help(parameter: &Descriptor) -> String {
     let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
     format!("{}{unit}\n\nAllowed: {}.", parameter.doc, parameter.kind.expectation())
-}
-
-/// A key in words.
-pub(crate) fn words(key: &str) -> String {
-    key.replace('_', " ")
 }

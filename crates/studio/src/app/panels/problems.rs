@@ -35,9 +35,9 @@ pub(crate) fn problems_ui(ui: &mut Ui, session: &Session) -> Option<ProblemActio
                         action = problem.span.clone().map(ProblemAction::ShowInText);
                     }
                     let missing = matches!(problem.kind, ProblemKind::Asset(_));
-                    if missing && ui.small_button("Relink").on_hover_text("Choose another file in its stead").clicked()
+                    if missing && ui.small_button("Relink").on_hover_text("Choose another file to replace it").clicked()
                     {
-                        action = Some(ProblemAction::Relink(place(&problem.path)));
+                        action = Some(ProblemAction::Relink(parse_path(&problem.path)));
                     }
                 });
             }
@@ -46,10 +46,10 @@ pub(crate) fn problems_ui(ui: &mut Ui, session: &Session) -> Option<ProblemActio
     action
 }
 
-/// The place that a problem's path names.
-fn place(path: &str) -> ValuePath {
-    path.split('.').fold(ValuePath::root(), |place, segment| match segment.parse() {
-        Ok(index) => place.index(index),
-        Err(_) => place.key(segment),
+/// The path of a problem's parameter, from its text.
+fn parse_path(path: &str) -> ValuePath {
+    path.split('.').fold(ValuePath::root(), |path, segment| match segment.parse() {
+        Ok(index) => path.index(index),
+        Err(_) => path.key(segment),
     })
 }

@@ -13,14 +13,14 @@ use crate::{
 
 use eframe::egui::{self, Ui};
 
-/// Shows the panel; `selection` is what is chosen.
+/// Shows the panel and updates `selection`.
 pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     ui.horizontal(|ui| {
         ui.heading("Scene");
         add_menu_ui(ui, session, selection);
     });
-    for listed in session.document.phenomena() {
-        ui.push_id((listed.kind, listed.index), |ui| phenomenon_ui(ui, session, selection, &listed));
+    for entry in session.document.phenomena() {
+        ui.push_id((entry.id.kind, entry.id.index), |ui| phenomenon_ui(ui, session, selection, &entry));
     }
     ui.separator();
     for shared in SHARED_TABLES.iter().filter(|table| !table.many) {
@@ -36,7 +36,7 @@ pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selec
             let response = row_ui(ui, selection, own.clone(), &format!("{} {}", shared.key, index + 1));
             response.context_menu(|ui| {
                 if ui.button("Remove").clicked() {
-                    session.edit("remove", &[Operation::Remove { place: own.place() }]);
+                    session.edit("remove", &[Operation::Remove { place: own.path() }]);
                     *selection = Selection::default();
                 }
             });
@@ -56,7 +56,7 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     ui.menu_button("Add", |ui| {
         for kind in KINDS {
             if ui.button(kind.key).on_hover_text((kind.table)().doc.as_str()).clicked() {
-                let index = session.document.phenomena().iter().filter(|listed| listed.kind == kind.key).count();
+                let index = session.document.phenomena().iter().filter(|entry| entry.id.kind == kind.key).count();
                 let add = operations::add(&session.document, kind.key);
                 session.edit("add", &add);
                 *selection = Selection { key: kind.key, index: Some(index) };
@@ -66,8 +66,8 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
         ui.separator();
         for shared in SHARED_TABLES.iter().filter(|table| table.many) {
             if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
-                let place = ValuePath::root().key(shared.key);
-                session.edit("add", &[Operation::Append { place, value: Value::Table(Table::default()) }]);
+                let path = ValuePath::root().key(shared.key);
+                session.edit("add", &[Operation::Append { place: path, value: Value::Table(Table::default()) }]);
                 ui.close();
             }
         }
@@ -76,55 +76,55 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     .on_hover_text("Add a phenomenon, a light or an obstacle");
 }
 
-fn phenomenon_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
-    let own = Selection { key: listed.kind, index: Some(listed.index) };
+fn phenomenon_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, entry: &PhenomenonEntry) {
+    let own = Selection::from(entry.id);
     ui.horizontal(|ui| {
-        let mut enabled = listed.enabled;
-        let name = format!("Draw {}", listed.name);
+        let mut enabled = entry.enabled;
+        let name = format!("Draw {}", entry.name);
         let shown = ui.checkbox(&mut enabled, "").on_hover_text(&name).accessible_name(name);
         if shown.changed() {
-            session.edit("hide", &[operations::set_enabled(listed, enabled)]);
+            session.edit("hide", &[operations::set_enabled(entry, enabled)]);
         }
-        let response = row_ui(ui, selection, own, &listed.name).on_hover_text(listed.kind);
-        response.context_menu(|ui| phenomenon_menu_ui(ui, session, selection, listed));
-        let solo = ui.small_button("S").on_hover_text(format!("Draw only {}, or all again", listed.name));
-        let solo = solo.accessible_name(format!("Solo {}", listed.name));
+        let response = row_ui(ui, selection, own, &entry.name).on_hover_text(entry.id.kind);
+        response.context_menu(|ui| phenomenon_menu_ui(ui, session, selection, entry));
+        let solo = ui.small_button("S").on_hover_text(format!("Draw only {}, or all again", entry.name));
+        let solo = solo.accessible_name(format!("Solo {}", entry.name));
         if solo.clicked() {
-            let change = operations::solo(&session.document, listed);
+            let change = operations::solo(&session.document, entry);
             session.edit("solo", &change);
         }
     });
 }
 
-fn phenomenon_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, listed: &PhenomenonEntry) {
-    rename_ui(ui, session, listed);
+fn phenomenon_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection, entry: &PhenomenonEntry) {
+    rename_ui(ui, session, entry);
     if ui.button("Duplicate").clicked() {
-        let copy = operations::duplicate(&session.document, listed);
+        let copy = operations::duplicate(&session.document, entry);
         session.edit("duplicate", &copy);
         ui.close();
     }
     if ui.button("Remove").clicked() {
-        session.edit("remove", &[Operation::Remove { place: listed.place() }]);
+        session.edit("remove", &[Operation::Remove { place: entry.id.path() }]);
         *selection = Selection::default();
         ui.close();
     }
 }
 
-/// A field for its name, applied when the field loses the focus: a partial name may equal another's.
-fn rename_ui(ui: &mut Ui, session: &mut Session, listed: &PhenomenonEntry) {
-    let kept = ui.scope_id().with("name");
-    let mut name = ui.data(|data| data.get_temp::<String>(kept)).unwrap_or_else(|| listed.name.clone());
+/// A field for the name. It is applied when the field loses the focus, since a partly typed name may equal that of another phenomenon.
+fn rename_ui(ui: &mut Ui, session: &mut Session, entry: &PhenomenonEntry) {
+    let draft_id = ui.scope_id().with("name");
+    let mut name = ui.data(|data| data.get_temp::<String>(draft_id)).unwrap_or_else(|| entry.name.clone());
     ui.horizontal(|ui| {
         let label = ui.label("Name").id;
         let field = ui.add(egui::TextEdit::singleline(&mut name).desired_width(120.0)).labelled_by(label);
         if field.changed() {
-            ui.data_mut(|data| data.insert_temp(kept, name.clone()));
+            ui.data_mut(|data| data.insert_temp(draft_id, name.clone()));
         }
         if field.lost_focus() {
-            ui.data_mut(|data| data.remove::<String>(kept));
-            if !name.trim().is_empty() && name != listed.name {
-                let place = listed.place().key("name");
-                session.edit("rename", &[Operation::Set { place, value: Value::Text(name.trim().to_owned()) }]);
+            ui.data_mut(|data| data.remove::<String>(draft_id));
+            if !name.trim().is_empty() && name != entry.name {
+                let path = entry.id.path().key("name");
+                session.edit("rename", &[Operation::Set { place: path, value: Value::Text(name.trim().to_owned()) }]);
                 ui.close();
             }
         }

@@ -11,9 +11,10 @@ use eframe::egui::{
 /// The panel with the text.
 #[derive(Default)]
 pub(crate) struct TextPanel {
+    /// The bytes to select in the next frame.
     jump: Option<Span>,
-    /// When something was typed last, s, and in which line.
-    typed: Option<(f64, usize)>,
+    /// The time of the last edit, s, and its line.
+    last_edit: Option<(f64, usize)>,
 }
 
 /// A longer pause in typing starts a new undo step, s.
@@ -25,7 +26,7 @@ impl TextPanel {
         self.jump = Some(span);
     }
 
-    /// Shows the text; what is typed is an edit like any other.
+    /// Shows the text. Typing is an undoable edit.
     pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session) {
         let heading = ui.heading("Text").id;
         let mut text = session.document.text().to_string();
@@ -34,17 +35,21 @@ impl TextPanel {
             let mut output = editor.show(ui);
             *output.response = egui::Response::clone(&output.response).labelled_by(heading);
             if let Some(span) = self.jump.take() {
-                let marked = marked(&text, &span);
-                output.state.cursor.set_char_range(Some(marked));
+                let range = char_range(&text, &span);
+                output.state.cursor.set_char_range(Some(range));
                 output.state.store(ui.ctx(), output.response.id);
                 output.response.request_focus();
-                let at = output.galley.pos_from_cursor(marked.primary).translate(output.galley_pos.to_vec2());
+                let at = output.galley.pos_from_cursor(range.primary).translate(output.galley_pos.to_vec2());
                 ui.scroll_to_rect(at, Some(egui::Align::Center));
             }
             if output.response.changed() {
                 let now = ui.input(|input| input.time);
                 let line = changed_line(session.document.text(), &text);
-                if self.typed.replace((now, line)).is_none_or(|(then, there)| now - then > PAUSE_S || line != there) {
+                if self
+                    .last_edit
+                    .replace((now, line))
+                    .is_none_or(|(last, last_line)| now - last > PAUSE_S || line != last_line)
+                {
                     session.document.end_step();
                 }
                 session.document.replace("typing", &text);
@@ -61,8 +66,8 @@ fn changed_line(before: &str, after: &str) -> usize {
     before.lines().zip(after.lines()).take_while(|(one, other)| one == other).count()
 }
 
-/// The characters that bytes of the text stand for.
-fn marked(text: &str, span: &Span) -> CCursorRange {
+/// The range of characters at a range of bytes of the text.
+fn char_range(text: &str, span: &Span) -> CCursorRange {
     let characters = |byte: usize| text.char_indices().take_while(|(at, _)| *at < byte).count();
     CCursorRange::two(CCursor::new(characters(span.start)), CCursor::new(characters(span.end)))
 }

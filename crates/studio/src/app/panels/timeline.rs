@@ -1,5 +1,6 @@
 //! The timeline: play, pause, step, scrub, the loop range, and keyframe marks.
 
+use bansho::base::parameters::Value;
 use eframe::egui::{self, Color32, CornerRadius, PointerButton, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use crate::{
@@ -19,18 +20,18 @@ pub(crate) fn timeline_ui(ui: &mut Ui, session: &mut Session) {
 
 fn transport_ui(ui: &mut Ui, session: &mut Session) {
     let transport = &mut session.transport;
-    let button = |ui: &mut Ui, icon: Icon, name: &str| icon::button(ui, icon, name).clicked();
+    let button = |ui: &mut Ui, icon: Icon, name: &str| icon::button_ui(ui, icon, name).clicked();
     if button(ui, Icon::First, "First frame") {
         transport.go_to(*transport.range().start());
     }
-    if button(ui, Icon::Back, "Frame back") {
+    if button(ui, Icon::StepBack, "Frame back") {
         transport.step(-1);
     }
-    let (sign, name) = if transport.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
-    if button(ui, sign, name) {
+    let (icon, name) = if transport.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
+    if button(ui, icon, name) {
         transport.set_playing(!transport.is_playing());
     }
-    if button(ui, Icon::On, "Frame on") {
+    if button(ui, Icon::StepForward, "Frame on") {
         transport.step(1);
     }
     let frames = transport.frames();
@@ -77,7 +78,7 @@ fn bar_ui(ui: &mut Ui, session: &mut Session) {
     let played = Rect::from_x_y_ranges(x_of(*range.start() as f64)..=x_of(*range.end() as f64), rect.y_range());
     painter.rect_filled(played, CornerRadius::same(2), visuals.widgets.inactive.bg_fill);
     let frame_s = session.transport.frame_s();
-    for time in key_times(session) {
+    for time in keyframe_times(session) {
         let at = pos2(x_of(first as f64 + time / frame_s), rect.center().y);
         painter.circle_filled(at, 3.0, Color32::from_rgb(235, 170, 60));
     }
@@ -88,18 +89,17 @@ fn bar_ui(ui: &mut Ui, session: &mut Session) {
     }
 }
 
-/// Times of every key in the scene, s.
-fn key_times(session: &Session) -> Vec<f64> {
-    use bansho::base::parameters::Value;
-    fn gather(value: &Value, times: &mut Vec<f64>) {
-        times.extend(keyframes::keys(value).into_iter().map(|(time, _)| time));
+/// Times of all keyframes in the scene, s.
+fn keyframe_times(session: &Session) -> Vec<f64> {
+    fn collect(value: &Value, times: &mut Vec<f64>) {
+        times.extend(keyframes::keyframes(value).into_iter().map(|key| key.time_s));
         match value {
-            Value::Table(table) => table.entries.iter().for_each(|entry| gather(&entry.node.value, times)),
-            Value::List(items) => items.iter().for_each(|item| gather(&item.value, times)),
+            Value::Table(table) => table.entries.iter().for_each(|entry| collect(&entry.node.value, times)),
+            Value::List(items) => items.iter().for_each(|item| collect(&item.value, times)),
             _ => {}
         }
     }
     let mut times = Vec::new();
-    session.document.values().entries.iter().for_each(|entry| gather(&entry.node.value, &mut times));
+    session.document.values().entries.iter().for_each(|entry| collect(&entry.node.value, &mut times));
     times
 }

@@ -1,4 +1,4 @@
-//! From an empty sky to a saved scene that splits, as a newcomer would go.
+//! The aurora editor: from an empty sky to a saved scene with a split.
 
 use eframe::egui::{Event, Modifiers, Pos2, Rect, Role, pos2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
@@ -10,12 +10,12 @@ fn plane(harness: &Harness<'_, Studio>, name: &str) -> Rect {
     harness.get_by_label(name).rect()
 }
 
-/// Shares of the plane, from its north-west corner.
+/// A position on the plane, as fractions of its size from the north-west corner.
 fn at(plane: Rect, x: f32, y: f32) -> Pos2 {
     pos2(plane.left() + x * plane.width(), plane.top() + y * plane.height())
 }
 
-/// Draws a line through shares of the target plane.
+/// Draws a line through positions on the target plane, as fractions of its size.
 fn stroke(harness: &mut Harness<'_, Studio>, line: &[[f32; 2]]) {
     let plane = plane(harness, "Aurora target");
     let place = |fraction: &[f32; 2]| at(plane, fraction[0], fraction[1]);
@@ -45,7 +45,7 @@ fn drawing(harness: &mut Harness<'_, Studio>) -> AuroraDrawing {
 }
 
 #[test]
-fn an_s_is_drawn_split_played_saved_and_opened_again() {
+fn an_s_shape_is_drawn_split_played_saved_and_reopened() {
     let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.5], [0.5, 0.45], [0.9, 0.5]]);
     assert_eq!(drawing(&mut harness).lines(0).len(), 1);
@@ -86,7 +86,7 @@ fn an_s_is_drawn_split_played_saved_and_opened_again() {
 }
 
 #[test]
-fn impossible_choices_are_refused_with_the_reason() {
+fn invalid_edits_are_refused_with_the_reason() {
     let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.5], [0.9, 0.5]]);
     let before = text(&mut harness);
@@ -174,15 +174,15 @@ fn sheets_and_points_are_linked_by_dragging() {
     assert!(text(&mut harness).contains("link = [{ from = 1, to = 2 }]"), "{}", text(&mut harness));
     link(&mut harness, at(source, 0.5, 0.4), at(target, 0.5, 0.4));
     link(&mut harness, at(target, 0.3, 0.4), at(target, 0.5, 0.4));
-    let linked = drawing(&mut harness).linked(1);
+    let linked = drawing(&mut harness).linked_points(1);
     assert_eq!(linked.len(), 1, "{}", text(&mut harness));
     assert!(text(&mut harness).contains("to = 1, from_length_fraction = 0.2"), "{}", text(&mut harness));
     click(&mut harness, at(target, 0.5, 0.4));
-    assert!(drawing(&mut harness).linked(1).is_empty(), "{}", text(&mut harness));
+    assert!(drawing(&mut harness).linked_points(1).is_empty(), "{}", text(&mut harness));
 }
 
 #[test]
-fn energy_is_painted_and_taken_away_with_shift() {
+fn energy_is_raised_and_with_shift_lowered() {
     let mut harness = window(&sky(4, ""));
     stroke(&mut harness, &[[0.1, 0.5], [0.9, 0.5]]);
     choose(&mut harness, "Ray energy");
@@ -205,7 +205,7 @@ fn energy_is_painted_and_taken_away_with_shift() {
 }
 
 #[test]
-fn shapes_are_made_of_templates_retimed_and_removed() {
+fn shapes_are_created_from_templates_retimed_and_removed() {
     let mut harness = window(&sky(60, ""));
     choose(&mut harness, "Template");
     choose(&mut harness, "spiral");

@@ -1,4 +1,4 @@
-//! Files as a person chooses them: by the questions of the window, and by dropping them on it.
+//! Opening and saving files in dialogs, and dropping files on the window.
 
 use std::{
     fs,
@@ -12,7 +12,7 @@ use egui_kittest::{Harness, kittest::Queryable};
 use super::{super::Studio, SCENE, drawn, sky, text, window};
 use crate::editors::aurora::document::AuroraDrawing;
 
-/// Types `path` as the name that the window asks for, and answers with `button`.
+/// Types `path` in the open dialog and clicks `button`.
 pub(super) fn answer(harness: &mut Harness<'_, Studio>, path: &Path, button: &str) {
     harness.get_by_role_and_label(Role::TextInput, "Name").focus();
     harness.run_steps(2);
@@ -22,9 +22,9 @@ pub(super) fn answer(harness: &mut Harness<'_, Studio>, path: &Path, button: &st
     confirm(harness, button);
 }
 
-/// Answers a question with `button`, which something else may be called too.
+/// Clicks `button` of the open dialog; other widgets may have the same label.
 pub(super) fn confirm(harness: &mut Harness<'_, Studio>, button: &str) {
-    // A question finds its place in the first frames.
+    // A dialog is positioned in its first frames.
     harness.run_steps(3);
     harness.get_all_by_label(button).last().expect("the answer").click();
     drawn(harness);
@@ -42,7 +42,7 @@ pub(super) fn save(harness: &mut Harness<'_, Studio>) {
     harness.run_steps(3);
 }
 
-/// Chooses from the menus, one after the other.
+/// Clicks menu entries one after another.
 fn menu(harness: &mut Harness<'_, Studio>, choices: &[&str]) {
     for choice in choices {
         harness.get_by_label(choice).click();
@@ -81,8 +81,8 @@ fn drop_on(harness: &mut Harness<'_, Studio>, files: &[PathBuf]) {
     drawn(harness);
 }
 
-/// A plate, a mesh, drawings and scenes in a folder of their own.
-fn handles() -> tempfile::TempDir {
+/// A folder with a plate, a mesh, drawings and scenes.
+fn asset_folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     fs::copy(scenes.join("plates/checkerboard.png"), folder.path().join("board.png")).unwrap();
@@ -96,9 +96,9 @@ fn handles() -> tempfile::TempDir {
 }
 
 #[test]
-fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
-    let handles = handles();
-    let file = |name: &str| handles.path().join(name);
+fn files_dropped_on_an_unsaved_scene_are_added_to_it() {
+    let folder = asset_folder();
+    let file = |name: &str| folder.path().join(name);
     let mut harness =
         window(&sky(2, "[[aurora]]\npreroll_s = 0.0\nparticles = { count = 300 }\nfield = { cells = 31 }\n"));
     drop_on(&mut harness, &[file("board.png")]);
@@ -123,16 +123,16 @@ fn files_dropped_on_a_scene_without_a_file_become_what_they_are() {
 
     drop_on(&mut harness, &[file("ring.glb")]);
     assert_eq!(text(&mut harness), before);
-    assert!(notice(&mut harness).contains("particle flame"), "{}", notice(&mut harness));
+    assert!(notice(&mut harness).contains("flame_particles"), "{}", notice(&mut harness));
     fs::write(file("words.doc"), "").unwrap();
     drop_on(&mut harness, &[file("words.doc")]);
     assert!(notice(&mut harness).starts_with("words.doc: "), "{}", notice(&mut harness));
 }
 
 #[test]
-fn a_mesh_that_is_dropped_burns_and_of_several_files_none_is_forgotten() {
-    let handles = handles();
-    let file = |name: &str| handles.path().join(name);
+fn a_dropped_mesh_becomes_a_burner_and_all_dropped_files_are_added() {
+    let folder = asset_folder();
+    let file = |name: &str| folder.path().join(name);
     let mut harness =
         window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
     drop_on(&mut harness, &[file("ring.glb"), file("board.png")]);
@@ -149,7 +149,7 @@ fn a_mesh_that_is_dropped_burns_and_of_several_files_none_is_forgotten() {
 }
 
 #[test]
-fn a_scene_is_saved_under_a_whole_name_and_never_over_another_unasked() {
+fn saving_appends_the_extension_and_asks_before_replacing_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut harness = window(SCENE);
     save(&mut harness);
@@ -170,7 +170,7 @@ fn a_scene_is_saved_under_a_whole_name_and_never_over_another_unasked() {
 }
 
 #[test]
-fn what_a_question_led_to_comes_after_the_scene_was_saved_under_a_new_name() {
+fn the_pending_action_follows_save_as() {
     let folder = tempfile::tempdir().unwrap();
     let other = folder.path().join("other.toml");
     fs::write(&other, "bansho = 2\n[[rain]]\n").unwrap();
@@ -186,7 +186,7 @@ fn what_a_question_led_to_comes_after_the_scene_was_saved_under_a_new_name() {
 }
 
 #[test]
-fn examples_that_are_saved_take_their_plates_with_them() {
+fn saved_examples_include_their_assets() {
     for example in ["rain over plate", "burning mesh"] {
         let folder = tempfile::tempdir().unwrap();
         let mut harness = window(SCENE);
@@ -204,18 +204,18 @@ fn examples_that_are_saved_take_their_plates_with_them() {
 }
 
 #[test]
-fn a_scene_that_is_saved_in_another_folder_names_the_same_files() {
-    let handles = handles();
+fn a_scene_saved_in_another_folder_refers_to_the_same_files() {
+    let folder = asset_folder();
     let scene = format!("{SCENE}[plate]\nimage = \"board.png\" # the ground\n");
-    fs::write(handles.path().join("scene.toml"), &scene).unwrap();
+    fs::write(folder.path().join("scene.toml"), &scene).unwrap();
     let mut harness = window("bansho = 2\n");
-    open(&mut harness, &handles.path().join("scene.toml"));
+    open(&mut harness, &folder.path().join("scene.toml"));
     menu(&mut harness, &["File", "Save as…"]);
-    answer(&mut harness, &handles.path().join("deep/er/scene.toml"), "Save");
-    let saved = fs::read_to_string(handles.path().join("deep/er/scene.toml")).unwrap();
+    answer(&mut harness, &folder.path().join("deep/er/scene.toml"), "Save");
+    let saved = fs::read_to_string(folder.path().join("deep/er/scene.toml")).unwrap();
     assert!(saved.contains("image = \"../../board.png\" # the ground"), "{saved}");
     assert!(harness.state_mut().session().document.error().is_none());
-    assert_eq!(fs::read_to_string(handles.path().join("scene.toml")).unwrap(), scene, "the first one stays");
+    assert_eq!(fs::read_to_string(folder.path().join("scene.toml")).unwrap(), scene, "the first one stays");
 }
 
 #[test]
@@ -234,8 +234,8 @@ fn a_scene_that_cannot_be_saved_says_so_and_stays_unsaved() {
 
 #[test]
 fn a_scene_that_cannot_be_saved_elsewhere_keeps_its_paths() {
-    let handles = handles();
-    let file = |name: &str| handles.path().join(name);
+    let folder = asset_folder();
+    let file = |name: &str| folder.path().join(name);
     let scene = format!("{SCENE}[plate]\nimage = \"board.png\"\n");
     fs::write(file("scene.toml"), &scene).unwrap();
     let mut harness = window("bansho = 2\n");
@@ -257,7 +257,7 @@ fn a_scene_that_cannot_be_saved_elsewhere_keeps_its_paths() {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_is_not_written_over_unasked() {
+fn replacing_an_unreadable_file_asks_first() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     fs::write(&path, SCENE).unwrap();

@@ -1,4 +1,4 @@
-//! A machine too slow for the scene, in the shape of a player that says so: what is wished for, and what the window then shows.
+//! The session and the window with a fake player: which frames are requested, and how slow frames, drafts and panics are shown.
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 
@@ -12,14 +12,14 @@ use crate::{
     player::{Event, FrameRequest, Picture, Player},
 };
 
-/// What was wished for, and what is reported next.
+/// The requests, and the events that are reported next.
 #[derive(Default)]
 struct RequestSlot {
     requests: Vec<FrameRequest>,
     events: Vec<Event>,
 }
 
-/// A player that only does what its desk says.
+/// A fake player with scripted events.
 #[derive(Clone, Default)]
 struct Fake(Rc<RefCell<RequestSlot>>);
 
@@ -43,10 +43,10 @@ impl Player for Fake {
 
 impl Fake {
     fn last(&self) -> FrameRequest {
-        self.0.borrow().requests.last().expect("a wish").clone()
+        self.0.borrow().requests.last().expect("a request").clone()
     }
 
-    fn wished(&self) -> usize {
+    fn request_count(&self) -> usize {
         self.0.borrow().requests.len()
     }
 
@@ -56,7 +56,7 @@ impl Fake {
         self.0.borrow_mut().events.push(event);
     }
 
-    /// Fulfills the last wish: the scene is good, and its picture took so long, s.
+    /// Serves the last request: the scene is valid, and its picture took `draw_s`.
     fn process(&self, draw_s: f64) {
         let request = self.last();
         let nowhere: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
@@ -88,7 +88,7 @@ fn session() -> (Session, Fake) {
 }
 
 #[test]
-fn previews_shrink_while_something_is_dragged_slowly_and_are_whole_again_after() {
+fn previews_shrink_during_a_slow_drag() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     assert_eq!((fake.last().within, fake.last().number), (WINDOW, None));
@@ -101,15 +101,15 @@ fn previews_shrink_while_something_is_dragged_slowly_and_are_whole_again_after()
     }
     session.update(5.0, WINDOW, true);
     assert!(fake.last().within[0] <= 320, "{:?}", fake.last().within);
-    let wished = fake.wished();
+    let wished = fake.request_count();
     session.update(5.1, WINDOW, false);
-    assert_eq!((fake.last().within, fake.wished()), (WINDOW, wished + 1), "whole once nothing is dragged");
+    assert_eq!((fake.last().within, fake.request_count()), (WINDOW, wished + 1), "whole once nothing is dragged");
     session.update(5.2, WINDOW, false);
-    assert_eq!(fake.wished(), wished + 1, "nothing is wished for twice");
+    assert_eq!(fake.request_count(), wished + 1, "nothing is wished for twice");
 }
 
 #[test]
-fn drafts_are_wished_for_unless_the_exact_frame_is() {
+fn drafts_are_requested_unless_the_frame_must_be_exact() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     assert!(fake.last().draft && !fake.last().exact && !fake.last().full_quality);
@@ -125,7 +125,7 @@ fn drafts_are_wished_for_unless_the_exact_frame_is() {
 }
 
 #[test]
-fn late_news_of_a_document_that_was_open_before_is_none() {
+fn late_events_of_a_closed_document_are_ignored() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     fake.process(0.01);
@@ -153,21 +153,21 @@ fn late_news_of_a_document_that_was_open_before_is_none() {
 }
 
 #[test]
-fn what_was_broken_by_a_file_is_tried_again_with_another() {
+fn frames_that_panicked_are_drawn_again_with_a_new_file() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     let revision = session.document.revision();
     fake.panic(revision, 0);
     session.update(0.1, WINDOW, false);
     assert!(session.has_panicked());
-    let wished = fake.wished();
+    let wished = fake.request_count();
     session.reload_assets();
     session.update(0.2, WINDOW, false);
-    assert!(!session.has_panicked() && fake.wished() == wished + 1);
+    assert!(!session.has_panicked() && fake.request_count() == wished + 1);
 }
 
 #[test]
-fn a_frame_that_panicked_is_not_drawn_again_unless_asked_for_and_others_are() {
+fn a_frame_that_panicked_is_only_drawn_again_on_request() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     fake.process(0.01);
@@ -186,17 +186,17 @@ fn a_frame_that_panicked_is_not_drawn_again_unless_asked_for_and_others_are() {
         (wished, session.has_panicked())
     };
     assert_eq!([at(3), at(4)], [(true, true), (true, false)], "of one state");
-    let wished = fake.wished();
+    let wished = fake.request_count();
     session.transport.go_to(3);
     session.update(0.4, WINDOW, false);
-    assert!(session.has_panicked() && fake.wished() == wished);
+    assert!(session.has_panicked() && fake.request_count() == wished);
     session.retry();
     session.update(0.5, WINDOW, false);
     assert!(!session.has_panicked() && fake.last().number == Some(3));
 }
 
 #[test]
-fn a_scene_that_panics_while_it_is_checked_is_broken_at_every_frame() {
+fn a_panic_during_a_check_affects_all_frames() {
     let (mut session, fake) = session();
     session.update(0.0, WINDOW, false);
     fake.process(0.01);
@@ -205,14 +205,14 @@ fn a_scene_that_panics_while_it_is_checked_is_broken_at_every_frame() {
     session.update(0.2, WINDOW, false);
     fake.panic(session.document.revision(), 0);
     session.update(0.3, WINDOW, false);
-    let wished = fake.wished();
+    let wished = fake.request_count();
     session.transport.go_to(4);
     session.update(0.4, WINDOW, false);
-    assert!(session.has_panicked() && fake.wished() == wished);
+    assert!(session.has_panicked() && fake.request_count() == wished);
 }
 
 #[test]
-fn the_window_offers_to_draw_a_frame_once_more_that_panicked() {
+fn the_window_offers_to_retry_a_frame_that_panicked() {
     let (session, fake) = session();
     let revision = session.document.revision();
     let mut harness = Harness::builder()
@@ -223,15 +223,15 @@ fn the_window_offers_to_draw_a_frame_once_more_that_panicked() {
     fake.panic(revision, 0);
     harness.run_steps(2);
     harness.get_by_label_contains("a phenomenon panicked");
-    let wished = fake.wished();
+    let wished = fake.request_count();
     harness.get_by_label("Retry").click();
     harness.run_steps(2);
-    assert_eq!(fake.wished(), wished + 1);
+    assert_eq!(fake.request_count(), wished + 1);
     assert!(harness.query_by_label("Retry").is_none());
 }
 
 #[test]
-fn the_window_says_what_is_a_draft_or_a_live_state_and_draws_it_exactly_when_asked() {
+fn the_window_marks_drafts_and_live_states() {
     let (session, fake) = session();
     let mut harness = Harness::builder()
         .with_size(vec2(1200.0, 800.0))

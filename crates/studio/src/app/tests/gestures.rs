@@ -1,4 +1,4 @@
-//! What is one step of the history, and what hands must not do by accident.
+//! Undo steps, and accidental edits that must not happen.
 
 use eframe::egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, Role, TouchPhase, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
@@ -14,8 +14,8 @@ fn steps(harness: &mut Harness<'_, Studio>) -> Vec<String> {
     harness.state_mut().session().document.undo_labels().map(str::to_owned).collect()
 }
 
-/// Turns the wheel by one notch over the picture.
-fn notch(harness: &mut Harness<'_, Studio>, lines: f32) {
+/// Scrolls over the picture.
+fn scroll(harness: &mut Harness<'_, Studio>, lines: f32) {
     let middle = harness.get_by_label("Viewport").rect().center();
     harness.hover_at(middle);
     harness.step();
@@ -37,14 +37,14 @@ fn position(harness: &mut Harness<'_, Studio>) -> [f64; 3] {
 }
 
 #[test]
-fn a_notch_of_the_wheel_comes_nearer_in_one_step() {
+fn scrolling_dollies_in_one_step() {
     let mut harness = window(SCENE);
     let before = position(&mut harness);
-    notch(&mut harness, 1.0);
+    scroll(&mut harness, 1.0);
     assert!(position(&mut harness)[2] < 0.95 * before[2], "{:?}", position(&mut harness));
     assert_eq!(steps(&mut harness), ["camera"]);
     harness.run_steps(60);
-    notch(&mut harness, -1.0);
+    scroll(&mut harness, -1.0);
     assert_eq!(steps(&mut harness), ["camera"; 2], "later turns are another step");
     undo(&mut harness);
     undo(&mut harness);
@@ -63,7 +63,7 @@ fn the_picture_is_panned_with_shift() {
 }
 
 #[test]
-fn an_aurora_alone_is_seen_as_before_once_hands_turn_the_camera() {
+fn turning_the_default_camera_of_an_aurora_keeps_its_view() {
     let mut harness = window(&sky(2, ""));
     let seen = |harness: &mut Harness<'_, Studio>| {
         let camera = harness.state_mut().session().plan().unwrap().scene().camera.clone();
@@ -91,7 +91,7 @@ fn an_aurora_alone_is_seen_as_before_once_hands_turn_the_camera() {
 }
 
 #[test]
-fn an_aurora_alone_whose_camera_is_keyed_stays_in_sight() {
+fn keyframing_the_default_camera_of_an_aurora_keeps_its_view() {
     let mut harness = window(&sky(2, ""));
     harness.get_by_role_and_label(Role::Button, "camera").click();
     harness.run_steps(3);
@@ -102,13 +102,13 @@ fn an_aurora_alone_whose_camera_is_keyed_stays_in_sight() {
 }
 
 #[test]
-fn a_curve_that_is_held_still_stays_as_it_is() {
+fn a_press_without_a_drag_changes_no_curve() {
     let mut harness = window(SCENE);
     harness.get_by_label("Curves").click();
     harness.run_steps(6);
     let chart = harness.get_by_role_and_label(Role::Canvas, "B(s)  blue").rect().shrink(4.0);
     let curve = highest(&mut harness);
-    // The chart ends a quarter above its highest point.
+    // The chart's maximum is a quarter above its highest point.
     let at = chart.left_bottom() + vec2(curve.0 * chart.width(), -0.8 * chart.height());
     press(&mut harness, at);
     harness.hover_at(at - vec2(0.0, 0.1 * chart.height()));
@@ -124,7 +124,7 @@ fn a_curve_that_is_held_still_stays_as_it_is() {
     assert_eq!(text(&mut harness), SCENE);
 }
 
-/// The highest point of the flame's blue.
+/// The highest point of the flame's blue curve.
 fn highest(harness: &mut Harness<'_, Studio>) -> (f32, f32) {
     use bansho::base::parameters::{Parameters, Reader, Value};
     use bansho::fire::sheet::FlameSheetParameters;
@@ -139,7 +139,7 @@ fn highest(harness: &mut Harness<'_, Studio>) -> (f32, f32) {
 }
 
 #[test]
-fn rising_curves_are_never_dragged_into_a_fault() {
+fn rising_curves_stay_valid() {
     let mut harness = window(SCENE);
     harness.get_by_label("Curves").click();
     harness.run_steps(6);
@@ -154,7 +154,7 @@ fn rising_curves_are_never_dragged_into_a_fault() {
 }
 
 #[test]
-fn a_recording_does_not_begin_again_over_its_own_keys() {
+fn a_recording_does_not_loop() {
     let short = SCENE.replace("frames = 10", "frames = 6");
     let mut harness = window(&short);
     for choice in ["Blow", "Record"] {
@@ -177,7 +177,7 @@ fn a_recording_does_not_begin_again_over_its_own_keys() {
 }
 
 #[test]
-fn saving_while_a_hand_blows_saves_no_passing_wind() {
+fn saving_during_a_wind_drag_saves_no_temporary_wind() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     let mut harness = window(SCENE);
@@ -242,7 +242,7 @@ fn retiming_a_shape_that_counts_frames_is_one_step() {
 }
 
 #[test]
-fn typing_is_taken_back_line_by_line_and_after_a_rest() {
+fn typing_is_undone_by_line_and_pause() {
     let mut harness = window(SCENE);
     harness.key_press(Key::F2);
     harness.run_steps(3);
@@ -298,9 +298,9 @@ fn the_edit_menu_undoes_redoes_and_goes_back_several_steps() {
 }
 
 #[test]
-fn shapes_stay_under_the_hand_that_drags_them_in_time() {
+fn shapes_stay_under_the_pointer_that_drags_them_in_time() {
     let arc = "[[aurora.shapes]]\nsheets = [{ form = \"arc\" }]\n";
-    // The last of them comes after the shot, so that the line of time ends with it.
+    // The last shape is after the end of the shot, so that the timeline ends with it.
     let mut harness = window(&sky(31, &format!("{arc}{arc}transition_s = 0.4\n{arc}transition_s = 3.6\n")));
     let at = |harness: &Harness<'_, Studio>, shape: &str| harness.get_by_label(shape).rect().center().x;
     let arrivals = |harness: &mut Harness<'_, Studio>| {
@@ -310,12 +310,12 @@ fn shapes_stay_under_the_hand_that_drags_them_in_time() {
                 .unwrap();
         drawing.arrivals().to_vec()
     };
-    // Once chosen it has its time beside the line, which is shorter then.
+    // Once selected, its time is shown beside the timeline, which is shorter then.
     harness.get_by_label("Shape 3").click();
     drawn(&mut harness);
     let (first, last) = (at(&harness, "Shape 1"), at(&harness, "Shape 3"));
     let end_s = arrivals(&mut harness)[2];
-    // Held one and a half pixels away from its middle it goes to three quarters of the line, by less than a pixel at a time.
+    // Grabbed 1.5 pixels off its center, it is dragged to three quarters of the timeline, by less than a pixel per frame.
     let handle = harness.get_by_label("Shape 3").rect().center();
     let by = 0.25 * (first - last);
     press(&mut harness, handle + vec2(1.5, 0.0));

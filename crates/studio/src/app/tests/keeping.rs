@@ -1,4 +1,4 @@
-//! Work is never lost without a question: closing, crashes, panics, other programs, and files dropped on the window.
+//! Unsaved work is not lost: closing, crashes, panics, other programs, and dropped files.
 
 use std::{
     fs,
@@ -11,13 +11,13 @@ use std::{
 use eframe::egui::{Key, Role, Theme, ViewportCommand, ViewportEvent, ViewportId, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
-use super::{super::Studio, PATIENCE, SCENE, Session, assets, choosing, drag, drawn, text, window};
+use super::{super::Studio, SCENE, Session, TIMEOUT, assets, choosing, drag, drawn, text, window};
 use crate::{
     document::{Document, files::autosave::Autosave},
-    player::{PolledPlayer, ThreadPlayer, tests::PanickedFrames},
+    player::{PolledPlayer, ThreadPlayer, tests::PanickingAssets},
 };
 
-/// A window on a scene that lies in `folder`.
+/// A window with a scene in a file in `folder`.
 fn window_on_file(folder: &Path, scene: &str) -> (Harness<'static, Studio>, PathBuf) {
     let path = folder.join("scene.toml");
     fs::write(&path, scene).unwrap();
@@ -32,17 +32,17 @@ fn edit(harness: &mut Harness<'_, Studio>, from: &str, to: &str) {
     drawn(harness);
 }
 
-/// Lets the window work until `done`.
+/// Runs frames of the window until `done`.
 fn until(harness: &mut Harness<'_, Studio>, what: &str, done: impl Fn(&mut Harness<'_, Studio>) -> bool) {
     let began = Instant::now();
     while !done(harness) {
         harness.step();
         thread::sleep(Duration::from_millis(10));
-        assert!(began.elapsed() < PATIENCE, "{what}");
+        assert!(began.elapsed() < TIMEOUT, "{what}");
     }
 }
 
-/// Asks the window to close, as the cross in its corner does.
+/// Requests the window to close, as its close button does.
 fn close(harness: &mut Harness<'_, Studio>) {
     harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.push(ViewportEvent::Close);
     harness.step();
@@ -75,7 +75,7 @@ fn closing_with_unsaved_work_asks() {
 }
 
 #[test]
-fn work_is_left_where_that_is_said() {
+fn unsaved_work_is_discarded_on_request() {
     let folder = tempfile::tempdir().unwrap();
     let (mut harness, path) = window_on_file(folder.path(), SCENE);
     edit(&mut harness, "height = 0.9", "height = 1.7");
@@ -87,7 +87,7 @@ fn work_is_left_where_that_is_said() {
 }
 
 #[test]
-fn what_is_decided_later_is_not_decided_by_saving() {
+fn a_postponed_decision_about_an_external_change_stays_open() {
     let folder = tempfile::tempdir().unwrap();
     let (mut harness, path) = window_on_file(folder.path(), SCENE);
     thread::sleep(Duration::from_millis(300));
@@ -105,7 +105,7 @@ fn what_is_decided_later_is_not_decided_by_saving() {
 }
 
 #[test]
-fn a_file_that_is_taken_away_counts_as_unsaved_until_it_is_written_anew() {
+fn a_scene_whose_file_was_deleted_is_unsaved() {
     let folder = tempfile::tempdir().unwrap();
     let (mut harness, path) = window_on_file(folder.path(), SCENE);
     thread::sleep(Duration::from_millis(300));
@@ -118,10 +118,10 @@ fn a_file_that_is_taken_away_counts_as_unsaved_until_it_is_written_anew() {
 }
 
 #[test]
-fn what_other_programs_write_is_taken_or_asked_about() {
+fn external_changes_are_loaded_or_asked_about() {
     let folder = tempfile::tempdir().unwrap();
     let (mut harness, path) = window_on_file(folder.path(), SCENE);
-    // The watch begins with the window's first look.
+    // The file is watched from the first frame on.
     thread::sleep(Duration::from_millis(300));
     fs::write(&path, SCENE.replace("height = 0.9", "height = 1.25")).unwrap();
     until(&mut harness, "an outside edit is taken", |harness| text(harness).contains("height = 1.25"));
@@ -136,26 +136,26 @@ fn what_other_programs_write_is_taken_or_asked_about() {
     assert!(text(&mut harness).contains("height = 1.5"), "and can be taken back");
 }
 
-/// A home in which a studio kept a fire of that height, and crashed.
+/// A settings folder with the autosave of a crashed studio, whose fire has that height.
 fn crashed(height: &str) -> tempfile::TempDir {
     let home = tempfile::tempdir().unwrap();
     let kept = Autosave::begin(&home.path().join("unsaved"), "studio").unwrap();
     let mut document = Document::new("fire.toml", SCENE);
     document.replace("typing", &SCENE.replace("height = 0.9", &format!("height = {height}")));
-    kept.keep(&document, None).unwrap();
-    // Dropped without its end.
+    kept.save(&document, None).unwrap();
+    // Dropped without `end`, as by a crash.
     home
 }
 
-/// All texts that studios keep in `home`.
-fn kept_in(home: &Path) -> String {
+/// The text of all autosaves in `home`.
+fn autosaves_in(home: &Path) -> String {
     let entries = fs::read_dir(home.join("unsaved")).unwrap().map(|entry| entry.unwrap().path());
     let scenes = entries.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     scenes.map(|path| fs::read_to_string(path).unwrap()).collect()
 }
 
 #[test]
-fn recovering_asks_before_it_loses_work_and_keeps_what_it_opens() {
+fn recovering_asks_about_unsaved_work_and_autosaves_what_it_opens() {
     let home = crashed("3.5");
     let mut harness = window_at_home(home.path());
     edit(&mut harness, "height = 0.9", "height = 1.25");
@@ -169,16 +169,20 @@ fn recovering_asks_before_it_loses_work_and_keeps_what_it_opens() {
     harness.get_by_label("There is unsaved work.");
     assert!(text(&mut harness).contains("height = 1.25"));
     choosing::confirm(&mut harness, "Cancel");
-    assert!(text(&mut harness).contains("height = 1.25") && kept_in(home.path()).contains("height = 3.5"));
+    assert!(text(&mut harness).contains("height = 1.25") && autosaves_in(home.path()).contains("height = 3.5"));
     recover(&mut harness);
     choosing::confirm(&mut harness, "Leave it");
     assert!(text(&mut harness).contains("height = 3.5"));
-    assert_eq!(kept_in(home.path()).matches("height = 3.5").count(), 1, "as this studio's own work, and only once");
+    assert_eq!(
+        autosaves_in(home.path()).matches("height = 3.5").count(),
+        1,
+        "as this studio's own work, and only once"
+    );
     assert!(harness.query_by_label("Recover").is_none());
 }
 
 #[test]
-fn recovered_work_that_is_not_wanted_is_forgotten() {
+fn unwanted_recovered_work_is_discarded() {
     let home = crashed("3.5");
     let mut harness = window_at_home(home.path());
     harness.get_by_label("Recover").click();
@@ -186,11 +190,11 @@ fn recovered_work_that_is_not_wanted_is_forgotten() {
     harness.get_by_label("Not wanted: a scene never saved").click();
     drawn(&mut harness);
     assert_eq!(text(&mut harness), SCENE);
-    assert!(harness.query_by_label("Recover").is_none() && !kept_in(home.path()).contains("height"));
+    assert!(harness.query_by_label("Recover").is_none() && !autosaves_in(home.path()).contains("height"));
 }
 
 #[test]
-fn a_window_with_unsaved_work_rests_once_that_is_kept() {
+fn no_repaint_is_requested_after_the_autosave() {
     let home = tempfile::tempdir().unwrap();
     let mut harness = window_at_home(home.path());
     edit(&mut harness, "height = 0.9", "height = 1.25");
@@ -198,32 +202,32 @@ fn a_window_with_unsaved_work_rests_once_that_is_kept() {
         let delay = harness.output().viewport_output.get(&ViewportId::ROOT).map(|output| output.repaint_delay);
         delay == Some(Duration::MAX)
     };
-    // It waits to keep the work, and then for nothing.
+    // It waits for the autosave, and then requests no repaint.
     let mut repaints = 0;
     while !rests(&harness) {
         harness.step();
         repaints += 1;
         assert!(repaints < 10_000, "it never rests");
     }
-    assert!(kept_in(home.path()).contains("height = 1.25"));
+    assert!(autosaves_in(home.path()).contains("height = 1.25"));
     let kept: Vec<_> = fs::read_dir(home.path().join("unsaved")).unwrap().map(|entry| entry.unwrap().path()).collect();
     kept.iter().for_each(|path| fs::remove_file(path).unwrap());
-    // Ten seconds go by, in which something else moves.
+    // Ten seconds pass with repaints.
     for _ in 0..600 {
         harness.step();
     }
-    assert!(rests(&harness) && kept_in(home.path()).is_empty(), "what did not change is not written again");
+    assert!(rests(&harness) && autosaves_in(home.path()).is_empty(), "what did not change is not written again");
     edit(&mut harness, "height = 1.25", "height = 1.75");
     for _ in 0..400 {
         harness.step();
     }
-    assert!(kept_in(home.path()).contains("height = 1.75"));
+    assert!(autosaves_in(home.path()).contains("height = 1.75"));
 }
 
 #[test]
-fn a_studio_that_can_keep_nothing_says_so_once() {
+fn a_studio_without_autosave_warns_once() {
     let home = tempfile::tempdir().unwrap();
-    // Where the folder for unsaved work should be.
+    // A file in place of the folder for autosaves.
     fs::write(home.path().join("unsaved"), "").unwrap();
     let mut harness = window_at_home(home.path());
     let told =
@@ -240,7 +244,7 @@ fn a_studio_that_can_keep_nothing_says_so_once() {
 }
 
 #[test]
-fn work_of_a_studio_that_crashed_is_offered() {
+fn work_of_a_crashed_studio_is_offered() {
     let home = crashed("3.5");
     let session = Session::new(Document::new("scene", "bansho = 2\n"), None, Box::<PolledPlayer>::default(), assets);
     let studio = Studio::new(session, Some(home.path().to_path_buf()));
@@ -256,13 +260,13 @@ fn work_of_a_studio_that_crashed_is_offered() {
 }
 
 #[test]
-fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
+fn a_panic_is_reported_and_a_copy_of_the_scene_saved() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     fs::write(&path, SCENE).unwrap();
     let player = ThreadPlayer::start(|| {}).unwrap();
     let session =
-        Session::new(Document::new("scene.toml", SCENE), Some(path), Box::new(player), |_| Arc::new(PanickedFrames));
+        Session::new(Document::new("scene.toml", SCENE), Some(path), Box::new(player), |_| Arc::new(PanickingAssets));
     let mut harness = Harness::builder()
         .with_max_steps(64)
         .build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), Studio::new(session, None));
@@ -276,7 +280,7 @@ fn a_panic_is_told_and_the_scene_saved_beside_the_original() {
     assert!(harness.state_mut().session().picture().is_some(), "the last good picture stays");
     harness.get_by_label("Play").click();
     harness.run_steps(5);
-    // It plays, and so is never done drawing.
+    // While playing, drawing does not end.
     let number = |harness: &mut Harness<'_, Studio>| harness.state_mut().session().picture().map(|(own, _)| own.number);
     let (last, mended) = (number(&mut harness), text(&mut harness).replace("[plate]\nimage = \"plate.png\"\n", ""));
     harness.state_mut().session().document.replace("typing", &mended);
@@ -297,7 +301,7 @@ fn a_shot_is_rendered_with_progress() {
 }
 
 #[test]
-fn a_shot_that_is_rendered_is_stopped_and_goes_on_later() {
+fn rendering_a_shot_is_stopped_and_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let (mut harness, _) = window_on_file(folder.path(), &SCENE.replace("frames = 10", "frames = 100000"));
     let render = |harness: &mut Harness<'_, Studio>| {
@@ -337,7 +341,7 @@ fn a_shot_that_is_rendered_is_stopped_and_goes_on_later() {
     assert_eq!(fs::metadata(&first).unwrap().modified().unwrap(), written, "whole frames are kept");
 }
 
-/// A window that keeps what it must in `home`.
+/// A window with its settings in `home`.
 fn window_at_home(home: &Path) -> Harness<'static, Studio> {
     let session = Session::new(Document::new("fire.toml", SCENE), None, Box::<PolledPlayer>::default(), assets);
     let studio = Studio::new(session, Some(home.to_path_buf()));
@@ -348,7 +352,7 @@ fn window_at_home(home: &Path) -> Harness<'static, Studio> {
 }
 
 #[test]
-fn layout_theme_and_recent_files_are_there_again() {
+fn layout_theme_and_recent_files_are_restored() {
     let (home, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let path = folder.path().join("kept.toml");
     let width = |harness: &Harness<'_, Studio>| harness.get_by_label("Viewport").rect().width();

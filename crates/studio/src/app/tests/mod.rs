@@ -1,4 +1,4 @@
-//! The window driven as a person with a screen reader would: by what widgets are called.
+//! The window, driven through the accessible names of its widgets, as by a screen reader.
 
 mod aurora;
 mod choosing;
@@ -36,8 +36,8 @@ height = 0.9
 position = [0.0, 1.0, 0.0]
 ";
 
-/// How long is waited for what hangs, whatever else the machine does.
-const PATIENCE: Duration = Duration::from_secs(300);
+/// Timeout, also for a busy machine.
+const TIMEOUT: Duration = Duration::from_secs(300);
 
 fn assets(folder: &Path) -> Arc<dyn Assets> {
     Arc::new(FileAssets::new(folder))
@@ -55,18 +55,18 @@ fn window_by(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, St
     harness
 }
 
-/// Lets the window work until its picture is there.
+/// Runs frames of the window until its picture is drawn.
 fn drawn(harness: &mut Harness<'_, Studio>) {
     let began = Instant::now();
     harness.run_steps(3);
     while harness.state_mut().session().is_busy() {
         harness.step();
-        assert!(began.elapsed() < PATIENCE, "no picture");
+        assert!(began.elapsed() < TIMEOUT, "no picture");
     }
     harness.run_steps(2);
 }
 
-/// A small scene with an aurora of few particles, to be quick; `rest` goes on in its table.
+/// A small scene with an aurora of few particles; `rest` continues its table.
 fn sky(frames: u32, rest: &str) -> String {
     format!(
         "bansho = 2\n[picture]\nsize = [64, 36]\nframes = {frames}\n[[aurora]]\npreroll_s = 0.0\n\
@@ -79,7 +79,7 @@ fn text(harness: &mut Harness<'_, Studio>) -> String {
 }
 
 #[test]
-fn a_scene_is_shown_and_then_the_window_rests() {
+fn a_scene_is_shown_and_then_no_repaint_is_requested() {
     let mut harness = window(SCENE);
     let (picture, _) = harness.state_mut().session().picture().expect("a picture");
     assert_eq!(picture.size, [64, 36]);
@@ -134,7 +134,7 @@ fn time_is_stepped_played_and_stopped() {
 }
 
 #[test]
-fn time_is_scrubbed_and_a_range_of_it_repeats() {
+fn time_is_scrubbed_and_a_range_is_looped() {
     let mut harness = window(SCENE);
     let bar = harness.get_by_label("Timeline").rect();
     drag(&mut harness, bar.left_center() + vec2(8.0, 0.0), vec2(0.5 * bar.width() - 8.0, 0.0));
@@ -156,7 +156,7 @@ fn time_is_scrubbed_and_a_range_of_it_repeats() {
 }
 
 #[test]
-fn a_picture_that_the_window_cannot_hold_is_a_preview_and_says_so() {
+fn a_picture_larger_than_the_viewport_is_a_preview() {
     let mut harness = window(&SCENE.replace("[64, 36]", "[1920, 1080]"));
     let (picture, _) = harness.state_mut().session().picture().expect("a picture");
     let [width, height] = picture.size;
@@ -165,7 +165,7 @@ fn a_picture_that_the_window_cannot_hold_is_a_preview_and_says_so() {
 }
 
 #[test]
-fn exposure_is_set_by_hand_and_given_back() {
+fn exposure_is_set_and_made_automatic_again() {
     let mut harness = window(SCENE);
     harness.get_by_role_and_label(Role::SpinButton, "Exposure").set_value_accesskit(7.5);
     drawn(&mut harness);
@@ -195,7 +195,7 @@ fn phenomena_are_added_copied_and_removed() {
 }
 
 #[test]
-fn faults_are_told_with_their_lines_and_lead_to_the_text() {
+fn problems_show_their_lines_and_link_to_the_text() {
     let mut harness = window(SCENE);
     let faulty = SCENE.replace("height", "heigth");
     harness.state_mut().session().document.replace("typing", &faulty);
@@ -220,7 +220,7 @@ fn dragging_the_picture_turns_the_camera() {
     assert_eq!(text(&mut harness), SCENE, "a drag is one step");
 }
 
-/// A hand blows from the middle of the viewport, which is answered, and goes on.
+/// Starts a wind drag in the middle of the viewport, and returns its start.
 fn blow(harness: &mut Harness<'_, Studio>) -> egui::Pos2 {
     harness.get_by_label("Blow").click();
     harness.run_steps(2);
@@ -233,11 +233,11 @@ fn blow(harness: &mut Harness<'_, Studio>) -> egui::Pos2 {
 }
 
 #[test]
-fn blowing_is_wind_while_it_lasts_and_keyframes_when_recorded() {
+fn wind_drags_are_temporary_and_recorded_as_keyframes() {
     let mut harness = window(SCENE);
     let middle = blow(&mut harness);
     release(&mut harness, middle + vec2(100.0, 0.0));
-    assert_eq!(text(&mut harness), SCENE, "as if it had never been");
+    assert_eq!(text(&mut harness), SCENE, "the text is unchanged");
 
     let longer = SCENE.replace("frames = 10", "frames = 200");
     let mut harness = window(&longer);
@@ -267,7 +267,7 @@ fn lamps_are_dragged() {
 }
 
 #[test]
-fn a_plate_that_vanished_is_told_and_linked_anew() {
+fn a_missing_plate_is_reported_and_relinked() {
     let folder = tempfile::tempdir().unwrap();
     let plate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/checkerboard.png");
     std::fs::copy(plate, folder.path().join("board.png")).unwrap();
@@ -296,7 +296,7 @@ fn burners_are_dragged() {
     assert!(edited.contains("position = [0.0, 0.5, 0.0]"), "the flame itself stays: {edited}");
 }
 
-/// Where on the screen the first frame shows a point of the scene.
+/// The position on the screen of a point of the scene in the first frame.
 fn seen_at(harness: &mut Harness<'_, Studio>, point: DVec3) -> egui::Pos2 {
     let plan = harness.state_mut().session().plan().cloned().unwrap();
     let [width, height] = plan.size().map(|side| side as f32);
@@ -338,7 +338,7 @@ fn drag(harness: &mut Harness<'_, Studio>, from: egui::Pos2, by: egui::Vec2) {
     release(harness, from + by);
 }
 
-/// Drags to the right while thirty pictures are shown, in which time passes, and then does not.
+/// Drags to the right for thirty frames. Playback runs during the drag and stops with it.
 fn drag_for_a_second(harness: &mut Harness<'_, Studio>, from: egui::Pos2) {
     press(harness, from);
     for step in 1..30 {

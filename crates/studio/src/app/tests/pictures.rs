@@ -1,5 +1,5 @@
-//! How the window looks, against pictures that were looked at (UPDATE_SNAPSHOTS=1 takes new ones). A GPU's need a Vulkan
-//! device; Mesa's lavapipe is one. What paints without a GPU must paint the same.
+//! Snapshots of the window (UPDATE_SNAPSHOTS=1 updates them). Those of a GPU need a Vulkan device, such as Mesa's lavapipe. The software
+//! rasterizer must paint the same.
 
 use std::{cell::Cell, rc::Rc};
 
@@ -17,7 +17,7 @@ use image::{Rgba, RgbaImage};
 use super::{super::Studio, SCENE, drawn, sky, window_by};
 use bansho_egui_software::{Painter, PixelRect};
 
-/// Small, for they are kept with the code.
+/// Size of the window, points. It is small, since the snapshots are in the repository.
 const SIZE: [f32; 2] = [960.0, 620.0];
 
 const SNAPSHOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/snapshots");
@@ -36,16 +36,16 @@ split = [{ sheet = 1, length_fraction = 0.5 }]
 link = [{ from = 2, to = 3, from_length_fraction = 0.3, to_length_fraction = 0.5 }]
 ";
 
-/// A window of `text`, painted by what the builder is given.
-type Paints = fn(HarnessBuilder<Studio>, &str) -> Harness<'static, Studio>;
+/// Opens a window with a scene and a renderer.
+type OpenWindow = fn(HarnessBuilder<Studio>, &str) -> Harness<'static, Studio>;
 
-/// Looks at a window that is called so.
-type Looks = fn(&mut Harness<'_, Studio>, &str);
+/// Compares a window with a snapshot.
+type Compare = fn(&mut Harness<'_, Studio>, &str);
 
 fn by_gpu(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, Studio> {
     let mut setup = default_wgpu_setup();
     if let WgpuSetup::CreateNew(new) = &mut setup {
-        // Without one the test must fail rather than go another way.
+        // Without Vulkan the test must fail instead of using another backend.
         new.instance_descriptor.backends = wgpu::Backends::VULKAN;
     }
     window_by(builder.renderer(WgpuTestRenderer::from_setup(setup)), text)
@@ -55,17 +55,17 @@ fn by_software(builder: HarnessBuilder<Studio>, text: &str) -> Harness<'static, 
     window_by(builder.renderer(Software::default()), text)
 }
 
-fn painted(paints: Paints, text: &str) -> Harness<'static, Studio> {
-    paints(Harness::builder().with_size(vec2(SIZE[0], SIZE[1])), text)
+fn painted(open: OpenWindow, text: &str) -> Harness<'static, Studio> {
+    open(Harness::builder().with_size(vec2(SIZE[0], SIZE[1])), text)
 }
 
-/// Paints as the studio does where there is no GPU, and holds what it paints in places against all painted anew.
+/// Paints by the software rasterizer, and compares partial repaints with whole ones.
 #[derive(Default)]
 struct Software {
     painter: Painter,
-    /// What the system was given, pixels.
+    /// The pixels of the window.
     screen: Vec<u32>,
-    /// Frames of which all was painted.
+    /// Number of frames that were painted as a whole.
     whole: Rc<Cell<usize>>,
 }
 
@@ -90,11 +90,11 @@ impl TestRenderer for Software {
         };
         let (pixels, changed) = show(&mut self.painter);
         let same = show(&mut self.painter).1;
-        self.painter.forget();
+        self.painter.invalidate();
         let (anew, all) = show(&mut self.painter);
         let whole = PixelRect { left: 0, top: 0, right: size[0] as i32, bottom: size[1] as i32 };
         if !same.is_empty() || all != [whole] || pixels != anew {
-            return Err(format!("in places, {changed:?}, it is not painted as all at once"));
+            return Err(format!("the partial repaint of {changed:?} differs from a whole one"));
         }
         self.whole.update(|frames| frames + usize::from(changed == [whole]));
         Ok(RgbaImage::from_fn(size[0], size[1], |x, y| {
@@ -104,7 +104,7 @@ impl TestRenderer for Software {
     }
 }
 
-/// What the window shows, but for the line at the bottom that tells how long drawing took.
+/// The pixels of the window without the status line, which shows times.
 fn seen(harness: &mut Harness<'_, Studio>) -> RgbaImage {
     let status = harness.get_by_label_contains("of 64 × 36").rect().top();
     let mut picture = harness.render().unwrap();
@@ -112,18 +112,18 @@ fn seen(harness: &mut Harness<'_, Studio>) -> RgbaImage {
     picture
 }
 
-/// Compares it.
-fn as_it_did(harness: &mut Harness<'_, Studio>, name: &str) {
+/// Compares the window with a snapshot.
+fn equals_snapshot(harness: &mut Harness<'_, Studio>, name: &str) {
     let options = SnapshotOptions::new().output_path(SNAPSHOTS);
     image_snapshot_options(&seen(harness), name, &options);
 }
 
-/// Compares what was painted without a GPU with what one painted.
-fn as_a_gpu_does(harness: &mut Harness<'_, Studio>, name: &str) {
+/// Compares the software rasterizer with the snapshot of a GPU.
+fn resembles_snapshot(harness: &mut Harness<'_, Studio>, name: &str) {
     let picture = seen(harness);
     let expected = image::open(format!("{SNAPSHOTS}/{name}.png")).unwrap().into_rgba8();
     assert_eq!(picture.dimensions(), expected.dimensions());
-    // Where nothing is painted the one is clear and the other black.
+    // Unpainted pixels are transparent in one and black in the other.
     let apart = |(a, b): (&Rgba<u8>, &Rgba<u8>)| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
     let differences: Vec<f64> = picture.pixels().zip(expected.pixels()).map(apart).map(f64::from).collect();
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
@@ -131,54 +131,54 @@ fn as_a_gpu_does(harness: &mut Harness<'_, Studio>, name: &str) {
     assert!(worst <= 6.0 && mean < 0.02, "{name}: {worst} of 255 at worst, {mean} in the mean");
 }
 
-fn dark_and_light(paints: Paints, looks: Looks) {
-    let mut harness = painted(paints, SCENE);
-    looks(&mut harness, "window_dark");
+fn dark_and_light(open: OpenWindow, compare: Compare) {
+    let mut harness = painted(open, SCENE);
+    compare(&mut harness, "window_dark");
     harness.ctx.set_theme(Theme::Light);
     harness.run_steps(3);
-    looks(&mut harness, "window_light");
+    compare(&mut harness, "window_light");
 }
 
-fn curves(paints: Paints, looks: Looks) {
-    let mut harness = painted(paints, SCENE);
-    // The stage above is called so too.
+fn curves(open: OpenWindow, compare: Compare) {
+    let mut harness = painted(open, SCENE);
+    // The stage has the same label.
     harness.get_all_by_label("texture").last().expect("the section").click();
     harness.run_steps(12);
     harness.get_by_label("threshold").scroll_to_me();
     harness.run_steps(12);
-    looks(&mut harness, "curves");
+    compare(&mut harness, "curves");
 }
 
-fn aurora_editor(paints: Paints, looks: Looks) {
-    let mut harness = painted(paints, &sky(150, SHAPES));
+fn aurora_editor(open: OpenWindow, compare: Compare) {
+    let mut harness = painted(open, &sky(150, SHAPES));
     harness.get_by_label("Shape 2").click();
     drawn(&mut harness);
-    looks(&mut harness, "aurora_editor");
+    compare(&mut harness, "aurora_editor");
 }
 
 #[test]
 #[ignore = "needs a Vulkan device"]
 fn the_window_looks_as_it_did_dark_and_light() {
-    dark_and_light(by_gpu, as_it_did);
+    dark_and_light(by_gpu, equals_snapshot);
 }
 
 #[test]
 #[ignore = "needs a Vulkan device"]
 fn curves_look_as_they_did() {
-    curves(by_gpu, as_it_did);
+    curves(by_gpu, equals_snapshot);
 }
 
 #[test]
 #[ignore = "needs a Vulkan device"]
 fn the_aurora_editor_looks_as_it_did() {
-    aurora_editor(by_gpu, as_it_did);
+    aurora_editor(by_gpu, equals_snapshot);
 }
 
 #[test]
 fn without_a_gpu_the_window_looks_as_with_one() {
-    dark_and_light(by_software, as_a_gpu_does);
-    curves(by_software, as_a_gpu_does);
-    aurora_editor(by_software, as_a_gpu_does);
+    dark_and_light(by_software, resembles_snapshot);
+    curves(by_software, resembles_snapshot);
+    aurora_editor(by_software, resembles_snapshot);
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn frames_that_are_painted_in_places_are_those_painted_anew() {
     let frames = |harness: &mut Harness<'_, Studio>, count: usize| {
         for _ in 0..count {
             harness.step();
-            // Which holds the two against each other.
+            // This compares partial and whole repaints.
             harness.render().unwrap();
         }
     };
@@ -197,7 +197,7 @@ fn frames_that_are_painted_in_places_are_those_painted_anew() {
     harness.state_mut().session().transport.set_playing(true);
     frames(&mut harness, 6);
     harness.state_mut().session().transport.set_playing(false);
-    // A menu opens over everything, a field takes the keys, a section unfolds, and letters come that were never seen.
+    // Open a menu, focus a text field, unfold a section, and show new glyphs.
     harness.get_by_label("File").click();
     frames(&mut harness, 4);
     harness.key_press(Key::Escape);

@@ -1,4 +1,4 @@
-//! What a hand reaches for without being told: a new scene, a parameter by its name, another name, curves on the picture, only the picture.
+//! New scenes, searching parameters, renaming, curves on the picture, and showing only the picture.
 
 use eframe::egui::{Event, Key, Role, vec2};
 use egui_kittest::kittest::Queryable;
@@ -6,7 +6,7 @@ use egui_kittest::kittest::Queryable;
 use super::{SCENE, drag, drawn, text, window};
 
 #[test]
-fn a_new_scene_begins_with_what_was_chosen_and_asks_where_work_would_be_lost() {
+fn a_new_scene_is_made_from_its_template_and_asks_about_unsaved_work() {
     let mut harness = window(SCENE);
     for (name, begins) in [("Rain", "[[rain]]"), ("Nothing", "bansho = 2")] {
         for choice in ["File", "New", name] {
@@ -26,7 +26,7 @@ fn a_new_scene_begins_with_what_was_chosen_and_asks_where_work_would_be_lost() {
 }
 
 #[test]
-fn parameters_are_found_by_name_and_by_what_they_do() {
+fn parameters_are_found_by_name_and_description() {
     let mut harness = window(SCENE);
     assert!(harness.query_by_label("octaves").is_none(), "its section is closed");
     let find = |harness: &mut egui_kittest::Harness<'_, super::Studio>, words: &str| {
@@ -64,7 +64,7 @@ fn a_phenomenon_is_renamed() {
 }
 
 #[test]
-fn curves_are_shaped_on_top_of_the_live_flame() {
+fn curves_are_edited_on_top_of_the_picture() {
     let mut harness = window(SCENE);
     harness.get_by_label("Curves").click();
     harness.run_steps(6);
@@ -73,7 +73,7 @@ fn curves_are_shaped_on_top_of_the_live_flame() {
     assert!(viewport.contains_rect(chart), "{viewport} {chart}");
     let before = harness.state_mut().session().picture().map(|(picture, _)| picture.pixels.clone());
     let chart = chart.shrink(4.0);
-    // The point (0.6, 0.42); the chart ends a quarter above its highest point, but not above what is allowed.
+    // The point (0.6, 0.42). The chart's maximum is a quarter above the highest point, but within the bounds.
     let at = chart.left_bottom() + vec2(0.6 * chart.width(), -0.42 * chart.height());
     drag(&mut harness, at, vec2(0.0, 0.3 * chart.height()));
     assert!(text(&mut harness).contains("threshold = [["), "{}", text(&mut harness));
@@ -85,7 +85,7 @@ fn curves_are_shaped_on_top_of_the_live_flame() {
 }
 
 #[test]
-fn a_key_leaves_nothing_but_the_picture() {
+fn a_key_shows_only_the_picture() {
     let mut harness = window(SCENE);
     let width = harness.get_by_label("Viewport").rect().width();
     harness.key_press(Key::F);

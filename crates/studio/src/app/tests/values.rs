@@ -1,4 +1,4 @@
-//! Values that hands change: sliders, keys, what is recorded, and the stages that show what they do.
+//! Editing values: sliders, keyframes, recording, curves, and the thumbnails of stages.
 
 use bansho::base::math::DVec3;
 use eframe::egui::{Event, Modifiers, PointerButton, Role, vec2};
@@ -28,7 +28,7 @@ fn bounded_values_have_sliders_with_their_numbers_beside() {
 }
 
 #[test]
-fn a_particle_flame_is_slid_hotter_and_lighter() {
+fn sliders_of_a_particle_flame_edit_its_parameters() {
     let mut harness =
         window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[[flame_particles]]\nparticles = 50\n");
     for (section, name, to, written) in [
@@ -41,7 +41,7 @@ fn a_particle_flame_is_slid_hotter_and_lighter() {
         slide(&mut harness, name, to);
         assert!(text(&mut harness).contains(written), "{}", text(&mut harness));
     }
-    // The usual burner's fuel, which the text need not state.
+    // The fuel of the implied burner.
     for section in ["burners", "flame particles.0.burners.0, as usual"] {
         harness.get_by_label(section).click_accesskit();
         harness.run_steps(12);
@@ -52,7 +52,7 @@ fn a_particle_flame_is_slid_hotter_and_lighter() {
 }
 
 #[test]
-fn rain_is_slid_heavier_and_its_drops_and_streaks_changed() {
+fn sliders_edit_rain_shutter_and_wind() {
     let mut harness = window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
     slide(&mut harness, "rate mm per h", 40.0);
     assert!(text(&mut harness).contains("rate_mm_per_h = 40.0"), "{}", text(&mut harness));
@@ -79,19 +79,19 @@ fn rain_is_slid_heavier_and_its_drops_and_streaks_changed() {
 }
 
 #[test]
-fn values_are_keyed_at_two_times_and_unkeyed() {
+fn keyframes_are_set_at_two_times_and_removed() {
     let mut harness = window(SCENE);
-    let place = "flame_sheet.0.position";
-    harness.get_by_label(&format!("Key the value at this time: {place}")).click();
+    let path = "flame_sheet.0.position";
+    harness.get_by_label(&format!("Key the value at this time: {path}")).click();
     drawn(&mut harness);
     harness.get_by_label("Frame on").click();
     drawn(&mut harness);
-    harness.get_by_label(&format!("Keyed; key the value at this time: {place}")).click();
+    harness.get_by_label(&format!("Keyed; key the value at this time: {path}")).click();
     drawn(&mut harness);
     let keyed = text(&mut harness);
     let line = keyed.lines().find(|line| line.starts_with("position = { keys")).unwrap_or_default();
     assert_eq!(line.matches("[0.0, 0.0, 0.0]").count(), 2, "{keyed}");
-    harness.get_by_label(&format!("Take out the key at this time: {place}")).click();
+    harness.get_by_label(&format!("Take out the key at this time: {path}")).click();
     drawn(&mut harness);
     assert_eq!(text(&mut harness).matches("[0.0, 0.0, 0.0]").count(), 1, "{}", text(&mut harness));
     assert!(harness.state_mut().session().document.error().is_none());
@@ -172,7 +172,7 @@ fn vectors_and_colors_with_bounds_have_sliders() {
 }
 
 #[test]
-fn a_camera_that_is_turned_while_recording_is_keyed_now() {
+fn turning_the_camera_while_recording_sets_a_keyframe() {
     let mut harness = window(SCENE);
     harness.get_by_label("Record").click();
     harness.get_by_label("Frame on").click();
@@ -185,7 +185,7 @@ fn a_camera_that_is_turned_while_recording_is_keyed_now() {
 }
 
 #[test]
-fn stages_of_the_flame_are_seen_live() {
+fn stages_of_the_flame_are_drawn_live() {
     let mut harness = window(SCENE);
     for name in ["texture", "thresholded", "sharpened", "colored"] {
         harness.get_by_label(&format!("Stage {name}"));
@@ -214,7 +214,7 @@ fn stages_of_the_flame_are_seen_live() {
 }
 
 #[test]
-fn a_value_beyond_its_bounds_is_told_and_left_as_it_is() {
+fn a_value_out_of_bounds_is_reported_and_not_changed() {
     let faulty =
         SCENE.replace("height = 0.9", "height = -5.0").replace("bansho = 2", "bansho = 2\n[camera]\nroll_deg = 9999.0");
     let mut harness = window(&faulty);

@@ -1,8 +1,9 @@
 //! The viewport: the picture, and dragging in it to move the camera, the wind, lamps and burners.
 
-pub(crate) mod handles;
-pub(crate) mod pointer;
-pub(crate) mod wind_drag;
+mod curve_overlay;
+mod handles;
+mod pointer;
+mod wind_drag;
 
 use bansho::{
     base::{
@@ -14,13 +15,10 @@ use bansho::{
 };
 
 use crate::{
-    editors::flame_sheet::{curves_ui, stages_ui::color_image},
+    app::widgets::picture_texture::PictureTexture,
     session::{Session, selection::Selection},
 };
-use eframe::egui::{
-    self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2,
-    pos2, vec2,
-};
+use eframe::egui::{self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use handles::{Handle, handles};
 use pointer::{CameraPose, rounded};
 use wind_drag::WindDrag;
@@ -36,19 +34,20 @@ pub(super) enum ViewportTool {
     Camera,
     /// Sets the wind to the drag vector.
     Wind,
-    /// Moves lamps, flames and burners.
-    Place,
+    /// Moves the handles of lamps and phenomena.
+    MoveHandles,
 }
 
 /// The viewport.
 #[derive(Default)]
 pub(super) struct Viewport {
-    texture: Option<(TextureHandle, u64)>,
+    texture: PictureTexture,
     pixels: [usize; 2],
-    pub(super) tool: ViewportTool,
+    tool: ViewportTool,
     wind_drag: Option<WindDrag>,
-    held: Option<ValuePath>,
-    /// Whether curves lie on top of the picture.
+    /// The handle that is dragged.
+    dragged: Option<ValuePath>,
+    /// Whether curve editors are shown on the picture.
     curves: bool,
 }
 
@@ -60,14 +59,14 @@ impl Viewport {
 
     /// Shows the picture and handles dragging in it.
     pub(super) fn ui(&mut self, ui: &mut Ui, session: &mut Session, selection: &Selection) {
-        let behind = ui.painter().add(Shape::Noop);
+        let background = ui.painter().add(Shape::Noop);
         let panel = ui.clip_rect();
         self.tools_ui(ui, session, selection);
         let (response, painter) = ui.allocate_painter(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
         let scale = ui.ctx().pixels_per_point();
         self.pixels = [response.rect.width(), response.rect.height()].map(|side| (side * scale).max(1.0) as usize);
-        ui.painter().set(behind, around(panel, response.rect, ui.visuals().panel_fill));
+        ui.painter().set(background, fill_around(panel, response.rect, ui.visuals().panel_fill));
         let Some(size) = self.upload_picture(ui, session) else {
             painter.rect_filled(response.rect, 0.0, SURROUND);
             let text = if session.document.error().is_some() { "nothing to show yet" } else { "drawing…" };
@@ -76,16 +75,16 @@ impl Viewport {
             return;
         };
         let drawn = session.picture().map_or(size, |(picture, _)| picture.size);
-        let frame = on_pixels(fit(size, response.rect), drawn, scale);
-        painter.add(around(response.rect, frame, SURROUND));
-        if let Some((texture, _)) = &self.texture {
+        let frame = snap_to_pixels(fit_within(size, response.rect), drawn, scale);
+        painter.add(fill_around(response.rect, frame, SURROUND));
+        if let Some(texture) = self.texture.id() {
             let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-            painter.image(texture.id(), frame, whole, Color32::WHITE);
+            painter.image(texture, frame, whole, Color32::WHITE);
         }
         self.handle_pointer(ui, session, &response, frame);
         self.paint_handles(session, &painter, frame);
-        if self.curves && curves_ui::has_any(selection) {
-            curves_ui::curves_ui(ui, session, selection, response.rect);
+        if self.curves && curve_overlay::has_any(selection) {
+            curve_overlay::curve_overlay_ui(ui, session, selection, response.rect);
         }
     }
 
@@ -94,16 +93,16 @@ impl Viewport {
             ui.selectable_value(&mut self.tool, ViewportTool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
             ui.selectable_value(&mut self.tool, ViewportTool::Wind, "Blow")
-                .on_hover_text("Drag to blow: the drag is the wind");
-            ui.selectable_value(&mut self.tool, ViewportTool::Place, "Place")
+                .on_hover_text("Drag to set the wind to the direction and length of the drag");
+            ui.selectable_value(&mut self.tool, ViewportTool::MoveHandles, "Place")
                 .on_hover_text("Drag lamps, flames and burners");
             ui.toggle_value(&mut session.recording, "Record")
-                .on_hover_text("What is dragged leaves keyframes; time passes while you blow or drag things");
+                .on_hover_text("Dragging sets keyframes; playback runs during drags of wind and handles");
             ui.toggle_value(&mut session.draft, "Draft")
-                .on_hover_text("Simulates with fewer particles, to follow your hands; rendering never does");
-            if curves_ui::has_any(selection) {
+                .on_hover_text("Simulates with fewer particles, for faster feedback; rendering always uses all");
+            if curve_overlay::has_any(selection) {
                 ui.toggle_value(&mut self.curves, "Curves")
-                    .on_hover_text("The curves of what is chosen, on the picture");
+                    .on_hover_text("The curves of the selection, on the picture");
             }
             ui.separator();
             exposure_ui(ui, session);
@@ -112,17 +111,8 @@ impl Viewport {
 
     /// Uploads a new picture to the texture. Returns the size of the scene's picture.
     pub(super) fn upload_picture(&mut self, ui: &Ui, session: &Session) -> Option<[usize; 2]> {
-        let (picture, drawn) = session.picture()?;
-        if self.texture.as_ref().is_none_or(|(_, shown)| *shown != drawn) {
-            let image = color_image(picture);
-            match &mut self.texture {
-                Some((texture, shown)) => {
-                    texture.set(image, TextureOptions::LINEAR);
-                    *shown = drawn;
-                }
-                None => self.texture = Some((ui.ctx().load_texture("picture", image, TextureOptions::LINEAR), drawn)),
-            }
-        }
+        let (picture, serial) = session.picture()?;
+        self.texture.upload(ui.ctx(), "picture", picture, serial);
         Some(picture.scene_size)
     }
 
@@ -130,22 +120,22 @@ impl Viewport {
         let Some(plan) = session.plan().cloned() else { return };
         let time = session.transport.time_s();
         let camera = plan.scene().camera.at(time, plan.size());
-        let pose = CameraPose::of(&plan, session.document.values(), time);
+        let pose = CameraPose::at_time(&plan, session.document.values(), time);
         let heights = |drag: Vec2| DVec2::new(f64::from(drag.x), f64::from(drag.y)) / f64::from(frame.height());
         let drag = heights(response.drag_delta());
         let shift = ui.input(|input| input.modifiers.shift);
-        let pans = response.dragged_by(PointerButton::Middle)
+        let is_pan = response.dragged_by(PointerButton::Middle)
             || (shift && self.tool == ViewportTool::Camera && response.dragged_by(PointerButton::Primary));
-        if pans {
-            move_camera(session, pose.panned(drag, &camera));
+        if is_pan {
+            set_camera(session, pose.panned(drag, &camera));
         } else if response.dragged_by(PointerButton::Primary)
             && self.tool == ViewportTool::Camera
             && drag != DVec2::ZERO
         {
-            move_camera(session, pose.turned(drag, &camera));
+            set_camera(session, pose.rotated(drag, &camera));
         }
         self.dolly(ui, session, response, pose);
-        self.blow(session, response, &camera, heights(response.total_drag_delta().unwrap_or_default()));
+        self.drag_wind(session, response, &camera, heights(response.total_drag_delta().unwrap_or_default()));
         self.drag_handle(ui, session, response, &camera, frame);
     }
 
@@ -154,11 +144,11 @@ impl Viewport {
         const STEP: f32 = 50.0;
         let scrolled = ui.input(|input| input.smooth_scroll_delta().y);
         if response.hovered() && scrolled != 0.0 {
-            move_camera(session, pose.dollied(f64::from(scrolled / STEP)));
+            set_camera(session, pose.dollied(f64::from(scrolled / STEP)));
         }
     }
 
-    fn blow(&mut self, session: &mut Session, response: &Response, camera: &Camera, drag: DVec2) {
+    fn drag_wind(&mut self, session: &mut Session, response: &Response, camera: &Camera, drag: DVec2) {
         if self.tool != ViewportTool::Wind {
             return;
         }
@@ -167,7 +157,7 @@ impl Viewport {
         }
         match &self.wind_drag {
             Some(wind_drag) if response.dragged_by(PointerButton::Primary) => {
-                wind_drag.update(session, pointer::wind(drag, camera));
+                wind_drag.update(session, pointer::wind_of_drag(drag, camera));
             }
             _ => {}
         }
@@ -178,7 +168,7 @@ impl Viewport {
         }
     }
 
-    /// Ends a wind drag, as before saving: wind that is not recorded is reset.
+    /// Ends a wind drag, for example before saving. Wind that is not recorded is reset.
     pub(super) fn end_wind_drag(&mut self, session: &mut Session) {
         if let Some(wind_drag) = self.wind_drag.take() {
             wind_drag.end(session);
@@ -188,40 +178,40 @@ impl Viewport {
     fn drag_handle(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
         /// Hit radius of a handle, points.
         const HIT_RADIUS: f32 = 14.0;
-        if self.tool != ViewportTool::Place {
+        if self.tool != ViewportTool::MoveHandles {
             return;
         }
         let handles = handles(session);
         let on_screen = |handle: &Handle| Some(to_screen(camera.project(handle.point)?.pixel, camera, frame));
         if response.drag_started_by(PointerButton::Primary) {
             let from = ui.input(|input| input.pointer.press_origin());
-            let near = |handle: &&Handle| Some((on_screen(handle)?.distance(from?), handle.place.clone()));
+            let near = |handle: &&Handle| Some((on_screen(handle)?.distance(from?), handle.path.clone()));
             let nearest = handles.iter().filter_map(|handle| near(&handle)).min_by(|a, b| a.0.total_cmp(&b.0));
-            self.held = nearest.filter(|(distance, _)| *distance < HIT_RADIUS).map(|(_, place)| place);
-            if session.recording && self.held.is_some() {
+            self.dragged = nearest.filter(|(distance, _)| *distance < HIT_RADIUS).map(|(_, path)| path);
+            if session.recording && self.dragged.is_some() {
                 session.transport.play_to_the_end();
             }
         }
-        if !response.dragged_by(PointerButton::Primary) && self.held.take().is_some() && session.recording {
+        if !response.dragged_by(PointerButton::Primary) && self.dragged.take().is_some() && session.recording {
             session.transport.set_playing(false);
         }
         // Recording stops at the end of the shot.
         let ended = session.recording && !session.transport.is_playing();
-        let held = handles.iter().find(|handle| Some(&handle.place) == self.held.as_ref()).filter(|_| !ended);
-        if let (Some(handle), Some(at)) = (held, response.interact_pointer_pos())
-            && let Some(moved) = pointer::dragged(handle.point, to_picture(at, camera, frame), camera)
+        let dragged = handles.iter().find(|handle| Some(&handle.path) == self.dragged.as_ref()).filter(|_| !ended);
+        if let (Some(handle), Some(at)) = (dragged, response.interact_pointer_pos())
+            && let Some(moved) = pointer::move_at_depth(handle.point, to_picture(at, camera, frame), camera)
         {
-            session.set("place", &handle.place, Value::numbers(rounded(moved - handle.origin)));
+            session.set("place", &handle.path, Value::numbers(rounded(moved - handle.origin)));
         }
     }
 
     fn paint_handles(&self, session: &Session, painter: &egui::Painter, frame: Rect) {
-        let Some(plan) = session.plan().filter(|_| self.tool == ViewportTool::Place) else { return };
+        let Some(plan) = session.plan().filter(|_| self.tool == ViewportTool::MoveHandles) else { return };
         let camera = plan.scene().camera.at(session.transport.time_s(), plan.size());
         for handle in handles(session) {
-            let Some(seen) = camera.project(handle.point) else { continue };
-            let at = to_screen(seen.pixel, &camera, frame);
-            let width = if Some(&handle.place) == self.held.as_ref() { 3.0 } else { 1.5 };
+            let Some(projected) = camera.project(handle.point) else { continue };
+            let at = to_screen(projected.pixel, &camera, frame);
+            let width = if Some(&handle.path) == self.dragged.as_ref() { 3.0 } else { 1.5 };
             painter.circle_stroke(at, 8.0, Stroke::new(width, Color32::from_rgb(255, 210, 90)));
             let font = egui::FontId::proportional(12.0);
             painter.text(at + vec2(11.0, 0.0), egui::Align2::LEFT_CENTER, handle.name, font, Color32::from_gray(220));
@@ -229,7 +219,7 @@ impl Viewport {
     }
 }
 
-fn move_camera(session: &mut Session, pose: CameraPose) {
+fn set_camera(session: &mut Session, pose: CameraPose) {
     let camera = ValuePath::root().key("camera");
     let value = |key: &str, to: DVec3| (camera.key(key), Value::numbers(rounded(to)));
     session.set_all("camera", [value("position", pose.position), value("target", pose.target)]);
@@ -238,7 +228,7 @@ fn move_camera(session: &mut Session, pose: CameraPose) {
 /// The exposure of the scene; a change replaces the automatic one.
 fn exposure_ui(ui: &mut Ui, session: &mut Session) {
     let Some(mut ev100) = session.plan().map(|plan| f64::from(plan.exposure_ev100)) else { return };
-    let place = ValuePath::root().key("picture").key("exposure_ev100");
+    let path = ValuePath::root().key("picture").key("exposure_ev100");
     let label = ui.label("Exposure").on_hover_text("Exposure value at ISO 100; less is brighter").id;
     let drag = egui::DragValue::new(&mut ev100)
         .clamp_existing_to_range(false)
@@ -247,32 +237,32 @@ fn exposure_ui(ui: &mut Ui, session: &mut Session) {
         .max_decimals(2)
         .suffix(" EV");
     if ui.add(drag).labelled_by(label).changed() {
-        session.set("exposure", &place, Value::Number((ev100 * 100.0).round() / 100.0));
+        session.set("exposure", &path, Value::Number((ev100 * 100.0).round() / 100.0));
     }
-    if ui.small_button("Auto").on_hover_text("Exposure chosen from what the scene holds").clicked() {
-        session.set("exposure", &place, Value::Text("auto".into()));
+    if ui.small_button("Auto").on_hover_text("Automatic exposure of the scene").clicked() {
+        session.set("exposure", &path, Value::Text("auto".into()));
     }
 }
 
-/// The largest rectangle of the picture's proportions in the middle of `within`.
-fn fit([width, height]: [usize; 2], within: Rect) -> Rect {
+/// The largest rectangle with the picture's aspect ratio, centered in `within`.
+fn fit_within([width, height]: [usize; 2], within: Rect) -> Rect {
     let size = vec2(width as f32, height as f32);
     let scale = (within.width() / size.x).min(within.height() / size.y);
     Rect::from_center_size(within.center(), size * scale)
 }
 
-/// `frame` moved onto the screen's pixels, of which a point has `scale`; where a picture of `drawn` pixels is as large but for a part
-/// of one, exactly as large, so that each of its pixels is one of the screen's and none is mixed from several.
-fn on_pixels(frame: Rect, drawn: [usize; 2], scale: f32) -> Rect {
-    let (place, size) = (frame.min.to_vec2() * scale, frame.size() * scale);
+/// `frame` aligned to the pixels of the screen, which has `scale` pixels per point. If the picture of `drawn` pixels has the same size up
+/// to rounding, the frame gets exactly its size, so that the picture is shown without resampling.
+fn snap_to_pixels(frame: Rect, drawn: [usize; 2], scale: f32) -> Rect {
+    let (position, size) = (frame.min.to_vec2() * scale, frame.size() * scale);
     let drawn = vec2(drawn[0] as f32, drawn[1] as f32);
-    let alike = (size - drawn).abs().max_elem() < 1.5;
-    let size = if alike { drawn } else { size.round() };
-    Rect::from_min_size((place.round() / scale).to_pos2(), size / scale)
+    let is_same_size = (size - drawn).abs().max_elem() < 1.5;
+    let size = if is_same_size { drawn } else { size.round() };
+    Rect::from_min_size((position.round() / scale).to_pos2(), size / scale)
 }
 
-/// What `whole` has around `hole`, filled. Where nothing is painted twice, a machine that paints without a GPU paints faster.
-fn around(whole: Rect, hole: Rect, fill: Color32) -> Shape {
+/// The area of `whole` outside of `hole`, filled. Painting no pixel twice is faster with the software rasterizer.
+fn fill_around(whole: Rect, hole: Rect, fill: Color32) -> Shape {
     let hole = hole.intersect(whole);
     let strips = [
         Rect::from_min_max(whole.min, pos2(whole.max.x, hole.min.y)),
@@ -280,8 +270,8 @@ fn around(whole: Rect, hole: Rect, fill: Color32) -> Shape {
         Rect::from_min_max(pos2(hole.max.x, hole.min.y), pos2(whole.max.x, hole.max.y)),
         Rect::from_min_max(pos2(whole.min.x, hole.max.y), whole.max),
     ];
-    let seen = strips.into_iter().filter(|strip| strip.is_positive());
-    Shape::Vec(seen.map(|strip| Shape::rect_filled(strip, 0.0, fill)).collect())
+    let visible = strips.into_iter().filter(|strip| strip.is_positive());
+    Shape::Vec(visible.map(|strip| Shape::rect_filled(strip, 0.0, fill)).collect())
 }
 
 fn to_screen(pixel: DVec2, camera: &Camera, frame: Rect) -> Pos2 {
@@ -299,13 +289,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_of_the_viewports_size_lies_pixel_on_pixel() {
+    fn a_picture_of_the_viewports_size_is_aligned_to_pixels() {
         let within = Rect::from_min_size(pos2(210.0, 60.4), vec2(853.6, 601.0));
-        let frame = fit([1280, 720], within);
-        assert_eq!(on_pixels(frame, [853, 480], 1.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(853.0, 480.0)));
-        // Of two pixels a point.
-        assert_eq!(on_pixels(frame, [1707, 960], 2.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(853.5, 480.0)));
-        // A preview fills the same frame, from pixel to pixel.
-        assert_eq!(on_pixels(frame, [427, 240], 1.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(854.0, 480.0)));
+        let frame = fit_within([1280, 720], within);
+        assert_eq!(snap_to_pixels(frame, [853, 480], 1.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(853.0, 480.0)));
+        // Two pixels per point.
+        assert_eq!(
+            snap_to_pixels(frame, [1707, 960], 2.0),
+            Rect::from_min_size(pos2(210.0, 121.0), vec2(853.5, 480.0))
+        );
+        // A preview fills the same frame, aligned to pixels.
+        assert_eq!(snap_to_pixels(frame, [427, 240], 1.0), Rect::from_min_size(pos2(210.0, 121.0), vec2(854.0, 480.0)));
     }
 }

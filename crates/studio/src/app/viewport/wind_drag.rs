@@ -1,4 +1,4 @@
-//! A drag that sets the wind: while it lasts the drag vector is added to the wind, then the wind is what it was before.
+//! A pointer drag that sets the wind: during the drag its vector is added to the wind, and afterwards the wind is as before.
 
 use bansho::{
     base::{math::DVec3, parameters::Value},
@@ -17,24 +17,24 @@ pub(super) struct WindDrag {
     start_s: f64,
 }
 
-/// The name of the step in the history.
+/// The label of the undo step.
 const LABEL: &str = "blow";
 
-fn place() -> ValuePath {
+fn velocity_path() -> ValuePath {
     ValuePath::root().key("wind").key("velocity")
 }
 
 impl WindDrag {
     /// Begins a drag. While recording, the playback runs during the drag.
     pub(super) fn begin(session: &mut Session) -> Self {
-        let base_velocity =
-            keyframes::vector(session.document.values(), &place(), session.transport.time_s()).unwrap_or_default();
+        let base_velocity = keyframes::vector(session.document.values(), &velocity_path(), session.transport.time_s())
+            .unwrap_or_default();
         let base_velocity = base_velocity.to_array();
         let wind_drag = Self { base_velocity, recording: session.recording, start_s: session.transport.time_s() };
         session.document.end_step();
         if wind_drag.recording {
             session.transport.play_to_the_end();
-            wind_drag.key(session, base_velocity);
+            wind_drag.set_keyframe(session, base_velocity);
         }
         wind_drag
     }
@@ -45,10 +45,10 @@ impl WindDrag {
         if self.recording {
             // The keyframe at the start of the drag stays, and recording stops at the end of the shot.
             if session.transport.time_s() != self.start_s && session.transport.is_playing() {
-                self.key(session, velocity);
+                self.set_keyframe(session, velocity);
             }
         } else {
-            session.edit(LABEL, &[Operation::Set { place: place(), value: Value::numbers(velocity) }]);
+            session.edit(LABEL, &[Operation::Set { place: velocity_path(), value: Value::numbers(velocity) }]);
         }
     }
 
@@ -56,7 +56,7 @@ impl WindDrag {
     pub(super) fn end(self, session: &mut Session) {
         if self.recording {
             if session.transport.is_playing() {
-                self.key(session, self.base_velocity);
+                self.set_keyframe(session, self.base_velocity);
             }
             session.transport.set_playing(false);
             session.document.end_step();
@@ -65,8 +65,8 @@ impl WindDrag {
         }
     }
 
-    fn key(&self, session: &mut Session, velocity: [f64; 3]) {
-        let key = session.keyframe(&place(), Value::numbers(velocity));
-        session.edit(LABEL, &[key]);
+    fn set_keyframe(&self, session: &mut Session, velocity: [f64; 3]) {
+        let operation = session.keyframe_operation(&velocity_path(), Value::numbers(velocity));
+        session.edit(LABEL, &[operation]);
     }
 }

@@ -16,20 +16,21 @@ const MIN_DISTANCE: f64 = 0.002;
 /// The bounds of a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CurveBounds {
-    /// Least and greatest x.
+    /// Minimum and maximum x.
     pub(crate) x: [f64; 2],
-    /// Least and greatest y.
+    /// Minimum and maximum y.
     pub(crate) y: [f64; 2],
     /// Whether it must be monotonically increasing.
     pub(crate) rising: bool,
 }
 
-/// Where a curve's numbers lie on the screen.
+/// Maps the coordinates of a curve to the screen.
 struct Chart {
+    /// Its area on the screen, points.
     rect: Rect,
     x: [f64; 2],
     y: [f64; 2],
-    /// Whether no point may lie below the one before.
+    /// Whether the curve must be monotonically increasing.
     rising: bool,
 }
 
@@ -51,8 +52,8 @@ impl Chart {
         [value((at.x - rect.left()) / rect.width(), self.x), value((rect.bottom() - at.y) / rect.height(), self.y)]
     }
 
-    /// The height `y` for a point between two of the heights `before` and `after`: a rising curve stays one.
-    fn level(&self, y: f64, before: Option<f64>, after: Option<f64>) -> f64 {
+    /// `y` of a point between neighbors at `before` and `after`, clamped between them if the curve must increase.
+    fn clamp_rising(&self, y: f64, before: Option<f64>, after: Option<f64>) -> f64 {
         if !self.rising {
             return y;
         }
@@ -66,10 +67,10 @@ impl Chart {
     }
 }
 
-/// Shows the curve `value`, which may be what is `allowed`; what it becomes where a hand changed it.
-pub(crate) fn curve_editor_ui(ui: &mut Ui, label: Id, value: &Value, allowed: CurveBounds) -> Option<Value> {
-    let CurveBounds { x, y, rising } = allowed;
-    let (points, interpolation) = read(value)?;
+/// Shows the curve `value` within `bounds`. Returns the curve if it was edited.
+pub(crate) fn curve_editor_ui(ui: &mut Ui, label: Id, value: &Value, bounds: CurveBounds) -> Option<Value> {
+    let CurveBounds { x, y, rising } = bounds;
+    let (points, interpolation) = parse_curve(value)?;
     let curve = Curve::new(points.clone(), interpolation.into()).ok()?;
     let width = ui.available_width().clamp(120.0, 260.0);
     let (_, rect) = ui.allocate_space(vec2(width, 90.0));
@@ -79,20 +80,21 @@ pub(crate) fn curve_editor_ui(ui: &mut Ui, label: Id, value: &Value, allowed: Cu
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "curve"));
     let response = response.labelled_by(label);
     let top = y[1].min(highest(&points).max(y[0] + 1e-3) * 1.25).max(y[0] + 1e-3);
-    let chart = Chart { rect: response.rect.shrink(4.0), x, y: [y[0], held_still(ui, &response, top)], rising };
+    let chart =
+        Chart { rect: response.rect.shrink(4.0), x, y: [y[0], constant_while_dragging(ui, &response, top)], rising };
     paint(&painter, ui, &chart, &curve);
-    let edited = edit(ui, &response, &chart, points)?;
-    Some(write(edited, interpolation))
+    let edited = edit_points(ui, &response, &chart, points)?;
+    Some(curve_value(edited, interpolation))
 }
 
-/// The chart's top, kept constant while dragging: otherwise the scale would grow with the dragged point.
-fn held_still(ui: &Ui, response: &Response, top: f64) -> f64 {
-    let held = response.id.with("top");
+/// The largest y of the chart, which stays constant while dragging: otherwise the scale would grow with the dragged point.
+fn constant_while_dragging(ui: &Ui, response: &Response, top: f64) -> f64 {
+    let id = response.id.with("top");
     ui.data_mut(|data| {
         if response.is_pointer_button_down_on() || response.dragged() {
-            *data.get_temp_mut_or(held, top)
+            *data.get_temp_mut_or(id, top)
         } else {
-            data.remove::<f64>(held);
+            data.remove::<f64>(id);
             top
         }
     })
@@ -117,17 +119,17 @@ fn paint(painter: &egui::Painter, ui: &Ui, chart: &Chart, curve: &Curve) {
     }
 }
 
-/// The points after what hands did; `None` where they did nothing.
-fn edit(ui: &Ui, response: &Response, chart: &Chart, mut points: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
+/// The points after the pointer's edit; `None` if there was none.
+fn edit_points(ui: &Ui, response: &Response, chart: &Chart, mut points: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
     let at = response.interact_pointer_pos()?;
-    let held = response.id.with("held");
+    let dragged = response.id.with("held");
     if response.double_clicked() {
         let [x, y] = chart.to_curve(at);
         let index = points.partition_point(|point| point[0] < x);
         let [before, after] =
             [index.checked_sub(1).map(|before| points[before][1]), points.get(index).map(|point| point[1])];
-        points.insert(index, [x, chart.level(y, before, after)]);
-        return ascending(&points, chart).then_some(points);
+        points.insert(index, [x, chart.clamp_rising(y, before, after)]);
+        return is_ascending(&points, chart).then_some(points);
     }
     if response.secondary_clicked() {
         let index = chart.nearest(&points, at).filter(|_| points.len() > 1)?;
@@ -137,35 +139,36 @@ fn edit(ui: &Ui, response: &Response, chart: &Chart, mut points: Vec<[f64; 2]>) 
     if response.drag_started_by(PointerButton::Primary) {
         let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(at);
         let index = chart.nearest(&points, from);
-        ui.data_mut(|data| data.insert_temp(held, index));
+        ui.data_mut(|data| data.insert_temp(dragged, index));
     }
     if !response.dragged_by(PointerButton::Primary) {
         return None;
     }
-    let index = ui.data(|data| data.get_temp::<Option<usize>>(held)).flatten().filter(|&index| index < points.len())?;
-    let moved = between_neighbors(&points, index, chart.to_curve(at), chart);
+    let index =
+        ui.data(|data| data.get_temp::<Option<usize>>(dragged)).flatten().filter(|&index| index < points.len())?;
+    let moved = clamp_between_neighbors(&points, index, chart.to_curve(at), chart);
     (points[index] != moved).then(|| {
         points[index] = moved;
         points
     })
 }
 
-/// A control point cannot pass its neighbors.
-fn between_neighbors(points: &[[f64; 2]], index: usize, wanted: [f64; 2], chart: &Chart) -> [f64; 2] {
-    let apart = MIN_DISTANCE * (chart.x[1] - chart.x[0]);
-    let low = index.checked_sub(1).map_or(chart.x[0], |before| points[before][0] + apart);
-    let high = points.get(index + 1).map_or(chart.x[1], |after| after[0] - apart);
+/// `wanted` for point `index`, clamped so that it does not pass its neighbors.
+fn clamp_between_neighbors(points: &[[f64; 2]], index: usize, wanted: [f64; 2], chart: &Chart) -> [f64; 2] {
+    let min_distance = MIN_DISTANCE * (chart.x[1] - chart.x[0]);
+    let low = index.checked_sub(1).map_or(chart.x[0], |before| points[before][0] + min_distance);
+    let high = points.get(index + 1).map_or(chart.x[1], |after| after[0] - min_distance);
     let [before, after] = [index.checked_sub(1), Some(index + 1)].map(|at| points.get(at?).map(|point| point[1]));
     let x = if low <= high { wanted[0].clamp(low, high) } else { points[index][0] };
-    [x, chart.level(wanted[1], before, after)]
+    [x, chart.clamp_rising(wanted[1], before, after)]
 }
 
-fn ascending(points: &[[f64; 2]], chart: &Chart) -> bool {
-    let apart = MIN_DISTANCE * (chart.x[1] - chart.x[0]);
-    points.windows(2).all(|pair| pair[1][0] - pair[0][0] >= apart)
+fn is_ascending(points: &[[f64; 2]], chart: &Chart) -> bool {
+    let min_distance = MIN_DISTANCE * (chart.x[1] - chart.x[0]);
+    points.windows(2).all(|pair| pair[1][0] - pair[0][0] >= min_distance)
 }
 
-fn read(value: &Value) -> Option<(Vec<[f64; 2]>, InterpolationName)> {
+fn parse_curve(value: &Value) -> Option<(Vec<[f64; 2]>, InterpolationName)> {
     let (list, name) = match value {
         Value::List(items) => (items, InterpolationName::default()),
         Value::Table(table) => {
@@ -185,7 +188,7 @@ fn read(value: &Value) -> Option<(Vec<[f64; 2]>, InterpolationName)> {
     Some((list.iter().map(point).collect::<Option<_>>()?, name))
 }
 
-fn write(points: Vec<[f64; 2]>, name: InterpolationName) -> Value {
+fn curve_value(points: Vec<[f64; 2]>, name: InterpolationName) -> Value {
     let list = Value::List(points.into_iter().map(|point| Value::numbers(point).into()).collect());
     if Interpolation::from(name) == Interpolation::Monotone {
         return list;

@@ -1,34 +1,34 @@
-//! Small buttons with painted signs: no font needs to have them, and they look alike everywhere.
+//! Small buttons with painted icons, which look the same with every font.
 
 use eframe::egui::{self, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
-/// A sign on a button.
+/// The icon of a button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Icon {
-    /// To the first frame.
+    /// Go to the first frame.
     First,
-    /// One frame back.
-    Back,
-    /// Lets time pass.
+    /// Go one frame back.
+    StepBack,
+    /// Play.
     Play,
-    /// Stops time.
+    /// Pause.
     Pause,
-    /// One frame on.
-    On,
-    /// A key may be set.
-    Key,
-    /// Keyed, but not at this time.
-    Keyed,
-    /// A key stands here.
-    KeyHere,
-    /// Back to the default.
+    /// Go one frame forward.
+    StepForward,
+    /// A keyframe can be set; the value has none.
+    Constant,
+    /// The value has keyframes, but none at the current time.
+    Keyframed,
+    /// The value has a keyframe at the current time.
+    KeyframeHere,
+    /// Reset to the default.
     Reset,
-    /// Takes out, or away.
+    /// Remove, dismiss or stop.
     Cross,
 }
 
-/// A button with `icon`; `name` says what it does.
-pub(crate) fn button(ui: &mut Ui, icon: Icon, name: &str) -> Response {
+/// Shows a button with `icon`. `name` says what it does.
+pub(crate) fn button_ui(ui: &mut Ui, icon: Icon, name: &str) -> Response {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(ui.spacing().interact_size.y), Sense::click());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, ui.is_enabled(), name));
     if ui.is_rect_visible(rect) {
@@ -48,21 +48,21 @@ impl Icon {
         let diamond = || vec![at(0.5, -0.1), at(1.1, 0.5), at(0.5, 1.1), at(-0.1, 0.5), at(0.5, -0.1)];
         match self {
             Self::First => vec![bar(-0.1), filled(vec![at(1.1, 0.0), at(1.1, 1.0), at(0.3, 0.5)])],
-            Self::Back => vec![filled(vec![at(0.75, 0.1), at(0.75, 0.9), at(0.15, 0.5)])],
+            Self::StepBack => vec![filled(vec![at(0.75, 0.1), at(0.75, 0.9), at(0.15, 0.5)])],
             Self::Play => vec![filled(vec![at(0.1, -0.1), at(1.1, 0.5), at(0.1, 1.1)])],
             Self::Pause => vec![bar(0.08), bar(0.64)],
-            Self::On => vec![filled(vec![at(0.25, 0.1), at(0.85, 0.5), at(0.25, 0.9)])],
-            Self::Key => vec![line(diamond())],
-            Self::Keyed => vec![line(diamond()), Shape::circle_filled(rect.center(), 1.8, stroke.color)],
-            Self::KeyHere => vec![filled(diamond())],
-            Self::Reset => reset(rect, stroke),
+            Self::StepForward => vec![filled(vec![at(0.25, 0.1), at(0.85, 0.5), at(0.25, 0.9)])],
+            Self::Constant => vec![line(diamond())],
+            Self::Keyframed => vec![line(diamond()), Shape::circle_filled(rect.center(), 1.8, stroke.color)],
+            Self::KeyframeHere => vec![filled(diamond())],
+            Self::Reset => reset_shapes(rect, stroke),
             Self::Cross => vec![line(vec![at(0.1, 0.1), at(0.9, 0.9)]), line(vec![at(0.9, 0.1), at(0.1, 0.9)])],
         }
     }
 }
 
-/// An arc with an arrow's head.
-fn reset(rect: Rect, stroke: Stroke) -> Vec<Shape> {
+/// An arc with an arrowhead.
+fn reset_shapes(rect: Rect, stroke: Stroke) -> Vec<Shape> {
     let radius = 0.5 * rect.width();
     let on = |turns: f32| rect.center() + radius * Vec2::angled(std::f32::consts::TAU * turns);
     let arc = (0..=18).map(|step| on(-0.12 + 0.75 * step as f32 / 18.0)).collect();

@@ -1,4 +1,4 @@
-//! Value editors, one for each kind of parameter, independent of scenes.
+//! Value editors, one for each kind of parameter.
 
 use bansho::base::parameters::{Choice, Kind, Node, Value};
 use eframe::egui::{self, Color32, DragValue, Id, Ui};
@@ -24,7 +24,7 @@ const NUMBER_WIDTH: f32 = 114.0;
 const MIN_SLIDER_WIDTH: f32 = 40.0;
 
 impl ValueEditor<'_> {
-    /// Shows `value`; what it becomes where a hand changed it.
+    /// Shows `value`. Returns the new value if it was edited.
     pub(crate) fn ui(&self, ui: &mut Ui, value: &Value) -> Option<Value> {
         match self.kind {
             Kind::Bool => self.checkbox_ui(ui, value),
@@ -66,18 +66,18 @@ impl ValueEditor<'_> {
     }
 
     fn number_ui(&self, ui: &mut Ui, number: f64, bounds: [f64; 2], default: Option<f64>) -> Option<f64> {
-        let slid = self.slider_ui(ui, number, bounds, default).map(decimal);
+        let slid = self.slider_ui(ui, number, bounds, default).map(round_to_4_decimals);
         let dragged = self.drag_ui(ui, number, bounds);
         slid.or(dragged)
     }
 
     fn drag_ui(&self, ui: &mut Ui, mut number: f64, [min, max]: [f64; 2]) -> Option<f64> {
-        let speed = speed(number);
+        let speed = drag_speed(number);
         let drag = DragValue::new(&mut number).range(min..=max).speed(speed).max_decimals(4);
         // A value out of bounds is reported as a problem; showing it must not change it.
         let drag = drag.clamp_existing_to_range(false);
         let changed = ui.add(drag.suffix(self.suffix())).labelled_by(self.label).changed();
-        changed.then(|| decimal(number))
+        changed.then(|| round_to_4_decimals(number))
     }
 
     /// A slider over the allowed range, logarithmic where that spans orders of magnitude; `None` without bounds.
@@ -91,7 +91,9 @@ impl ValueEditor<'_> {
         let slider = slider.clamping(egui::SliderClamping::Edits);
         let slider = match scale {
             SliderScale::Linear => slider,
-            SliderScale::Logarithmic { least } => slider.logarithmic(true).smallest_positive(least),
+            SliderScale::Logarithmic { smallest_positive } => {
+                slider.logarithmic(true).smallest_positive(smallest_positive)
+            }
         };
         ui.add(slider).labelled_by(self.label).changed().then_some(number)
     }
@@ -104,26 +106,26 @@ impl ValueEditor<'_> {
         }
     }
 
-    /// Numbers beside one another; where they have bounds, each below the other with a slider.
+    /// Numbers in a row; if they have bounds, each in a row of its own with a slider.
     fn vector_ui(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
         let Value::List(items) = value else { return None };
         let default = |index: usize| match self.default {
             Some(Value::List(items)) => items.get(index)?.value.as_number(),
             _ => None,
         };
-        let whole = items.iter().all(|item| matches!(item.value, Value::Integer(_)));
+        let is_integer = items.iter().all(|item| matches!(item.value, Value::Integer(_)));
         let mut edited = items.clone();
         let mut changed = false;
-        let slides = SliderScale::for_bounds(bounds, default(0)).is_some();
-        let component = Self { unit: if slides { self.unit } else { "" }, ..*self };
+        let has_sliders = SliderScale::for_bounds(bounds, default(0)).is_some();
+        let component = Self { unit: if has_sliders { self.unit } else { "" }, ..*self };
         let mut show = |ui: &mut Ui, index: usize, item: &mut Node| {
             let Some(number) = item.value.as_number() else { return };
             if let Some(number) = component.number_ui(ui, number, bounds, default(index)) {
                 changed = true;
-                item.value = if whole { Value::Integer(number.round() as i64) } else { Value::Number(number) };
+                item.value = if is_integer { Value::Integer(number.round() as i64) } else { Value::Number(number) };
             }
         };
-        if slides {
+        if has_sliders {
             ui.vertical(|ui| {
                 for (index, item) in edited.iter_mut().enumerate() {
                     ui.horizontal(|ui| show(ui, index, item));
@@ -176,7 +178,7 @@ impl ValueEditor<'_> {
     }
 }
 
-/// An allowed value of `kind`, where there is no default.
+/// A valid value of `kind`, for parameters without a default.
 pub(crate) fn initial_value(kind: &Kind) -> Value {
     match kind {
         Kind::Bool => Value::Bool(false),
@@ -199,16 +201,16 @@ pub(crate) fn initial_value(kind: &Kind) -> Value {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SliderScale {
     Linear,
-    /// Logarithmic down to `least`.
+    /// Logarithmic down to `smallest_positive`.
     Logarithmic {
-        least: f64,
+        smallest_positive: f64,
     },
 }
 
 impl SliderScale {
-    /// For `[min, max]` around what is `default`; `None` without bounds that a hand could mean.
+    /// The scale for the range `[min, max]` with a default value; `None` for ranges that are too wide for a slider.
     fn for_bounds([min, max]: [f64; 2], default: Option<f64>) -> Option<Self> {
-        /// A wider range is no useful slider range.
+        /// Wider ranges have no slider.
         const MAX_SPAN: f64 = 2e6;
         /// Ranges with a larger ratio are logarithmic.
         const LOGARITHMIC_RATIO: f64 = 50.0;
@@ -220,18 +222,18 @@ impl SliderScale {
             Some(default) => max / default >= LOGARITHMIC_RATIO,
             None => min > 0.0 && max / min >= LOGARITHMIC_RATIO,
         };
-        let least = if min > 0.0 { min } else { default.map_or(1e-6 * max, |default| 1e-3 * default) };
-        Some(if wide { Self::Logarithmic { least } } else { Self::Linear })
+        let smallest_positive = if min > 0.0 { min } else { default.map_or(1e-6 * max, |default| 1e-3 * default) };
+        Some(if wide { Self::Logarithmic { smallest_positive } } else { Self::Linear })
     }
 }
 
-/// Change per pixel of dragging: 1 % of the number, at least 0.002.
-fn speed(number: f64) -> f64 {
+/// Change per point of dragging: 1 % of the number, at least 0.002.
+fn drag_speed(number: f64) -> f64 {
     (number.abs() * 0.01).max(0.002)
 }
 
 /// The number rounded to 4 decimals, so that files stay readable.
-fn decimal(number: f64) -> f64 {
+fn round_to_4_decimals(number: f64) -> f64 {
     let rounded = (number * 10_000.0).round() / 10_000.0;
     // Numbers that would be rounded to 0 keep all digits.
     if rounded == 0.0 || !rounded.is_finite() { number } else { rounded }
@@ -242,11 +244,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sliders_go_by_decades_where_the_range_does() {
+    fn sliders_of_wide_ranges_are_logarithmic() {
         assert_eq!(SliderScale::for_bounds([0.0, 1.0], Some(0.5)), Some(SliderScale::Linear));
         assert_eq!(SliderScale::for_bounds([-40.0, 40.0], None), Some(SliderScale::Linear));
-        assert_eq!(SliderScale::for_bounds([0.0, 1000.0], Some(2.0)), Some(SliderScale::Logarithmic { least: 0.002 }));
-        assert_eq!(SliderScale::for_bounds([0.01, 100.0], None), Some(SliderScale::Logarithmic { least: 0.01 }));
+        assert_eq!(
+            SliderScale::for_bounds([0.0, 1000.0], Some(2.0)),
+            Some(SliderScale::Logarithmic { smallest_positive: 0.002 })
+        );
+        assert_eq!(
+            SliderScale::for_bounds([0.01, 100.0], None),
+            Some(SliderScale::Logarithmic { smallest_positive: 0.01 })
+        );
         assert_eq!(SliderScale::for_bounds([f64::MIN, f64::MAX], Some(1.0)), None);
         assert_eq!(SliderScale::for_bounds([1.0, 1.0], None), None);
     }

@@ -15,9 +15,12 @@ use crate::document::Document;
 /// The autosave of a running studio.
 #[derive(Debug)]
 pub struct Autosave {
-    kept: PathBuf,
+    /// The file with the unsaved work.
+    file: PathBuf,
+    /// The path of the lock file.
     lock: PathBuf,
-    _held: File,
+    /// The locked file; the lock ends with the process.
+    _lock: File,
 }
 
 /// Unsaved work of a studio that crashed.
@@ -27,114 +30,114 @@ pub struct RecoveredWork {
     pub origin: String,
     /// The text.
     pub text: String,
-    /// The file that it is kept in, or the browser's name for it.
-    pub(crate) kept_in: PathBuf,
+    /// The file that it is stored in, or its name in the browser's local storage.
+    pub(crate) stored_as: PathBuf,
 }
 
-/// Most names that studios take in one folder.
-const MOST_NAMES: usize = 100;
+/// Maximum number of autosaves in one folder.
+const MAX_SESSIONS: usize = 100;
 
-/// Begins the first line of kept work; the origin follows.
+/// Start of the first line of a stored work; the origin follows.
 const HEADING: &str = "# unsaved work of the studio on: ";
 
 impl Autosave {
-    /// Keeps work in `folder`, under a name that begins with `session` and that no other running studio has.
+    /// Starts autosaving in `folder`, under a name that begins with `session` and that no other running studio has.
     ///
     /// # Errors
-    /// The folder cannot be made or written, it knows no locks, or too many studios hold some.
+    /// The folder cannot be created or written, its file system has no locks, or too many autosaves are in it.
     pub fn begin(folder: &Path, session: &str) -> io::Result<Self> {
         Self::begin_with(folder, session, File::try_lock)
     }
 
-    /// The same with another way to lock a file.
+    /// As [`begin`](Self::begin), with another function that locks a file.
     fn begin_with(
         folder: &Path,
         session: &str,
         try_lock: impl Fn(&File) -> Result<(), TryLockError>,
     ) -> io::Result<Self> {
         fs::create_dir_all(folder)?;
-        for number in 0..MOST_NAMES {
+        for number in 0..MAX_SESSIONS {
             let lock = folder.join(format!("{session}-{number}.lock"));
-            let was_there = lock.exists();
-            let held = File::create(&lock)?;
-            match try_lock(&held) {
+            let existed = lock.exists();
+            let lock_file = File::create(&lock)?;
+            match try_lock(&lock_file) {
                 Ok(()) if !lock.with_extension("toml").exists() => {
-                    return Ok(Self { kept: lock.with_extension("toml"), lock, _held: held });
+                    return Ok(Self { file: lock.with_extension("toml"), lock, _lock: lock_file });
                 }
-                // Another studio's, or work that waits to be recovered.
+                // Held by another studio, or unsaved work that was not recovered yet.
                 Ok(()) | Err(TryLockError::WouldBlock) => {}
                 Err(TryLockError::Error(error)) => {
-                    if !was_there {
-                        // One that stays does no harm.
+                    if !existed {
+                        // A file that remains is harmless.
                         let _ = fs::remove_file(&lock);
                     }
                     return Err(error);
                 }
             }
         }
-        Err(io::Error::other(format!("{MOST_NAMES} studios run, or left work that was never recovered")))
+        Err(io::Error::other(format!("{MAX_SESSIONS} studios run, or left work that was never recovered")))
     }
 
-    /// Keeps what is unsaved, or nothing where nothing is.
+    /// Stores the unsaved work of `document`, or removes the stored work if `document` is saved.
     ///
     /// # Errors
     /// The work cannot be written.
-    pub fn keep(&self, document: &Document, origin: Option<&Path>) -> Result<(), MediaError> {
+    pub fn save(&self, document: &Document, origin: Option<&Path>) -> Result<(), MediaError> {
         if !document.is_dirty() {
-            // Nothing kept is nothing to remove.
-            let _ = fs::remove_file(&self.kept);
+            // Fails where nothing is stored.
+            let _ = fs::remove_file(&self.file);
             return Ok(());
         }
         let origin = origin.map(|path| path.display().to_string()).unwrap_or_default();
-        atomic::write_bytes(&self.kept, kept(&origin, document.text()).as_bytes())
+        atomic::write_bytes(&self.file, encode(&origin, document.text()).as_bytes())
     }
 
-    /// Ends well: nothing is left to recover.
+    /// Removes the stored work and the lock when the studio closes.
     pub fn end(self) {
-        // What cannot be removed is offered at the next start, which does no harm.
-        let _ = fs::remove_file(&self.kept);
+        // A file that cannot be removed is offered for recovery at the next start, which is harmless.
+        let _ = fs::remove_file(&self.file);
         let _ = fs::remove_file(&self.lock);
     }
 }
 
-/// Work of `origin` as it is kept.
-pub fn kept(origin: &str, text: &str) -> String {
+/// The text that is stored for unsaved work of the file `origin`. [`RecoveredWork::decode`] reads it.
+pub fn encode(origin: &str, text: &str) -> String {
     format!("{HEADING}{origin}\n{text}")
 }
 
-/// The work in `folder` that no running studio holds.
+/// The unsaved work in `folder` of studios that no longer run.
 pub fn recoverable(folder: &Path) -> Vec<RecoveredWork> {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "toml") && !is_held(path));
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "toml") && !is_locked(path));
     files.sort();
     files.into_iter().filter_map(read).collect()
 }
 
-/// Where a folder knows no locks, no studio keeps work in it.
-fn is_held(kept: &Path) -> bool {
-    let lock = File::open(kept.with_extension("lock"));
+/// Whether a running studio holds the lock of the work in `file`. On file systems without locks no studio stores work.
+fn is_locked(file: &Path) -> bool {
+    let lock = File::open(file.with_extension("lock"));
     lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 fn read(file: PathBuf) -> Option<RecoveredWork> {
-    let recovered = RecoveredWork::of(&fs::read_to_string(&file).ok()?)?;
-    Some(RecoveredWork { kept_in: file, ..recovered })
+    let recovered = RecoveredWork::decode(&fs::read_to_string(&file).ok()?)?;
+    Some(RecoveredWork { stored_as: file, ..recovered })
 }
 
 impl RecoveredWork {
-    /// Work as it was [`kept`], in no file.
-    pub fn of(kept: &str) -> Option<Self> {
-        let (heading, text) = kept.split_once('\n')?;
+    /// Reads what [`encode`] wrote; `stored_as` is empty.
+    pub fn decode(stored: &str) -> Option<Self> {
+        let (heading, text) = stored.split_once('\n')?;
         let origin = heading.strip_prefix(HEADING)?;
-        Some(Self { origin: origin.to_owned(), text: text.to_owned(), kept_in: PathBuf::new() })
+        Some(Self { origin: origin.to_owned(), text: text.to_owned(), stored_as: PathBuf::new() })
     }
 
-    /// Forgets it, once it is open again or not wanted.
-    pub fn forget(&self) {
-        // What cannot be removed is offered again, which does no harm.
-        let _ = fs::remove_file(&self.kept_in);
-        let _ = fs::remove_file(self.kept_in.with_extension("lock"));
+    /// Removes its file.
+    pub fn discard(&self) {
+        // A file that cannot be removed is offered again, which is harmless.
+        let _ = fs::remove_file(&self.stored_as);
+        let _ = fs::remove_file(self.stored_as.with_extension("lock"));
     }
 }
 
@@ -147,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_without_locks_is_told_of_at_once() {
+    fn a_folder_without_locks_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let without = |_: &File| Err(TryLockError::Error(io::ErrorKind::Unsupported.into()));
         let error = Autosave::begin_with(folder.path(), "studio", without).unwrap_err();
@@ -155,13 +158,13 @@ mod tests {
     }
 
     #[test]
-    fn names_that_others_hold_are_passed_over_and_there_is_an_end_to_it() {
+    fn locked_names_are_skipped_up_to_a_maximum() {
         let folder = tempfile::tempdir().unwrap();
         let first = Autosave::begin(folder.path(), "studio").unwrap();
         let second = Autosave::begin(folder.path(), "studio").unwrap();
-        assert_ne!(first.kept, second.kept);
+        assert_ne!(first.file, second.file);
         let held = |_: &File| Err(TryLockError::WouldBlock);
         Autosave::begin_with(folder.path(), "studio", held).unwrap_err();
-        assert_eq!(files_in(folder.path()), MOST_NAMES);
+        assert_eq!(files_in(folder.path()), MAX_SESSIONS);
     }
 }

@@ -17,7 +17,7 @@ use bansho::{
 
 use super::Document;
 
-/// Why a document cannot be opened.
+/// Why a scene file cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct OpenError(Box<JobError>);
@@ -38,11 +38,11 @@ pub fn open(path: &Path) -> Result<Document, OpenError> {
     Ok(Document::new(path.display().to_string(), read(path)?))
 }
 
-/// Saves `document` to `path`, whole or not at all, as `text`: its own, or one that says the same from there, which is then a
-/// step of its history.
+/// Saves `text` to `path`, atomically. `text` is the text of `document`, or the same scene with paths adjusted to another folder, which
+/// then becomes an undo step.
 ///
 /// # Errors
-/// The file cannot be written; the one that was there stays, and so does the document.
+/// The file cannot be written. A previous file and the document are unchanged then.
 pub fn save(document: &mut Document, path: &Path, text: Arc<str>) -> Result<(), MediaError> {
     atomic::write_bytes(path, text.as_bytes())?;
     if text != *document.text() {
@@ -55,45 +55,45 @@ pub fn save(document: &mut Document, path: &Path, text: Arc<str>) -> Result<(), 
     Ok(())
 }
 
-/// Whether `path` ends as scenes do.
-pub fn is_named_as_scene(path: &Path) -> bool {
+/// Whether `path` has the extension of scene files, `.toml`.
+pub fn has_scene_extension(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-/// `path` with the ending of scenes.
-pub fn named_as_scene(path: PathBuf) -> PathBuf {
-    if is_named_as_scene(&path) {
+/// `path`, with `.toml` appended unless it has that extension.
+pub fn with_scene_extension(path: PathBuf) -> PathBuf {
+    if has_scene_extension(&path) {
         return path;
     }
-    let mut whole = path.into_os_string();
-    whole.push(".toml");
-    whole.into()
+    let mut name = path.into_os_string();
+    name.push(".toml");
+    name.into()
 }
 
-/// Writes a copy beside `path`, where it is found after a failure, and says where. Earlier copies stay.
+/// Writes a copy of `text` beside `path`, after a panic, and returns its path. Earlier copies are not overwritten.
 ///
 /// # Errors
 /// The copy cannot be written.
-pub fn rescue(text: &str, path: &Path) -> Result<PathBuf, MediaError> {
-    write_beside(|which| path.with_extension(format!("rescued{which}.toml")), text.as_bytes())
+pub fn save_rescue_copy(text: &str, path: &Path) -> Result<PathBuf, MediaError> {
+    write_to_free_name(|which| path.with_extension(format!("rescued{which}.toml")), text.as_bytes())
 }
 
-/// Most files of one name that are told apart by numbers.
-const MOST_OF_A_NAME: usize = 1000;
+/// Maximum number of files whose names differ in a number only.
+const MAX_NUMBERED_FILES: usize = 1000;
 
-/// Writes `bytes` to the first file that is free, or that holds just them already; which one. `named` makes its path of what tells it
-/// from the first: nothing, ` 2`, ` 3` and so on.
+/// Writes `bytes` to the first of several numbered files that does not exist, or that has just this content. Returns its path. `named`
+/// makes a path from a suffix: empty, ` 2`, ` 3` and so on.
 ///
 /// # Errors
 /// The file cannot be written, or too many names are taken.
-pub fn write_beside(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Result<PathBuf, MediaError> {
+pub fn write_to_free_name(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Result<PathBuf, MediaError> {
     let mut file = named("");
-    for number in 2..=MOST_OF_A_NAME {
+    for number in 2..=MAX_NUMBERED_FILES {
         if fs::symlink_metadata(&file).is_err() {
             atomic::write_bytes(&file, bytes)?;
             return Ok(file);
         }
-        if fs::read(&file).is_ok_and(|there| there == bytes) {
+        if fs::read(&file).is_ok_and(|content| content == bytes) {
             return Ok(file);
         }
         file = named(&format!(" {number}"));
@@ -104,58 +104,58 @@ pub fn write_beside(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Result<Pat
 /// How another program changed a file since it was opened or saved here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ExternalChange {
-    /// Nothing.
-    Same,
-    /// Another text.
+    /// It has the same text.
+    Unchanged,
+    /// It has this text.
     Changed(Arc<str>),
-    /// Something that cannot be read as text, and why.
+    /// It cannot be read as text, for this reason.
     Unreadable(String),
-    /// It deleted the file.
-    Gone,
+    /// It was deleted.
+    Deleted,
 }
 
-/// What another program made of the file of `document` in `path`.
+/// How another program changed the file `path` of `document`.
 pub fn external_change(document: &Document, path: &Path) -> ExternalChange {
     match fs::read_to_string(path) {
-        Ok(there) if *there != *document.saved => ExternalChange::Changed(there.into()),
-        Ok(_) => ExternalChange::Same,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => ExternalChange::Gone,
+        Ok(text) if *text != *document.saved => ExternalChange::Changed(text.into()),
+        Ok(_) => ExternalChange::Unchanged,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => ExternalChange::Deleted,
         Err(error) => ExternalChange::Unreadable(error.to_string()),
     }
 }
 
-/// Files that were open lately, the last first, kept as one path a line.
+/// Recently opened files, the newest first. They are stored as one path per line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Recent {
+pub struct RecentFiles {
     file: Option<PathBuf>,
     paths: Vec<PathBuf>,
 }
 
-/// Most files that are remembered.
-const MOST_RECENT: usize = 12;
+/// Maximum number of recent files.
+const MAX_RECENT_FILES: usize = 12;
 
-impl Recent {
-    /// The list in `file`; empty where there is none.
+impl RecentFiles {
+    /// Reads the list in `file`; empty where there is none.
     pub fn read(file: PathBuf) -> Self {
         let text = fs::read_to_string(&file).unwrap_or_default();
-        let paths = text.lines().filter(|line| !line.is_empty()).map(PathBuf::from).take(MOST_RECENT).collect();
+        let paths = text.lines().filter(|line| !line.is_empty()).map(PathBuf::from).take(MAX_RECENT_FILES).collect();
         Self { file: Some(file), paths }
     }
 
-    /// The files, the last first.
+    /// The files, the newest first.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
     }
 
-    /// Puts `path` first and keeps the list.
+    /// Puts `path` first and stores the list.
     ///
     /// # Errors
-    /// The list cannot be written; it is then right until the program ends.
-    pub fn note(&mut self, path: &Path) -> Result<(), MediaError> {
+    /// The list cannot be written. It stays valid in memory.
+    pub fn add(&mut self, path: &Path) -> Result<(), MediaError> {
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
         self.paths.retain(|other| *other != path);
         self.paths.insert(0, path);
-        self.paths.truncate(MOST_RECENT);
+        self.paths.truncate(MAX_RECENT_FILES);
         let Some(file) = &self.file else { return Ok(()) };
         let lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
         atomic::write_bytes(file, (lines.join("\n") + "\n").as_bytes())

@@ -23,7 +23,7 @@ pub struct FileWatcher {
 
 #[derive(Debug, Default)]
 struct Shared {
-    touched: AtomicBool,
+    modified: AtomicBool,
     closing: AtomicBool,
 }
 
@@ -34,37 +34,37 @@ fn modification_stamp(path: &Path) -> Option<(SystemTime, u64)> {
 }
 
 impl FileWatcher {
-    /// Looks at `path` from now on; `wake` is called from another thread when it was touched.
+    /// Starts watching `path`; `wake` is called from another thread after each modification.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     pub fn start(path: &Path, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
-        let (watched, own) = (path.to_path_buf(), shared.clone());
-        let look = move || {
+        let (watched, flags) = (path.to_path_buf(), shared.clone());
+        let poll = move || {
             let mut last = modification_stamp(&watched);
-            while !own.closing.load(Ordering::Relaxed) {
+            while !flags.closing.load(Ordering::Relaxed) {
                 thread::sleep(POLL_INTERVAL);
                 let now = modification_stamp(&watched);
                 if now != last {
                     last = now;
-                    own.touched.store(true, Ordering::Relaxed);
+                    flags.modified.store(true, Ordering::Relaxed);
                     wake();
                 }
             }
         };
-        thread::Builder::new().name("watch".into()).spawn(look)?;
+        thread::Builder::new().name("watch".into()).spawn(poll)?;
         Ok(Self { path: path.to_path_buf(), shared })
     }
 
-    /// What it looks at.
+    /// The watched file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether it was touched since this was asked last.
-    pub fn touched(&self) -> bool {
-        self.shared.touched.swap(false, Ordering::Relaxed)
+    /// Whether the file was modified since the last call.
+    pub fn take_modified(&self) -> bool {
+        self.shared.modified.swap(false, Ordering::Relaxed)
     }
 }
 
@@ -81,17 +81,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_writing_is_told_once() {
+    fn a_modification_is_reported_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.toml");
         fs::write(&path, "bansho = 2\n").unwrap();
         let (sender, woken) = mpsc::channel();
         let watch = FileWatcher::start(&path, move || sender.send(()).unwrap_or_default()).unwrap();
-        assert!(!watch.touched());
-        // The thread may have taken its first look before or after this.
+        assert!(!watch.take_modified());
+        // The thread may have polled for the first time before or after this.
         thread::sleep(Duration::from_millis(200));
         fs::write(&path, "bansho = 2 # longer\n").unwrap();
         woken.recv_timeout(Duration::from_secs(20)).unwrap();
-        assert!(watch.touched() && !watch.touched());
+        assert!(watch.take_modified() && !watch.take_modified());
     }
 }

@@ -10,7 +10,11 @@ mod tool;
 
 use std::sync::Arc;
 
-use bansho::{aurora::shapes::Form, scene::operation::Operation};
+use bansho::{
+    aurora::{AuroraParameters, shapes::Form},
+    base::{parameters::Value, phenomenon::kind::Describe},
+    scene::operation::Operation,
+};
 
 use self::{
     plane::{Plane, Side},
@@ -31,15 +35,19 @@ pub(crate) struct AuroraEditor {
     /// The shape that is edited.
     target: usize,
     /// The sheet that the next stroke replaces; `None` for a new sheet.
-    next: Option<usize>,
+    next_sheet: Option<usize>,
     drag: DragState,
     /// The shape that is dragged on the timeline.
     shape_drag: Option<shape_timeline::ShapeDrag>,
     shape_error: Option<(String, Pos2)>,
-    read: Option<(Revision, Result<Arc<AuroraDrawing>, String>)>,
+    /// The shapes of a revision, or why there are none.
+    cached: Option<(Revision, Result<Arc<AuroraDrawing>, String>)>,
 }
 
 impl AuroraEditor {
+    /// The kind of phenomenon that it edits.
+    pub(crate) const KIND: &'static str = AuroraParameters::KEY;
+
     /// Shows the editor of aurora `index`.
     pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {
         if self.index != index {
@@ -54,7 +62,7 @@ impl AuroraEditor {
                 }
                 Err(reason) => {
                     ui.colored_label(ui.visuals().warn_fg_color, reason);
-                    ui.weak("Mend the text or undo (Ctrl+Z); the shapes come back then.");
+                    ui.weak("Correct the text or undo (Ctrl+Z) to see the shapes again.");
                     return;
                 }
             }
@@ -65,12 +73,12 @@ impl AuroraEditor {
     /// The shapes of the current revision.
     fn drawing(&mut self, session: &Session) -> Result<Arc<AuroraDrawing>, String> {
         let revision = session.document.revision();
-        if let Some((_, read)) = self.read.as_ref().filter(|(of, _)| *of == revision) {
+        if let Some((_, read)) = self.cached.as_ref().filter(|(cached, _)| *cached == revision) {
             return read.clone();
         }
         let read = AuroraDrawing::read(session.document.values(), self.index, session.assets());
         let read = read.map(Arc::new).map_err(|shape_error| shape_error.to_string());
-        self.read = Some((revision, read.clone()));
+        self.cached = Some((revision, read.clone()));
         read
     }
 
@@ -96,7 +104,7 @@ impl AuroraEditor {
                 }
             })
             .response
-            .on_hover_text("A named form in stead of the yellow sheet");
+            .on_hover_text("Replaces the yellow sheet by a named form");
             ui.separator();
             self.next_stroke_ui(ui, drawing);
         });
@@ -112,14 +120,14 @@ impl AuroraEditor {
         if ui.link(text).on_hover_text("Click for another; or click a sheet of the drawing").clicked() && count > 0 {
             let next = self.target_sheet(drawing).map_or(0, |sheet| sheet + 1);
             let new = self.target == 0 && next >= count;
-            self.next = (!new).then_some(next % count);
+            self.next_sheet = (!new).then_some(next % count);
         }
     }
 
     /// The sheet that a stroke replaces. The first shape accepts new sheets; the number of the others follows from the transitions.
     fn target_sheet(&self, drawing: &AuroraDrawing) -> Option<usize> {
         let count = drawing.lines(self.target).len();
-        match self.next {
+        match self.next_sheet {
             _ if !drawing.is_stated() => None,
             Some(next) => Some(next.min(count.saturating_sub(1))),
             None if self.target == 0 => None,
@@ -130,7 +138,7 @@ impl AuroraEditor {
     /// Selects the sheet after the one that was drawn.
     fn select_next_sheet(&mut self, drawing: &AuroraDrawing) {
         let count = drawing.lines(self.target).len().max(1);
-        self.next = self.target_sheet(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
+        self.next_sheet = self.target_sheet(drawing).filter(|_| self.target > 0).map(|sheet| (sheet + 1) % count);
     }
 
     fn planes_ui(&mut self, ui: &mut Ui, session: &mut Session, drawing: &AuroraDrawing) {
@@ -152,10 +160,10 @@ impl AuroraEditor {
 
     /// Applies an edit of the shapes, or shows the error at `at`. Returns whether it was applied.
     fn change(&mut self, session: &mut Session, label: &str, operations: &[Operation], at: Pos2) -> bool {
-        match session.edit_shapes(label, operations, self.index) {
+        match edit_shapes(session, label, operations, self.index) {
             Ok(drawing) => {
                 self.shape_error = None;
-                self.read = Some((session.document.revision(), Ok(Arc::new(drawing))));
+                self.cached = Some((session.document.revision(), Ok(Arc::new(drawing))));
                 true
             }
             Err(shape_error) => {
@@ -182,4 +190,30 @@ impl AuroraEditor {
             },
         );
     }
+}
+
+/// Applies `operations` to the shapes of aurora `index`. Returns its shapes.
+///
+/// # Errors
+/// The resulting shapes are invalid; nothing is changed then.
+pub(crate) fn edit_shapes(
+    session: &mut Session,
+    label: &str,
+    operations: &[Operation],
+    index: usize,
+) -> Result<AuroraDrawing, ShapeEditError> {
+    let assets = session.assets().clone();
+    let drawing = session.document.edit_shapes(label, operations, index, &assets)?;
+    session.set_notice(None);
+    Ok(drawing)
+}
+
+/// Replaces the sheets of the first shape of aurora `index` by the strokes of the SVG file that the scene calls `name`.
+///
+/// # Errors
+/// There is no such aurora, or the strokes make no valid shape.
+pub(crate) fn import_drawing(session: &mut Session, index: usize, name: Value) -> Result<(), ShapeEditError> {
+    let drawing = AuroraDrawing::read(session.document.values(), index, session.assets())?;
+    edit_shapes(session, "drawing", &drawing.trace(name), index)?;
+    Ok(())
 }

@@ -19,8 +19,8 @@ pub(super) enum DragState {
     None,
     /// The stroke drawn so far, km.
     Stroke(Vec<DVec2>),
-    /// A dragged control point: sheet and point.
-    MovePoint(usize, usize),
+    /// A dragged control point: the indices of its sheet and of the point on it.
+    MovePoint { sheet: usize, point: usize },
     /// The first of two ends to merge.
     MergeFrom(SheetEnd),
     /// A link from a position on the source to a sheet of the target: the whole sheet is linked, or only the point.
@@ -75,7 +75,8 @@ impl AuroraEditor {
         /// Smallest distance between two points of a stroke, points of the screen.
         const STEP: f32 = 2.0;
         if pointer.response.clicked() {
-            self.next = pointer.sheet_of(&drawing.lines(self.target)).or(self.next).filter(|_| drawing.is_stated());
+            self.next_sheet =
+                pointer.sheet_at(&drawing.lines(self.target)).or(self.next_sheet).filter(|_| drawing.is_stated());
         }
         if pointer.response.drag_started_by(PointerButton::Primary) {
             self.drag = DragState::Stroke(vec![pointer.plane.to_plane(pointer.from)]);
@@ -106,12 +107,12 @@ impl AuroraEditor {
                 points.into_iter().enumerate().map(move |(point, at)| (at.distance(from), sheet, point))
             });
             let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|near| near.0 < pointer.hit_radius(self.tool));
-            self.drag = nearest.map_or(DragState::None, |(_, sheet, point)| DragState::MovePoint(sheet, point));
+            self.drag = nearest.map_or(DragState::None, |(_, sheet, point)| DragState::MovePoint { sheet, point });
         }
-        let DragState::MovePoint(sheet, point) = self.drag else { return };
+        let DragState::MovePoint { sheet, point } = self.drag else { return };
         let mut points = drawing.points(self.target, sheet);
-        if let Some(held) = points.get_mut(point) {
-            *held = pointer.point();
+        if let Some(dragged) = points.get_mut(point) {
+            *dragged = pointer.point();
         }
         let moved = drawing.set_points(self.target, sheet, &points);
         if !moved.is_empty() {
@@ -162,7 +163,7 @@ impl AuroraEditor {
             return;
         }
         let all = drawing.lines(self.target);
-        let Some(sheet) = pointer.near(&all, self.tool) else { return };
+        let Some(sheet) = pointer.sheet_near(&all, self.tool) else { return };
         let Some(on) = polyline::nearest(&all[sheet], pointer.point()) else { return };
         let moved = f64::from(pointer.response.drag_delta().length());
         let by = if lower { -STRENGTH * moved } else { STRENGTH * moved };
@@ -174,23 +175,24 @@ impl AuroraEditor {
 
     fn split(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
         let Some(all) = self.source(drawing, pointer) else { return };
-        let Some(sheet) = pointer.near(&all, self.tool) else { return };
+        let Some(sheet) = pointer.sheet_near(&all, self.tool) else { return };
         let Some(on) = polyline::nearest(&all[sheet], pointer.point()) else { return };
         let split = drawing.split(self.target, sheet, polyline::fraction_of(&all[sheet], on));
         if self.change(session, "split", &split, pointer.at) {
-            (self.next, self.tool) = (Some(0), DrawTool::Draw);
+            (self.next_sheet, self.tool) = (Some(0), DrawTool::Draw);
         }
     }
 
     fn merge(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
         let Some(all) = self.source(drawing, pointer) else { return };
         let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
-            [(line.first(), false), (line.last(), true)].map(|(point, last)| (point.copied(), (sheet, last)))
+            let end = |last: bool| SheetEnd { sheet, last };
+            [(line.first().copied(), end(false)), (line.last().copied(), end(true))]
         });
         let near = |(point, end): (Option<DVec2>, SheetEnd)| Some((point?.distance(pointer.point()), end));
         let nearest = ends.filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, end)) = nearest.filter(|near| near.0 < pointer.hit_radius(self.tool)) else {
-            if pointer.near(&all, self.tool).is_some() {
+            if pointer.sheet_near(&all, self.tool).is_some() {
                 self.shape_error = Some(("only ends merge: sheets never branch".into(), pointer.at));
             }
             return;
@@ -202,7 +204,7 @@ impl AuroraEditor {
         self.drag = DragState::None;
         let merge = drawing.merge(self.target, [first, end]);
         if self.change(session, "merge", &merge, pointer.at) {
-            (self.next, self.tool) = (Some(0), DrawTool::Draw);
+            (self.next_sheet, self.tool) = (Some(0), DrawTool::Draw);
         }
     }
 
@@ -220,16 +222,16 @@ impl AuroraEditor {
             let pressed = PointerInput { at: pointer.from, ..*pointer };
             let from = match side {
                 Side::Source => Some(pressed.point()),
-                Side::Target => pressed.arrival(drawing, self.target - 1),
+                Side::Target => pressed.origin_of_arrival(drawing, self.target - 1),
             };
             let from = from.and_then(|from| on_sheet(&all, from, pointer.hit_radius(self.tool)));
             let linking = |from| DragState::Linking { from, point_alone: side == Side::Target, at: pointer.at };
             self.drag = from.map_or(DragState::None, linking);
         }
         if pointer.response.clicked() && side == Side::Target {
-            let freed = drawing.unlink(self.target, pointer.point(), pointer.hit_radius(self.tool));
-            if !freed.is_empty() {
-                self.change(session, "unlink", &freed, pointer.at);
+            let unlinked = drawing.unlink(self.target, pointer.point(), pointer.hit_radius(self.tool));
+            if !unlinked.is_empty() {
+                self.change(session, "unlink", &unlinked, pointer.at);
             }
         }
         let DragState::Linking { from, point_alone, at } = &mut self.drag else { return };
@@ -237,15 +239,16 @@ impl AuroraEditor {
         let (from, point_alone) = (*from, *point_alone);
         if pointer.response.drag_stopped() {
             self.drag = DragState::None;
-            let over = planes.iter().find(|plane| plane.rect.contains(pointer.at)).unwrap_or(pointer.plane);
-            let let_go = PointerInput { plane: over, ..*pointer };
-            let Some(to) = on_sheet(&drawing.lines(self.target), let_go.point(), let_go.hit_radius(self.tool)) else {
+            let plane = planes.iter().find(|plane| plane.rect.contains(pointer.at)).unwrap_or(pointer.plane);
+            let released = PointerInput { plane, ..*pointer };
+            let Some(to) = on_sheet(&drawing.lines(self.target), released.point(), released.hit_radius(self.tool))
+            else {
                 return;
             };
             let change = if point_alone {
                 drawing.link_point(self.target, from, to)
             } else {
-                drawing.link_sheet(self.target, from, to.0)
+                drawing.link_sheet(self.target, from, to.sheet)
             };
             self.change(session, "link", &change, pointer.at);
         }
@@ -265,7 +268,7 @@ impl AuroraEditor {
 /// The position on one of `all` that is nearest to `point`, within `hit_radius`, km.
 fn on_sheet(all: &[Vec<DVec2>], point: DVec2, hit_radius: f64) -> Option<SheetPosition> {
     let (sheet, on) = polyline::nearest_among(all, point).filter(|(_, on)| on.distance < hit_radius)?;
-    Some((sheet, polyline::fraction_of(&all[sheet], on)))
+    Some(SheetPosition { sheet, fraction: polyline::fraction_of(&all[sheet], on) })
 }
 
 /// The path of the pointer while pressed since the last frame, with all its events.
@@ -300,27 +303,25 @@ impl PointerInput<'_> {
         self.plane.to_plane(self.at)
     }
 
-    /// The reach of `tool`, km.
+    /// The hit radius of `tool`, km.
     fn hit_radius(&self, tool: DrawTool) -> f64 {
         self.plane.km(tool.hit_radius())
     }
 
-    /// The sheet nearest to the pointer, within the reach of `tool`.
-    fn near(&self, all: &[Vec<DVec2>], tool: DrawTool) -> Option<usize> {
-        on_sheet(all, self.point(), self.hit_radius(tool)).map(|(sheet, _)| sheet)
+    /// The sheet nearest to the pointer, within the hit radius of `tool`.
+    fn sheet_near(&self, all: &[Vec<DVec2>], tool: DrawTool) -> Option<usize> {
+        on_sheet(all, self.point(), self.hit_radius(tool)).map(|position| position.sheet)
     }
 
-    /// Where the control point leaves shape `before` that arrives nearest to the pointer.
-    fn arrival(&self, drawing: &AuroraDrawing, before: usize) -> Option<DVec2> {
+    /// The point on shape `before` of the control point that arrives nearest to the pointer.
+    fn origin_of_arrival(&self, drawing: &AuroraDrawing, before: usize) -> Option<DVec2> {
         let point_paths = drawing.point_paths(before);
-        let off = |pointer_path: &&[DVec2; 2]| pointer_path[1].distance(self.point());
-        let nearest = point_paths.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b)));
-        nearest
-            .filter(|pointer_path| off(pointer_path) < self.hit_radius(DrawTool::Link))
-            .map(|pointer_path| pointer_path[0])
+        let distance = |point_path: &&[DVec2; 2]| point_path[1].distance(self.point());
+        let nearest = point_paths.iter().flatten().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.filter(|path| distance(path) < self.hit_radius(DrawTool::Link)).map(|path| path[0])
     }
 
-    fn sheet_of(&self, all: &[Vec<DVec2>]) -> Option<usize> {
-        self.near(all, DrawTool::Draw)
+    fn sheet_at(&self, all: &[Vec<DVec2>]) -> Option<usize> {
+        self.sheet_near(all, DrawTool::Draw)
     }
 }

@@ -37,14 +37,14 @@ impl DrawTool {
             Self::Smooth => ("Smooth", "Brush over a sheet on the right to smooth it"),
             Self::Erase => (
                 "Erase",
-                "Brush away points of the sheets on the right; a sheet goes with its last two, from all shapes",
+                "Brush away points of the sheets on the right; a sheet without two points is removed from all shapes",
             ),
-            Self::Split => ("Split", "Click a sheet of the source where it shall split on the way"),
-            Self::Merge => ("Merge", "Click two ends of the source that shall grow together on the way"),
+            Self::Split => ("Split", "Click a sheet of the source where it shall split in the transition"),
+            Self::Merge => ("Merge", "Click two ends of the source that shall merge in the transition"),
             Self::Link => (
                 "Link",
                 "Drag from a sheet of the source to the sheet on the right that it shall become, or on the right one point along \
-                 its sheet to where it shall arrive; click a linked point to let it go",
+                 its sheet to where it shall arrive; click a linked point to unlink it",
             ),
             Self::Brightness => {
                 ("Brightness", "Brush along a sheet on the right to brighten it; with Shift to darken it")

@@ -6,7 +6,7 @@ use bansho::Assets;
 
 use super::reply::Reply;
 use crate::{
-    document::{ReportedProblem, Revision},
+    document::{PhenomenonId, ReportedProblem, Revision},
     player::{FrameRequest, Picture},
 };
 use js_sys::{Array, Uint8Array};
@@ -14,10 +14,10 @@ use wasm_bindgen::{JsCast, JsValue};
 
 /// A message from the page to the worker.
 pub(super) enum PageMessage {
-    /// A file that no folder holds.
-    File(String, Vec<u8>),
-    /// A frame request, with its number.
-    Request(u64, FrameRequest),
+    /// An added file.
+    File { name: String, bytes: Vec<u8> },
+    /// A frame request with its serial number.
+    Request { number: u64, request: FrameRequest },
 }
 
 impl PageMessage {
@@ -36,15 +36,18 @@ impl PageMessage {
             (&*request.name).into(),
             (&*request.text).into(),
         ];
-        let stages = request.stages.map_or(JsValue::NULL, |sheet| (sheet as f64).into());
-        head.into_iter().chain([frame, width, height]).chain(flags).chain([stages]).collect()
+        let stages = match request.stages {
+            Some(PhenomenonId { kind, index }) => [kind.into(), (index as f64).into()],
+            None => [JsValue::NULL; 2],
+        };
+        head.into_iter().chain([frame, width, height]).chain(flags).chain(stages).collect()
     }
 
-    /// Reads a message; requests find their files in `assets`.
+    /// Reads a message. Requests get `assets` as the source of their files.
     pub(super) fn read(message: &JsValue, assets: &Arc<dyn Assets>) -> Option<Self> {
         let mut fields = Fields::of(message)?;
         Some(match fields.text()?.as_str() {
-            "file" => Self::File(fields.text()?, fields.bytes()?),
+            "file" => Self::File { name: fields.text()?, bytes: fields.bytes()? },
             "request" => {
                 let number = fields.count()?;
                 let request = FrameRequest {
@@ -57,9 +60,9 @@ impl PageMessage {
                     exact: fields.flag()?,
                     draft: fields.flag()?,
                     full_quality: fields.flag()?,
-                    stages: fields.next()?.as_f64().map(|sheet| sheet as usize),
+                    stages: fields.phenomenon()?,
                 };
-                Self::Request(number, request)
+                Self::Request { number, request }
             }
             _ => return None,
         })
@@ -70,13 +73,15 @@ impl Reply {
     pub(super) fn write(self) -> Array {
         match self {
             Self::Ready => array(["ready".into()]),
-            Self::Checked { number, found: Ok(ev100) } => array(["checked".into(), count(number), ev100.into()]),
-            Self::Checked { number, found: Err(faults) } => {
-                let faults: Array = faults.iter().map(fault).collect();
-                array(["checked".into(), count(number), faults.into()])
+            Self::Checked { number, report: Ok(ev100) } => array(["checked".into(), count(number), ev100.into()]),
+            Self::Checked { number, report: Err(problems) } => {
+                let problems: Array = problems.iter().map(write_problem).collect();
+                array(["checked".into(), count(number), problems.into()])
             }
-            Self::Drawn { picture } => drawn("drawn", &picture).collect(),
-            Self::Stage { stage, picture } => drawn("stage", &picture).chain([JsValue::from(stage as f64)]).collect(),
+            Self::Drawn { picture } => write_picture("drawn", &picture).collect(),
+            Self::Stage { stage, picture } => {
+                write_picture("stage", &picture).chain([JsValue::from(stage as f64)]).collect()
+            }
             Self::FullQualityFrame { frame, png } => {
                 array(["full_quality_frame".into(), (frame as f64).into(), Uint8Array::from(png.as_slice()).into()])
             }
@@ -92,10 +97,10 @@ impl Reply {
             "ready" => Self::Ready,
             "checked" => {
                 let number = fields.count()?;
-                let said = fields.next()?;
-                let faults =
-                    || said.dyn_ref::<Array>().into_iter().flat_map(Array::iter).filter_map(read_fault).collect();
-                Self::Checked { number, found: said.as_f64().map(|ev100| ev100 as f32).ok_or_else(faults) }
+                let report = fields.next()?;
+                let problems =
+                    || report.dyn_ref::<Array>().into_iter().flat_map(Array::iter).filter_map(read_problem).collect();
+                Self::Checked { number, report: report.as_f64().map(|ev100| ev100 as f32).ok_or_else(problems) }
             }
             "drawn" => Self::Drawn { picture: fields.picture()? },
             "stage" => {
@@ -115,27 +120,28 @@ fn array<const N: usize>(fields: [JsValue; N]) -> Array {
     fields.into_iter().collect()
 }
 
-/// A fault as a message holds it: without a place, both of its ends are null.
-fn fault(found: &ReportedProblem) -> Array {
+/// A problem as an array. Without a span, both of its ends are null.
+fn write_problem(problem: &ReportedProblem) -> Array {
     let end = |at: Option<usize>| at.map_or(JsValue::NULL, |at| (at as f64).into());
-    let [start, stop] = [found.span.as_ref().map(|span| span.start), found.span.as_ref().map(|span| span.end)].map(end);
-    let asset = found.asset.as_deref().map_or(JsValue::NULL, JsValue::from);
-    array([start, stop, (&*found.path).into(), (&*found.reason).into(), asset])
+    let [start, stop] =
+        [problem.span.as_ref().map(|span| span.start), problem.span.as_ref().map(|span| span.end)].map(end);
+    let asset = problem.asset.as_deref().map_or(JsValue::NULL, JsValue::from);
+    array([start, stop, (&*problem.path).into(), (&*problem.reason).into(), asset])
 }
 
-fn read_fault(message: JsValue) -> Option<ReportedProblem> {
+fn read_problem(message: JsValue) -> Option<ReportedProblem> {
     let mut fields = Fields::of(&message)?;
     let [start, stop] = [fields.next()?, fields.next()?].map(|end| end.as_f64().map(|at| at as usize));
     let span = start.zip(stop).map(|(start, stop)| start..stop);
     Some(ReportedProblem { span, path: fields.text()?, reason: fields.text()?, asset: fields.next()?.as_string() })
 }
 
-/// Counts stay far below 2^53.
+/// A serial number. These stay far below 2^53, so that they are exact as JavaScript numbers.
 fn count(number: u64) -> JsValue {
     (number as f64).into()
 }
 
-fn drawn(kind: &str, picture: &Picture) -> impl Iterator<Item = JsValue> {
+fn write_picture(kind: &str, picture: &Picture) -> impl Iterator<Item = JsValue> {
     let Picture { revision, number: frame, size, scene_size, pixels, exact, draft, draw_s, advance_s } = picture;
     let head = [JsValue::from(kind), count(revision.0), (*frame as f64).into()];
     let sizes = [*size, *scene_size].concat().into_iter().map(|side| JsValue::from(side as f64));
@@ -174,6 +180,12 @@ impl Fields {
 
     fn size(&mut self) -> Option<[usize; 2]> {
         Some([self.number()? as usize, self.number()? as usize])
+    }
+
+    /// A phenomenon's kind and index; both null for none.
+    fn phenomenon(&mut self) -> Option<Option<PhenomenonId>> {
+        let (kind, index) = (self.next()?.as_string(), self.next()?.as_f64());
+        Some(kind.zip(index).and_then(|(kind, index)| PhenomenonId::find(&kind, index as usize)))
     }
 
     fn bytes(&mut self) -> Option<Vec<u8>> {

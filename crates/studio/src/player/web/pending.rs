@@ -1,10 +1,10 @@
-//! The requests that a page sent to its worker and that are not finished. A worker that panics terminates, and is replaced.
+//! The unfinished requests of a page to its worker. A worker that panics terminates and is replaced.
 
 use std::collections::VecDeque;
 
 use super::reply::{Reply, WorkerMessage};
 use crate::{
-    document::recheck,
+    document::plan_from_report,
     player::{Event, FrameRequest},
 };
 
@@ -13,15 +13,15 @@ use crate::{
 pub(super) struct Pending {
     /// With their numbers, the oldest first.
     requests: VecDeque<(u64, FrameRequest)>,
-    /// Number of requests so far.
-    made: u64,
+    /// Number of the newest request; the first has number 1.
+    newest_number: u64,
     /// Number of the last finished request.
-    done: u64,
+    finished_number: u64,
     /// Whether the worker terminated while idle.
     lost: bool,
 }
 
-/// What follows from received messages.
+/// The effects of received messages.
 #[derive(Default)]
 pub(super) struct WorkerUpdate {
     pub(super) events: Vec<Event>,
@@ -32,10 +32,10 @@ pub(super) struct WorkerUpdate {
 }
 
 impl Pending {
-    /// Adds a request. Returns whether its worker is alive.
+    /// Adds a request. Returns whether the worker is alive.
     pub(super) fn push(&mut self, request: FrameRequest) -> bool {
-        self.made += 1;
-        self.requests.push_back((self.made, request));
+        self.newest_number += 1;
+        self.requests.push_back((self.newest_number, request));
         !std::mem::take(&mut self.lost)
     }
 
@@ -45,19 +45,19 @@ impl Pending {
     }
 
     pub(super) fn is_busy(&self) -> bool {
-        self.done != self.made
+        self.finished_number != self.newest_number
     }
 
     /// Finishes all requests: there is no worker any more.
-    pub(super) fn give_up(&mut self) {
-        self.finish(self.made);
+    pub(super) fn finish_all(&mut self) {
+        self.finish(self.newest_number);
     }
 
     /// Handles the messages received since the last call. Messages after the termination are ignored.
-    pub(super) fn handle_messages(&mut self, heard: Vec<WorkerMessage>) -> WorkerUpdate {
+    pub(super) fn handle_messages(&mut self, messages: Vec<WorkerMessage>) -> WorkerUpdate {
         let mut update = WorkerUpdate::default();
-        for heard in heard {
-            match heard {
+        for message in messages {
+            match message {
                 WorkerMessage::Reply(Reply::Ready) => update.ready = true,
                 WorkerMessage::Reply(Reply::Panicked { number, message }) => {
                     update
@@ -66,7 +66,7 @@ impl Pending {
                     update.terminated = true;
                 }
                 WorkerMessage::Terminated => {
-                    let message = "it ended without a word, as where memory runs out".to_owned();
+                    let message = "the worker ended without a message, as when memory runs out".to_owned();
                     update.events.extend(self.worker_failed(None, message));
                     update.terminated = true;
                 }
@@ -82,9 +82,9 @@ impl Pending {
 
     fn event(&mut self, reply: Reply) -> Option<Event> {
         Some(match reply {
-            Reply::Checked { number, found } => {
+            Reply::Checked { number, report } => {
                 let request = self.request_of(number)?;
-                let outcome = recheck(&request.name, &request.text, found);
+                let outcome = plan_from_report(&request.name, &request.text, report);
                 Event::Checked { revision: request.revision, outcome }
             }
             Reply::Drawn { picture } => Event::Drawn(picture),
@@ -117,7 +117,7 @@ impl Pending {
     }
 
     fn finish(&mut self, number: u64) {
-        self.done = number;
+        self.finished_number = number;
         self.requests.retain(|(own, _)| *own > number);
     }
 }
@@ -133,12 +133,12 @@ mod tests {
         WorkerMessage::Reply(Reply::Panicked { number, message: "broken on purpose".into() })
     }
 
-    fn said(reply: Reply) -> Vec<WorkerMessage> {
+    fn message(reply: Reply) -> Vec<WorkerMessage> {
         vec![WorkerMessage::Reply(reply)]
     }
 
     /// The frames that panicked.
-    fn broken(events: &[Event]) -> Vec<Option<i64>> {
+    fn panicked_frames(events: &[Event]) -> Vec<Option<i64>> {
         let number = |event: &Event| match event {
             Event::Panicked { number, .. } => Some(*number),
             _ => None,
@@ -150,27 +150,30 @@ mod tests {
     fn a_worker_that_panics_ends_once() {
         let mut pending = Pending::default();
         assert!(pending.push(request(SCENE, 3)));
-        // A trap follows the last words, in the same moment.
+        // The trap follows the message of the panic immediately.
         let update = pending.handle_messages(vec![panicked(1), WorkerMessage::Terminated]);
-        assert_eq!((broken(&update.events), update.terminated, pending.is_busy()), (vec![Some(3)], true, false));
+        assert_eq!(
+            (panicked_frames(&update.events), update.terminated, pending.is_busy()),
+            (vec![Some(3)], true, false)
+        );
         assert!(pending.push(request(SCENE, 4)), "another worker is there");
-        let update = pending.handle_messages(said(Reply::Done { number: 2 }));
+        let update = pending.handle_messages(message(Reply::Done { number: 2 }));
         assert_eq!((update.events.len(), update.terminated, pending.is_busy()), (0, false, false));
     }
 
     #[test]
-    fn what_was_wished_for_since_is_still_to_be_had() {
+    fn the_newest_request_survives_the_worker() {
         let mut pending = Pending::default();
         for number in 3..6 {
             pending.push(request(SCENE, number));
         }
         let update = pending.handle_messages(vec![panicked(1), WorkerMessage::Terminated]);
-        assert_eq!(broken(&update.events), [Some(3)]);
+        assert_eq!(panicked_frames(&update.events), [Some(3)]);
         let newest = pending.newest().map(|(number, request)| (number, request.number));
         assert_eq!((newest, pending.is_busy()), (Some((3, Some(5))), true));
-        // Nobody says over which one it ended; each is blamed once at most.
+        // The message does not say at which request it ended; each request is reported as the cause at most once.
         let update = pending.handle_messages(vec![WorkerMessage::Terminated]);
-        assert_eq!((broken(&update.events), pending.is_busy()), (vec![Some(5)], false));
+        assert_eq!((panicked_frames(&update.events), pending.is_busy()), (vec![Some(5)], false));
     }
 
     #[test]
@@ -181,12 +184,12 @@ mod tests {
         assert!(!pending.push(request(SCENE, 0)));
         assert_eq!(pending.newest().map(|(number, _)| number), Some(1));
         assert!(pending.push(request(SCENE, 1)), "the other one");
-        pending.give_up();
+        pending.finish_all();
         assert!(!pending.is_busy() && pending.newest().is_none());
     }
 
     #[test]
-    fn what_a_worker_says_of_a_wish_is_passed_on() {
+    fn replies_become_events() {
         let mut pending = Pending::default();
         pending.push(request(SCENE, 7));
         let picture = Picture {
@@ -200,16 +203,16 @@ mod tests {
             draw_s: 0.0,
             advance_s: 0.0,
         };
-        let heard = [
+        let replies = [
             Reply::Ready,
-            Reply::Checked { number: 1, found: Ok(9.5) },
+            Reply::Checked { number: 1, report: Ok(9.5) },
             Reply::Drawn { picture: picture.clone() },
             Reply::Stage { stage: 2, picture },
             Reply::FullQualityFrame { frame: 7, png: vec![1] },
-            Reply::Failed { number: 1, reason: "no room".into() },
-            Reply::Failed { number: 9, reason: "of no wish".into() },
+            Reply::Failed { number: 1, reason: "no memory".into() },
+            Reply::Failed { number: 9, reason: "of no request".into() },
         ];
-        let update = pending.handle_messages(heard.into_iter().map(WorkerMessage::Reply).collect());
+        let update = pending.handle_messages(replies.into_iter().map(WorkerMessage::Reply).collect());
         assert!(update.ready && !update.terminated && pending.is_busy());
         let [checked, drawn, stage, full_quality, failed] = &update.events[..] else {
             panic!("{} events", update.events.len())

@@ -1,24 +1,24 @@
 //! Messages from the worker to the page.
 
-use crate::{document::ReportedProblem, player::Picture};
+use crate::{document::CheckReport, player::Picture};
 
 /// A message of the worker.
 pub(super) enum Reply {
     /// It is ready for messages.
     Ready,
-    /// The scene of request `number` was checked: its exposure, or its faults.
-    Checked { number: u64, found: Result<f32, Vec<ReportedProblem>> },
+    /// The scene of request `number` was checked.
+    Checked { number: u64, report: CheckReport },
     /// A preview.
     Drawn { picture: Picture },
     /// A small picture of a stage.
     Stage { stage: usize, picture: Picture },
-    /// A finished picture: its frame, and the file.
+    /// A full-quality frame as a PNG.
     FullQualityFrame { frame: i64, png: Vec<u8> },
-    /// Why request `number` has no picture.
+    /// Request `number` failed.
     Failed { number: u64, reason: String },
-    /// What a phenomenon said when it panicked over request `number`. The worker has terminated.
+    /// A phenomenon panicked while request `number` was served. The worker has terminated.
     Panicked { number: u64, message: String },
-    /// Nothing more comes of request `number`.
+    /// Request `number` is finished.
     Done { number: u64 },
 }
 

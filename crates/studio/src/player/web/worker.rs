@@ -11,9 +11,9 @@ use super::{
     reply::{Reply, WorkerMessage},
 };
 use crate::{
-    document::ReportedProblem,
+    document::{CheckReport, ReportedProblem},
     player::{Event, FrameRequest, Player, PolledPlayer},
-    scenes::examples::Bundle,
+    scenes::examples::BundledAssets,
 };
 use js_sys::Array;
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
@@ -37,8 +37,8 @@ struct WorkerHandle {
     inbox: Rc<RefCell<Vec<WorkerMessage>>>,
     /// Messages to send once the worker is ready.
     outbox: Option<Vec<Array>>,
-    _listen: Closure<dyn FnMut(MessageEvent)>,
-    _mourn: Closure<dyn FnMut()>,
+    _on_message: Closure<dyn FnMut(MessageEvent)>,
+    _on_error: Closure<dyn FnMut()>,
 }
 
 impl WorkerHandle {
@@ -47,24 +47,24 @@ impl WorkerHandle {
         options.set_type(WorkerType::Module);
         let worker = Worker::new_with_options(SCRIPT, &options)?;
         let inbox = Rc::new(RefCell::new(Vec::new()));
-        let (heard, woken) = (inbox.clone(), wake.clone());
-        let listen = Closure::new(move |event: MessageEvent| {
-            heard.borrow_mut().extend(Reply::read(&event.data()).map(WorkerMessage::Reply));
-            woken();
+        let (received, wake_page) = (inbox.clone(), wake.clone());
+        let on_message = Closure::new(move |event: MessageEvent| {
+            received.borrow_mut().extend(Reply::read(&event.data()).map(WorkerMessage::Reply));
+            wake_page();
         });
-        worker.set_onmessage(Some(listen.as_ref().unchecked_ref()));
-        let heard = inbox.clone();
-        let worker_failed = Closure::new(move || {
-            heard.borrow_mut().push(WorkerMessage::Terminated);
+        worker.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
+        let received = inbox.clone();
+        let on_error = Closure::new(move || {
+            received.borrow_mut().push(WorkerMessage::Terminated);
             wake();
         });
-        worker.set_onerror(Some(worker_failed.as_ref().unchecked_ref()));
+        worker.set_onerror(Some(on_error.as_ref().unchecked_ref()));
         // The compiled program.
         worker.post_message(&wasm_bindgen::module())?;
-        Ok(Self { worker, inbox, outbox: Some(Vec::new()), _listen: listen, _mourn: worker_failed })
+        Ok(Self { worker, inbox, outbox: Some(Vec::new()), _on_message: on_message, _on_error: on_error })
     }
 
-    fn say(&mut self, message: Array) {
+    fn send(&mut self, message: Array) {
         match &mut self.outbox {
             Some(outbox) => outbox.push(message),
             // Arrays of numbers, texts and bytes can always be copied.
@@ -74,7 +74,7 @@ impl WorkerHandle {
 
     fn flush(&mut self) {
         for message in self.outbox.take().unwrap_or_default() {
-            self.say(message);
+            self.send(message);
         }
     }
 }
@@ -89,28 +89,28 @@ impl Drop for WorkerHandle {
 }
 
 impl WorkerPlayer {
-    /// Starts a worker; `wake` is called whenever there is something to [`poll`](Player::poll).
+    /// Starts a worker; `wake` is called whenever there are events to [`poll`](Player::poll).
     ///
     /// # Errors
-    /// The browser gives no workers.
+    /// The browser cannot start workers.
     pub fn start(wake: impl Fn() + 'static) -> Result<Self, JsValue> {
         let wake: Rc<dyn Fn()> = Rc::new(wake);
         let worker = WorkerHandle::start(wake.clone())?;
         Ok(Self { worker, wake, files: Vec::new(), pending: Pending::default() })
     }
 
-    /// Replaces a worker that terminated and sends it the newest request. Where the browser gives no other, rendering ends.
+    /// Replaces a worker that terminated, and sends the newest request to the new one. If none can be started, all requests end.
     fn restart(&mut self) {
-        let Ok(worker) = WorkerHandle::start(self.wake.clone()) else { return self.pending.give_up() };
+        let Ok(worker) = WorkerHandle::start(self.wake.clone()) else { return self.pending.finish_all() };
         // Messages of the old worker are dropped with it.
         self.worker = worker;
-        self.files.iter().for_each(|(name, bytes)| self.worker.say(PageMessage::file(name, bytes)));
-        self.tell_newest();
+        self.files.iter().for_each(|(name, bytes)| self.worker.send(PageMessage::file(name, bytes)));
+        self.send_newest();
     }
 
-    fn tell_newest(&mut self) {
+    fn send_newest(&mut self) {
         if let Some((number, request)) = self.pending.newest() {
-            self.worker.say(PageMessage::request(number, request));
+            self.worker.send(PageMessage::request(number, request));
         }
     }
 }
@@ -118,7 +118,7 @@ impl WorkerPlayer {
 impl Player for WorkerPlayer {
     fn request(&mut self, request: FrameRequest) {
         if self.pending.push(request) {
-            self.tell_newest();
+            self.send_newest();
         } else {
             self.restart();
         }
@@ -144,7 +144,7 @@ impl Player for WorkerPlayer {
     }
 
     fn add_file(&mut self, name: &str, bytes: &[u8]) {
-        self.worker.say(PageMessage::file(name, bytes));
+        self.worker.send(PageMessage::file(name, bytes));
         self.files.push((name.to_owned(), bytes.to_vec()));
     }
 }
@@ -153,7 +153,7 @@ impl Player for WorkerPlayer {
 struct WorkerMain {
     scope: DedicatedWorkerGlobalScope,
     player: PolledPlayer,
-    bundle: Bundle,
+    bundle: BundledAssets,
     assets: Arc<dyn Assets>,
     /// Number of the current request.
     number: u64,
@@ -167,28 +167,28 @@ pub fn run_worker() {
     let worker = Rc::new(RefCell::new(WorkerMain {
         scope: scope.clone(),
         player: PolledPlayer::default(),
-        bundle: Bundle::default(),
-        assets: Arc::new(Bundle::default()),
+        bundle: BundledAssets::default(),
+        assets: Arc::new(BundledAssets::default()),
         number: 0,
         working: false,
     }));
-    let listen = Closure::<dyn FnMut(MessageEvent)>::new(move |event: MessageEvent| {
-        worker.borrow_mut().hear(&event.data());
-        go_on(&worker);
+    let on_message = Closure::<dyn FnMut(MessageEvent)>::new(move |event: MessageEvent| {
+        worker.borrow_mut().receive(&event.data());
+        schedule_work(&worker);
     });
-    scope.set_onmessage(Some(listen.as_ref().unchecked_ref()));
-    // It listens for as long as the worker lives.
-    listen.forget();
-    say(&scope, Reply::Ready);
+    scope.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
+    // The callback lives as long as the worker.
+    on_message.forget();
+    post(&scope, Reply::Ready);
 }
 
-fn say(scope: &DedicatedWorkerGlobalScope, reply: Reply) {
+fn post(scope: &DedicatedWorkerGlobalScope, reply: Reply) {
     // Arrays of numbers, texts and bytes can always be copied.
     let _ = scope.post_message(&reply.write());
 }
 
 /// Schedules time slices until no request is left; messages are received between two slices.
-fn go_on(worker: &Rc<RefCell<WorkerMain>>) {
+fn schedule_work(worker: &Rc<RefCell<WorkerMain>>) {
     let mut own = worker.borrow_mut();
     if own.working || !own.player.is_busy() {
         return;
@@ -197,21 +197,21 @@ fn go_on(worker: &Rc<RefCell<WorkerMain>>) {
     let next = worker.clone();
     let work = Closure::once_into_js(move || {
         next.borrow_mut().work();
-        go_on(&next);
+        schedule_work(&next);
     });
     let _ = own.scope.set_timeout_with_callback(work.unchecked_ref());
 }
 
 impl WorkerMain {
-    fn hear(&mut self, message: &JsValue) {
+    fn receive(&mut self, message: &JsValue) {
         match PageMessage::read(message, &self.assets) {
-            Some(PageMessage::File(name, bytes)) => {
+            Some(PageMessage::File { name, bytes }) => {
                 self.bundle.add_file(name, bytes);
                 self.assets = Arc::new(self.bundle.clone());
             }
-            Some(PageMessage::Request(number, request)) => {
+            Some(PageMessage::Request { number, request }) => {
                 self.number = number;
-                self.tell_panics_of(number);
+                self.report_panics_of(number);
                 self.player.request(request);
             }
             None => {}
@@ -219,29 +219,29 @@ impl WorkerMain {
     }
 
     /// A panic ends the program on wasm: the hook sends its message to the page.
-    fn tell_panics_of(&self, number: u64) {
+    fn report_panics_of(&self, number: u64) {
         std::panic::set_hook(Box::new(move |panic| {
-            let said = panic.payload_as_str().unwrap_or("no reason given");
-            let place = panic.location().map(|location| format!(" ({location})")).unwrap_or_default();
+            let message = panic.payload_as_str().unwrap_or("no reason given");
+            let location = panic.location().map(|location| format!(" ({location})")).unwrap_or_default();
             let scope: DedicatedWorkerGlobalScope = js_sys::global().unchecked_into();
-            say(&scope, Reply::Panicked { number, message: format!("{said}{place}") });
+            post(&scope, Reply::Panicked { number, message: format!("{message}{location}") });
         }));
     }
 
     fn work(&mut self) {
         self.working = false;
         for event in self.player.poll() {
-            say(&self.scope, reply(self.number, event));
+            post(&self.scope, reply(self.number, event));
         }
         if !self.player.is_busy() {
-            say(&self.scope, Reply::Done { number: self.number });
+            post(&self.scope, Reply::Done { number: self.number });
         }
     }
 }
 
 fn reply(number: u64, event: Event) -> Reply {
     match event {
-        Event::Checked { outcome, .. } => Reply::Checked { number, found: found(outcome) },
+        Event::Checked { outcome, .. } => Reply::Checked { number, report: check_report(outcome) },
         Event::Drawn(picture) => Reply::Drawn { picture },
         Event::Stage(stage, picture) => Reply::Stage { stage, picture },
         Event::FullQualityFrame { number: frame, png } => Reply::FullQualityFrame { frame, png },
@@ -250,8 +250,8 @@ fn reply(number: u64, event: Event) -> Reply {
     }
 }
 
-/// What the page could only find out by building every phenomenon.
-fn found(outcome: Result<Arc<Plan>, SceneError>) -> Result<f32, Vec<ReportedProblem>> {
-    let faults = |error: SceneError| error.problems.iter().map(ReportedProblem::from).collect();
-    outcome.map(|plan| plan.exposure_ev100).map_err(faults)
+/// The results of a check for which all phenomena must be built.
+fn check_report(outcome: Result<Arc<Plan>, SceneError>) -> CheckReport {
+    let problems = |error: SceneError| error.problems.iter().map(ReportedProblem::from).collect();
+    outcome.map(|plan| plan.exposure_ev100).map_err(problems)
 }

@@ -13,27 +13,37 @@ use super::{
     AuroraDrawing, Factor, SheetPosition,
     links::rounded,
     polyline,
-    renumber::SheetRemap,
-    sheets::{curve_chain, curve_range, non_default, with_form, with_points},
+    renumber::{JoinedPart, SheetRemap},
+    sheets::{DirectedCurve, curve_chain, curve_range, non_default, with_form, with_points},
 };
 
-/// An end of a sheet: which sheet, and whether its last point rather than its first.
-pub type SheetEnd = (usize, bool);
+/// An end of a sheet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SheetEnd {
+    /// Index of the sheet.
+    pub sheet: usize,
+    /// Whether it is the last point rather than the first.
+    pub last: bool,
+}
 
-/// The sheets of a shape after an edit, and how positions on the old sheets map to them.
-type RemappedSheets = (Vec<SheetParameters>, SheetRemap);
+/// The sheets of a shape after an edit.
+pub(super) struct RemappedSheets {
+    pub(super) sheets: Vec<SheetParameters>,
+    /// How positions on the old sheets map to the new ones.
+    pub(super) remap: SheetRemap,
+}
 
 /// Half of the gap between the two halves of a split sheet, as a fraction of the map's side.
 const HALF_GAP: f64 = 0.012;
 
 impl AuroraDrawing {
-    /// A stroke in place of sheet `sheet` of shape `shape`, or as a new one.
+    /// Draws a stroke in place of sheet `sheet` of shape `shape`, or as a new one.
     pub fn draw(&self, shape: usize, sheet: Option<usize>, stroke: &[DVec2]) -> Vec<Operation> {
-        let points = self.written(stroke);
+        let points = self.simplified_points(stroke);
         self.put_sheet(shape, sheet, |old| with_points(old, points))
     }
 
-    /// A named form in place of sheet `sheet`, or as a new one.
+    /// Puts a named form in place of sheet `sheet`, or as a new one.
     pub fn put_form(&self, shape: usize, sheet: Option<usize>, form: Form) -> Vec<Operation> {
         self.put_sheet(shape, sheet, |old| with_form(old, form))
     }
@@ -53,20 +63,20 @@ impl AuroraDrawing {
         self.write(shape, &sheets)
     }
 
-    /// The strokes of the SVG file `path` in place of the sheets of the first shape.
-    pub fn trace(&self, path: Value) -> Vec<Operation> {
+    /// Puts the strokes of the SVG file `file` in place of the sheets of the first shape.
+    pub fn trace(&self, file: Value) -> Vec<Operation> {
         let mut sheet = Table::default();
-        sheet.push("svg_file", path);
+        sheet.push("svg_file", file);
         let sheets = Value::List(vec![Value::Table(sheet).into()]);
         if self.is_stated() {
             return vec![Operation::Set { place: self.shape(0).key("sheets"), value: sheets }];
         }
         let mut shape = Table::default();
         shape.push("sheets", sheets);
-        vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }]
+        vec![Operation::Append { place: self.path.key("shapes"), value: Value::Table(shape) }]
     }
 
-    /// New points for sheet `sheet`.
+    /// Sets the points of sheet `sheet`.
     pub fn set_points(&self, shape: usize, sheet: usize, points: &[DVec2]) -> Vec<Operation> {
         let mut sheets = self.sheets(shape);
         let points = points.iter().map(|&point| self.rounded(point)).collect();
@@ -78,16 +88,18 @@ impl AuroraDrawing {
 
     /// Changes `factor` by `by` around the fraction `at` of the length of sheet `sheet`.
     pub fn paint(&self, shape: usize, sheet: usize, factor: Factor, at: f64, by: f64) -> Vec<Operation> {
-        const POINTS: usize = 16;
-        const REACH: f64 = 0.12;
+        /// Number of intervals of the painted curve.
+        const INTERVALS: usize = 16;
+        /// Radius of the brush, as a fraction of the sheet's length.
+        const RADIUS: f64 = 0.12;
         let mut sheets = self.sheets(shape);
         let Some(curve) = sheets.get_mut(sheet).map(|sheet| factor.of(sheet)) else { return Vec::new() };
         let even: Vec<[f64; 2]> =
-            (0..=POINTS).map(|step| step as f64 / POINTS as f64).map(|at| [at, curve.eval(at)]).collect();
+            (0..=INTERVALS).map(|step| step as f64 / INTERVALS as f64).map(|at| [at, curve.eval(at)]).collect();
         let [low, high] = factor.bounds();
         let value = |value: f64| rounded(value.clamp(low, high));
         let points =
-            polyline::brushed(&even, at, by, REACH).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
+            polyline::brushed(&even, at, by, RADIUS).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
         if let Ok(painted) = Curve::new(points, curve.interpolation()) {
             *curve = painted;
         }
@@ -102,8 +114,8 @@ impl AuroraDrawing {
         change.push("length_fraction", Value::Number(at));
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
-        // A link of the split sheet now means its first half.
-        let part = |link: &LinkParameters| match link.from_length_fraction {
+        // A link of the split sheet becomes one of its first half.
+        let update_link = |link: &LinkParameters| match link.from_length_fraction {
             None if link.from == sheet as i64 + 1 => {
                 LinkParameters { from_length_fraction: Some(rounded(0.5 * at)), ..link.clone() }
             }
@@ -113,9 +125,9 @@ impl AuroraDrawing {
         let from = polyline::at(&line, at);
         let changed = self.propagated(shape, from.as_slice(), |shape, targets| {
             let (sheets, cut) = self.cut_at(shape, *targets.first()?)?;
-            Some((sheets, SheetRemap::Cut(cut)))
+            Some(RemappedSheets { sheets, remap: SheetRemap::Cut(cut) })
         });
-        operations.extend(self.write_all(shape, &changed, part, |_| Vec::new()));
+        operations.extend(self.write_all(shape, &changed, update_link, |_| Vec::new()));
         operations
     }
 
@@ -123,14 +135,14 @@ impl AuroraDrawing {
     pub fn merge(&self, shape: usize, ends: [SheetEnd; 2]) -> Vec<Operation> {
         let mut change = Table::default();
         let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
-        change.push("sheets", list(ends.map(|(sheet, _)| sheet as i64 + 1)));
-        change.push("ends", list(ends.map(|(_, last)| i64::from(last))));
+        change.push("sheets", list(ends.map(|end| end.sheet as i64 + 1)));
+        change.push("ends", list(ends.map(|end| i64::from(end.last))));
         let mut operations =
             vec![Operation::Append { place: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
-        let at = |(sheet, last): SheetEnd| {
-            let line = before.get(sheet)?;
-            if last { line.last().copied() } else { line.first().copied() }
+        let at = |end: SheetEnd| {
+            let line = before.get(end.sheet)?;
+            if end.last { line.last().copied() } else { line.first().copied() }
         };
         if let [Some(first), Some(second)] = ends.map(at) {
             let joined = self.propagated(shape, &[first, second], |shape, targets| match targets {
@@ -165,19 +177,19 @@ impl AuroraDrawing {
         changed
     }
 
-    /// The operations that write the changed shapes from `first` on, and renumber everything that refers to their sheets. Splits that are
-    /// `needless` then are removed.
+    /// The operations that write the changed shapes from `first` on, and renumber all references to their sheets, as [`renumbered`](Self::renumbered)
+    /// says.
     pub(super) fn write_all(
         &self,
         first: usize,
         changed: &[RemappedSheets],
-        links: impl Fn(&LinkParameters) -> LinkParameters,
+        update_link: impl Fn(&LinkParameters) -> LinkParameters,
         needless: impl Fn(usize) -> Vec<usize>,
     ) -> Vec<Operation> {
-        let written = changed.iter().enumerate().flat_map(|(index, (sheets, _))| self.write(first + index, sheets));
+        let written = changed.iter().enumerate().flat_map(|(index, shape)| self.write(first + index, &shape.sheets));
         let mut operations: Vec<Operation> = written.collect();
-        let remaps: Vec<SheetRemap> = changed.iter().map(|(_, remap)| remap.clone()).collect();
-        operations.extend(self.renumbered(first, &remaps, links, needless));
+        let remaps: Vec<SheetRemap> = changed.iter().map(|shape| shape.remap.clone()).collect();
+        operations.extend(self.renumbered(first, &remaps, update_link, needless));
         operations
     }
 
@@ -190,19 +202,19 @@ impl AuroraDrawing {
         self.write(shape, &sheets)
     }
 
-    /// One more shape, as the last one is.
+    /// Appends a copy of the last shape.
     pub fn add_shape(&self) -> Vec<Operation> {
         let mut shape = Table::default();
         shape.push("sheets", sheet_list(&self.sheets(self.arrivals().len() - 1)));
-        let shape = Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) };
-        // Shapes that the scene does not state must be stated before another can come of them.
+        let shape = Operation::Append { place: self.path.key("shapes"), value: Value::Table(shape) };
+        // Default shapes must be stated before another can follow them.
         if self.is_stated() { vec![shape] } else { vec![shape.clone(), shape] }
     }
 
-    /// Without shape `shape`.
+    /// Removes shape `shape`.
     pub fn remove_shape(&self, shape: usize) -> Vec<Operation> {
         let next = self.parameters.shapes.get(1).filter(|_| shape == 0);
-        // What comes first is there from the beginning, and comes from nothing.
+        // The first shape has no transition.
         let stated = next.map_or(Vec::new(), |next| {
             let keys = [
                 ("transition_s", next.transition_s.is_some()),
@@ -217,43 +229,44 @@ impl AuroraDrawing {
         of_next.chain([Operation::Remove { place: self.shape(shape) }]).collect()
     }
 
-    /// Reaches shape `shape` so long after the one before was left, s.
+    /// Sets the duration of the transition to shape `shape`, s.
     pub fn retime(&self, shape: usize, transition_s: f64) -> Vec<Operation> {
-        let place = self.shape(shape);
+        let path = self.shape(shape);
         let in_frames = self.parameters.shapes.get(shape).is_some_and(|shape| shape.transition_frames.is_some());
-        let frames = in_frames.then(|| Operation::Remove { place: place.key("transition_frames") });
+        let frames = in_frames.then(|| Operation::Remove { place: path.key("transition_frames") });
         let seconds = Value::Number((transition_s.max(0.1) * 100.0).round() / 100.0);
-        frames.into_iter().chain([Operation::Set { place: place.key("transition_s"), value: seconds }]).collect()
+        frames.into_iter().chain([Operation::Set { place: path.key("transition_s"), value: seconds }]).collect()
     }
 
-    /// Time from the shape before `shape` to this one, s.
+    /// Duration of the transition to shape `shape`, s.
     pub fn transition_s(&self, shape: usize) -> f64 {
         let hold = self.parameters.shapes.get(shape.wrapping_sub(1)).map_or(0.0, |before| before.hold_s);
         let at = |shape: usize| self.arrivals().get(shape).copied().unwrap_or_default();
         at(shape) - at(shape.saturating_sub(1)) - hold
     }
 
-    /// Whether a shape is drawn as it is after its splits and merges, rather than before.
+    /// Whether shapes are drawn as they are after their splits and merges, rather than before.
     pub fn shows_changes(&self) -> bool {
         self.parameters.morphing.correspondence == Correspondence::Automatic
     }
 
     pub(super) fn shape(&self, shape: usize) -> ValuePath {
-        self.place.key("shapes").index(shape)
+        self.path.key("shapes").index(shape)
     }
 
-    /// Where in shape `shape` a point of the one before arrives.
+    /// The point of shape `shape` at which `from` on the shape before arrives.
     fn destination_of(&self, shape: usize, from: DVec2) -> Option<DVec2> {
         let strands = self.point_paths(shape - 1);
         let on = |point_paths: &Vec<[DVec2; 2]>| {
-            let [leaving, arriving] = [0, 1].map(|end| point_paths.iter().map(|way| way[end]).collect::<Vec<_>>());
+            let [leaving, arriving] =
+                [0, 1].map(|end| point_paths.iter().map(|point_path| point_path[end]).collect::<Vec<_>>());
             let on = polyline::nearest(&leaving, from)?;
             Some((on.distance, arriving.get(on.segment)?.lerp(*arriving.get(on.segment + 1)?, on.fraction)))
         };
         strands.iter().filter_map(on).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
-    /// The sheets of shape `shape`, the one at `target` cut there, and where that is; `None` where there is nothing to cut.
+    /// The sheets of shape `shape`, with the one at `target` cut there, and the position of the cut; `None` where there is nothing to cut.
     fn cut_at(&self, shape: usize, target: DVec2) -> Option<(Vec<SheetParameters>, SheetPosition)> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
@@ -262,7 +275,7 @@ impl AuroraDrawing {
         let fraction = polyline::fraction_of(line, on);
         // A short segment keeps most of its length.
         if fraction * (1.0 - fraction) < f64::EPSILON {
-            // Where the sheet is cut already, the validation reports it.
+            // That the sheet is cut there already is reported by the validation.
             return None;
         }
         let gap = HALF_GAP * self.extent_km() / polyline::length(line).max(f64::MIN_POSITIVE);
@@ -270,62 +283,73 @@ impl AuroraDrawing {
         let parts = ranges.map(|range| SheetParameters {
             flux_factor: curve_range(&sheets[sheet].flux_factor, range),
             energy_factor: curve_range(&sheets[sheet].energy_factor, range),
-            ..with_points(&sheets[sheet], self.written(&polyline::range(line, range)))
+            ..with_points(&sheets[sheet], self.simplified_points(&polyline::range(line, range)))
         });
         sheets.splice(sheet..=sheet, parts);
-        Some((sheets, (sheet, fraction)))
+        Some((sheets, SheetPosition { sheet, fraction }))
     }
 
-    /// The sheets of shape `shape`, those that end at `targets` joined there, and what becomes of places on them; `None` where they are one.
+    /// The sheets of shape `shape`, with those that end at `targets` joined there; `None` where both ends are of one sheet.
     fn joined_at(&self, shape: usize, targets: [DVec2; 2]) -> Option<RemappedSheets> {
         let mut sheets = self.sheets(shape);
         let all = self.lines(shape);
         let ends = targets.map(|target| nearest_end(&all, target));
         let [Some(first), Some(second)] = ends else { return None };
-        if first.0 == second.0 {
+        if first.sheet == second.sheet {
             return None;
         }
         // The first runs toward the seam, the second away from it.
-        let turned = [!first.1, second.1];
-        let mut parts = [self.points(shape, first.0), self.points(shape, second.0)];
-        parts.iter_mut().zip(turned).filter(|(_, turned)| *turned).for_each(|(part, _)| part.reverse());
-        let [one, other] = [polyline::length(&parts[0]), polyline::length(&parts[1])];
+        let parts = [
+            JoinedPart { sheet: first.sheet, reversed: !first.last },
+            JoinedPart { sheet: second.sheet, reversed: second.last },
+        ];
+        let lines = parts.map(|JoinedPart { sheet, reversed }| {
+            let mut line = self.points(shape, sheet);
+            if reversed {
+                line.reverse();
+            }
+            line
+        });
+        let [one, other] = [polyline::length(&lines[0]), polyline::length(&lines[1])];
+        let seam = one / (one + other);
         let curves = |curve: fn(&SheetParameters) -> &Curve| {
-            let of = |sheet: usize, turned: bool| (curve(&sheets[sheet]), turned);
-            curve_chain([of(first.0, turned[0]), of(second.0, turned[1])], one / (one + other))
+            let directed =
+                |part: JoinedPart| DirectedCurve { curve: curve(&sheets[part.sheet]), reversed: part.reversed };
+            curve_chain(parts.map(directed), seam)
         };
         let (flux_factor, energy_factor) = (curves(|sheet| &sheet.flux_factor), curves(|sheet| &sheet.energy_factor));
-        let points = parts.concat().into_iter().map(|point| self.rounded(point)).collect();
-        let joined = SheetParameters { flux_factor, energy_factor, ..with_points(&sheets[first.0], points) };
-        sheets[first.0.min(second.0)] = joined;
-        sheets.remove(first.0.max(second.0));
-        let remap = SheetRemap::Joined([(first.0, turned[0]), (second.0, turned[1])], one / (one + other));
-        Some((sheets, remap))
+        let points = lines.concat().into_iter().map(|point| self.rounded(point)).collect();
+        let joined = SheetParameters { flux_factor, energy_factor, ..with_points(&sheets[first.sheet], points) };
+        sheets[first.sheet.min(second.sheet)] = joined;
+        sheets.remove(first.sheet.max(second.sheet));
+        Some(RemappedSheets { sheets, remap: SheetRemap::Joined { parts, seam } })
     }
 
-    /// The operations that set the sheets of shape `shape`, and change nothing else.
+    /// The operations that set the sheets of shape `shape` and change nothing else.
     fn write(&self, shape: usize, sheets: &[SheetParameters]) -> Vec<Operation> {
-        let place = self.shape(shape).key("sheets");
+        let path = self.shape(shape).key("sheets");
         let Some(old) = self.parameters.shapes.get(shape).map(|shape| &shape.sheets) else {
             let mut shape = Table::default();
             shape.push("sheets", sheet_list(sheets));
-            return vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }];
+            return vec![Operation::Append { place: self.path.key("shapes"), value: Value::Table(shape) }];
         };
-        list_edits(&place, old, sheets).unwrap_or_else(|| vec![Operation::Set { place, value: sheet_list(sheets) }])
+        list_edits(&path, old, sheets)
+            .unwrap_or_else(|| vec![Operation::Set { place: path, value: sheet_list(sheets) }])
     }
 }
 
-/// The operations that turn the list at `place` from `old` into `new` entry by entry, which keeps comments; `None` where entries would
+/// The operations that turn the list at `path` from `old` into `new` entry by entry, which keeps comments; `None` where entries would
 /// have to be inserted.
-fn list_edits(place: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
+fn list_edits(path: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]) -> Option<Vec<Operation>> {
     if old.is_empty() {
         return None;
     }
     let mut rest = new.iter().peekable();
-    let gone: Vec<usize> = (0..old.len()).filter(|&index| rest.next_if(|own| **own == old[index]).is_none()).collect();
+    let gone: Vec<usize> =
+        (0..old.len()).filter(|&index| rest.next_if(|sheet| **sheet == old[index]).is_none()).collect();
     if rest.peek().is_none() {
         // From the last to the first, so that indices stay valid.
-        return Some(gone.iter().rev().map(|&index| Operation::Remove { place: place.index(index) }).collect());
+        return Some(gone.iter().rev().map(|&index| Operation::Remove { place: path.index(index) }).collect());
     }
     let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
     let behind = old.iter().rev().zip(new.iter().rev()).take_while(same).count();
@@ -335,18 +359,19 @@ fn list_edits(place: &ValuePath, old: &[SheetParameters], new: &[SheetParameters
     }
     let pairs = old.iter().zip(new).take(kept.min(made)).enumerate();
     let mut operations: Vec<Operation> =
-        pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect();
-    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: place.index(sheet) }));
+        pairs.flat_map(|(sheet, (old, new))| differences(&path.index(sheet), old, new)).collect();
+    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: path.index(sheet) }));
     let added = new.get(kept..).filter(|_| made > kept).unwrap_or_default();
     operations.extend(
-        added.iter().map(|sheet| Operation::Append { place: place.clone(), value: Value::Table(non_default(sheet)) }),
+        added.iter().map(|sheet| Operation::Append { place: path.clone(), value: Value::Table(non_default(sheet)) }),
     );
     Some(operations)
 }
 
 fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<SheetEnd> {
     let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
-        let end = |last: bool, point: Option<&DVec2>| point.map(|point| (point.distance(target), (sheet, last)));
+        let end =
+            |last: bool, point: Option<&DVec2>| point.map(|point| (point.distance(target), SheetEnd { sheet, last }));
         [end(false, line.first()), end(true, line.last())]
     });
     ends.flatten().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, end)| end)
@@ -357,13 +382,13 @@ fn sheet_list(sheets: &[SheetParameters]) -> Value {
 }
 
 /// The keys to set and to remove so that `old` becomes `new`.
-fn differences(place: &ValuePath, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
+fn differences(path: &ValuePath, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
     let [old, new] = [non_default(old), non_default(new)];
     let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
     let change = |key: &'static str| match (old.get(key), new.get(key)) {
         (old, new) if old == new => None,
-        (_, Some(node)) => Some(Operation::Set { place: place.key(key), value: node.value.clone() }),
-        (_, None) => Some(Operation::Remove { place: place.key(key) }),
+        (_, Some(node)) => Some(Operation::Set { place: path.key(key), value: node.value.clone() }),
+        (_, None) => Some(Operation::Remove { place: path.key(key) }),
     };
     keys.filter_map(change).collect()
 }

@@ -21,6 +21,7 @@ use bansho::{
     base::{
         math::DVec2,
         parameters::{Parameters, ProblemKind, Reader, Table, Value},
+        phenomenon::kind::Describe,
     },
     scene::{
         ValuePath,
@@ -33,13 +34,13 @@ use bansho::{
 use crate::document::Document;
 
 pub use changes::SheetEnd;
-pub use links::SheetPosition;
+pub use links::{LinkedPoint, SheetPosition};
 pub use sheets::Factor;
 
 /// The shapes of one aurora of a scene.
 #[derive(Clone, Debug)]
 pub struct AuroraDrawing {
-    place: ValuePath,
+    path: ValuePath,
     parameters: AuroraParameters,
     sequence: Sequence,
 }
@@ -52,7 +53,7 @@ pub enum ShapeEditError {
     Missing,
     /// A problem outside of the shapes.
     #[error("{0}")]
-    Faulty(String),
+    Invalid(String),
     /// Invalid shapes.
     #[error("shape {}: {}", shape_number(.0), .0.kind)]
     Shape(ShapeError),
@@ -61,9 +62,9 @@ pub enum ShapeEditError {
     Edit(#[from] EditError),
 }
 
-/// The 1-based number of the shape with the fault.
-fn shape_number(fault: &ShapeError) -> usize {
-    let number = fault.key.split('.').nth(1).and_then(|segment| segment.parse::<usize>().ok());
+/// The 1-based number of the shape with the error.
+fn shape_number(error: &ShapeError) -> usize {
+    let number = error.key.split('.').nth(1).and_then(|segment| segment.parse::<usize>().ok());
     number.unwrap_or_default() + 1
 }
 
@@ -71,23 +72,23 @@ impl AuroraDrawing {
     /// The shapes of aurora `index` of the scene `root`.
     ///
     /// # Errors
-    /// There is no such aurora, or its parameters or shapes are faulty.
+    /// There is no such aurora, or its parameters or shapes are invalid.
     pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, ShapeEditError> {
-        let place = ValuePath::root().key("aurora").index(index);
-        let Some(Value::Table(table)) = place.find(root).map(|node| &node.value) else {
+        let path = ValuePath::root().key(AuroraParameters::KEY).index(index);
+        let Some(Value::Table(table)) = path.find(root).map(|node| &node.value) else {
             return Err(ShapeEditError::Missing);
         };
         let mut reader = Reader::new();
         let parameters = AuroraParameters::read_table(table, &mut reader, &[]);
-        // Keys that every phenomenon has are not the aurora's own.
-        let own = |kind: &ProblemKind| !matches!(kind, ProblemKind::UnknownKey { .. });
-        if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| own(&problem.kind)) {
-            return Err(ShapeEditError::Faulty(problem.to_string()));
+        // The keys that all phenomena have are unknown to this reader.
+        let is_own = |kind: &ProblemKind| !matches!(kind, ProblemKind::UnknownKey { .. });
+        if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| is_own(&problem.kind)) {
+            return Err(ShapeEditError::Invalid(problem.to_string()));
         }
         let AuroraParameters { shapes, morphing, extent_km, .. } = &parameters;
         let sequence =
             Sequence::new(shapes, morphing, *extent_km, assets.as_ref(), None).map_err(ShapeEditError::Shape)?;
-        Ok(Self { place, parameters, sequence })
+        Ok(Self { path, parameters, sequence })
     }
 
     /// Side of the map, km.
@@ -127,10 +128,14 @@ impl AuroraDrawing {
         let all = self.lines(shape);
         let arrives = |point_paths: &&Vec<[DVec2; 2]>| {
             let Some([_, middle]) = point_paths.get(point_paths.len() / 2) else { return false };
-            polyline::nearest_among(&all, *middle).is_some_and(|(own, _)| own == sheet)
+            polyline::nearest_among(&all, *middle).is_some_and(|(nearest, _)| nearest == sheet)
         };
         let strands = shape.checked_sub(1).map(|before| self.point_paths(before)).unwrap_or_default();
-        strands.iter().filter(arrives).map(|point_paths| point_paths.iter().map(|way| way[0]).collect()).collect()
+        strands
+            .iter()
+            .filter(arrives)
+            .map(|point_paths| point_paths.iter().map(|point_path| point_path[0]).collect())
+            .collect()
     }
 
     /// The paths of the points of shape `shape` to the next one, km, by strand: start and end.
@@ -152,7 +157,7 @@ impl Document {
         assets: &Arc<dyn Assets>,
     ) -> Result<AuroraDrawing, ShapeEditError> {
         let text = operation::apply(self.text(), operations)?;
-        let root = values(&text).map_err(|problem| ShapeEditError::Faulty(problem.to_string()))?;
+        let root = values(&text).map_err(|problem| ShapeEditError::Invalid(problem.to_string()))?;
         let drawing = AuroraDrawing::read(&root, index, assets)?;
         self.apply_text(label, text, root);
         Ok(drawing)

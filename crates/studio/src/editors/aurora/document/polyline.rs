@@ -5,7 +5,7 @@ use bansho::base::math::{DVec2, lerp};
 /// A position on a polyline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinePoint {
-    /// The segment, from the point of that number to the next.
+    /// Index of the segment, which goes from the point with that index to the next.
     pub segment: usize,
     /// The fraction of the segment.
     pub fraction: f64,
@@ -101,9 +101,9 @@ pub fn smoothed(points: &[DVec2], around: DVec2, radius: f64) -> Vec<DVec2> {
     smooth
 }
 
-/// Factors along a sheet, as (fraction, factor), changed by `by` at the fraction `at`, falling linearly to 0 at distance `reach`.
-pub fn brushed(factors: &[[f64; 2]], at: f64, by: f64, reach: f64) -> Vec<[f64; 2]> {
-    let weight = |fraction: f64| (1.0 - (fraction - at).abs() / reach).max(0.0);
+/// Factors along a sheet, as [fraction, factor], increased by `by` at the fraction `at`, and linearly less up to the distance `radius`.
+pub fn brushed(factors: &[[f64; 2]], at: f64, by: f64, radius: f64) -> Vec<[f64; 2]> {
+    let weight = |fraction: f64| (1.0 - (fraction - at).abs() / radius).max(0.0);
     factors.iter().map(|&[fraction, factor]| [fraction, lerp(factor, factor + by, weight(fraction))]).collect()
 }
 
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_place_is_on_a_segment_or_at_an_end() {
+    fn the_nearest_point_is_on_a_segment_or_at_an_end() {
         let corner = line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]);
         let on = nearest(&corner, DVec2::new(1.0, -2.0)).unwrap();
         assert_eq!((on.segment, on.point, on.distance), (0, DVec2::new(1.0, 0.0), 2.0));
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_begin_and_end_where_they_should() {
+    fn ranges_begin_and_end_at_fractions_of_the_length() {
         let corner = line(&[[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]]);
         assert_eq!(range(&corner, [0.25, 0.5]), line(&[[1.0, 0.0], [2.0, 0.0]]));
         assert_eq!(range(&corner, [0.5, 1.0]), line(&[[2.0, 0.0], [3.0, 0.0], [3.0, 1.0]]));
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn smoothing_takes_a_kink_back_and_leaves_the_rest() {
+    fn smoothing_reduces_a_kink_and_leaves_the_rest() {
         let kink = line(&[[0.0, 0.0], [1.0, 2.0], [2.0, 0.0], [9.0, 0.0], [10.0, 1.0]]);
         let smooth = smoothed(&kink, DVec2::new(1.0, 2.0), 2.0);
         assert_eq!(smooth, line(&[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [9.0, 0.0], [10.0, 1.0]]));

@@ -1,4 +1,4 @@
-//! Sheets as the scene states them, and their edits.
+//! The sheets of a shape as the scene states them.
 
 use bansho::{
     aurora::shapes::SheetParameters,
@@ -28,7 +28,7 @@ impl Factor {
         }
     }
 
-    /// The range of painting; a file may state more.
+    /// The range of the brush; a scene may state values outside of it.
     pub(super) fn bounds(self) -> [f64; 2] {
         match self {
             Self::Flux => [0.0, 8.0],
@@ -41,8 +41,8 @@ impl AuroraDrawing {
     /// Tolerance of simplified lines, as a fraction of the map's side.
     const TOLERANCE: f64 = 0.002;
 
-    /// The line simplified and rounded, as it is written to the file.
-    pub(super) fn written(&self, line: &[DVec2]) -> Vec<[f64; 2]> {
+    /// The points of `line`, simplified and rounded, as they are written to the scene.
+    pub(super) fn simplified_points(&self, line: &[DVec2]) -> Vec<[f64; 2]> {
         let points = polyline::simplified(line, Self::TOLERANCE * self.extent_km());
         points.into_iter().map(|point| self.rounded(point)).collect()
     }
@@ -50,8 +50,8 @@ impl AuroraDrawing {
     /// Rounded to a thousandth of the map's side or finer, clamped to the map.
     pub(super) fn rounded(&self, point: DVec2) -> [f64; 2] {
         let half = self.extent_km() / 2.0;
-        let places = if self.extent_km() >= 100.0 { 10.0 } else { 1000.0 };
-        point.clamp(DVec2::splat(-half), DVec2::splat(half)).to_array().map(|km| (km * places).round() / places)
+        let scale = if self.extent_km() >= 100.0 { 10.0 } else { 1000.0 };
+        point.clamp(DVec2::splat(-half), DVec2::splat(half)).to_array().map(|km| (km * scale).round() / scale)
     }
 
     /// The control points of sheet `sheet` of shape `shape`: those of the file where it lists them.
@@ -76,8 +76,8 @@ impl AuroraDrawing {
         let entry = |(sheet, line): (usize, &Vec<DVec2>)| {
             let along = |factor| along(line, &self.factors(shape, sheet, factor));
             let [flux_factor, energy_factor] = [Factor::Flux, Factor::Energy].map(along);
-            // The factors include the fading ends.
-            let plain = with_points(&SheetParameters::default(), self.written(line));
+            // The evaluated factors include the taper of the ends.
+            let plain = with_points(&SheetParameters::default(), self.simplified_points(line));
             SheetParameters { flux_factor, energy_factor, end_taper: 0.0, ..plain }
         };
         lines.iter().enumerate().map(entry).collect()
@@ -88,7 +88,7 @@ impl AuroraDrawing {
 fn along(line: &[DVec2], values: &[f64]) -> Curve {
     /// Tolerance of a factor.
     const TOLERANCE: f64 = 0.01;
-    let usual = SheetParameters::default().flux_factor;
+    let default = SheetParameters::default().flux_factor;
     let total = polyline::length(line).max(f64::MIN_POSITIVE);
     let mut distance = 0.0;
     let mut points = Vec::new();
@@ -98,28 +98,28 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
     }
     let first = values.first().copied().unwrap_or(1.0);
     if values.iter().all(|value| (value - first).abs() < TOLERANCE) {
-        let even = vec![[0.0, rounded(first)]];
+        let constant = vec![[0.0, rounded(first)]];
         return if (first - 1.0).abs() < TOLERANCE {
-            usual
+            default
         } else {
-            Curve::new(even, usual.interpolation()).unwrap_or(usual)
+            Curve::new(constant, default.interpolation()).unwrap_or(default)
         };
     }
     // The interpolated curve may overshoot between few points; finer tolerances follow then.
     let with = |tolerance: f64| {
         let kept = polyline::simplified(&points, tolerance).into_iter().map(|point| point.to_array().map(rounded));
-        Curve::new(kept.collect(), usual.interpolation()).ok()
+        Curve::new(kept.collect(), default.interpolation()).ok()
     };
     let is_near = |curve: &Curve| points.iter().all(|point| (curve.eval(point.x) - point.y).abs() < 2.0 * TOLERANCE);
     let curves = [TOLERANCE, 0.3 * TOLERANCE, 0.1 * TOLERANCE, 0.0].into_iter().filter_map(with);
     let found = curves.reduce(|best, finer| if is_near(&best) { best } else { finer });
-    found.unwrap_or(usual)
+    found.unwrap_or(default)
 }
 
 /// Whether `sheet` has no transform.
 fn is_plain(sheet: &SheetParameters) -> bool {
-    let placing = |sheet: &SheetParameters| (sheet.position_km, sheet.rotation_deg, sheet.scale, sheet.mirror);
-    placing(sheet) == placing(&SheetParameters::default())
+    let transform = |sheet: &SheetParameters| (sheet.position_km, sheet.rotation_deg, sheet.scale, sheet.mirror);
+    transform(sheet) == transform(&SheetParameters::default())
 }
 
 /// `sheet` with a stroke through `points`.
@@ -160,24 +160,31 @@ pub(super) fn curve_range(curve: &Curve, [from, to]: [f64; 2]) -> Curve {
     Curve::new(points, curve.interpolation()).unwrap_or_else(|_| curve.clone())
 }
 
-/// Two curves end to end, the first up to the fraction `fraction`; each may run against its own direction.
-pub(super) fn curve_chain(parts: [(&Curve, bool); 2], fraction: f64) -> Curve {
+/// A factor's curve, and whether its sheet is reversed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DirectedCurve<'a> {
+    pub(super) curve: &'a Curve,
+    pub(super) reversed: bool,
+}
+
+/// Two curves end to end; the second begins at `fraction`.
+pub(super) fn curve_chain(parts: [DirectedCurve; 2], fraction: f64) -> Curve {
     /// Width of the seam, as a fraction of the length.
     const SEAM: f64 = 1e-3;
-    let [first, second] = parts;
-    if first.0 == second.0 && first.0.points().len() < 2 {
-        return first.0.clone();
+    let [first, second] = parts.map(|part| part.curve);
+    if first == second && first.points().len() < 2 {
+        return first.clone();
     }
     let ranges = [[0.0, fraction - SEAM], [fraction + SEAM, 1.0]];
     let mut points = Vec::new();
-    for ((curve, reversed), [from, to]) in parts.into_iter().zip(ranges) {
-        let mut own = curve_range(&sampled(curve), [0.0, 1.0]).points().to_vec();
+    for (DirectedCurve { curve, reversed }, [from, to]) in parts.into_iter().zip(ranges) {
+        let mut range = curve_range(&sampled(curve), [0.0, 1.0]).points().to_vec();
         if reversed {
-            own = own.iter().rev().map(|&[at, value]| [1.0 - at, value]).collect();
+            range = range.iter().rev().map(|&[at, value]| [1.0 - at, value]).collect();
         }
-        points.extend(own.iter().map(|&[at, value]| [lerp(from, to, at), value]));
+        points.extend(range.iter().map(|&[at, value]| [lerp(from, to, at), value]));
     }
-    Curve::new(points, first.0.interpolation()).unwrap_or_else(|_| first.0.clone())
+    Curve::new(points, first.interpolation()).unwrap_or_else(|_| first.clone())
 }
 
 /// The curve with control points at both ends.
@@ -189,10 +196,10 @@ pub(super) fn sampled(curve: &Curve) -> Curve {
 
 /// The keys of `parameters` that differ from the defaults.
 pub(super) fn non_default<P: Parameters>(parameters: &P) -> Table {
-    let usual = P::default().to_table();
+    let defaults = P::default().to_table();
     let mut table = Table::default();
     for entry in parameters.to_table().entries {
-        if usual.get(&entry.key) != Some(&entry.node) {
+        if defaults.get(&entry.key) != Some(&entry.node) {
             table.push(entry.key, entry.node.value);
         }
     }

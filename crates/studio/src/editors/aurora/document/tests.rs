@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use bansho::{Assets, MemoryAssets, aurora::shapes::Form, base::math::DVec2};
 
-use super::{AuroraDrawing, Factor, ShapeEditError};
+use super::{AuroraDrawing, Factor, LinkedPoint, ShapeEditError, SheetEnd, SheetPosition};
 use crate::document::Document;
 
 const ARC: &str = "\
@@ -31,13 +31,21 @@ fn stroke(points: &[[f64; 2]]) -> Vec<DVec2> {
     points.iter().map(|&point| DVec2::from(point)).collect()
 }
 
-fn is_good(document: &mut Document) -> bool {
+fn at(sheet: usize, fraction: f64) -> SheetPosition {
+    SheetPosition { sheet, fraction }
+}
+
+fn end(sheet: usize, last: bool) -> SheetEnd {
+    SheetEnd { sheet, last }
+}
+
+fn is_valid(document: &mut Document) -> bool {
     document.check_now(&assets());
     document.error().is_none()
 }
 
 #[test]
-fn strokes_are_drawn_as_new_sheets_and_in_stead_of_old_ones() {
+fn strokes_add_and_replace_sheets() {
     let (mut document, drawing) = open("bansho = 2\n[[aurora]]\n");
     assert!(!drawing.is_stated() && drawing.arrivals() == [0.0]);
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-100.0, 0.0], [0.0, 0.04], [100.0, 0.0]])));
@@ -46,11 +54,11 @@ fn strokes_are_drawn_as_new_sheets_and_in_stead_of_old_ones() {
     let drawing = change(&mut document, &drawing.draw(0, Some(1), &stroke(&[[-100.0, -50.0], [100.0, -50.0]])));
     assert_eq!(drawing.lines(0).len(), 2);
     assert_eq!(drawing.points(0, 1), stroke(&[[-100.0, -50.0], [100.0, -50.0]]));
-    assert!(is_good(&mut document));
+    assert!(is_valid(&mut document));
 }
 
 #[test]
-fn impossible_strokes_are_refused_in_the_scene_s_words() {
+fn invalid_strokes_are_refused_with_the_scenes_error() {
     let (mut document, drawing) = open(ARC);
     let across = drawing.draw(0, None, &stroke(&[[0.0, -100.0], [0.0, 100.0]]));
     let shape_error = document.edit_shapes("draw", &across, 0, &assets()).unwrap_err();
@@ -60,7 +68,7 @@ fn impossible_strokes_are_refused_in_the_scene_s_words() {
 }
 
 #[test]
-fn a_split_cuts_what_the_sheet_became() {
+fn a_split_cuts_the_sheets_of_later_shapes() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.add_shape());
     let bent = stroke(&[[-200.0, 100.0], [0.0, 60.0], [200.0, 100.0]]);
@@ -75,27 +83,27 @@ fn a_split_cuts_what_the_sheet_became() {
     let twice = drawing.split(1, 0, 0.5);
     let shape_error = document.edit_shapes("split", &twice, 0, &assets()).unwrap_err();
     assert!(shape_error.to_string().contains("split already"), "{shape_error}");
-    assert!(is_good(&mut document));
+    assert!(is_valid(&mut document));
 }
 
 #[test]
-fn two_ends_grow_together_and_a_ring_is_refused() {
+fn two_ends_merge_and_a_ring_is_refused() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[220.0, 60.0], [-200.0, 60.0]])));
     let drawing = change(&mut document, &drawing.add_shape());
-    let merge = drawing.merge(1, [(0, true), (1, false)]);
+    let merge = drawing.merge(1, [end(0, true), end(1, false)]);
     let drawing = change(&mut document, &merge);
     assert_eq!(drawing.lines(1).len(), 1);
     let points = drawing.points(1, 0);
     assert_eq!((points[0], points[points.len() - 1]), (DVec2::new(-200.0, 0.0), DVec2::new(-200.0, 60.0)));
     let shape_error =
-        document.edit_shapes("merge", &drawing.merge(1, [(0, false), (1, true)]), 0, &assets()).unwrap_err();
+        document.edit_shapes("merge", &drawing.merge(1, [end(0, false), end(1, true)]), 0, &assets()).unwrap_err();
     assert!(shape_error.to_string().contains("ring"), "{shape_error}");
-    assert!(is_good(&mut document));
+    assert!(is_valid(&mut document));
 }
 
 #[test]
-fn forms_are_put_and_moved_point_by_point() {
+fn forms_are_replaced_by_their_moved_points() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.put_form(0, Some(0), Form::SShape));
     assert!(document.text().contains("sheets = [{ form = \"s_shape\" }]"), "{}", document.text());
@@ -108,7 +116,7 @@ fn forms_are_put_and_moved_point_by_point() {
 }
 
 #[test]
-fn brightness_is_painted_where_the_brush_is() {
+fn brightness_is_painted_under_the_brush() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.paint(0, 0, Factor::Flux, 0.25, 1.0));
     assert!(document.text().contains("flux_factor = [[0.0, 1.0]"), "{}", document.text());
@@ -128,50 +136,50 @@ fn shapes_are_added_timed_and_removed() {
     assert_eq!((drawing.arrivals()[1], drawing.transition_s(1)), (2.5, 2.5));
     let drawing = change(&mut document, &drawing.remove_shape(1));
     assert_eq!(drawing.arrivals().len(), 1);
-    assert!(is_good(&mut document));
+    assert!(is_valid(&mut document));
     // What comes first then is there from the beginning, in one piece or two.
     let drawing = change(&mut document, &drawing.add_shape());
     let drawing = change(&mut document, &drawing.retime(1, 2.5));
     let drawing = change(&mut document, &drawing.split(1, 0, 0.4));
     let drawing = change(&mut document, &drawing.remove_shape(0));
     assert_eq!(drawing.arrivals(), [0.0]);
-    assert!(is_good(&mut document) && !document.text().contains("transition_s"), "{}", document.text());
+    assert!(is_valid(&mut document) && !document.text().contains("transition_s"), "{}", document.text());
 }
 
 #[test]
-fn sheets_and_points_are_told_what_they_become() {
+fn sheets_and_points_are_linked() {
     let (mut document, drawing) = open(ARC);
     let drawing = change(&mut document, &drawing.draw(0, None, &stroke(&[[-200.0, 60.0], [200.0, 60.0]])));
     let drawing = change(&mut document, &drawing.add_shape());
     let drawing = change(&mut document, &drawing.add_shape());
-    let exchanged = change(&mut document, &drawing.link_sheet(1, (0, 0.3), 1));
+    let exchanged = change(&mut document, &drawing.link_sheet(1, at(0, 0.3), 1));
     assert!(document.text().contains("link = [{ from = 1, to = 2 }]"), "{}", document.text());
     let crosses = |drawing: &AuroraDrawing, shape: usize| {
         drawing.point_paths(shape)[0].iter().all(|[from, to]| (to.y - from.y).abs() > 59.0)
     };
     assert!(crosses(&exchanged, 0) && !crosses(&exchanged, 1), "only that transition goes otherwise");
-    let back = change(&mut document, &exchanged.link_sheet(1, (0, 0.3), 0));
+    let back = change(&mut document, &exchanged.link_sheet(1, at(0, 0.3), 0));
     assert!(!crosses(&back, 0));
 
-    let moved = change(&mut document, &back.link_point(1, (0, 0.25), (0, 0.5)));
-    let [from, to] = moved.linked(1)[0].1;
+    let moved = change(&mut document, &back.link_point(1, at(0, 0.25), at(0, 0.5)));
+    let LinkedPoint { from, to, .. } = moved.linked_points(1)[0];
     assert!((from.x + 100.0).abs() < 1e-6 && to.x.abs() < 1e-6, "{from} {to}");
     let arrives = |drawing: &AuroraDrawing, from: f64| {
         let point_paths = drawing.point_paths(0).concat();
         point_paths
             .iter()
-            .filter(|way| way[0].y.abs() < 1.0)
-            .map(|way| ((way[0].x - from).abs(), way[1].x))
+            .filter(|path| path[0].y.abs() < 1.0)
+            .map(|path| ((path[0].x - from).abs(), path[1].x))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap()
             .1
     };
     assert!(arrives(&moved, -100.0).abs() < 5.0, "{}", arrives(&moved, -100.0));
-    let again = change(&mut document, &moved.link_point(1, (0, 0.26), (0, 0.4)));
-    assert_eq!(again.linked(1).len(), 1, "the same point is linked anew: {}", document.text());
-    let freed = change(&mut document, &again.unlink(1, DVec2::new(-40.0, 0.0), 5.0));
-    assert!(freed.linked(1).is_empty() && (arrives(&freed, -100.0) + 100.0).abs() < 5.0);
-    assert!(is_good(&mut document));
+    let again = change(&mut document, &moved.link_point(1, at(0, 0.26), at(0, 0.4)));
+    assert_eq!(again.linked_points(1).len(), 1, "the same point is linked anew: {}", document.text());
+    let unlinked = change(&mut document, &again.unlink(1, DVec2::new(-40.0, 0.0), 5.0));
+    assert!(unlinked.linked_points(1).is_empty() && (arrives(&unlinked, -100.0) + 100.0).abs() < 5.0);
+    assert!(is_valid(&mut document));
 }
 
 /// Three sheets from west to east.
@@ -199,14 +207,14 @@ split = [{{ sheet = 2, length_fraction = 0.5 }}]
 }
 
 #[test]
-fn what_counts_sheets_follows_them() {
+fn references_to_sheets_are_renumbered() {
     let text =
         &exchanged_then_split("link = [{ from = 3, to = 4, from_length_fraction = 0.5, to_length_fraction = 0.25 }]\n");
     let (document, drawing) = open(text);
     let after = |operations: &[bansho::scene::operation::Operation]| {
         let mut document = Document::new("aurora", document.text().clone());
         change(&mut document, operations);
-        assert!(is_good(&mut document), "{}", document.text());
+        assert!(is_valid(&mut document), "{}", document.text());
         document.text().to_string()
     };
     let cut = after(&drawing.split(1, 0, 0.5));
@@ -225,13 +233,13 @@ fn what_counts_sheets_follows_them() {
 }
 
 #[test]
-fn a_sheet_goes_with_all_that_only_it_becomes() {
+fn a_sheet_is_removed_with_the_sheets_that_only_it_becomes() {
     let text =
         &exchanged_then_split(&format!("[[aurora.shapes]]\n{THREE}\nmerge = [{{ sheets = [2, 3], ends = [1, 0] }}]\n"));
     let counts_after = |shape: usize, sheet: usize| {
         let (mut document, drawing) = open(text);
         let drawing = change(&mut document, &drawing.remove_sheet(shape, sheet));
-        assert!(is_good(&mut document), "{}", document.text());
+        assert!(is_valid(&mut document), "{}", document.text());
         assert!(document.text().contains("# in the middle"));
         ([0, 1, 2, 3].map(|shape| drawing.lines(shape).len()), document.text().to_string())
     };
@@ -249,7 +257,7 @@ fn a_sheet_goes_with_all_that_only_it_becomes() {
 }
 
 #[test]
-fn what_is_painted_along_sheets_outlives_an_edit_of_one_that_stands_for_many() {
+fn painted_factors_survive_an_edit_of_a_sheet_with_copies() {
     let shapes = "\
 bansho = 2
 [[aurora]]
@@ -273,11 +281,11 @@ sheets = [
         }
     }
     assert!(document.text().contains("# a pair"), "{}", document.text());
-    assert!(is_good(&mut document));
+    assert!(is_valid(&mut document));
 }
 
 #[test]
-fn entries_of_a_list_keep_their_comments_when_others_come_and_go() {
+fn list_items_keep_their_comments_when_others_are_added_or_removed() {
     let shapes = "\
 bansho = 2
 [[aurora]]

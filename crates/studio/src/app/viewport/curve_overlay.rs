@@ -1,4 +1,4 @@
-//! An overlay on the viewport with all curves of the selected table.
+//! An overlay on the viewport with editors of all curves of the selected table.
 
 use bansho::{
     base::parameters::{Descriptor, Kind, TableDescriptor, Value},
@@ -6,9 +6,9 @@ use bansho::{
 };
 
 use crate::{
-    app::{
-        panels::inspector::words,
-        widgets::curve_editor::{self, CurveBounds},
+    app::widgets::{
+        curve_editor::{self, CurveBounds},
+        key_label,
     },
     session::{Session, selection::Selection},
 };
@@ -37,14 +37,14 @@ pub(crate) fn has_any(selection: &Selection) -> bool {
     selection.descriptor().is_some_and(any)
 }
 
-/// Shows them along the lower edge of the picture in `viewport`, row over row.
-pub(crate) fn curves_ui(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
+/// Shows the curves along the lower edge of `viewport`, in rows.
+pub(crate) fn curve_overlay_ui(ui: &mut Ui, session: &mut Session, selection: &Selection, viewport: Rect) {
     let Some(descriptor) = selection.descriptor() else { return };
     let mut curves = Vec::new();
-    collect_curves(&selection.place(), descriptor, &mut curves);
-    let across = (((viewport.width() - GAP) / (WIDTH + GAP)) as usize).clamp(1, curves.len().max(1));
-    let down = curves.len().div_ceil(across);
-    let height = (down as f32 * (HEIGHT + GAP) + GAP).min(MAX_HEIGHT * viewport.height());
+    collect_curves(&selection.path(), descriptor, &mut curves);
+    let columns = (((viewport.width() - GAP) / (WIDTH + GAP)) as usize).clamp(1, curves.len().max(1));
+    let rows = curves.len().div_ceil(columns);
+    let height = (rows as f32 * (HEIGHT + GAP) + GAP).min(MAX_HEIGHT * viewport.height());
     let corner = egui::pos2(viewport.left(), viewport.bottom() - height);
     let area = egui::Area::new(egui::Id::unique("curves")).order(egui::Order::Middle).fixed_pos(corner);
     area.constrain_to(viewport).show(ui.ctx(), |ui| {
@@ -54,9 +54,9 @@ pub(crate) fn curves_ui(ui: &mut Ui, session: &mut Session, selection: &Selectio
             ui.visuals_mut().extreme_bg_color = BACKGROUND;
             egui::ScrollArea::vertical().max_height(height - GAP).show(ui, |ui| {
                 egui::Grid::new("curves").spacing(vec2(GAP, GAP)).show(ui, |ui| {
-                    for (index, (place, parameter)) in curves.iter().enumerate() {
-                        curve_ui(ui, session, place, parameter);
-                        if (index + 1) % across == 0 {
+                    for (index, (path, parameter)) in curves.iter().enumerate() {
+                        curve_ui(ui, session, path, parameter);
+                        if (index + 1) % columns == 0 {
                             ui.end_row();
                         }
                     }
@@ -66,14 +66,14 @@ pub(crate) fn curves_ui(ui: &mut Ui, session: &mut Session, selection: &Selectio
     });
 }
 
-/// Every curve of a table and of those within it.
+/// Collects all curves of a table and of its sub-tables.
 fn collect_curves(
-    place: &ValuePath,
+    path: &ValuePath,
     table: &'static TableDescriptor,
     curves: &mut Vec<(ValuePath, &'static Descriptor)>,
 ) {
     for parameter in &table.parameters {
-        let own = place.key(parameter.key);
+        let own = path.key(parameter.key);
         match &parameter.kind {
             Kind::Curve { .. } => curves.push((own, parameter)),
             Kind::Table(inner) => collect_curves(&own, inner(), curves),
@@ -82,30 +82,30 @@ fn collect_curves(
     }
 }
 
-fn curve_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor) {
+fn curve_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, parameter: &Descriptor) {
     let Kind::Curve { x, y, rising } = parameter.kind else { return };
-    let stated = place.find(session.document.values()).map(|node| node.value.clone());
+    let stated = path.find(session.document.values()).map(|node| node.value.clone());
     let present: Option<Value> = stated.or_else(|| parameter.default.clone());
-    ui.push_id(place, |ui| {
+    ui.push_id(path, |ui| {
         ui.vertical(|ui| {
             ui.set_width(WIDTH);
             let label = ui.label(title(parameter)).on_hover_text(&parameter.doc).id;
             let edited = present
                 .and_then(|value| curve_editor::curve_editor_ui(ui, label, &value, CurveBounds { x, y, rising }));
             if let Some(value) = edited {
-                session.set(parameter.key, place, value);
+                session.set(parameter.key, path, value);
             }
         });
     });
 }
 
-/// Its name, preceded by the paper's symbol if its description begins with one: `V(w), eq. (4)`.
+/// The name of a curve, preceded by the paper's symbol if its description starts with one: `V(w), eq. (4)`.
 fn title(parameter: &Descriptor) -> String {
     let symbol = parameter.doc.split(',').next().filter(|symbol| symbol.len() <= 8 && symbol.contains('('));
     let symbol = symbol.or_else(|| parameter.doc.split(',').next().filter(|symbol| symbol.starts_with("1 - ")));
     match symbol {
-        Some(symbol) => format!("{symbol}  {}", words(parameter.key)),
-        None => words(parameter.key),
+        Some(symbol) => format!("{symbol}  {}", key_label(parameter.key)),
+        None => key_label(parameter.key),
     }
 }
 
@@ -118,7 +118,7 @@ mod tests {
         let sheet = Selection { key: "flame_sheet", index: Some(0) };
         assert!(has_any(&sheet) && !has_any(&Selection { key: "camera", index: None }));
         let mut curves = Vec::new();
-        collect_curves(&sheet.place(), sheet.descriptor().unwrap(), &mut curves);
+        collect_curves(&sheet.path(), sheet.descriptor().unwrap(), &mut curves);
         let titles: Vec<String> = curves.iter().map(|(_, parameter)| title(parameter)).collect();
         for symbol in ["V(w)", "H(u)", "C(s)", "R(s)", "G(s)", "B(s)", "A(w)", "D(w)", "1 - F"] {
             assert_eq!(titles.iter().filter(|title| title.starts_with(symbol)).count(), 1, "{symbol}: {titles:?}");
