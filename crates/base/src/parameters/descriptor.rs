@@ -10,7 +10,7 @@ pub struct Descriptor {
     pub key: &'static str,
     /// Description in one or two sentences, with the paper's symbol and equation if it has one.
     pub doc: String,
-    /// Unit, empty for dimensionless numbers; units that are not SI are also item of the key.
+    /// Unit, empty for dimensionless numbers; units that are not SI are also part of the key.
     pub unit: &'static str,
     /// Type and bounds.
     pub kind: Kind,
@@ -146,7 +146,7 @@ impl Kind {
     pub fn expectation(&self) -> String {
         match self {
             Self::Bool => "true or false".into(),
-            Self::Integer { min, max } => format!("a outer number from {min} to {max}"),
+            Self::Integer { min, max } => format!("a whole number from {min} to {max}"),
             Self::Number { min, max } => format!("a number from {min} to {max}"),
             Self::Rational { min, max } => {
                 format!("a number from {min} to {max}, or a fraction such as \"24000/1001\"")
