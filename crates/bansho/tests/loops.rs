@@ -111,7 +111,7 @@ fn goes_with(text: &str) -> &'static str {
 #[test]
 fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
     let header =
-        |table: &SharedTable| if table.many { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) };
+        |table: &SharedTable| if table.is_list { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) };
     let shared = SHARED_TABLES.iter().map(|table| (header(table), (table.table)()));
     let kinds = KINDS.iter().map(|kind| (format!("[[{}]]", kind.key), (kind.table)()));
     let plan = |text: &str| -> Result<Planned, String> {

@@ -84,7 +84,7 @@ fn draw(text: &str) -> bool {
     let number = scene.picture.first_frame + 1;
     let options =
         PlanOptions { size: Some([17, 11]), overscan: true, layers: true, aovs: true, ..PlanOptions::default() };
-    let scene = scene.adapted(&SceneOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let scene = scene.with_options(&SceneOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let Ok(compiled) = CompiledScene::build(Arc::new(scene), assets, None) else { return false };
     let compiled = Arc::new(compiled);
     let plan = Plan::new(&compiled, &options).unwrap_or_else(|error| panic!("{error}\n{text}"));
@@ -110,7 +110,7 @@ fn scene(seed: u64) -> String {
     };
     let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; the picture's size is whole and given anyhow.
         let left_out = [("obstacle", "shape"), ("picture", "size")];

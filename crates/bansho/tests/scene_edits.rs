@@ -37,15 +37,15 @@ fn absent_tables_are_made_and_bare_words_are_strings() {
 
 #[test]
 fn places_that_are_not_there_are_named() {
-    assert!(matches!(set(SCENE, "flame_sheet.7.height=2"), Err(EditError::NoSuchPlace { .. })));
-    assert!(matches!(set(SCENE, "picture.size"), Err(EditError::NoAssignment(_))));
-    assert!(matches!(set(SCENE, "=3"), Err(EditError::NoAssignment(_))));
-    assert!(matches!(set(SCENE, "picture..size=3"), Err(EditError::NoAssignment(_))));
+    assert!(matches!(set(SCENE, "flame_sheet.7.height=2"), Err(EditError::NoSuchPath { .. })));
+    assert!(matches!(set(SCENE, "picture.size"), Err(EditError::InvalidAssignment(_))));
+    assert!(matches!(set(SCENE, "=3"), Err(EditError::InvalidAssignment(_))));
+    assert!(matches!(set(SCENE, "picture..size=3"), Err(EditError::InvalidAssignment(_))));
     // Found by fuzzing: a path so deep that its result could not be read again.
     let deep = format!("picture{}=3", ".a".repeat(100));
-    assert!(matches!(set(SCENE, &deep), Err(EditError::NoAssignment(_))));
+    assert!(matches!(set(SCENE, &deep), Err(EditError::InvalidAssignment(_))));
     let nested = format!("picture.a.b.c.d={}{}", "[".repeat(78), "]".repeat(78));
-    assert!(matches!(set(SCENE, &nested), Err(EditError::NoAssignment(_))));
+    assert!(matches!(set(SCENE, &nested), Err(EditError::InvalidAssignment(_))));
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn lists_of_tables_within_tables_are_reached_in_both_ways_of_writing_them() {
         let beyond = set(scene, "flame_particles.0.burners.2.speed=1").unwrap_err().to_string();
         assert!(beyond.contains("burners.2.speed`: 2 is not in the scene; there is: tables 0 to 1"), "{beyond}");
         let whole = set(scene, "flame_particles.0.burners.0=1");
-        assert!(matches!(whole, Err(EditError::NoAssignment(_))), "{whole:?}");
+        assert!(matches!(whole, Err(EditError::InvalidAssignment(_))), "{whole:?}");
     }
     assert!(set(headed, "flame_particles.0.burners.0.speed=2").unwrap().contains("speed = 2 # slow"));
     let none = set("bansho = 2\n[[flame_particles]]\nsmoke = 1\n", "flame_particles.0.burners.0.speed=1");

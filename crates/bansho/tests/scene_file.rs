@@ -172,9 +172,9 @@ fn of_many_faults_the_first_are_listed_and_the_rest_counted() {
     let text = format!("bansho = 2\n{}", "[[absorber]]\nnear = -1\n".repeat(20_000));
     let error = parse(&text).err().unwrap();
     assert_eq!((error.problems.len(), error.omitted), (100, 19_900));
-    let faults: Vec<String> = error.faults().collect();
-    assert_eq!((faults.len(), error.more().as_deref()), (100, Some("test.toml: and 19900 more faults")));
-    assert!(faults[99].starts_with("test.toml:201:8: absorber.99.near (absorber 100): "), "{}", faults[99]);
+    let messages: Vec<String> = error.messages().collect();
+    assert_eq!((messages.len(), error.omitted_message().as_deref()), (100, Some("test.toml: and 19900 more problems")));
+    assert!(messages[99].starts_with("test.toml:201:8: absorber.99.near (absorber 100): "), "{}", messages[99]);
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn random_scene(seed: u64) -> String {
     let mut uniform = random(seed);
     let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = parameters::sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; a spot may not be full beyond its end.
         // Most random lenses are beyond the field of view that they may have.

@@ -72,7 +72,7 @@ fn page() -> String {
          here. How values, keys and curves are written is told in [the guide](../guide/scene-file.md).\n"
     );
     for shared in &SHARED_TABLES {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         section(&mut page, &header, "", (shared.table)());
     }
     for kind in KINDS {

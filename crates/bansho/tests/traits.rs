@@ -49,14 +49,14 @@ fn fog_dims_a_lamp_by_beers_law_wherever_it_stands() {
 }
 
 #[test]
-fn frames_carry_figures_where_they_are_asked_for() {
-    let asked = PlanOptions { figures: true, ..PlanOptions::default() };
-    let frame = render(&fogged(2.5), &asked, 0);
+fn frames_carry_metadata_if_requested() {
+    let options = PlanOptions { metadata: true, ..PlanOptions::default() };
+    let frame = render(&fogged(2.5), &options, 0);
     // The fog has none.
-    let [lamp] = &frame.figures[..] else { panic!("{:?}", frame.figures) };
-    assert_eq!((lamp.phenomenon.as_str(), lamp.figures.len()), ("lamp", 1));
-    assert_eq!((lamp.figures[0].name, lamp.figures[0].unit, lamp.figures[0].value), ("depth", "m", 2.5));
-    assert!(render(&fogged(2.5), &PlanOptions::default(), 0).figures.is_empty());
+    let [lamp] = &frame.metadata[..] else { panic!("{:?}", frame.metadata) };
+    assert_eq!((lamp.phenomenon.as_str(), lamp.entries.len()), ("lamp", 1));
+    assert_eq!((lamp.entries[0].name, lamp.entries[0].unit, lamp.entries[0].value), ("depth", "m", 2.5));
+    assert!(render(&fogged(2.5), &PlanOptions::default(), 0).metadata.is_empty());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use bansho_base::{
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, MetadataEntry, Rect},
     phenomenon::{
         Deflection, Prepared, Run, SnapshotError, Stepped, Stepping,
         strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
@@ -266,12 +266,12 @@ impl Prepared for Mixed<'_> {
         strip.crossfade(other, self.share, self.aovs);
     }
 
-    fn figures(&self) -> Vec<Figure> {
-        let mix = |(present, passing): (Figure, Figure)| {
+    fn metadata(&self) -> Vec<MetadataEntry> {
+        let mix = |(present, passing): (MetadataEntry, MetadataEntry)| {
             let value = f64::from(self.share).mul_add(present.value - passing.value, passing.value);
-            Figure { value, ..present }
+            MetadataEntry { value, ..present }
         };
-        self.present.figures().into_iter().zip(self.passing.figures()).map(mix).collect()
+        self.present.metadata().into_iter().zip(self.passing.metadata()).map(mix).collect()
     }
 
     fn may_bend(&self) -> bool {

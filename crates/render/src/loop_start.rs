@@ -73,7 +73,7 @@ impl Change {
 pub(crate) fn small(plan: &Plan) -> Plan {
     let longest = plan.size[0].max(plan.size[1]);
     let size = plan.size.map(|side| (side * SIDE).div_ceil(longest));
-    Plan { layers: false, aovs: false, figures: false, ..plan.at_size(size) }
+    Plan { layers: false, aovs: false, metadata: false, ..plan.at_size(size) }
 }
 
 /// Display codes of a frame over black, from 0 to 1.

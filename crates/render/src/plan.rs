@@ -24,8 +24,8 @@ pub struct PlanOptions {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
-    /// Whether frames carry the phenomena's figures.
-    pub figures: bool,
+    /// Whether frames carry the phenomena's metadata.
+    pub metadata: bool,
     /// How display formats will show the picture; a plate made for display is taken back through it.
     pub display: color::View,
 }
@@ -69,8 +69,8 @@ pub struct Plan {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
-    /// Whether frames carry the phenomena's figures.
-    pub figures: bool,
+    /// Whether frames carry the phenomena's metadata.
+    pub metadata: bool,
     /// How display formats show the picture.
     pub display: color::View,
 }
@@ -107,7 +107,7 @@ impl Plan {
             exposure_ev100,
             layers: options.layers,
             aovs: options.aovs,
-            figures: options.figures,
+            metadata: options.metadata,
             display: options.display,
             scene,
         })

@@ -27,7 +27,7 @@ fn look_at<T>(
 ) -> Vec<T> {
     let assets = Arc::new(FileAssets::new(scenes()));
     let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
-    let scene = scene.adapted(options).unwrap_or_else(|error| panic!("{error}"));
+    let scene = scene.with_options(options).unwrap_or_else(|error| panic!("{error}"));
     let compiled = CompiledScene::build(Arc::new(scene), assets, None).unwrap_or_else(|errors| panic!("{errors}"));
     let compiled = Arc::new(compiled);
     let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, MetadataEntry, Rect},
     math::{
         DVec3,
         random::{Key, Purpose, uniform},
@@ -193,9 +193,9 @@ impl Prepared for PreparedEmitter<'_> {
         Rect::from_size(self.view.size[0], self.view.size[1])
     }
 
-    fn figures(&self) -> Vec<Figure> {
+    fn metadata(&self) -> Vec<MetadataEntry> {
         let depth = self.view.camera.depth(self.emitter.at(self.view.shutter.middle()));
-        vec![Figure { name: "depth", unit: "m", value: depth }]
+        vec![MetadataEntry { name: "depth", unit: "m", value: depth }]
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

@@ -30,7 +30,7 @@ impl Planned {
         (adapted, options): (&SceneOptions, &PlanOptions),
         assets: Arc<dyn Assets>,
     ) -> Result<Self, String> {
-        let scene = scene.adapted(adapted).map_err(|error| error.to_string())?;
+        let scene = scene.with_options(adapted).map_err(|error| error.to_string())?;
         let compiled = CompiledScene::build(Arc::new(scene), assets, None);
         let compiled = Arc::new(compiled.map_err(|errors| errors.located("test.toml", "").to_string())?);
         let plan = Arc::new(Plan::new(&compiled, options).map_err(|error| error.to_string())?);

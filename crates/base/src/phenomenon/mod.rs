@@ -10,7 +10,7 @@ use std::{fmt, sync::Arc};
 use crate::{
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
-    image::{Figure, Image, Rect},
+    image::{Image, MetadataEntry, Rect},
 };
 use strip::{AovDescriptor, DepthInterval, Shutter, Strip, View};
 use surroundings::{OtherPhenomena, Publication, Surroundings};
@@ -258,8 +258,8 @@ pub trait Prepared: Send + Sync {
     /// The value of a pixel must not depend on the strip in which it is drawn.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
 
-    /// Figures of this frame, with unique names.
-    fn figures(&self) -> Vec<Figure> {
+    /// Metadata of this frame, entries with unique names.
+    fn metadata(&self) -> Vec<MetadataEntry> {
         Vec::new()
     }
 

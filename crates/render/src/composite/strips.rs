@@ -210,7 +210,7 @@ pub(crate) fn frame(
         channels: channels(composition, planes),
         opaque,
         content,
-        figures: Vec::new(),
+        metadata: Vec::new(),
     })
 }
 

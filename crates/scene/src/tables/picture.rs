@@ -1,4 +1,4 @@
-//! What a scene says of its picture, its plate and its lights.
+//! The tables `[picture]`, `[plate]` and `[[light]]`.
 
 use bansho_base::{
     color::MAX_EV100,
@@ -15,7 +15,7 @@ pub const LARGEST_SIDE: f64 = 16_384.0;
 pub struct FrameRate {
     /// Frames.
     pub frames: u32,
-    /// In so many seconds.
+    /// The seconds that these frames take.
     pub seconds: u32,
 }
 
@@ -31,7 +31,7 @@ fn parse_fraction(text: &str) -> Option<FrameRate> {
     Some(FrameRate { frames: frames.trim().parse().ok()?, seconds: seconds.trim().parse().ok()? })
 }
 
-/// Decimal rates keep three places, which every rate in use needs at most.
+/// Decimal rates have three decimal places: no rate in use needs more.
 fn decimal(number: f64) -> FrameRate {
     let thousandths = (number * 1000.0).round() as u32;
     if thousandths.is_multiple_of(1000) {
@@ -170,18 +170,18 @@ bansho_base::parameters! {
 }
 
 impl LightParameters {
-    /// Whether it shines one way.
+    /// Whether it has a direction.
     pub fn is_directed(&self) -> bool {
         self.kind != LightKind::Point
     }
 
-    /// Whether its direction is one.
-    pub fn has_direction(&self) -> bool {
+    /// Whether the vector of its direction is not zero.
+    pub fn has_valid_direction(&self) -> bool {
         DVec3::from(self.direction).try_normalize().is_some()
     }
 
-    /// Whether it stands somewhere, so that its position matters.
-    pub fn stands(&self) -> bool {
+    /// Whether it has a position.
+    pub fn has_position(&self) -> bool {
         self.kind != LightKind::Directional
     }
 

@@ -157,7 +157,7 @@ fn change(session: &mut Session, bench_scene: &BenchScene, way: f64) -> Result<(
             [[-240.0, -180.0], [0.0, -150.0 - 60.0 * way], [240.0, -180.0]].map(|point| Value::numbers(point).into());
         let sheets = ValuePath::root().key("aurora").index(0).key("shapes").index(0).key("sheets");
         let place = sheets.index(0).key("points");
-        session.edit_shapes("move point", &[Operation::Set { place, value: Value::List(points.into()) }], 0)?;
+        session.edit_shapes("move point", &[Operation::Set { path: place, value: Value::List(points.into()) }], 0)?;
         return Ok(());
     };
     let (kind, keys) = keys.split_first().unwrap_or((&"", &[]));

@@ -11,14 +11,14 @@ use bansho::{
     scene::{
         Scene, ValuePath,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
 /// The scene as `bansho render` draws it unless it is told otherwise.
 fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
     let options = SceneOptions { implied_backdrop: true, ..SceneOptions::default() };
-    let scene = Scene::parse(name, text, KINDS)?.adapted(&options);
+    let scene = Scene::parse(name, text, KINDS)?.with_options(&options);
     scene.map(Arc::new).map_err(|error| unplaced(name, text, error.to_string()))
 }
 
@@ -70,7 +70,7 @@ impl Checker {
         text: &str,
         assets: &Arc<dyn Assets>,
     ) -> Option<Result<PlannedScene, SceneError>> {
-        let fewer = fewer_particles(&values(text).ok()?);
+        let fewer = fewer_particles(&parse_values(text).ok()?);
         let draft = operation::apply(text, &fewer).ok().filter(|_| !fewer.is_empty())?;
         let whole = self.check(name, text, assets);
         let planned = |whole: PlannedScene| {
@@ -162,7 +162,7 @@ fn fewer_particles(root: &Table) -> Vec<Operation> {
             let place = keys.iter().fold(ValuePath::root().key(kind).index(index), |place, key| place.key(key));
             let stated = place.find(root).and_then(|node| node.value.as_number());
             if stated.or_else(|| usual(kind, keys)).is_some_and(|count| count > most as f64) {
-                operations.push(Operation::Set { place, value: Value::Integer(most) });
+                operations.push(Operation::Set { path: place, value: Value::Integer(most) });
             }
         }
     }
@@ -213,8 +213,8 @@ mod tests {
     #[test]
     fn a_draft_has_fewer_particles_where_there_are_many() {
         let many = "bansho = 2\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
-        let fewer = fewer_particles(&values(many).unwrap());
-        let places: Vec<String> = fewer.iter().map(|operation| operation.place().to_string()).collect();
+        let fewer = fewer_particles(&parse_values(many).unwrap());
+        let places: Vec<String> = fewer.iter().map(|operation| operation.path().to_string()).collect();
         assert_eq!(places, ["aurora.0.particles.count", "flame_particles.0.particles"]);
         assert!(draft("bansho = 2\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));
         assert!(draft("bansho = 2\n[[rain]]\n[[flame_particles]]\nparticles = 900\n").is_none());

@@ -21,7 +21,7 @@ use bansho::{
     scene::{
         edit::EditError,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
@@ -249,7 +249,7 @@ impl Document {
     }
 
     fn parse(&mut self) {
-        match values(&self.text) {
+        match parse_values(&self.text) {
             Ok(values) => {
                 self.values = values;
                 self.syntax = None;

@@ -52,7 +52,7 @@ fn in_value(place: &ValuePath, node: &Node, kind: &Kind, found: &mut Vec<(ValueP
 
 #[cfg(test)]
 mod tests {
-    use bansho::scene::values;
+    use bansho::scene::parse_values;
 
     use super::*;
 
@@ -60,8 +60,10 @@ mod tests {
     fn plates_meshes_and_drawings_are_found_where_they_stand() {
         let text = "bansho = 2\n[plate]\nimage = \"a.png\"\n[[obstacle]]\nfile = \"b.glb\"\n[[aurora]]\n[[aurora]]\n\
             [[aurora.shapes]]\nsheets = [{ form = \"arc\" }, { svg_file = \"c.svg\" }]\n";
-        let found: Vec<(String, String)> =
-            named_files(&values(text).unwrap()).into_iter().map(|(place, name)| (place.to_string(), name)).collect();
+        let found: Vec<(String, String)> = named_files(&parse_values(text).unwrap())
+            .into_iter()
+            .map(|(place, name)| (place.to_string(), name))
+            .collect();
         let wanted =
             [("plate.image", "a.png"), ("obstacle.0.file", "b.glb"), ("aurora.1.shapes.0.sheets.1.svg_file", "c.svg")];
         assert_eq!(found, wanted.map(|(place, name)| (place.to_owned(), name.to_owned())));

@@ -74,7 +74,7 @@ pub mod operations {
     pub fn add(document: &Document, kind: &str) -> Vec<Operation> {
         let mut table = Table::default();
         table.push("name", Value::Text(free_name(kind, &document.phenomena())));
-        vec![Operation::Append { place: ValuePath::root().key(kind), value: Value::Table(table) }]
+        vec![Operation::Append { path: ValuePath::root().key(kind), value: Value::Table(table) }]
     }
 
     /// Adds a phenomenon like `original` under a name of its own.
@@ -86,7 +86,7 @@ pub mod operations {
         copy.push("name", Value::Text(free_name(&original.name, &document.phenomena())));
         let others = table.entries.iter().filter(|entry| entry.key != "name");
         others.for_each(|entry| copy.push(entry.key.clone(), entry.node.value.clone()));
-        vec![Operation::Append { place: ValuePath::root().key(original.kind), value: Value::Table(copy) }]
+        vec![Operation::Append { path: ValuePath::root().key(original.kind), value: Value::Table(copy) }]
     }
 
     /// Draws it, or does not.
@@ -94,8 +94,8 @@ pub mod operations {
         let place = listed.place().key("enabled");
         match (enabled, listed.enabled) {
             // Being drawn is the default.
-            (true, false) => Operation::Remove { place },
-            _ => Operation::Set { place, value: Value::Bool(enabled) },
+            (true, false) => Operation::Remove { path: place },
+            _ => Operation::Set { path: place, value: Value::Bool(enabled) },
         }
     }
 

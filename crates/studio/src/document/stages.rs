@@ -14,7 +14,7 @@ use bansho::{
     scene::{
         Instance, PlateParameters, Scene, ValuePath,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
@@ -36,7 +36,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 
 /// Plans of the stages of flame sheet `index` of the scene `text`; `None` where it is faulty or has no such sheet.
 pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, index: usize) -> Option<Vec<PlannedScene>> {
-    let root = values(text).ok()?;
+    let root = parse_values(text).ok()?;
     names().map(|stage| plan(name, [text, stage], &root, assets, index)).collect()
 }
 
@@ -52,10 +52,10 @@ fn plan(
     let sheet = FlameSheetParameters::read_table(table, &mut Reader::new(), &[]);
     let stated = |key: &str| place.key(key).find(root).is_some();
     let mut operations = vec![
-        Operation::Set { place: place.key("stage"), value: Value::Text(stage.to_owned()) },
-        Operation::Set { place: place.key("position"), value: Value::numbers([0.0; 3]) },
+        Operation::Set { path: place.key("stage"), value: Value::Text(stage.to_owned()) },
+        Operation::Set { path: place.key("position"), value: Value::numbers([0.0; 3]) },
     ];
-    operations.extend(stated("instances").then(|| Operation::Remove { place: place.key("instances") }));
+    operations.extend(stated("instances").then(|| Operation::Remove { path: place.key("instances") }));
     let scene = Scene::parse(name, &operation::apply(text, &operations).ok()?, KINDS).ok()?;
     let mut sheets = scene.instances.iter().filter(|instance| instance.kind.key == FlameSheetParameters::KEY);
     let alone = Instance { enabled: true, ..sheets.nth(index)?.clone() };
@@ -76,7 +76,7 @@ fn plan(
         ..scene
     };
     let options = PlanOptions { size: Some(SIZE), ..PlanOptions::default() };
-    let scene = scene.adapted(&SceneOptions::default()).ok()?;
+    let scene = scene.with_options(&SceneOptions::default()).ok()?;
     let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
     let plan = Arc::new(Plan::new(&compiled, &options).ok()?);
     Some(PlannedScene { compiled, plan })

@@ -246,7 +246,7 @@ impl Session {
             if keyed(&place) || (self.recording && keyframes::animatable(&place)) {
                 self.keyframe(&place, value)
             } else {
-                Operation::Set { place, value }
+                Operation::Set { path: place, value }
             }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
@@ -273,7 +273,7 @@ impl Session {
         let camera = ValuePath::root().key(CAMERA);
         let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
         let told = [&position, &target].map(|place| place.find(self.document.values()).is_some());
-        let tells = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
+        let tells = operations.iter().any(|operation| [&position, &target].contains(&operation.path()));
         let usual = CameraParameters::default().to_table();
         let mut all = Vec::new();
         if tells && told == [false; 2] {
@@ -281,7 +281,7 @@ impl Session {
                 let stated = place.find(self.document.values()).is_some();
                 let present =
                     self.implied_value(&place).filter(|value| usual.get(key).is_none_or(|node| node.value != *value));
-                all.extend(present.filter(|_| !stated).map(|value| Operation::Set { place, value }));
+                all.extend(present.filter(|_| !stated).map(|value| Operation::Set { path: place, value }));
             }
         }
         all.extend(operations);
@@ -290,7 +290,7 @@ impl Session {
 
     /// The operation that sets a keyframe at `place` at the current time.
     pub fn keyframe(&self, place: &ValuePath, value: Value) -> Operation {
-        Operation::SetKeyframe { place: place.clone(), time: self.transport.time_s(), value }
+        Operation::SetKeyframe { path: place.clone(), time: self.transport.time_s(), value }
     }
 
     /// [`poll_player`](Self::poll_player), then [`advance_time`](Self::advance_time).

@@ -22,7 +22,7 @@ impl Session {
     /// Lets `place` name the file `file`.
     pub fn relink(&mut self, place: &ValuePath, file: &Path) {
         let value = self.named(file);
-        self.edit("relink", &[Operation::Set { place: place.clone(), value }]);
+        self.edit("relink", &[Operation::Set { path: place.clone(), value }]);
         self.reload_assets();
     }
 
@@ -48,7 +48,7 @@ impl Session {
             self.add_mesh_burner(file, selection.index_of(KIND_WITH_BURNERS));
         } else if is_one_of(&PICTURES) {
             let place = ValuePath::root().key("plate").key("image");
-            self.edit("plate", &[Operation::Set { place, value: self.named(file) }]);
+            self.edit("plate", &[Operation::Set { path: place, value: self.named(file) }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let reason =
@@ -74,6 +74,6 @@ impl Session {
         let mut burner = Table::default();
         burner.push("shape", Value::Text("mesh".into()));
         burner.push("file", self.named(file));
-        self.edit("mesh", &[Operation::Append { place: flame.key("burners"), value: Value::Table(burner) }]);
+        self.edit("mesh", &[Operation::Append { path: flame.key("burners"), value: Value::Table(burner) }]);
     }
 }

@@ -134,7 +134,7 @@ fn list_ui(
             _ => Vec::new(),
         };
         // An item of the default list can only be changed once the file states the list.
-        let state_list = Operation::Set { place: place.clone(), value: Value::List(items.clone()) };
+        let state_list = Operation::Set { path: place.clone(), value: Value::List(items.clone()) };
         let before = if is_stated || items.is_empty() { Vec::new() } else { vec![state_list] };
         if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(place), item) {
             // A change to the implied item states it.
@@ -145,7 +145,7 @@ fn list_ui(
             list_item_ui(ui, session, &place.index(index), item, &node.value, filter, &before);
         }
         if ui.button(format!("Add to {}", words(parameter.key))).clicked() {
-            let append = Operation::Append { place: place.clone(), value: initial_value(item) };
+            let append = Operation::Append { path: place.clone(), value: initial_value(item) };
             session.edit("add", &[before.as_slice(), &[append]].concat());
         }
     });
@@ -164,17 +164,15 @@ fn list_item_ui(
 ) {
     ui.horizontal(|ui| {
         if icon::button(ui, Icon::Cross, &format!("Remove {place}")).clicked() {
-            session.edit("remove", &[before, &[Operation::Remove { place: place.clone() }]].concat());
+            session.edit("remove", &[before, &[Operation::Remove { path: place.clone() }]].concat());
         }
         match kind {
             Kind::Table(inner) => section_ui(ui, session, place, &place.to_string(), inner(), filter),
             kind => {
                 let label = ui.label(place.to_string()).id;
                 if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).ui(ui, value) {
-                    session.edit(
-                        &place.to_string(),
-                        &[before, &[Operation::Set { place: place.clone(), value }]].concat(),
-                    );
+                    session
+                        .edit(&place.to_string(), &[before, &[Operation::Set { path: place.clone(), value }]].concat());
                 }
             }
         }
@@ -196,7 +194,7 @@ fn row_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Des
             if ui.button("Set").labelled_by(label).clicked() {
                 session.edit(
                     parameter.key,
-                    &[Operation::Set { place: place.clone(), value: initial_value(&parameter.kind) }],
+                    &[Operation::Set { path: place.clone(), value: initial_value(&parameter.kind) }],
                 );
             }
             return;
@@ -234,7 +232,7 @@ fn name_ui(ui: &mut Ui, name: RichText) -> Response {
 fn reset_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, parameter: &Descriptor, stated: bool) {
     let name = format!("Default of {}", words(parameter.key));
     if stated && icon::button(ui, Icon::Reset, &name).clicked() {
-        session.edit("default", &[Operation::Remove { place: place.clone() }]);
+        session.edit("default", &[Operation::Remove { path: place.clone() }]);
     }
 }
 
@@ -251,7 +249,7 @@ fn key_button_ui(ui: &mut Ui, session: &mut Session, place: &ValuePath, stated: 
     };
     if icon::button(ui, sign, &format!("{doc}: {place}")).clicked() {
         match here {
-            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: place.clone(), time }]),
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { path: place.clone(), time }]),
             None => session.key(place, present),
         }
     }

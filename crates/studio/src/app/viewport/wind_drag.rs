@@ -48,7 +48,7 @@ impl WindDrag {
                 self.key(session, velocity);
             }
         } else {
-            session.edit(LABEL, &[Operation::Set { place: place(), value: Value::numbers(velocity) }]);
+            session.edit(LABEL, &[Operation::Set { path: place(), value: Value::numbers(velocity) }]);
         }
     }
 

@@ -59,11 +59,11 @@ impl AuroraDrawing {
         sheet.push("svg_file", path);
         let sheets = Value::List(vec![Value::Table(sheet).into()]);
         if self.is_stated() {
-            return vec![Operation::Set { place: self.shape(0).key("sheets"), value: sheets }];
+            return vec![Operation::Set { path: self.shape(0).key("sheets"), value: sheets }];
         }
         let mut shape = Table::default();
         shape.push("sheets", sheets);
-        vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }]
+        vec![Operation::Append { path: self.place.key("shapes"), value: Value::Table(shape) }]
     }
 
     /// New points for sheet `sheet`.
@@ -101,7 +101,7 @@ impl AuroraDrawing {
         change.push("sheet", Value::Integer(sheet as i64 + 1));
         change.push("length_fraction", Value::Number(at));
         let mut operations =
-            vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
+            vec![Operation::Append { path: self.shape(shape).key("split"), value: Value::Table(change) }];
         // A link of the split sheet now means its first half.
         let part = |link: &LinkParameters| match link.from_length_fraction {
             None if link.from == sheet as i64 + 1 => {
@@ -126,7 +126,7 @@ impl AuroraDrawing {
         change.push("sheets", list(ends.map(|(sheet, _)| sheet as i64 + 1)));
         change.push("ends", list(ends.map(|(_, last)| i64::from(last))));
         let mut operations =
-            vec![Operation::Append { place: self.shape(shape).key("merge"), value: Value::Table(change) }];
+            vec![Operation::Append { path: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
         let at = |(sheet, last): SheetEnd| {
             let line = before.get(sheet)?;
@@ -194,7 +194,7 @@ impl AuroraDrawing {
     pub fn add_shape(&self) -> Vec<Operation> {
         let mut shape = Table::default();
         shape.push("sheets", sheet_list(&self.sheets(self.arrivals().len() - 1)));
-        let shape = Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) };
+        let shape = Operation::Append { path: self.place.key("shapes"), value: Value::Table(shape) };
         // Shapes that the scene does not state must be stated before another can come of them.
         if self.is_stated() { vec![shape] } else { vec![shape.clone(), shape] }
     }
@@ -213,17 +213,17 @@ impl AuroraDrawing {
             ];
             keys.into_iter().filter(|(_, stated)| *stated).map(|(key, _)| key).collect()
         });
-        let of_next = stated.into_iter().map(|key| Operation::Remove { place: self.shape(1).key(key) });
-        of_next.chain([Operation::Remove { place: self.shape(shape) }]).collect()
+        let of_next = stated.into_iter().map(|key| Operation::Remove { path: self.shape(1).key(key) });
+        of_next.chain([Operation::Remove { path: self.shape(shape) }]).collect()
     }
 
     /// Reaches shape `shape` so long after the one before was left, s.
     pub fn retime(&self, shape: usize, transition_s: f64) -> Vec<Operation> {
         let place = self.shape(shape);
         let in_frames = self.parameters.shapes.get(shape).is_some_and(|shape| shape.transition_frames.is_some());
-        let frames = in_frames.then(|| Operation::Remove { place: place.key("transition_frames") });
+        let frames = in_frames.then(|| Operation::Remove { path: place.key("transition_frames") });
         let seconds = Value::Number((transition_s.max(0.1) * 100.0).round() / 100.0);
-        frames.into_iter().chain([Operation::Set { place: place.key("transition_s"), value: seconds }]).collect()
+        frames.into_iter().chain([Operation::Set { path: place.key("transition_s"), value: seconds }]).collect()
     }
 
     /// Time from the shape before `shape` to this one, s.
@@ -309,9 +309,10 @@ impl AuroraDrawing {
         let Some(old) = self.parameters.shapes.get(shape).map(|shape| &shape.sheets) else {
             let mut shape = Table::default();
             shape.push("sheets", sheet_list(sheets));
-            return vec![Operation::Append { place: self.place.key("shapes"), value: Value::Table(shape) }];
+            return vec![Operation::Append { path: self.place.key("shapes"), value: Value::Table(shape) }];
         };
-        list_edits(&place, old, sheets).unwrap_or_else(|| vec![Operation::Set { place, value: sheet_list(sheets) }])
+        list_edits(&place, old, sheets)
+            .unwrap_or_else(|| vec![Operation::Set { path: place, value: sheet_list(sheets) }])
     }
 }
 
@@ -325,7 +326,7 @@ fn list_edits(place: &ValuePath, old: &[SheetParameters], new: &[SheetParameters
     let gone: Vec<usize> = (0..old.len()).filter(|&index| rest.next_if(|own| **own == old[index]).is_none()).collect();
     if rest.peek().is_none() {
         // From the last to the first, so that indices stay valid.
-        return Some(gone.iter().rev().map(|&index| Operation::Remove { place: place.index(index) }).collect());
+        return Some(gone.iter().rev().map(|&index| Operation::Remove { path: place.index(index) }).collect());
     }
     let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
     let behind = old.iter().rev().zip(new.iter().rev()).take_while(same).count();
@@ -336,10 +337,10 @@ fn list_edits(place: &ValuePath, old: &[SheetParameters], new: &[SheetParameters
     let pairs = old.iter().zip(new).take(kept.min(made)).enumerate();
     let mut operations: Vec<Operation> =
         pairs.flat_map(|(sheet, (old, new))| differences(&place.index(sheet), old, new)).collect();
-    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: place.index(sheet) }));
+    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { path: place.index(sheet) }));
     let added = new.get(kept..).filter(|_| made > kept).unwrap_or_default();
     operations.extend(
-        added.iter().map(|sheet| Operation::Append { place: place.clone(), value: Value::Table(non_default(sheet)) }),
+        added.iter().map(|sheet| Operation::Append { path: place.clone(), value: Value::Table(non_default(sheet)) }),
     );
     Some(operations)
 }
@@ -362,8 +363,8 @@ fn differences(place: &ValuePath, old: &SheetParameters, new: &SheetParameters) 
     let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
     let change = |key: &'static str| match (old.get(key), new.get(key)) {
         (old, new) if old == new => None,
-        (_, Some(node)) => Some(Operation::Set { place: place.key(key), value: node.value.clone() }),
-        (_, None) => Some(Operation::Remove { place: place.key(key) }),
+        (_, Some(node)) => Some(Operation::Set { path: place.key(key), value: node.value.clone() }),
+        (_, None) => Some(Operation::Remove { path: place.key(key) }),
     };
     keys.filter_map(change).collect()
 }

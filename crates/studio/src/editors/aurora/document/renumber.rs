@@ -134,10 +134,10 @@ impl AuroraDrawing {
     pub(super) fn set_list(&self, shape: usize, key: &str, tables: Vec<Table>) -> Operation {
         let place = self.shape(shape).key(key);
         if tables.is_empty() {
-            return Operation::Remove { place };
+            return Operation::Remove { path: place };
         }
         Operation::Set {
-            place,
+            path: place,
             value: Value::List(tables.into_iter().map(|table| Value::Table(table).into()).collect()),
         }
     }
