@@ -1,4 +1,4 @@
-//! What a scene has that its text does not state.
+//! Defaults that depend on the other values of a scene.
 
 use bansho::KINDS;
 use bansho_base::parameters::{Auto, Value};

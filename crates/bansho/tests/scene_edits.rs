@@ -1,4 +1,4 @@
-//! Changes of a scene's text by `--set`, and its upgrade.
+//! Edits of a scene's text by `--set`, and its upgrade.
 
 use bansho::{
     KINDS,

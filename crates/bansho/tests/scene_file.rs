@@ -1,4 +1,4 @@
-//! What scene files may say: faults are located, name what is allowed, and random valid scenes draw without a fault.
+//! Scene files: errors have positions and state what is allowed.
 
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod support;

@@ -104,8 +104,8 @@ fn name_problem(name: &str) -> Option<String> {
         return Some(format!("{problem}; allowed: {}", allowed_names()));
     }
     if name.trim().is_empty() || RESERVED_NAMES.contains(&name) || name.contains(is_control_or_dot) {
-        let fault = "cannot be a name, which begins the names of EXR channels";
-        return Some(format!("{fault}; allowed: {}", allowed_names()));
+        let problem = "cannot be a name, since the names of EXR channels begin with it";
+        return Some(format!("{problem}; allowed: {}", allowed_names()));
     }
     None
 }

@@ -265,9 +265,9 @@ impl Scene {
     /// The paths of all files that the scene names, as they are in its text.
     pub fn asset_paths(&self) -> Vec<String> {
         let plate = [&self.plate.image, &self.plate.depth].into_iter().flatten();
-        let solids = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
-        let own = plate.chain(solids).map(|path| path.0.clone());
-        own.chain(self.instances.iter().flat_map(|instance| instance.parameters.assets())).collect()
+        let obstacles = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
+        let shared = plate.chain(obstacles).map(|path| path.0.clone());
+        shared.chain(self.instances.iter().flat_map(|instance| instance.parameters.assets())).collect()
     }
 
     /// Hides the implied sky, ground and lamps; sky and lamps still light the scene.

@@ -29,9 +29,10 @@ pub fn short(kind: &PhenomenonKind) -> String {
         let first = FIRST_SHARED.iter().find(|(key, _)| *key == shared.key).map_or(&[][..], |(_, keys)| keys);
         let stated = tables(&setting, shared.key);
         let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-        let nothing = Table::default();
-        let usual = (stated.is_empty() && !first.is_empty()).then_some(&nothing);
-        for stated in stated.into_iter().chain(usual) {
+        let empty = Table::default();
+        // A table with keys to change first is written even if the setting does not have it.
+        let unstated = (stated.is_empty() && !first.is_empty()).then_some(&empty);
+        for stated in stated.into_iter().chain(unstated) {
             brief_table(&mut text, &header, (shared.table)(), stated, first);
         }
     }
@@ -43,7 +44,7 @@ pub fn short(kind: &PhenomenonKind) -> String {
 /// A list of tables, one on each line.
 fn brief_list(text: &mut String, shared: &SharedTable, tables: &[&Table]) {
     text.push('\n');
-    comment(text, &format!("{} More of them can be added here.", (shared.table)().doc));
+    comment(text, &format!("{} More can be added here.", (shared.table)().doc));
     text.push_str(&format!("{} = [\n", shared.key));
     tables.iter().for_each(|table| text.push_str(&format!("    {},\n", Value::Table((*table).clone()))));
     text.push_str("]\n");
@@ -82,12 +83,12 @@ fn lines(prefix: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&s
     let mut all = Vec::new();
     for parameter in &descriptor.parameters {
         let path = format!("{prefix}{}", parameter.key);
-        let own = stated.get(parameter.key).map(|node| &node.value);
+        let value = stated.get(parameter.key).map(|node| &node.value);
         if let Kind::Table(inner) = &parameter.kind {
-            let nothing = Table::default();
-            let own = if let Some(Value::Table(own)) = own { own } else { &nothing };
-            all.extend(lines(&format!("{path}."), inner(), own, first));
-        } else if let Some(value) = own.or(parameter.default.as_ref().filter(|_| first.contains(&path.as_str()))) {
+            let empty = Table::default();
+            let stated = if let Some(Value::Table(table)) = value { table } else { &empty };
+            all.extend(lines(&format!("{path}."), inner(), stated, first));
+        } else if let Some(value) = value.or(parameter.default.as_ref().filter(|_| first.contains(&path.as_str()))) {
             let assignment = format!("{path} = {value}");
             all.push(Line { comment: brief(parameter, assignment.len()), assignment });
         }
@@ -155,12 +156,12 @@ fn parameters(text: &mut String, prefix: &str, descriptor: &TableDescriptor, sta
         text.push('\n');
         comment(text, &explanation(parameter));
         let key = parameter.key;
-        let own = stated.get(key).map(|node| &node.value);
-        match (&parameter.kind, own, &parameter.default) {
-            (Kind::Table(inner), own, _) => {
-                let nothing = Table::default();
-                let own = if let Some(Value::Table(own)) = own { own } else { &nothing };
-                parameters(text, &format!("{prefix}{key}."), inner(), own);
+        let value = stated.get(key).map(|node| &node.value);
+        match (&parameter.kind, value, &parameter.default) {
+            (Kind::Table(inner), value, _) => {
+                let empty = Table::default();
+                let stated = if let Some(Value::Table(table)) = value { table } else { &empty };
+                parameters(text, &format!("{prefix}{key}."), inner(), stated);
             }
             (_, Some(value), _) => text.push_str(&format!("{prefix}{key} = {value}\n")),
             (_, None, Some(default)) => text.push_str(&format!("# {prefix}{key} = {default}\n")),

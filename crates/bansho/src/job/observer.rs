@@ -63,9 +63,9 @@ fn prefix(position: &Option<FilePosition>) -> String {
     position.as_ref().map(|FilePosition { file, position }| format!("{file}:{position}: ")).unwrap_or_default()
 }
 
-/// `1 frame lies` or `2 frames lie`.
-fn frames_lie(count: usize) -> String {
-    format!("{} {}", counted(count, "frame"), if count == 1 { "lies" } else { "lie" })
+/// `1 frame is` or `2 frames are`.
+fn frames_are(count: usize) -> String {
+    format!("{} {}", counted(count, "frame"), if count == 1 { "is" } else { "are" })
 }
 
 /// Something that the user should know and that does not stop the job.
@@ -73,7 +73,7 @@ fn frames_lie(count: usize) -> String {
 #[non_exhaustive]
 pub enum Warning {
     /// Frames outside the scene's range.
-    #[error("{} outside the scene's range, {first} to {last}; the scene is continued there", frames_lie(*.count))]
+    #[error("{} outside the scene's range, {first} to {last}; the scene is continued there", frames_are(*.count))]
     OutsideScene {
         /// How many.
         count: usize,
@@ -83,7 +83,7 @@ pub enum Warning {
         last: i64,
     },
     /// Frames outside one pass through the loop.
-    #[error("{} outside the loop's range, {first} to {last}; the loop is repeated there", frames_lie(*.count))]
+    #[error("{} outside the loop's range, {first} to {last}; the loop is repeated there", frames_are(*.count))]
     OutsideLoop {
         /// How many.
         count: usize,

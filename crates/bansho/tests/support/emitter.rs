@@ -1,4 +1,4 @@
-//! A luminous disc that moves in steps: it falls, shines on others, and can bend light.
+//! A luminous disk that moves in steps: it falls, illuminates others, and can refract light.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A scene that was read, compiled and planned, for tests of pictures.
+//! A parsed, compiled and planned scene, for tests of pictures.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 

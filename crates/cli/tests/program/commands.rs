@@ -177,7 +177,7 @@ fn the_studio_is_the_program_beside_this_one_and_where_there_is_none_it_says_how
     assert!(run().status.success());
     assert_eq!(folder.files("")["opened"], b"fire.toml\n");
 
-    // What the studio itself said is not said again.
+    // The studio's own message is not repeated.
     fs::write(&studio, "#!/bin/sh\necho 'error: no window' >&2\nexit 1\n").unwrap();
     let failed = run();
     assert_eq!((failed.status.code(), failed.stderr), (Some(1), b"error: no window\n".to_vec()));

@@ -57,17 +57,18 @@ fn only_kind<'a>(root: &Table, kinds: &'a [PhenomenonKind]) -> Option<&'a Phenom
     stated.next().filter(|_| stated.next().is_none())
 }
 
+/// Adds the backdrop, the exposure and the camera of the setting where the text states nothing that contradicts them.
 fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> ImpliedBackdrop {
     // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.setting).unwrap_or_default();
     let states = |key: &str| root.get(key).is_some();
-    let sky = !states("sky") && !states("light");
+    let no_light = !states("sky") && !states("light");
     let has = |key: &str| setting.get(key).is_some();
-    let whole = ImpliedBackdrop { sky: has("sky"), ground: has("ground"), lights: has("light") };
+    let setting_backdrop = ImpliedBackdrop { sky: has("sky"), ground: has("ground"), lights: has("light") };
     let implied = ImpliedBackdrop {
-        sky: sky && whole.sky,
-        ground: sky && !states("ground") && whole.ground,
-        lights: sky && !states("ground") && whole.lights,
+        sky: no_light && setting_backdrop.sky,
+        ground: no_light && !states("ground") && setting_backdrop.ground,
+        lights: no_light && !states("ground") && setting_backdrop.lights,
     };
     for (key, is_implied) in [("sky", implied.sky), ("ground", implied.ground), ("light", implied.lights)] {
         if let Some(Node { value, .. }) = setting.get(key).filter(|_| is_implied) {
@@ -75,7 +76,8 @@ fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> 
         }
     }
     if !states_placement(root, kind) {
-        if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == whole) {
+        if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == setting_backdrop)
+        {
             imply(completed, "picture", "exposure_ev100", exposure.clone());
         }
         imply_camera(completed, root, &setting);

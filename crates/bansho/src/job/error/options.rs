@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho_base::host::plural::counted;
 
-/// Channels in addition to the picture's own.
+/// Channels in addition to those of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChannelKind {
     /// One picture of each phenomenon.
@@ -28,7 +28,7 @@ pub enum SheetKind {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OptionError {
-    /// Layers or AOVs in a format without channels of its own for them.
+    /// Layers or AOVs in a format that has no channels for them.
     #[error("{channels} need a format with many channels, and {path} has none; allowed: .exr", path = .path.display())]
     ChannelsUnsupported {
         /// Which channels.

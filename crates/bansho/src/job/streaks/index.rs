@@ -69,7 +69,7 @@ fn describe_drop(cube: &StreakCube, drop: &FallingDrop) -> Value {
     })
 }
 
-/// The whole index.
+/// The index of all textures.
 pub(crate) fn describe(
     streaks: &Streaks,
     cube: &StreakCube,
@@ -88,7 +88,7 @@ pub(crate) fn describe(
         "exposure_s": cube.exposure,
         "velocity": streaks.law.name(),
         "air": { "density_kg_per_m3": cube.terminal_velocity.air.density, "viscosity_pa_s": cube.terminal_velocity.air.viscosity },
-        "diameters": if cube.spread { "each drop's own, within its bin" } else { "the bin's" },
+        "diameters": if cube.spread { "sampled within the bin for each drop" } else { "that of the bin" },
         "seed": streaks.seed,
         "how_to_read": how_to_read(streaks, writer),
     });

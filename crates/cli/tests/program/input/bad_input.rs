@@ -1,9 +1,8 @@
-//! What bad input gets: one error for each fault, with its place and what is allowed, the right exit code, and nothing
-//! written.
+//! Invalid input: one error for each problem, with its position and what is allowed, the right exit code, and no output.
 
 use crate::support::{FLAME, Folder};
 
-/// Renders a bad scene and gives what the program said.
+/// Renders an invalid scene and returns the messages.
 fn refused(scene: &str, code: i32) -> String {
     let folder = Folder::with_scene(scene);
     let run = folder.run(&["render", "scene.toml"]);
@@ -18,7 +17,7 @@ fn with_line(table: &str, line: &str) -> String {
     FLAME.replace(&format!("{table}\n"), &format!("{table}\n{line}\n"))
 }
 
-/// Everything that must stand in an error.
+/// Checks that an error contains all `parts`.
 fn says(error: &str, parts: &[&str]) {
     for part in parts {
         assert!(error.contains(part), "`{part}` is not in: {error}");
@@ -201,12 +200,12 @@ fn assignments_at_fault_are_blamed_and_not_the_scene() {
     misused(&["--set", "picture.frames=0"], &["scene.toml as changed", "picture.frames", "out of range"]);
     misused(&["--set", "picture.framse=3"], &["did you mean `frames`?"]);
     misused(&["--set", "height=2"], &["--set: height=2: ", "did you mean `flame_sheet.height`?"]);
-    // A fault of the scene itself is told as such, with its own line.
+    // A problem of the scene itself is reported as such, with its line.
     let folder = Folder::with_scene(&FLAME.replace("frames = 6", "frames = 0"));
     let run = folder.run(&["render", "scene.toml", "--set", "wind.gust=0.5"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1));
     says(&run.stderr, &["scene.toml:5:10: picture.frames"]);
-    // An assignment may also mend it.
+    // An assignment can also correct it.
     folder.succeed(&["render", "scene.toml", "--set", "picture.frames=1"]);
 }
 
@@ -217,7 +216,7 @@ fn words_that_are_no_options_are_refused_with_the_nearest() {
     misused(&["--bits", "12"], &["8", "16"]);
 }
 
-/// What the program says of a particle flame with these lines.
+/// The messages for a particle flame with these lines.
 fn refused_gas(lines: &str) -> String {
     refused(&format!("bansho = 2\n[picture]\nsize = [32, 18]\n[[flame_particles]]\n{lines}"), 3)
 }
@@ -228,7 +227,7 @@ fn a_burner_outside_the_domain_names_the_corner_that_it_lies_beyond() {
     says(&error, &["scene.toml:7:12: ", "burners.0.position", "[0.0, 90.0, 0.0] m", "`domain_max` [5.0, 5.0, 5.0] m"]);
     let error = refused_gas("domain_min = [1, -1, -1]\n[[flame_particles.burners]]\nposition = [0.5, 0, 0]\n");
     says(&error, &["scene.toml:7:12: ", "`domain_min` [1.0, -1.0, -1.0] m"]);
-    // Where no position is written, the corner is what can be at fault.
+    // Without a stated position, the error is at the corner.
     let error = refused_gas("particles = 500\ndomain_min = [1, -1, -1]\n");
     says(&error, &["scene.toml:6:14: ", "domain_min", "[0.0, 0.0, 0.0] m"]);
 }

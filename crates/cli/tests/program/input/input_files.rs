@@ -1,4 +1,4 @@
-//! What is read: ordinary files within bounds, a scene from standard input, and nothing outside of a folder where that is asked for.
+//! Input files: only regular files within limits, a scene from standard input, and no file outside of `--asset-root`.
 
 use std::{
     fs,
@@ -13,7 +13,7 @@ fn over(name: &str) -> String {
     format!("{FLAME}\n[plate]\nimage = \"{name}\"\n")
 }
 
-/// The one error of a command that is refused as a fault of the scene.
+/// The single error of a command that refuses a scene.
 fn refused(folder: &Folder, arguments: &[&str]) -> String {
     let run = folder.run(arguments);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{arguments:?}: {}", run.stderr);

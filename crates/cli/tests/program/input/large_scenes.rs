@@ -7,7 +7,7 @@ use crate::support::Folder;
 /// Longer than any of these takes on a slow machine that does much else, and far less than what grows with the square takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Checks a scene in good time: its exit code, and what was said.
+/// Checks a scene within the time limit; returns exit code and messages.
 fn check(scene: &str) -> (Option<i32>, String) {
     let folder = Folder::with_scene(scene);
     let begun = Instant::now();
@@ -37,13 +37,13 @@ fn of_many_faults_a_hundred_are_told_and_the_others_counted() {
     assert_eq!((code, errors.len()), (Some(3), 100));
     assert!(errors[0].starts_with("error: scene.toml:3:10: flame_sheet.0.height: -1 is out of range"), "{}", errors[0]);
     assert!(errors[99].starts_with("error: scene.toml:201:10: "), "{}", errors[99]);
-    assert_eq!(said.lines().last(), Some("scene.toml: and 15900 more faults"));
+    assert_eq!(said.lines().last(), Some("scene.toml: and 15900 more problems"));
 }
 
 #[test]
 fn a_hundred_faults_are_all_told() {
     let (_, said) = check(&repeated("[[flame_sheet]]\nheight = -1\n", 100));
-    assert_eq!((said.matches("error: ").count(), said.contains("more fault")), (100, false));
+    assert_eq!((said.matches("error: ").count(), said.contains("more problem")), (100, false));
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn a_million_unknown_keys_are_not_a_million_errors() {
     for scene in [format!("bansho = 2\n[[flame_sheet]]\n{keys}"), format!("bansho = 2\n{keys}")] {
         let (code, said) = check(&scene);
         assert_eq!((code, said.matches("error: ").count()), (Some(3), 100));
-        assert!(said.contains("and 999900 more faults"), "{said}");
+        assert!(said.contains("and 999900 more problems"), "{said}");
     }
 }
 

@@ -65,7 +65,7 @@ fn frames_are_cropped_to_what_is_lit_and_fill_the_sheet() {
     let all = description(&folder, "all.json");
     assert_eq!((&all["tile"], &all["picture"]), (&serde_json::json!([320, 180]), &serde_json::json!([320, 180])));
     assert_eq!(numbers(&all["padding"], &["left", "top", "right", "bottom"]), [0; 4]);
-    // A size of one's own is the whole picture's where it is cropped.
+    // If the picture is cropped, `--size` is the size of the whole picture.
     folder.succeed(&[
         "flipbook",
         "scene.toml",

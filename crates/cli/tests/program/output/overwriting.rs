@@ -1,4 +1,4 @@
-//! What may be written over: never what a scene is read from, and files that Bansho did not make only when asked to.
+//! Overwriting: files that a scene is read from are never overwritten, and files that Bansho did not make only with `--overwrite`.
 
 use std::{fs, path::Path};
 
@@ -90,7 +90,7 @@ fn no_output_of_any_command_is_a_hard_link_to_an_input() {
     }
 }
 
-/// Every command with what it is told to write into `f/`, and some file of those that it then writes.
+/// All commands with outputs in `f/`, and one of the files that they write.
 const COMMANDS: [(&str, &[&str]); 11] = [
     ("f/a.png", &["render", "scene.toml", "--frames", "0", "--out", "f/a.png"]),
     ("f/b.0000.exr", &["render", "scene.toml", "--frames", "0-1", "--out", "f/b.exr"]),
@@ -115,7 +115,7 @@ particles = 60
 preroll_s = 0.1
 ";
 
-/// Somebody's file is kept, replaced when that is asked for, and then replaced without asking, being ours.
+/// A foreign file is kept, replaced with `--overwrite`, and then replaced without it, since Bansho made it.
 fn keeps_what_is_not_ours(folder: &Folder, file: &str, arguments: &[&str]) {
     folder.write(file, "somebody's work");
     let before = folder.names();

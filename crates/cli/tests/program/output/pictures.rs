@@ -1,4 +1,4 @@
-//! What is drawn does not depend on how it is drawn.
+//! Pictures do not depend on how they are drawn.
 
 use bansho::base::color::decode_srgb8;
 
@@ -67,7 +67,7 @@ fn a_crop_of_layers_and_measures_is_the_same_part_too() {
     }
 }
 
-/// Whether the opaque pixels `shown` are the pixels `frame` with straight alpha over black, as near as 8 bits hold both.
+/// Whether the opaque pixels `shown` are the pixels `frame` with straight alpha over black, within the precision of 8 bits.
 fn is_over_black(shown: &[u8], frame: &[u8]) -> bool {
     let over = |(shown, frame): (&[u8], &[u8])| {
         let alpha = f32::from(frame[3]) / 255.0;
@@ -139,7 +139,7 @@ fn frames_beyond_the_scene_are_drawn_with_a_warning() {
     let run = folder.succeed(&["render", "scene.toml", "--frames", "-3-7x5", "--out", "f.png"]);
     let warnings: Vec<&str> = run.stderr.lines().filter(|line| line.starts_with("warning: ")).collect();
     assert_eq!(warnings.len(), 1, "{}", run.stderr);
-    assert!(warnings[0].contains("2 frames lie outside the scene's range, 0 to 5"), "{}", run.stderr);
+    assert!(warnings[0].contains("2 frames are outside the scene's range, 0 to 5"), "{}", run.stderr);
     assert_eq!(folder.names(), ["f.-0003.png", "f.0002.png", "f.0007.png", "scene.toml"]);
 }
 
@@ -150,7 +150,7 @@ fn a_loop_comes_back_to_its_beginning() {
     folder.succeed(&[&options[..], &["turn/f.png"]].concat());
     assert_eq!(folder.files("turn").len(), 15);
     let run = folder.succeed(&[&options[..], &["more/f.exr", "--frames", "0,15"]].concat());
-    assert!(run.stderr.contains("warning: 1 frame lies outside the loop's range, 0 to 14"), "{}", run.stderr);
+    assert!(run.stderr.contains("warning: 1 frame is outside the loop's range, 0 to 14"), "{}", run.stderr);
     let [first, again] = ["0000", "0015"].map(|number| read_exr(&folder.path(&format!("more/f.{number}.exr"))));
     assert!(first.channels == again.channels);
 }

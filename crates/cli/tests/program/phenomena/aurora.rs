@@ -1,4 +1,4 @@
-//! The aurora through the whole program.
+//! The aurora.
 
 use bansho::aurora::{
     SpectrumShape,
@@ -91,7 +91,7 @@ fn kilorayleighs_and_the_field_come_as_aovs() {
     let [fainter_red, first_positive] = ["636", "first_positive"].map(|line| greatest(&format!("kilorayleigh_{line}")));
     assert!((red / fainter_red - 2.997).abs() < 0.01, "{red} kR at 630.0 nm, {fainter_red} kR at 636.4 nm");
     assert!((deep_red / first_positive - 0.021_44).abs() < 1e-4, "{deep_red} kR of {first_positive} kR");
-    // Counts are whole; what is scattered makes the potential, which is negative and lowest where they are.
+    // Counts are integers. The scattered charges cause the potential, which is negative, with its minimum at the particles.
     for count in ["scatter_count", "particle_count"] {
         assert!(greatest(count) >= 1.0 && values(count).iter().all(|count| count.fract() == 0.0), "{count}");
     }
@@ -162,7 +162,7 @@ fn a_sheet_at_the_zenith_has_the_kilorayleighs_of_its_column() {
     folder.succeed(&["render", "scene.toml", "--aovs", "--out", "f.exr"]);
     let picture = read_exr(&folder.path("f.exr"));
     let emission = Emission::new(atmosphere(), SpectrumShape::Gaussian.spectrum());
-    // A height z gives flux x thickness x emission / z for all directions across the sheet together, by the tangent of their angle.
+    // An altitude z contributes flux x thickness x emission / z, integrated over the directions across the sheet by the tangent of their angle.
     let tangents = bansho::base::math::tan(f64::to_radians(15.0)) / 32.0;
     for (line, emitter, photons) in
         [("557", Emitter::OxygenGreen, 1.0), ("427", Emitter::NitrogenIon, 1.0), ("391", Emitter::NitrogenIon, 3.28)]

@@ -128,7 +128,7 @@ fn a_snapshot_that_is_damaged_or_of_another_scene_is_refused_and_made_anew() {
         (Vec::new(), "the snapshot is damaged"),
         (foreign, "the snapshot belongs to another scene"),
     ];
-    // Frame 4 itself is not drawn: it is made anew on the way.
+    // Frame 4 itself is not drawn: its snapshot is replaced on the way to a later frame.
     let later = [&render[..], &["--frames", "5-6"]].concat();
     for (bytes, reason) in cases {
         std::fs::write(folder.path("states/state.4.bansho"), bytes).unwrap();

@@ -1,4 +1,4 @@
-//! Rain through the whole program.
+//! Rain.
 
 use std::fs;
 

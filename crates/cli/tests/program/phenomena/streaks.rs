@@ -1,4 +1,4 @@
-//! Streak textures by themselves: pictures that measure what their index says.
+//! Streak textures: the pictures have the values that their index states.
 
 use std::{f64::consts::PI, fs};
 
@@ -82,7 +82,7 @@ fn light_makes_radiance_in_proportion_to_opacity() {
     folder.succeed(&[&common[..], &["--bits", "8", "-o", "png"]].concat());
     let about = index(&folder, "exr/streaks.json");
     let radiance = &about["light"]["radiance_of_an_opaque_drop_per_illuminance_per_sr"];
-    // Light from behind goes straight on: brighter than a white diffuser would be.
+    // Light from behind is scattered forward: brighter than by a white diffuser.
     assert!(number(&radiance[1]) > 1.0 / PI, "{radiance}");
     let exr = read_exr(&folder.path("exr/streak_20_1.exr"));
     let opacity = &exr.channels["opacity.V"];

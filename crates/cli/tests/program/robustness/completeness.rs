@@ -1,4 +1,4 @@
-//! All that was asked for is there at the end, or the program says what is not.
+//! At the end, all requested files exist, or the program lists those that do not.
 
 use std::{
     fs,
@@ -44,7 +44,7 @@ fn frames_that_vanish_or_are_changed_on_the_way_are_listed() {
             "error: f/f.####.{extension}: frames 3-14, 20, 22 are missing, or changed after this job wrote them"
         );
         assert!(told.contains(&said) && told.contains("; --frames draws them again"), "{told}");
-        // What is listed can be asked for.
+        // The list can be used as `--frames`.
         let again = ["render", "scene.toml", "--frames", "3-14,20,22", "--out", &format!("f/f.{extension}")];
         folder.succeed(&[&again[..], &["--metadata"]].concat());
         let all =
@@ -102,7 +102,7 @@ fn particles_and_textures_are_looked_for_too() {
     assert!(told.contains("error: s/streak_1_1_0.png: missing, or changed after this job wrote"), "{told}");
 }
 
-/// What a program says that writes to a device on which there is no room.
+/// The messages of a program that writes to a full device.
 #[cfg(target_os = "linux")]
 fn onto_a_full_device(folder: &Folder, arguments: &[&str]) -> String {
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();

@@ -1,4 +1,4 @@
-//! Places that cannot be written, and disks that are full.
+//! Paths that cannot be written, and full disks.
 
 use std::{
     fs,
@@ -35,7 +35,7 @@ fn is_root() -> bool {
     id.stdout == b"0\n"
 }
 
-/// What a user who may not write into `locked` is told. Root may write anywhere, so it becomes somebody else first.
+/// The error for a user without permission to write into `locked`. Root may write anywhere, so the test changes the user first.
 #[cfg(unix)]
 fn run_as_a_user(folder: &Folder) -> Run {
     use std::os::unix::{fs::PermissionsExt, process::CommandExt};

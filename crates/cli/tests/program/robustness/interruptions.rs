@@ -147,7 +147,7 @@ fn an_interrupted_film_leaves_nothing() {
     }
 }
 
-/// What an interrupted program says, once its `start` event was seen.
+/// The messages of a program that is interrupted after its `start` event.
 #[cfg(unix)]
 fn interrupted(folder: &Folder, arguments: &[&str]) -> String {
     use std::io::{BufRead, BufReader};
@@ -196,7 +196,7 @@ fn an_interruption_is_told_in_json_too() {
     assert_eq!((last["event"].as_str(), last["code"].as_u64()), (Some("error"), Some(130)));
 }
 
-/// Work that never looks whether it shall stop is ended all the same, whatever it waits for.
+/// Work that does not check for cancellation is ended too, whatever it waits for.
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_what_cannot_stop_by_itself_within_a_second() {

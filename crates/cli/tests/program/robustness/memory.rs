@@ -1,10 +1,10 @@
-//! Pictures that there is no memory for.
+//! Pictures that need more memory than there is.
 
 use std::process::Command;
 
 use crate::support::{FLAME, Folder, Run};
 
-/// Runs the program as if there were so many kilobytes of memory.
+/// Runs the program with a limit of its memory, kB.
 fn run_within(folder: &Folder, kilobytes: usize, arguments: &str) -> Run {
     let program = env!("CARGO_BIN_EXE_bansho");
     let limited = format!("ulimit -v {kilobytes}; exec {program} {arguments} --threads 1");

@@ -1,4 +1,4 @@
-//! Every phenomenon with all that can be asked of it, by any number of threads: it ends, and gives the same bytes.
+//! All phenomena with all options, with any number of threads: no deadlock, and the same bytes.
 
 use std::{process::Stdio, time::Duration};
 
@@ -7,7 +7,7 @@ use crate::support::{FLAME, Folder};
 /// How long a few small frames may take, whatever else the machine does.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// What stands in each scene.
+/// The contents of each scene.
 const SCENES: [(&str, &str); 5] = [
     ("a flame sheet", "[[flame_sheet]]\n"),
     ("a particle flame", "[[flame_particles]]\nparticles = 6000\npreroll_s = 0.3\n"),
