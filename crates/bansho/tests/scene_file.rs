@@ -77,11 +77,11 @@ fn faults_name_their_place_and_what_is_allowed() {
         ),
         (
             "bansho = 2\n[[light]]\nkind = \"spot\"\ninner_cone_deg = 80\nouter_cone_deg = 10\n",
-            "test.toml:4:18: light.0.inner_cone_deg: a spot that is full up to 80 degrees cannot be dark beyond 10; allowed: ",
+            "test.toml:4:18: light.0.inner_cone_deg: a spot with full intensity up to 80 degrees cannot end at 10; allowed: ",
         ),
         (
             "bansho = 2\n[[emitter]]\nname = \"a.b\"\n",
-            "cannot be a name, which begins the names of EXR channels; allowed: 1 to 63 bytes of text without dots",
+            "cannot be a name, since the names of EXR channels begin with it; allowed: 1 to 63 bytes of text without dots",
         ),
         (
             "bansho = 2\n[[emitter]]\nname = \"Z\"\n",
@@ -90,7 +90,7 @@ fn faults_name_their_place_and_what_is_allowed() {
         ),
         (
             "bansho = 2\n[[emitter]]\nname = \"ein Nordlicht über dem Fjord, gesehen vom Ufer gegenüber im Mai\"\n",
-            "is a name of 65 bytes, which programs that read EXR files would cut; allowed: 1 to 63 bytes",
+            "is a name of 65 bytes, which programs that read EXR files would truncate; allowed: 1 to 63 bytes",
         ),
         ("bansho = 2\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
         ("bansho = 2\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),

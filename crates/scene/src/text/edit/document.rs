@@ -39,7 +39,7 @@ pub enum EditError {
         time: f64,
     },
     /// The scene's format is newer than this version.
-    #[error("format {found} is newer than this program; known: up to {FORMAT}")]
+    #[error("format {found} is newer than this program knows; known: up to {FORMAT}")]
     NewerFormat {
         /// The scene's format.
         found: i64,
