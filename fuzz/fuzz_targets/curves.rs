@@ -4,14 +4,14 @@
 #![no_main]
 
 use bansho_base::{parameters::{animated::Animated, CurveLimits, Node, Parameter, Range, Reader}, math::curve::Curve};
-use bansho_scene::values;
+use bansho_scene::parse_values;
 
 const LOW: f64 = -3.0;
 const HIGH: f64 = 1e6;
 
 libfuzzer_sys::fuzz_target!(|text: &str| {
     let Some((times, value)) = text.split_once('\n') else { return };
-    let Ok(table) = values(&format!("value = {value}")) else { return };
+    let Ok(table) = parse_values(&format!("value = {value}")) else { return };
     let Some(node) = table.get("value") else { return };
     let times: Vec<f64> = times.split(' ').filter_map(|time| time.parse().ok()).take(8).collect();
     for limits in [CurveLimits { y: Range::new(LOW, HIGH), ..CurveLimits::default() }, CurveLimits::default().rising()]

@@ -12,7 +12,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let mut uniform = || pairs.next().map_or(0.75, |pair| f64::from(u16::from_le_bytes([pair[0], pair[1]])) / 65536.0);
     let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         text += &table_text(&header, &parameters::sample((shared.table)(), &mut uniform));
     }
     for kind in KINDS {

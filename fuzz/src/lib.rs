@@ -56,7 +56,7 @@ pub fn draw_small(mut scene: Scene, assets: MemoryAssets) -> bool {
     let size = scene.picture.size.map(|side| (side as usize).min(32));
     let options = PlanOptions { size: Some(size), layers: true, aovs: true, ..PlanOptions::default() };
     let interruptible = scene.instances.iter().all(|instance| instance.kind.key == "flame_sheet");
-    let scene = Arc::new(scene.adapted(&SceneOptions::default()).expect("it is no loop"));
+    let scene = Arc::new(scene.with_options(&SceneOptions::default()).expect("it is no loop"));
     let compiled = match CompiledScene::build(scene, Arc::new(assets), None) {
         Ok(compiled) => Arc::new(compiled),
         Err(errors) => {

@@ -1,7 +1,7 @@
-//! What a frame costs beside its phenomena: compositing and view transform at 1920 x 1080, of flames within 960 x 900
-//! pixels in the dark: one that only shines, and two of which one absorbs; and one before a plate whose light it bends.
+//! The time of a frame without its phenomena: compositing and view transform at 1920 x 1080, of flames within 960 x 900
+//! pixels in the dark: one that only emits, and two of which one absorbs; and one before a plate whose light it refracts.
 //!
-//! The naive way composites whole pictures in f64, pixel by pixel, and shows each pixel by itself.
+//! The naive version composites whole pictures in f64 pixel by pixel, and applies the view to each pixel separately.
 
 use std::{hint::black_box, sync::Arc};
 
@@ -60,7 +60,7 @@ struct Patch {
     angles: Option<Image<2>>,
 }
 
-/// Radiance at a place: a soft disc over the middle half of the picture.
+/// Radiance at a pixel: a soft disk over the middle half of the picture.
 fn radiance(x: usize, y: usize) -> f32 {
     let (dx, dy) = (x as f32 / 480.0 - 2.0, y as f32 / 480.0 - 1.1);
     (1.0 - (dx * dx + dy * dy)).max(0.0) * 4000.0
@@ -172,7 +172,7 @@ fn frame(shot: &mut Shot) -> Frame {
     shot.read().expect("a frame was drawn")
 }
 
-/// Draws a frame, uses it and gives it back, as a job does.
+/// Draws a frame, uses it and recycles it, as a job does.
 fn frame_used<T>(shot: &mut Shot, with: impl Fn(&Frame) -> T) -> T {
     let frame = frame(shot);
     let used = with(&frame);

@@ -1,4 +1,4 @@
-//! Stops a frame that takes too long, from another thread, and draws another one with the same shot.
+//! Cancels a frame that takes too long from another thread, then draws another frame with the same shot.
 //!
 //! `cargo run --release -p bansho --example cancelling`
 
@@ -15,11 +15,11 @@ use std::{
 
 use bansho::{MemoryAssets, Observer, Plan, PlanOptions, RenderError, Shot, compile_scene};
 
-/// A particle flame that has to be simulated for 100 s before its frame 3000.
+/// A particle flame whose frame 3000 needs 100 s of simulation.
 const SCENE: &str =
     "bansho = 2\n[picture]\nsize = [320, 180]\nexposure_ev100 = 10.0\nframes = 4000\n[[flame_particles]]\n";
 
-/// Asked by the renderer at least once for each strip of a picture and each step of a simulation.
+/// Checked by the renderer at least once for each strip of a picture and each step of a simulation.
 #[derive(Default)]
 struct StopButton(AtomicBool);
 
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let waited = begin.elapsed().as_millis();
 
-    // The shot is still good: it goes on from the last whole step of the simulation, or begins again for an earlier time.
+    // The shot is still valid: it continues from the last complete step of the simulation, or restarts for an earlier time.
     button.0.store(false, Ordering::Relaxed);
     let frame = bansho::draw(&mut shot, 0, &button)?;
     let (width, height) = (frame.beauty.width(), frame.beauty.height());

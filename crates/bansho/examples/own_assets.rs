@@ -1,5 +1,4 @@
-//! Gives Bansho the pictures of a scene from memory, as an engine or an archive of assets would: here a plate that is made when it is
-//! asked for.
+//! Provides the pictures of a scene from memory, as an engine or an archive of assets would: here a plate that is generated on request.
 //!
 //! `cargo run --release -p bansho --example own_assets`
 
@@ -21,7 +20,7 @@ use bansho::{
 const SCENE: &str =
     "bansho = 2\n[picture]\nsize = [160, 90]\n[plate]\nimage = \"gradient\"\n[[rain]]\nrate_mm_per_h = 20.0\n";
 
-/// Knows one picture, `gradient`, and nothing else.
+/// Provides only one picture, `gradient`.
 struct Procedural;
 
 fn missing(path: &str) -> AssetError {
@@ -53,7 +52,7 @@ impl Assets for Procedural {
         Err(missing(path))
     }
 
-    /// Enters the fingerprints of frames: it must change when what the path stands for changes.
+    /// Part of the fingerprints of frames: it must change if the contents of the asset change.
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
         self.picture(path, frame).map(|_| [1; 32])
     }

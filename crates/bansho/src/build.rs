@@ -1,4 +1,4 @@
-//! Scenes made in code: plain structs in, a checked scene or its file out.
+//! Builds scenes in code, from structs of parameters.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use bansho_scene::{FORMAT, LightParameters, PictureParameters, PlateParameters, 
 use crate::parse_scene;
 use bansho_environment::ground::GroundParameters;
 
-/// Gathers the tables of a scene. Values are checked when it is built, by the same rules as a scene file.
+/// Collects the tables of a scene. Values are checked by [`build`](Self::build), like those of a scene file.
 ///
 /// ```
 /// use bansho::{SceneBuilder, scene::PictureParameters};
@@ -35,70 +35,70 @@ impl Default for SceneBuilder {
 }
 
 impl SceneBuilder {
-    /// A scene with every default and nothing in it.
+    /// An empty scene with all defaults.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The picture: size, frames, exposure. State it once.
+    /// Sets the picture: size, frames, exposure. Call it once.
     pub fn picture(self, parameters: &PictureParameters) -> Self {
         self.table("[picture]", None, parameters.to_table())
     }
 
-    /// The camera. State it once.
+    /// Sets the camera. Call it once.
     pub fn camera(self, parameters: &CameraParameters) -> Self {
         self.table("[camera]", None, parameters.to_table())
     }
 
-    /// The plate to lay the phenomena over. State it once.
+    /// Sets the plate over which the phenomena are composited. Call it once.
     pub fn plate(self, parameters: &PlateParameters) -> Self {
         self.table("[plate]", None, parameters.to_table())
     }
 
-    /// The wind that moves everything. State it once.
+    /// Sets the wind, which affects all phenomena. Call it once.
     pub fn wind(self, parameters: &WindParameters) -> Self {
         self.table("[wind]", None, parameters.to_table())
     }
 
-    /// The air that everything stands in. State it once.
+    /// Sets the air: temperature, pressure and others. Call it once.
     pub fn air(self, parameters: &Air) -> Self {
         self.table("[air]", None, parameters.to_table())
     }
 
-    /// The sky, which a scene has only where it is stated. State it once.
+    /// Adds a sky. Call it once.
     pub fn sky(self, parameters: &SkyParameters) -> Self {
         self.table("[sky]", None, parameters.to_table())
     }
 
-    /// The ground, which a scene has only where it is stated. State it once.
+    /// Adds a ground. Call it once.
     pub fn ground(self, parameters: &GroundParameters) -> Self {
         self.table("[ground]", None, parameters.to_table())
     }
 
-    /// One more light.
+    /// Adds a light.
     pub fn light(self, parameters: &LightParameters) -> Self {
         self.table("[[light]]", None, parameters.to_table())
     }
 
-    /// One more obstacle.
+    /// Adds an obstacle.
     pub fn obstacle(self, parameters: &ObstacleParameters) -> Self {
         self.table("[[obstacle]]", None, parameters.to_table())
     }
 
-    /// One more phenomenon, such as a flame sheet. Names are unique in a scene.
+    /// Adds a phenomenon, such as a flame sheet. Names are unique in a scene.
     pub fn phenomenon<P: Describe>(self, name: &str, parameters: &P) -> Self {
         self.table(&format!("[[{}]]", P::KEY), Some(name), parameters.to_table())
     }
 
-    /// The scene as a file.
+    /// The text of the scene file.
     pub fn to_toml(&self) -> &str {
         &self.text
     }
 
-    /// Checks all values.
+    /// Checks all values and returns the scene.
     ///
     /// # Errors
-    /// What a scene file would be refused for; lines are those of [`to_toml`](Self::to_toml).
+    /// The same errors as for a scene file; lines are those of [`to_toml`](Self::to_toml).
     pub fn build(&self) -> Result<Scene, SceneError> {
         parse_scene("scene", &self.text)
     }
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_built_is_what_was_said() {
+    fn a_built_scene_has_the_given_parameters() {
         let picture = PictureParameters { size: [320, 200], first_frame: -7, ..Default::default() };
         let camera = CameraParameters { vertical_fov_deg: 55.0.into(), ..Default::default() };
         let air = Air { temperature_k: 260.0, ..Default::default() };
@@ -140,7 +140,7 @@ mod tests {
             .obstacle(&obstacle)
             .obstacle(&ObstacleParameters::default());
         for table in SHARED_TABLES {
-            assert!(builder.to_toml().contains(&format!("[{}]", table.key)), "nothing states [{}]", table.key);
+            assert!(builder.to_toml().contains(&format!("[{}]", table.key)), "no table [{}]", table.key);
         }
         let scene = builder.build().unwrap();
         assert_eq!((scene.picture, scene.camera, scene.air), (picture, camera, air));

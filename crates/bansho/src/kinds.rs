@@ -1,4 +1,4 @@
-//! The kinds of phenomena that scenes may hold: the one list of them, and the feature that brings each.
+//! The kinds of phenomena that scenes may contain, and the features that enable them.
 
 #[cfg(feature = "aurora")]
 use bansho_aurora::AuroraParameters;
@@ -14,7 +14,7 @@ use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParamete
 use bansho_rain::RainParameters;
 use bansho_scene::{Scene, SceneError};
 
-/// Every kind of this build, in the order in which schema and book list them.
+/// All kinds of this build, in the order of the schema and the book.
 pub const KINDS: &[PhenomenonKind] = &[
     #[cfg(feature = "fire")]
     FlameSheetParameters::KIND,
@@ -26,15 +26,16 @@ pub const KINDS: &[PhenomenonKind] = &[
     AuroraParameters::KIND,
 ];
 
-/// Every kind that there is, and the feature of this crate that brings it.
+/// All kinds of Bansho, also those that are disabled in this build, each with the feature of this crate that enables it.
 const FEATURES: [(&str, &str); 4] =
     [("flame_sheet", "fire"), ("flame_particles", "fire"), ("rain", "rain"), ("aurora", "aurora")];
 
-/// Reads and checks a scene of every kind of phenomenon in this build; `file` is what errors call it. [`CompiledScene::build`] then reads
-/// what it names and builds what it shows.
+/// Parses and checks a scene with the kinds of phenomena of this build; `file` is its name in messages. [`CompiledScene::build`] then reads the
+/// files that it names and builds its phenomena.
 ///
 /// # Errors
-/// Every fault of the text, with its place, what is wrong and what is allowed. A phenomenon whose feature is disabled names that feature.
+/// All problems of the text, each with its position, what is wrong and what is allowed. For a phenomenon whose feature is disabled, the error
+/// names that feature.
 ///
 /// [`CompiledScene::build`]: crate::CompiledScene::build
 pub fn parse_scene(file: &str, text: &str) -> Result<Scene, SceneError> {
@@ -44,7 +45,7 @@ pub fn parse_scene(file: &str, text: &str) -> Result<Scene, SceneError> {
     })
 }
 
-/// Says which feature brings a kind, where the problem is that this build does not know it.
+/// If the problem is an unknown key that is a disabled kind, replaces it by one that names the feature.
 fn name_feature(problem: &mut Problem) {
     let ProblemKind::UnknownKey { key, .. } = &problem.kind else { return };
     let disabled = FEATURES.into_iter().find(|(kind, _)| kind == key && !KINDS.iter().any(|known| known.key == *kind));
@@ -65,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kind_that_is_left_out_names_its_feature() {
+    fn a_disabled_kind_names_its_feature() {
         for (key, feature) in FEATURES {
             let result = parse_scene("scene.toml", &format!("bansho = 2\n[[{key}]]\n"));
             if KINDS.iter().any(|kind| kind.key == key) {

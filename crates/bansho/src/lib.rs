@@ -1,8 +1,8 @@
-//! Flames, rain and aurora for pictures, as a library.
+//! Fire, rain and aurora for pictures, as a library.
 //!
-//! A scene is three lines of TOML or a [`SceneBuilder`]; a [`CompiledScene`] builds all that it shows, once; a [`Plan`] fixes the shot; the
-//! [`Shot`] draws frames to memory. Nothing here prints, reads a clock, or keeps threads of its own: work runs in the caller's rayon pool and
-//! reports to the caller's [`Observer`].
+//! A scene is text in TOML or made by a [`SceneBuilder`]. A [`CompiledScene`] builds its phenomena once, a [`Plan`] fixes size, exposure and
+//! loop of the shot, and the [`Shot`] draws frames to memory. The library does not print, read the clock, or create threads: work runs in the
+//! caller's rayon pool and reports to the caller's [`Observer`].
 //!
 //! ```
 //! use std::sync::Arc;
@@ -17,11 +17,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With the feature `files` (on by default) there is also `job`: from a scene file to pictures on disk, as the program
-//! `bansho render` does it.
+//! The feature `files` (on by default) adds the module `job`: from a scene file to pictures on disk, like the program `bansho render`.
 //!
-//! The features `fire`, `rain` and `aurora` (all on by default) bring the kinds of phenomena. A scene that names a kind whose
-//! feature is disabled is refused with an error that says which feature to enable.
+//! The features `fire`, `rain` and `aurora` (all on by default) enable the kinds of phenomena. A scene with a kind whose feature is disabled is
+//! refused with an error that names the feature.
 
 use std::sync::Arc;
 
@@ -62,10 +61,10 @@ pub use bansho_scene::{LoopError, Scene, SceneError, SceneOptions};
 pub use build::SceneBuilder;
 pub use kinds::{KINDS, parse_scene};
 
-/// Reads a scene and builds all that it shows.
+/// Parses a scene and builds its phenomena.
 ///
 /// # Errors
-/// Every fault of the text and of the assets it names, with its place, what is wrong and what is allowed.
+/// All problems of the text and of the assets that it names, each with its position, what is wrong and what is allowed.
 pub fn compile_scene(file: &str, text: &str, assets: Arc<dyn Assets>) -> Result<Arc<CompiledScene>, SceneError> {
     let scene = Arc::new(parse_scene(file, text)?);
     CompiledScene::build(scene, assets, None).map(Arc::new).map_err(|errors| errors.located(file, text))
@@ -74,7 +73,7 @@ pub fn compile_scene(file: &str, text: &str, assets: Arc<dyn Assets>) -> Result<
 /// Advances `shot` to frame `number` and draws it.
 ///
 /// # Errors
-/// The observer asked to stop, or a picture that the scene names cannot be had.
+/// The observer canceled the work, or a picture that the scene names cannot be read.
 pub fn draw(shot: &mut Shot, number: i64, observer: &dyn Observer) -> Result<Frame, RenderError> {
     shot.advance(number, observer)?;
     shot.draw(observer)?;

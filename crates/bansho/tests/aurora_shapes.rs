@@ -1,4 +1,4 @@
-//! Auroral shapes in scene files: the thesis's five scenes move as it tells, and faults stand at their sheet and point.
+//! Auroral shapes in scene files: the five scenes of the thesis move as it describes, and errors are reported at their sheet and point.
 
 #[path = "support/planned.rs"]
 mod planned;
@@ -120,8 +120,8 @@ fn step_to(simulation: &mut AuroraSimulation, frame: f64) {
     }
 }
 
-/// The share of the particles, and of their power, within so many km of places.
-fn shares_within(simulation: &AuroraSimulation, places: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
+/// The fraction of the particles, and of their power, within circles: centers and radii, km.
+fn fractions_within(simulation: &AuroraSimulation, circles: &[([f64; 2], f64)]) -> Vec<[f64; 2]> {
     let particles = simulation.particles();
     let (count, power) = (particles.len() as f64, particles.power_w());
     let within = |(middle, radius): &([f64; 2], f64)| {
@@ -130,7 +130,7 @@ fn shares_within(simulation: &AuroraSimulation, places: &[([f64; 2], f64)]) -> V
         let own: f64 = inside.iter().map(|index| f64::from(particles.powers_w[*index])).sum();
         [inside.len() as f64 / count, own / power]
     };
-    places.iter().map(within).collect()
+    circles.iter().map(within).collect()
 }
 
 /// The thesis shows a black circle within the fold of scene 1, and open bends in scene 2: nothing may be drawn across them.
@@ -150,7 +150,7 @@ fn no_particle_is_in_the_black_circle_and_the_inner_bends() {
         for moment in 0..moments {
             let frame = first + 9 * moment;
             step_to(&mut simulation, f64::from(frame));
-            let shares = shares_within(&simulation, &places);
+            let shares = fractions_within(&simulation, &places);
             let (within, around) = shares.split_at(places.len() / 2);
             assert!(within.iter().flatten().all(|share| *share == 0.0), "scene {scene}, frame {frame}: {within:?}");
             assert!(around.iter().flatten().all(|share| *share > 1e-2), "scene {scene}, frame {frame}: {around:?}");
@@ -158,9 +158,9 @@ fn no_particle_is_in_the_black_circle_and_the_inner_bends() {
     }
 }
 
-/// Of all stretches of the sheets as long as a fiftieth of them all: the least share that one holds of the particles that are due to it.
-fn least_stretch(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
-    /// Bins of such a stretch, by which one is moved on to the next.
+/// The particle density in the emptiest interval of the sheets, relative to the mean. An interval is a fiftieth of the length of all sheets.
+fn min_interval_density(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
+    /// Number of bins of an interval. Consecutive intervals are shifted by one bin.
     const BINS: usize = 4;
     let lengths: Vec<f64> =
         shape.sheets.iter().map(|sheet| sheet.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()).collect();
@@ -171,7 +171,7 @@ fn least_stretch(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
     let mut living = 0.0;
     for index in (0..particles.len()).filter(|index| !particles.dying[*index]) {
         living += 1.0;
-        // What bridges a gap is a sheet of its own, after those of the shape.
+        // A bridge across a gap is a separate sheet, after those of the shape.
         let Some(bins) = counts.get_mut(particles.sheets[index] as usize) else { continue };
         let last = bins.len() - 1;
         bins[((f64::from(particles.arc_fractions[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
@@ -190,7 +190,7 @@ fn every_stretch_of_the_thesis_scenes_holds_its_share_on_arrival() {
         let mut simulation = simulation(scene);
         for &arrival in &sequence.arrivals()[1..] {
             step_to(&mut simulation, arrival / FRAME_S);
-            let least = least_stretch(&simulation, &sequence.at(simulation.time()));
+            let least = min_interval_density(&simulation, &sequence.at(simulation.time()));
             assert!(least >= 0.5, "scene {scene}, {arrival} s: a stretch holds {least} of its share");
         }
     }
@@ -316,13 +316,13 @@ fn three_lines_make_an_aurora() {
         // Half the side of the drawn square and more.
         let length = sequence.at(1.0).length();
         assert!(length > 300.0, "{length} km: {text}");
-        let lit = lit_share(text);
+        let lit = lit_fraction(text);
         assert!(lit > 0.03, "{lit} of the picture is lit: {text}");
     }
 }
 
-/// The share of a scene's first picture that shines as a twentieth of white or more.
-fn lit_share(text: &str) -> f64 {
+/// The fraction of the pixels of a scene's first picture that are brighter than a twentieth of white.
+fn lit_fraction(text: &str) -> f64 {
     let assets = Arc::new(assets());
     let scene = Scene::parse("test.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some([96, 54]), ..PlanOptions::default() };

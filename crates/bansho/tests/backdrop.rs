@@ -1,4 +1,4 @@
-//! Sky, ground and lamps: what a scene shows beside its phenomena.
+//! Sky, ground and lamps.
 
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod support;
@@ -22,7 +22,7 @@ fn still_water_shows_a_lamp_as_far_below_the_horizon_as_it_stands_above() {
         let total = lit(&frame, rows.clone());
         rows.map(|y| y as f64 * lit(&frame, y..y + 1)).sum::<f64>() / total
     };
-    // The lamp stands 1 m above the camera, its image 3 m below it, both 4 m away; a meter there is 77.9 / 4 pixels.
+    // The lamp is 1 m above the camera, its image 3 m below it, both 4 m away; a meter there is 77.9 / 4 pixels.
     let meter = 45.0 / bansho_base::math::tan(std::f64::consts::PI / 6.0) / 4.0;
     assert!((44.5 - center(0..45) - meter).abs() < 0.3, "{}", center(0..45));
     assert!(lit(&frame, 0..45) > 0.0);

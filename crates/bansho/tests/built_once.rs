@@ -1,4 +1,4 @@
-//! Everything in a scene is built once a job: constructors count themselves. One test alone in its process, since the counts are the process's.
+//! A job builds everything in a scene once: constructors count their calls. This is the only test of its process, since the counters are global.
 
 use std::{collections::BTreeMap, fs, path::Path};
 

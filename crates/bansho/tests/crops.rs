@@ -1,4 +1,4 @@
-//! A part of a picture is the same part of the whole: light, depth, layers and AOVs, to the bit.
+//! A crop has the same pixels as the whole picture: light, depth, layers and AOVs, to the bit.
 
 #[path = "support/planned.rs"]
 mod planned;
@@ -16,7 +16,7 @@ use bansho_scene::Scene;
 use planned::Planned;
 
 const SIZE: [usize; 2] = [101, 67];
-/// Parts that begin and end at odd places, so that strips and vectors of theirs never meet those of the whole.
+/// Crops that begin and end at odd pixels, so that their strips and vectors are never aligned with those of the whole picture.
 const PARTS: [[usize; 4]; 6] =
     [[13, 7, 41, 29], [50, 33, 51, 34], [0, 19, 101, 5], [37, 0, 3, 67], [59, 41, 1, 1], [3, 1, 9, 11]];
 
@@ -65,7 +65,7 @@ fn of_flame_sheets_with_sparks_and_smoke() {
 
 #[test]
 fn of_particle_flames() {
-    // Fine sprites, which many columns hold nothing of, and coarse ones.
+    // Fine sprites, which leave many columns empty, and coarse ones.
     for lines in [
         "burners = [{ diameter = 0.3 }]\n",
         "rendering = { heat_haze_gain = 2.0 }\n",

@@ -1,4 +1,4 @@
-//! What a scene has that its text does not state.
+//! Defaults that depend on the other values of a scene.
 
 use bansho::KINDS;
 use bansho_base::parameters::{Auto, Value};
@@ -19,7 +19,7 @@ fn every_setting_is_a_scene() {
         let text = format!("bansho = 2\n{}[[{}]]\n", kind.scene_defaults, kind.key);
         let scene = Scene::parse("setting", &text, KINDS).unwrap_or_else(|error| panic!("{}: {error}", kind.key));
         assert_eq!(scene.implied, NONE, "{}: states all of it", kind.key);
-        let setting = bansho_scene::values(kind.scene_defaults).unwrap();
+        let setting = bansho_scene::parse_values(kind.scene_defaults).unwrap();
         assert!(matches!(setting.get("camera").map(|node| &node.value), Some(Value::Table(_))), "{}", kind.key);
     }
 }
@@ -98,7 +98,7 @@ fn what_the_scene_places_is_exposed_for_itself() {
 #[test]
 fn a_backdrop_that_nobody_wrote_is_seen_only_where_the_plan_shows_it() {
     let shown = |text: &str, implied_backdrop| {
-        let scene = read(text).adapted(&SceneOptions { implied_backdrop, ..SceneOptions::default() }).unwrap();
+        let scene = read(text).with_options(&SceneOptions { implied_backdrop, ..SceneOptions::default() }).unwrap();
         let sky = scene.sky.as_ref().unwrap();
         (sky.visible, scene.ground.is_some(), scene.lights.iter().any(|light| light.visible), scene.lights.len())
     };

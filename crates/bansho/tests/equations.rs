@@ -18,7 +18,7 @@ struct Method {
     page: &'static str,
     /// Folder of the crate in `crates`.
     in_crate: &'static str,
-    /// Module whose documentation holds the table; empty for the root of the crate.
+    /// Module whose documentation contains the table; empty for the root of the crate.
     module: &'static str,
     /// All equation numbers of the paper, without parentheses.
     required: &'static [&'static str],
@@ -58,7 +58,7 @@ enum Implementation {
     NotUsed,
 }
 
-/// What a table says of each equation number, or of each name of something without a number.
+/// The entry of a table for each equation number, or for each name of something without a number.
 type Equations = BTreeMap<String, Implementation>;
 
 #[test]
@@ -175,7 +175,7 @@ fn module_name(method: &Method) -> String {
     path.concat()
 }
 
-/// The file whose documentation holds a method's table.
+/// The file whose documentation contains the table of a method.
 fn module_file(method: &Method) -> PathBuf {
     let source = crate_source(method.in_crate);
     if method.module.is_empty() { source.join("lib.rs") } else { source.join(method.module).join("mod.rs") }

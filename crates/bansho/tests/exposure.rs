@@ -1,4 +1,4 @@
-//! What exposure shots get that state none, and what light a plate gives to rain.
+//! The exposure of shots that state none, and the light of a plate on rain.
 
 #[path = "support/planned.rs"]
 mod planned;
@@ -75,7 +75,7 @@ fn a_plates_exposure_is_the_stated_one_then_the_recorded_one_then_an_assumed_one
     assert_eq!(ev(&format!("{PLATE}exposure_ev100 = 9.5\n{RAIN}"), Some(3.0)), (9.5, None));
     assert_eq!(ev(&format!("{PLATE}{RAIN}"), Some(13.2)), (13.2, None));
     assert_eq!(ev(&format!("{PLATE}{RAIN}"), None), (12.0, assumed(12.0)));
-    // The picture's own exposure goes before all; a sky is nearly white, a flame neither dull nor white.
+    // The exposure of `[picture]` has priority; a sky is nearly white, a flame neither dark nor white.
     assert_eq!(ev(&format!("exposure_ev100 = 7.0\n{PLATE}{RAIN}"), Some(3.0)), (7.0, None));
     assert_eq!(ev(&format!("{PLATE}[sky]\nluminance = 1536.0\n{RAIN}"), None), (10.6, assumed(10.6)));
     let fire = "[[flame_sheet]]\ncolor = { luminance = 12000.0 }\n";
@@ -96,7 +96,7 @@ fn rain_shows_before_what_is_dark_in_a_plate_and_hardly_before_its_sky() {
     let change = |rows: std::ops::Range<usize>| mean(&wet, rows.clone()) / mean(&dry, rows) - 1.0;
     let (sky, wall) = (change(0..25), change(40..90));
     assert!(wall > 0.3 && sky.abs() < 0.15, "wall {wall}, sky {sky}");
-    // The plate's light is as bright as the plate looks, whatever the exposure.
+    // The light of the plate is as bright as the plate looks, for any exposure.
     let bright = frame(plan(&format!("exposure_ev100 = 4.0\n{PLATE}{RAIN}"), plate(None)));
     let apart = (mean(&bright, 0..90) / mean(&wet, 0..90) - 1.0).abs();
     assert!(apart < 1e-3, "{apart}");

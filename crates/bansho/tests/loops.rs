@@ -1,4 +1,4 @@
-//! Seamless loops, of closed forms and of what is stepped.
+//! Seamless loops of phenomena in closed form and of stepped phenomena.
 
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod support;
@@ -102,16 +102,16 @@ fn two_values(kind: &Kind, default: Option<&Value>) -> [String; 2] {
     }
 }
 
-/// What else must be said for a key to be valid.
-fn goes_with(text: &str) -> &'static str {
-    // The least focal length sees too much on the usual sensor.
+/// Further keys that are needed for a key to be valid.
+fn required_keys(text: &str) -> &'static str {
+    // The smallest focal length exceeds the maximum field of view with the default sensor.
     if text.starts_with("focal_length_mm") { "sensor_height_mm = 1.0\n" } else { "" }
 }
 
 #[test]
 fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
     let header =
-        |table: &SharedTable| if table.many { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) };
+        |table: &SharedTable| if table.is_list { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) };
     let shared = SHARED_TABLES.iter().map(|table| (header(table), (table.table)()));
     let kinds = KINDS.iter().map(|kind| (format!("[[{}]]", kind.key), (kind.table)()));
     let plan = |text: &str| -> Result<Planned, String> {
@@ -121,10 +121,11 @@ fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
     let mut tried = 0;
     for (header, table) in shared.chain(kinds) {
         for (open, closed) in keyed(table, false).iter().zip(keyed(table, true)) {
-            let [open, closed] = [open.as_str(), closed.as_str()]
-                .map(|text| format!("bansho = 2\n[picture]\nsize = [16, 9]\n{header}\n{text}\n{}", goes_with(text)));
+            let [open, closed] = [open.as_str(), closed.as_str()].map(|text| {
+                format!("bansho = 2\n[picture]\nsize = [16, 9]\n{header}\n{text}\n{}", required_keys(text))
+            });
             if let Err(error) = plan(&closed).map(|_| ()) {
-                // What needs more than its own key to be valid says so; it must not be the loop.
+                // A key that needs further keys has an error of its own, which must not be about the loop.
                 assert!(!error.contains("jumps"), "{closed}{error}");
             }
             let error = plan(&open).map(|_| ()).expect_err(&open);

@@ -1,7 +1,7 @@
 //! Random valid scenes of every phenomenon draw a small frame: no panic, no NaN.
 //!
-//! `BANSHO_RANDOM_SCENES` says how many, `BANSHO_RANDOM_SEED` from which seed on. Seeds that failed once are in `random_seeds.txt` and are
-//! tried first, whatever the two say.
+//! `BANSHO_RANDOM_SCENES` is their number, `BANSHO_RANDOM_SEED` the first seed. Seeds that failed once are in `random_seeds.txt` and are always
+//! tested first.
 
 use std::{panic, sync::Arc};
 
@@ -20,7 +20,7 @@ use bansho_render::{
 use bansho_scene::{SHARED_TABLES, Scene, SceneOptions};
 use rayon::prelude::*;
 
-/// How many are drawn, unless `BANSHO_RANDOM_SCENES` says otherwise, as in `.ci/run` and `.ci/long`.
+/// Default of `BANSHO_RANDOM_SCENES`, which is larger in `.ci/run` and `.ci/long`.
 const SCENES: u64 = 250;
 
 #[test]
@@ -47,11 +47,11 @@ fn number(variable: &str) -> Option<u64> {
     std::env::var(variable).ok()?.parse().ok()
 }
 
-/// What became of a scene.
+/// The result of drawing a scene.
 enum Outcome {
     Drawn,
     Refused,
-    /// The seed of one that ended in a panic, and what that said.
+    /// The seed of a scene that panicked, and the message.
     Failed(u64, String),
 }
 
@@ -84,7 +84,7 @@ fn draw(text: &str) -> bool {
     let number = scene.picture.first_frame + 1;
     let options =
         PlanOptions { size: Some([17, 11]), overscan: true, layers: true, aovs: true, ..PlanOptions::default() };
-    let scene = scene.adapted(&SceneOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let scene = scene.with_options(&SceneOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let Ok(compiled) = CompiledScene::build(Arc::new(scene), assets, None) else { return false };
     let compiled = Arc::new(compiled);
     let plan = Plan::new(&compiled, &options).unwrap_or_else(|error| panic!("{error}\n{text}"));
@@ -110,9 +110,9 @@ fn scene(seed: u64) -> String {
     };
     let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = sample((shared.table)(), &mut uniform);
-        // Random tables name no files, so no obstacle can be a mesh; the picture's size is whole and given anyhow.
+        // Random tables name no files, so no obstacle can be a mesh; the size of the picture is fixed.
         let left_out = [("obstacle", "shape"), ("picture", "size")];
         table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
         let camera = CameraParameters::read_table(&table, &mut Reader::new(), &[]);
@@ -129,7 +129,7 @@ fn scene(seed: u64) -> String {
         if !seed.is_multiple_of(4) {
             table.entries.retain(|entry| !["shape", "shapes"].contains(&entry.key.as_str()));
         }
-        // Many together are refused if one of them is, so most scenes hold one.
+        // A scene is refused if one of its phenomena is, so most scenes have only one.
         if seed.is_multiple_of(8) || seed as usize % KINDS.len() == index {
             text += &lines(&format!("[[{}]]", kind.key), &table);
         }
@@ -163,7 +163,7 @@ fn keep_small(table: &mut Table, kind: &str) {
     }
 }
 
-/// A table of one whole number.
+/// A table with one integer.
 fn one(key: &str, value: i64) -> Value {
     let mut table = Table::default();
     table.push(key, Value::Integer(value));

@@ -1,4 +1,4 @@
-//! A shot that goes on under another scene, and what of a scene is built anew for it.
+//! A shot that continues with another scene, and what is rebuilt for it.
 
 use std::sync::Arc;
 

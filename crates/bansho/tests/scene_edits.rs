@@ -1,4 +1,4 @@
-//! Changes of a scene's text by `--set`, and its upgrade.
+//! Edits of a scene's text by `--set`, and its upgrade.
 
 use bansho::{
     KINDS,
@@ -37,15 +37,15 @@ fn absent_tables_are_made_and_bare_words_are_strings() {
 
 #[test]
 fn places_that_are_not_there_are_named() {
-    assert!(matches!(set(SCENE, "flame_sheet.7.height=2"), Err(EditError::NoSuchPlace { .. })));
-    assert!(matches!(set(SCENE, "picture.size"), Err(EditError::NoAssignment(_))));
-    assert!(matches!(set(SCENE, "=3"), Err(EditError::NoAssignment(_))));
-    assert!(matches!(set(SCENE, "picture..size=3"), Err(EditError::NoAssignment(_))));
+    assert!(matches!(set(SCENE, "flame_sheet.7.height=2"), Err(EditError::NoSuchPath { .. })));
+    assert!(matches!(set(SCENE, "picture.size"), Err(EditError::InvalidAssignment(_))));
+    assert!(matches!(set(SCENE, "=3"), Err(EditError::InvalidAssignment(_))));
+    assert!(matches!(set(SCENE, "picture..size=3"), Err(EditError::InvalidAssignment(_))));
     // Found by fuzzing: a path so deep that its result could not be read again.
     let deep = format!("picture{}=3", ".a".repeat(100));
-    assert!(matches!(set(SCENE, &deep), Err(EditError::NoAssignment(_))));
+    assert!(matches!(set(SCENE, &deep), Err(EditError::InvalidAssignment(_))));
     let nested = format!("picture.a.b.c.d={}{}", "[".repeat(78), "]".repeat(78));
-    assert!(matches!(set(SCENE, &nested), Err(EditError::NoAssignment(_))));
+    assert!(matches!(set(SCENE, &nested), Err(EditError::InvalidAssignment(_))));
 }
 
 #[test]
@@ -60,14 +60,14 @@ fn lists_of_tables_within_tables_are_reached_in_both_ways_of_writing_them() {
         assert!(text.contains("speed = 1") && text.matches("diameter = 0.2").count() == 1, "{text}");
         assert_eq!(set(scene, "flame_particles.burners.speed=3").unwrap().matches("speed = 3").count(), 2);
         let beyond = set(scene, "flame_particles.0.burners.2.speed=1").unwrap_err().to_string();
-        assert!(beyond.contains("burners.2.speed`: 2 is not in the scene; there is: tables 0 to 1"), "{beyond}");
+        assert!(beyond.contains("burners.2.speed`: 2 is not in the scene; available: tables 0 to 1"), "{beyond}");
         let whole = set(scene, "flame_particles.0.burners.0=1");
-        assert!(matches!(whole, Err(EditError::NoAssignment(_))), "{whole:?}");
+        assert!(matches!(whole, Err(EditError::InvalidAssignment(_))), "{whole:?}");
     }
     assert!(set(headed, "flame_particles.0.burners.0.speed=2").unwrap().contains("speed = 2 # slow"));
     let none = set("bansho = 2\n[[flame_particles]]\nsmoke = 1\n", "flame_particles.0.burners.0.speed=1");
     let none = none.unwrap_err().to_string();
-    assert!(none.contains("burners is not in the scene; there is: smoke"), "{none}");
+    assert!(none.contains("burners is not in the scene; available: smoke"), "{none}");
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn single_values_of_lists_are_reached_by_number() {
     assert!(set(SCENE, "picture.size.1=9").unwrap().contains("size = [64, 9] # small"));
     for path in ["picture.size.2", "picture.size.x", "picture.size.0.x"] {
         let error = set(SCENE, &format!("{path}=1")).unwrap_err().to_string();
-        assert!(error.contains("there is: values 0 to 1"), "{error}");
+        assert!(error.contains("available: values 0 to 1"), "{error}");
     }
 }
 
@@ -85,7 +85,7 @@ fn a_path_without_its_table_gets_the_tables_that_have_such_a_parameter() {
     let height = told(SCENE, "height=2");
     assert_eq!(
         height,
-        "`height` is not in the scene, did you mean `flame_sheet.height`?; there is: bansho, picture, flame_sheet"
+        "`height` is not in the scene, did you mean `flame_sheet.height`?; available: bansho, picture, flame_sheet"
     );
     let both = "bansho = 2\n[[rain]]\n[[flame_particles]]\nburners = [{}]\n";
     for (scene, assignment, expected) in [

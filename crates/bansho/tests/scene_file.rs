@@ -1,4 +1,4 @@
-//! What scene files may say: faults are located, name what is allowed, and random valid scenes draw without a fault.
+//! Scene files: errors have positions and state what is allowed.
 
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod support;
@@ -77,11 +77,11 @@ fn faults_name_their_place_and_what_is_allowed() {
         ),
         (
             "bansho = 2\n[[light]]\nkind = \"spot\"\ninner_cone_deg = 80\nouter_cone_deg = 10\n",
-            "test.toml:4:18: light.0.inner_cone_deg: a spot that is full up to 80 degrees cannot be dark beyond 10; allowed: ",
+            "test.toml:4:18: light.0.inner_cone_deg: a spot with full intensity up to 80 degrees cannot end at 10; allowed: ",
         ),
         (
             "bansho = 2\n[[emitter]]\nname = \"a.b\"\n",
-            "cannot be a name, which begins the names of EXR channels; allowed: 1 to 63 bytes of text without dots",
+            "cannot be a name, since the names of EXR channels begin with it; allowed: 1 to 63 bytes of text without dots",
         ),
         (
             "bansho = 2\n[[emitter]]\nname = \"Z\"\n",
@@ -90,7 +90,7 @@ fn faults_name_their_place_and_what_is_allowed() {
         ),
         (
             "bansho = 2\n[[emitter]]\nname = \"ein Nordlicht über dem Fjord, gesehen vom Ufer gegenüber im Mai\"\n",
-            "is a name of 65 bytes, which programs that read EXR files would cut; allowed: 1 to 63 bytes",
+            "is a name of 65 bytes, which programs that read EXR files would truncate; allowed: 1 to 63 bytes",
         ),
         ("bansho = 2\n[[absorber]]\nnear = 2\nfar = 1\n", "test.toml:4:7: absorber.0.far: must lie behind `near`"),
         ("bansho = 2\n[plate]\nimage = \"gone.png\"\n", "test.toml:3:9: plate.image: gone.png: no such file"),
@@ -172,9 +172,9 @@ fn of_many_faults_the_first_are_listed_and_the_rest_counted() {
     let text = format!("bansho = 2\n{}", "[[absorber]]\nnear = -1\n".repeat(20_000));
     let error = parse(&text).err().unwrap();
     assert_eq!((error.problems.len(), error.omitted), (100, 19_900));
-    let faults: Vec<String> = error.faults().collect();
-    assert_eq!((faults.len(), error.more().as_deref()), (100, Some("test.toml: and 19900 more faults")));
-    assert!(faults[99].starts_with("test.toml:201:8: absorber.99.near (absorber 100): "), "{}", faults[99]);
+    let messages: Vec<String> = error.messages().collect();
+    assert_eq!((messages.len(), error.omitted_message().as_deref()), (100, Some("test.toml: and 19900 more problems")));
+    assert!(messages[99].starts_with("test.toml:201:8: absorber.99.near (absorber 100): "), "{}", messages[99]);
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn random_scene(seed: u64) -> String {
     let mut uniform = random(seed);
     let mut text = String::from("bansho = 2\n");
     for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         let mut table = parameters::sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; a spot may not be full beyond its end.
         // Most random lenses are beyond the field of view that they may have.

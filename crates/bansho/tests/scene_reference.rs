@@ -1,4 +1,4 @@
-//! The book cannot drift from the program: its page on the scene file is what the descriptors say, its examples are scenes.
+//! The reference page of the scene file in the book is generated from the descriptors, and all example scenes of the book are valid.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ fn the_books_page_on_the_scene_file_is_up_to_date() {
 }
 
 #[test]
-fn every_scene_in_readme_and_book_is_right() {
+fn every_scene_in_readme_and_book_is_valid() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let inside = |folder| std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
     let (guide, methods) = (inside("docs/src/guide"), inside("docs/src/methods"));
@@ -34,11 +34,11 @@ fn every_scene_in_readme_and_book_is_right() {
     for page in pages {
         let text = std::fs::read_to_string(&page).unwrap();
         for block in text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()) {
-            // Excerpts leave out the first line of a scene.
+            // Excerpts omit the first line of a scene.
             let scene = if block.contains("bansho = ") { block.to_owned() } else { format!("bansho = 2\n{block}") };
             scenes += 1;
             let Err(error) = Scene::parse("example", &scene, KINDS) else { continue };
-            // The plates of the examples are not there.
+            // The plates of the examples do not exist.
             let wrong = error.problems.iter().any(|problem| !matches!(problem.kind, ProblemKind::Asset(_)));
             assert!(!wrong, "{}: {error}", page.display());
         }
@@ -47,16 +47,16 @@ fn every_scene_in_readme_and_book_is_right() {
 }
 
 #[test]
-fn the_guide_tells_of_every_aov() {
+fn the_guide_lists_every_aov() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/guide/output.md");
     let page = std::fs::read_to_string(page).unwrap();
     for kind in KINDS {
         let scene = format!("bansho = 2\n[[{}]]\n", kind.key);
         let scene = Scene::parse("aovs", &scene, KINDS).unwrap_or_else(|error| panic!("{error}"));
-        let opening = BuildContext { name: "any", seed: 0, loop_s: None, assets: &MemoryAssets::default() };
-        let phenomenon = scene.instances[0].parameters.build(&opening).unwrap_or_else(|fault| panic!("{fault:?}"));
+        let context = BuildContext { name: "any", seed: 0, loop_s: None, assets: &MemoryAssets::default() };
+        let phenomenon = scene.instances[0].parameters.build(&context).unwrap_or_else(|error| panic!("{error:?}"));
         for aov in phenomenon.info().aovs {
-            assert!(page.contains(&format!("`{}`", aov.name)), "{}: {} is not told of", kind.key, aov.name);
+            assert!(page.contains(&format!("`{}`", aov.name)), "{}: {} is not listed", kind.key, aov.name);
             let unit = if aov.unit == "1" { "" } else { aov.unit };
             let row = page.lines().find(|line| line.contains(&format!("`{}`", aov.name))).unwrap_or_default();
             assert!(row.split('|').nth(3).is_some_and(|cell| cell.trim() == unit), "{}: {row}", aov.name);
@@ -69,10 +69,10 @@ fn page() -> String {
         "# The scene file\n\n\
          <!-- Written by crates/bansho/tests/scene_reference.rs from the descriptors; edit those instead. -->\n\n\
          A scene begins with its format, `bansho = {FORMAT}`. Everything else may be left out and then has the default given \
-         here. How values, keys and curves are written is told in [the guide](../guide/scene-file.md).\n"
+         here. How values, keys and curves are written is described in [the guide](../guide/scene-file.md).\n"
     );
     for shared in &SHARED_TABLES {
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
         section(&mut page, &header, "", (shared.table)());
     }
     for kind in KINDS {
@@ -81,7 +81,7 @@ fn page() -> String {
     page
 }
 
-/// What every phenomenon has beside its own parameters.
+/// Keys that every phenomenon has in addition to its parameters.
 const COMMON: &str = "| `name` | a string of 1 to 63 bytes without dots, none of `plate`, `sky`, `ground`, `lamps` and of names that EXR readers use themselves, such as `R`, `Z`, `depth` | the kind, numbered from the second on | \
     Unique name of this one; names its layers. |\n\
     | `enabled` | true or false | `true` | Whether it is drawn. |\n";

@@ -1,4 +1,4 @@
-//! The traits, proved by two phenomena whose pictures are known in closed form.
+//! Tests of the traits by two phenomena whose pictures are known in closed form.
 
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod support;
@@ -50,14 +50,14 @@ fn fog_dims_a_lamp_by_beers_law_wherever_it_stands() {
 }
 
 #[test]
-fn frames_carry_figures_where_they_are_asked_for() {
-    let asked = PlanOptions { figures: true, ..PlanOptions::default() };
-    let frame = render(&fogged(2.5), &asked, 0);
+fn frames_carry_metadata_if_requested() {
+    let options = PlanOptions { metadata: true, ..PlanOptions::default() };
+    let frame = render(&fogged(2.5), &options, 0);
     // The fog has none.
-    let [lamp] = &frame.figures[..] else { panic!("{:?}", frame.figures) };
-    assert_eq!((lamp.phenomenon.as_str(), lamp.figures.len()), ("lamp", 1));
-    assert_eq!((lamp.figures[0].name, lamp.figures[0].unit, lamp.figures[0].value), ("depth", "m", 2.5));
-    assert!(render(&fogged(2.5), &PlanOptions::default(), 0).figures.is_empty());
+    let [lamp] = &frame.metadata[..] else { panic!("{:?}", frame.metadata) };
+    assert_eq!((lamp.phenomenon.as_str(), lamp.entries.len()), ("lamp", 1));
+    assert_eq!((lamp.entries[0].name, lamp.entries[0].unit, lamp.entries[0].value), ("depth", "m", 2.5));
+    assert!(render(&fogged(2.5), &PlanOptions::default(), 0).metadata.is_empty());
 }
 
 #[test]
@@ -259,7 +259,7 @@ fn bent_light_displaces_the_plate_around_the_lamp_and_nowhere_else() {
         draw(&mut plan.open(), 0)
     };
     let (straight, bent) = (drawn(0.0), drawn(0.1));
-    // 0.1 rad at 45 pixels a radian: what stands 4.5 pixels to the right is seen.
+    // 0.1 rad at 45 pixels per radian: the light comes from 4.5 pixels to the right.
     let between = |x: usize| 0.5 * (straight.beauty.at(x, 45)[0] + straight.beauty.at(x + 1, 45)[0]);
     for x in 56..64 {
         assert!((bent.beauty.at(x, 45)[0] - between(x + 4)).abs() < 1e-4, "{x}");
@@ -277,7 +277,7 @@ fn only_what_lies_behind_the_air_is_displaced_and_nothing_nearer_gets_into_it() 
         let text = format!(
             "{CAMERA}[plate]\nimage = \"plate.png\"\n[[emitter]]\nradius = 0.2\nluminance = 0\nbend = {bend}\n"
         );
-        // The air is 2 m away: the left half of the plate stands before it, the right half behind.
+        // The air is 2 m away: the left half of the plate is in front of it, the right half behind.
         let depth = (0..120 * 90).map(|index| if index % 120 < 60 { 1.0 } else { 8.0 }).collect();
         let plan = plan_with(&text, &PlanOptions::default(), Arc::new(checkerboard_at(120, 90, Some(depth))));
         draw(&mut plan.open(), 0)
@@ -357,7 +357,7 @@ fn domes_and_panoramas_show_the_lamp_where_it_stands() {
     let dome = CAMERA.replace("target = [0, 0, -1]", "target = [0, 1, 0]\nlens = \"fisheye\"");
     let text = format!("{dome}[[emitter]]\nposition = [1, 1, 0]\nradius = 0.1\n");
     let frame = render(&text, &PlanOptions::default(), 0);
-    // 45 degrees from the zenith on a circle of 45 pixels for 90 degrees; east lies left, as on a star chart.
+    // 45 degrees from the zenith on a circle of 45 pixels for 90 degrees; east is left, as on a star chart.
     let lit = brightest(&frame);
     assert!((lit[0] - (60.0 - 22.5)).abs() < 0.6 && (lit[1] - 45.0).abs() < 0.6, "{lit:?}");
 

@@ -63,15 +63,15 @@ pub struct Frame {
     pub channels: Vec<Channel>,
     /// Whether a plate fills the picture, so that it is opaque.
     pub opaque: bool,
-    /// Figures of the phenomena that have any, if requested.
-    pub figures: Vec<FigureSet>,
+    /// Metadata of the phenomena that have any, if requested.
+    pub metadata: Vec<PhenomenonMetadata>,
     /// Bounding rectangle of the pixels that are not empty. Empty means no light, no alpha, infinite depth.
     pub content: Rect,
 }
 
 /// A named number that characterizes a frame, such as a rain rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figure {
+pub struct MetadataEntry {
     /// Its name, words joined by `_`.
     pub name: &'static str,
     /// Its unit; empty for a dimensionless number.
@@ -80,13 +80,13 @@ pub struct Figure {
     pub value: f64,
 }
 
-/// The figures of one phenomenon.
+/// The metadata of one phenomenon.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FigureSet {
+pub struct PhenomenonMetadata {
     /// Name of the phenomenon in the scene.
     pub phenomenon: String,
-    /// Its figures.
-    pub figures: Vec<Figure>,
+    /// Its entries.
+    pub entries: Vec<MetadataEntry>,
 }
 
 /// Display pixels: sRGB-encoded, straight alpha.

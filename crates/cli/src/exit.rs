@@ -1,62 +1,71 @@
-//! How the program ends: exit codes, and errors as a person reads them.
+//! How the program ends: exit codes, and the messages of errors.
 
 use std::process::ExitCode;
 
-use bansho::job::{Cause, JobError};
+use bansho::job::{ErrorCategory, JobError};
 
 use crate::{
-    command::{new::Unknown, studio::AlreadyReported},
     flags, interrupt,
-    output::{self, to_stderr},
+    output::{print_error_lines, print_message},
 };
 
-/// The work failed.
+/// The command failed.
 const FAILED: u8 = 1;
 /// The command line is invalid.
 const USAGE: u8 = 2;
-/// The scene is faulty.
+/// The scene is invalid.
 const SCENE: u8 = 3;
 
-/// An error that has already been reported; only its exit code is left.
+/// An invalid argument that only the command finds, such as an unknown name.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-pub(crate) struct ReportedJobError(pub(crate) JobError);
+pub(crate) struct UsageError(pub(crate) String);
+
+/// An error whose message has already been printed. It only determines the exit code.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ReportedError {
+    /// A job failed.
+    #[error(transparent)]
+    Job(JobError),
+    /// Another program failed, which printed the error itself.
+    #[error("another program failed")]
+    OtherProgram,
+}
 
 /// The exit code of an error.
 pub(crate) fn code(error: &anyhow::Error) -> u8 {
-    let reported = || error.downcast_ref::<ReportedJobError>().map(|reported| &reported.0);
-    match error.downcast_ref::<JobError>().or_else(reported).map(JobError::cause) {
-        Some(Cause::Usage) => USAGE,
-        Some(Cause::Scene) => SCENE,
-        Some(Cause::Cancelled) => interrupt::exit_code(),
-        None if error.is::<Unknown>() => USAGE,
-        Some(Cause::Work) | None => FAILED,
+    let job = match error.downcast_ref::<ReportedError>() {
+        Some(ReportedError::Job(job)) => Some(job),
+        _ => error.downcast_ref::<JobError>(),
+    };
+    match job.map(JobError::category) {
+        Some(ErrorCategory::Usage) => USAGE,
+        Some(ErrorCategory::Scene) => SCENE,
+        Some(ErrorCategory::Cancelled) => interrupt::exit_code(),
+        None if error.is::<UsageError>() => USAGE,
+        Some(ErrorCategory::Work) | None => FAILED,
     }
 }
 
-/// Prints one `error:` line for each error and returns the exit code.
+/// Prints an `error:` line for each error that has not been printed yet, and returns the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    if !error.is::<ReportedJobError>() && !error.is::<AlreadyReported>() {
-        tell(error);
+    if !error.is::<ReportedError>() {
+        match error.downcast_ref::<JobError>() {
+            Some(job) => print_job_error(job),
+            None => print_message("error", &format!("{error:#}")),
+        }
     }
     ExitCode::from(code(error))
 }
 
-fn tell(error: &anyhow::Error) {
-    match error.downcast_ref::<JobError>() {
-        Some(job) => report_job_error(job),
-        None => output::tell("error", &format!("{error:#}")),
-    }
-}
-
 /// Prints the error of a job.
-pub(crate) fn report_job_error(error: &JobError) {
+pub(crate) fn print_job_error(error: &JobError) {
     match error.scene() {
         Some(scene) => {
-            scene.faults().for_each(|fault| to_stderr(&format!("error: {fault}")));
-            scene.more().iter().for_each(|more| to_stderr(more));
-            flags::for_scene(scene).iter().for_each(|flag| output::tell("hint", flag));
+            scene.messages().for_each(|message| print_error_lines(&format!("error: {message}")));
+            scene.omitted_message().iter().for_each(|message| print_error_lines(message));
+            flags::hint_for_scene(scene).iter().for_each(|hint| print_message("hint", hint));
         }
-        None => output::tell("error", &flags::error(error)),
+        None => print_message("error", &flags::error_message(error)),
     }
 }

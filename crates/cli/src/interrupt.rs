@@ -1,7 +1,7 @@
-//! SIGINT and SIGTERM: the first asks the work to stop, and ends the program if that takes too long; the second ends it at once.
+//! SIGINT and SIGTERM. The first signal cancels the job, and ends the program if that takes too long; the second ends it immediately.
 //!
-//! Work that draws looks at [`came`] every strip of a picture and every step of a simulation. Reading, parsing, checking and writing
-//! do not, and a step may be long: what has not stopped by itself within [`PATIENCE`] is ended, without what it was writing.
+//! Jobs check [`is_requested`] for every strip of a picture and every step of a simulation. Reading, parsing, checking and writing do not, and
+//! a step may be long: if the job has not stopped after [`GRACE_PERIOD`], the program is ended, and unfinished files are removed.
 
 use std::{
     io,
@@ -20,67 +20,67 @@ use signal_hook::{
     flag, low_level,
 };
 
-/// How long work may take to stop by itself after the first signal.
-const PATIENCE: Duration = Duration::from_millis(600);
-/// How long telling and removing may take before the program is ended regardless: a terminal or a disk may not answer.
-const LAST_WORDS: Duration = Duration::from_millis(200);
-/// How often a signal is looked for.
-const TICK: Duration = Duration::from_millis(20);
+/// Time for a job to stop after the first signal.
+const GRACE_PERIOD: Duration = Duration::from_millis(600);
+/// Time for removing files and printing the message, since a terminal or a disk may not respond.
+const CLEANUP_TIMEOUT: Duration = Duration::from_millis(200);
+/// Interval at which the flag is polled.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Number of the signal that came; 0 before.
+/// Number of the received signal; 0 before.
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
-type Tell = Box<dyn Fn() + Send>;
+type PrintMessage = Box<dyn Fn() + Send>;
 
-/// What tells the user that the program was ended; nothing while there is no work that could stop by itself.
-static TELL: Mutex<Option<Tell>> = Mutex::new(None);
+/// Prints the message of a forced exit. `None` while there is no job, so that the program is ended without a grace period.
+static FORCED_EXIT_MESSAGE: Mutex<Option<PrintMessage>> = Mutex::new(None);
 
-/// Begins to listen, for the whole program. One that is ended by signal `n` has exit code `128 + n`.
-pub(crate) fn listen() -> io::Result<()> {
-    let came_before = Arc::new(AtomicBool::new(false));
+/// Installs the signal handlers. If the program is ended by signal `n`, its exit code is `128 + n`.
+pub(crate) fn install_handlers() -> io::Result<()> {
+    let was_signaled = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // The order matters: the shutdown looks at the flag before this signal sets it.
-        flag::register_conditional_shutdown(signal, 128 + signal, came_before.clone())?;
-        flag::register(signal, came_before.clone())?;
+        // The order matters: the shutdown must check the flag before this signal sets it.
+        flag::register_conditional_shutdown(signal, 128 + signal, was_signaled.clone())?;
+        flag::register(signal, was_signaled.clone())?;
         flag::register_usize(signal, SIGNAL.clone(), signal as usize)?;
     }
     thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
 }
 
-/// From now on work may stop by itself; `tell` says that it did not, and was ended.
-pub(crate) fn be_patient(tell: impl Fn() + Send + 'static) {
-    *TELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(tell));
+/// From now on, a job has a grace period to stop after a signal. `print_message` is called if it does not stop in time.
+pub(crate) fn set_grace_period(print_message: impl Fn() + Send + 'static) {
+    *FORCED_EXIT_MESSAGE.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(print_message));
 }
 
-/// Waits for a signal, then for the work, and ends the program.
+/// Waits for a signal, then for the job, and ends the program.
 fn watch() {
-    while !came() {
-        thread::sleep(TICK);
+    while !is_requested() {
+        thread::sleep(POLL_INTERVAL);
     }
-    let tell = TELL.lock().unwrap_or_else(PoisonError::into_inner).take();
-    if tell.is_some() {
-        thread::sleep(PATIENCE);
+    let print_message = FORCED_EXIT_MESSAGE.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if print_message.is_some() {
+        thread::sleep(GRACE_PERIOD);
     }
     let (done, wait) = mpsc::channel();
-    // Both may block: on a pipe that nobody reads, on a disk that does not answer.
-    let last_words = move || {
+    // Both may block: on a disk that does not respond, on a pipe that nobody reads.
+    let clean_up = move || {
         temporary_files::abandon_all();
-        tell.iter().for_each(|tell| tell());
-        // Nobody waits any longer where this fails.
+        print_message.iter().for_each(|print_message| print_message());
+        // Fails only after the timeout.
         let _ = done.send(());
     };
-    if thread::Builder::new().spawn(last_words).is_ok() {
-        let _ = wait.recv_timeout(LAST_WORDS);
+    if thread::Builder::new().spawn(clean_up).is_ok() {
+        let _ = wait.recv_timeout(CLEANUP_TIMEOUT);
     }
     low_level::exit(i32::from(exit_code()));
 }
 
-/// Whether a signal came.
-pub(crate) fn came() -> bool {
+/// Whether a signal requested the program to stop.
+pub(crate) fn is_requested() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
 }
 
-/// The exit code for the signal that came.
+/// The exit code for the received signal.
 pub(crate) fn exit_code() -> u8 {
     match SIGNAL.load(Ordering::Relaxed) {
         0 => 128 + SIGINT as u8,

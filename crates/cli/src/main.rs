@@ -1,4 +1,4 @@
-//! The program `bansho`: arguments in, pictures and exit codes out. All work is done by the library.
+//! The program `bansho`: the command line of the library `bansho`.
 
 mod args;
 mod command;
@@ -22,16 +22,16 @@ fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version are no errors, and go to stdout.
-            let told = output::heard(error.print().and_then(|()| io::stdout().flush()));
-            return match told {
+            // Help and version are not errors, and go to stdout.
+            let printed = output::ignore_broken_pipe(error.print().and_then(|()| io::stdout().flush()));
+            return match printed {
                 Err(failed) if error.exit_code() == 0 => exit::report(&failed.into()),
-                // An error that cannot be written to stderr is told by the exit code alone.
+                // If an error cannot be written to stderr, only the exit code reports it.
                 _ => ExitCode::from(error.exit_code().clamp(0, 255) as u8),
             };
         }
     };
-    match interrupt::listen().map_err(anyhow::Error::from).and_then(|()| run(&cli.command)) {
+    match interrupt::install_handlers().map_err(anyhow::Error::from).and_then(|()| run(&cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => exit::report(&error),
     }
@@ -42,14 +42,14 @@ fn run(command: &Command) -> anyhow::Result<()> {
         Command::New(args) => command::new::run(args),
         Command::Check(args) => command::check::run(args),
         Command::Upgrade(args) => command::upgrade::run(args),
-        Command::Schema => command::schema::run(),
+        Command::Schema => command::generated::run_schema(),
         Command::Render(args) => command::render::run(args),
         Command::Flipbook(args) => command::flipbook::run(args),
         Command::Streaks(args) => command::streaks::run(args),
         Command::Simulate(args) => command::simulate::run(args),
         Command::Calibrate => command::calibrate::run(),
         Command::Studio(args) => command::studio::run(args),
-        Command::Completions(args) => command::completions::run(args),
-        Command::Man(args) => command::man::run(args),
+        Command::Completions(args) => command::generated::run_completions(args),
+        Command::Man(args) => command::generated::run_man(args),
     }
 }

@@ -1,4 +1,4 @@
-//! `--stats`: where the time went.
+//! `--stats`: the time spent in each stage.
 
 use std::{
     collections::HashMap,
@@ -11,8 +11,8 @@ use std::{
 
 use bansho::{Stage, base::host::plural::counted};
 
-/// Adds up the time of each stage. A stage that begins inside another on the same thread stops the other's clock, so
-/// that nothing is counted twice.
+/// Measures the time of each stage. A stage within another one on the same thread pauses the clock of the outer one, so that no time is
+/// counted twice.
 pub(crate) struct Stats {
     since: Instant,
     clocks: Mutex<Clocks>,
@@ -52,11 +52,11 @@ impl Stats {
     }
 
     fn with_clocks(&self, change: impl FnOnce(&mut Clocks, Instant)) {
-        // Sums stay sums wherever a thread may have panicked.
+        // The sums are valid even if a thread panicked.
         change(&mut self.clocks.lock().unwrap_or_else(PoisonError::into_inner), Instant::now());
     }
 
-    /// The table, for `frames` drawn by `threads` threads.
+    /// The table of all stages, for `frames` drawn by `threads` threads.
     pub(crate) fn table(&self, frames: usize, threads: usize) -> String {
         let wall = self.since.elapsed().as_secs_f64();
         let clocks = self.clocks.lock().unwrap_or_else(PoisonError::into_inner);
@@ -74,26 +74,26 @@ impl Stats {
             frames as f64 / wall,
             counted(threads, "thread")
         );
-        if let Some(seconds) = processor_seconds() {
+        if let Some(seconds) = cpu_seconds() {
             let _ = write!(table, ", {:.0} % busy", 100.0 * seconds / (wall * threads.max(1) as f64));
         }
         if let Some(mebibytes) = peak_mebibytes() {
-            let _ = write!(table, ", at most {mebibytes} MiB");
+            let _ = write!(table, ", peak memory {mebibytes} MiB");
         }
         table
     }
 }
 
-/// Time that this process ran on any core, where the system says it cheaply.
-fn processor_seconds() -> Option<f64> {
+/// CPU time of this process on all cores, s; `None` where there is no `/proc`.
+fn cpu_seconds() -> Option<f64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
-    // The second field is a name in parentheses; user and system time are the 14th and 15th, in hundredths of a second.
+    // The second field is a name in parentheses. User and system time are the 14th and 15th, in hundredths of a second.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
     Some((ticks(14)? + ticks(15)?) / 100.0)
 }
 
-/// The most memory that this process held, where the system says it cheaply.
+/// Peak memory of this process, MiB; `None` where there is no `/proc`.
 fn peak_mebibytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

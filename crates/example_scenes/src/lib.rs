@@ -20,7 +20,7 @@ pub struct ExampleScene {
 include!(concat!(env!("OUT_DIR"), "/scenes.rs"));
 
 impl ExampleScene {
-    /// The first sentence of the comment that it begins with.
+    /// The first sentence of the comment at its beginning.
     pub fn summary(&self) -> String {
         let lines = self.text.lines().map_while(|line| line.strip_prefix('#'));
         let comment = lines.map(str::trim).collect::<Vec<_>>().join(" ");
@@ -30,7 +30,7 @@ impl ExampleScene {
         }
     }
 
-    /// The files that it names: path relative to the scene, and bytes.
+    /// The files that it names: paths relative to the scene, and contents.
     pub fn assets(&self) -> impl Iterator<Item = (&'static str, &'static [u8])> {
         self.asset_paths.iter().filter_map(|path| Some((*path, asset(path)?)))
     }
@@ -41,7 +41,7 @@ pub fn find(name: &str) -> Option<&'static ExampleScene> {
     SCENES.iter().find(|scene| scene.name == name)
 }
 
-/// The bytes of a file that some scene names, by its path relative to the scenes.
+/// The contents of a file that a scene names, by its path relative to the scenes.
 pub fn asset(path: &str) -> Option<&'static [u8]> {
     ASSETS.iter().find(|(own, _)| *own == path).map(|(_, bytes)| *bytes)
 }

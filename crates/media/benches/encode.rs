@@ -75,7 +75,7 @@ fn frame() -> Frame {
     let depth = (0..WIDTH * HEIGHT).map(|i| if heat(i) > 0.0 { 4.0 } else { f32::INFINITY }).collect();
     let beauty = Image::from_pixels(WIDTH, HEIGHT, pixels).expect("as many pixels as the size says");
     let content = Rect::from_size(beauty.width(), beauty.height());
-    Frame { header, beauty, depth: Some(depth), channels: Vec::new(), opaque: false, content, figures: Vec::new() }
+    Frame { header, beauty, depth: Some(depth), channels: Vec::new(), opaque: false, content, metadata: Vec::new() }
 }
 
 /// Naive: the encoder's default filter and compression.

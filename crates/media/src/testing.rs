@@ -21,7 +21,7 @@ pub(crate) fn frame(width: usize, height: usize) -> Frame {
             Channel { name: "torch.R".to_owned(), precision: Precision::Half, values: plane(0.01) },
         ],
         opaque: false,
-        figures: Vec::new(),
+        metadata: Vec::new(),
         content: Rect::from_size(width, height),
     }
 }

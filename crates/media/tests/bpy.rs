@@ -56,7 +56,7 @@ fn frame() -> Frame {
         depth: Some((0..count).map(|i| if i % 5 == 0 { f32::INFINITY } else { i as f32 * 0.37 }).collect()),
         channels: layer(LAYER).into_iter().chain(layer("plate")).chain(aovs).collect(),
         opaque: false,
-        figures: Vec::new(),
+        metadata: Vec::new(),
         content: Rect::from_size(SIZE[0], SIZE[1]),
     }
 }

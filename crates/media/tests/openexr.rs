@@ -46,7 +46,7 @@ fn frame() -> Frame {
         depth: Some(depth),
         channels,
         opaque: false,
-        figures: Vec::new(),
+        metadata: Vec::new(),
         content: Rect::from_size(width, height),
     }
 }

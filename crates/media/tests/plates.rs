@@ -50,7 +50,7 @@ fn frame(width: usize, height: usize) -> Frame {
     let channel = Channel { name: "fire.kelvin".to_owned(), precision: Precision::Single, values: vec![1500.0; count] };
     let beauty = Image::from_pixels(width, height, pixels).unwrap();
     let content = Rect::from_size(beauty.width(), beauty.height());
-    Frame { header, beauty, depth: Some(depth), channels: vec![channel], opaque: false, content, figures: Vec::new() }
+    Frame { header, beauty, depth: Some(depth), channels: vec![channel], opaque: false, content, metadata: Vec::new() }
 }
 
 fn png_bytes(picture: &DisplayImage) -> Vec<u8> {

@@ -105,8 +105,8 @@ fn frames(criterion: &mut Criterion) {
     ];
     for (name, rain) in &cases {
         if let Ok(prepared) = rain.prepare(&view, &surroundings, &Unobserved) {
-            let figures = prepared.figures();
-            let drops = figures.iter().find(|figure| figure.name == "drops_in_view").map_or(0.0, |figure| figure.value);
+            let metadata = prepared.metadata();
+            let drops = metadata.iter().find(|entry| entry.name == "drops_in_view").map_or(0.0, |entry| entry.value);
             let named = !name.contains("150,000") || (150_000.0..160_000.0).contains(&drops);
             assert!(drops > 5000.0 && named, "{name}: {drops} drops");
         }

@@ -58,7 +58,7 @@ impl fmt::Display for BuildErrors {
 impl BuildErrors {
     /// The errors with their positions in `text`, from which the scene was read. `file` is the file's name in messages.
     pub fn located(self, file: &str, text: &str) -> SceneError {
-        let root = bansho_scene::values(text).unwrap_or_default();
+        let root = bansho_scene::parse_values(text).unwrap_or_default();
         let mut reader = Reader::new();
         for (path, error) in self.0 {
             bansho_scene::report_build_error(error, path, &root, &mut reader);

@@ -1,7 +1,7 @@
 //! Seamless loops of stepped phenomena: the end of one run is crossfaded into the beginning of the next.
 
 use bansho_base::{
-    frame::Figure,
+    frame::MetadataEntry,
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
     image::{Image, Rect},
@@ -280,12 +280,12 @@ impl Prepared for PreparedCrossfade<'_> {
         strip.crossfade(adjacent, self.current_weight, self.aovs);
     }
 
-    fn figures(&self) -> Vec<Figure> {
-        let mix = |(current, adjacent): (Figure, Figure)| {
+    fn metadata(&self) -> Vec<MetadataEntry> {
+        let mix = |(current, adjacent): (MetadataEntry, MetadataEntry)| {
             let value = f64::from(self.current_weight).mul_add(current.value - adjacent.value, adjacent.value);
-            Figure { value, ..current }
+            MetadataEntry { value, ..current }
         };
-        self.current.figures().into_iter().zip(self.adjacent.figures()).map(mix).collect()
+        self.current.metadata().into_iter().zip(self.adjacent.metadata()).map(mix).collect()
     }
 
     fn may_refract(&self) -> bool {

@@ -27,8 +27,8 @@ pub struct PlanOptions {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
-    /// Whether frames carry the phenomena's figures.
-    pub figures: bool,
+    /// Whether frames carry the phenomena's metadata.
+    pub metadata: bool,
     /// The view transform of display formats. Its inverse is applied to a plate that is made for display.
     pub display: color::View,
 }
@@ -72,8 +72,8 @@ pub struct Plan {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
-    /// Whether frames carry the phenomena's figures.
-    pub figures: bool,
+    /// Whether frames carry the phenomena's metadata.
+    pub metadata: bool,
     /// The view transform of display formats, without the camera's white balance.
     pub display: color::View,
 }
@@ -100,7 +100,7 @@ impl Plan {
             exposure_ev100,
             layers: options.layers,
             aovs: options.aovs,
-            figures: options.figures,
+            metadata: options.metadata,
             display: options.display,
             scene,
         })

@@ -1,17 +1,21 @@
-//! What a scene must fulfill beyond the ranges of single parameters.
+//! Checks of a scene beyond the ranges of single parameters.
 
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},
     math,
-    parameters::{Auto, BuildError, Node, ProblemKind, Range, Reader, Span, Table, Value, nearest},
+    parameters::{Auto, BuildError, Node, ProblemKind, Range, Reader, Table, Value, nearest},
     phenomenon::kind::PhenomenonKind,
 };
 
-use super::{FORMAT, SHARED_TABLES, Scene, ValuePath, tables::picture::LightKind};
+use crate::{
+    FORMAT, SHARED_TABLES, Scene,
+    tables::picture::LightKind,
+    text::path::{ValuePath, nearest_span},
+};
 use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
 
-/// Checks that the format number is one that this program reads. Returns whether the rest is worth reading: in an older format, other keys
-/// are valid, and each would be one more problem.
+/// Checks the format number. Returns whether to read the rest: an older format has other keys, each of which would be reported as a further
+/// problem.
 pub(super) fn format(root: &Table, reader: &mut Reader) -> bool {
     let Some(node) = root.get("bansho") else {
         let kind = ProblemKind::Conflict(format!("the scene must begin with `bansho = {FORMAT}`, its format version"));
@@ -32,7 +36,7 @@ pub(super) fn format(root: &Table, reader: &mut Reader) -> bool {
     !matches!(node.value, Value::Integer(found) if found < FORMAT)
 }
 
-/// Only shared tables and known kinds of phenomena may stand at the root.
+/// Reports keys at the root that are neither shared tables nor kinds of phenomena.
 pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) {
     let known: Vec<&str> = std::iter::once("bansho")
         .chain(SHARED_TABLES.iter().map(|table| table.key))
@@ -49,30 +53,31 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
     }
 }
 
-/// Name of the plate's own layer.
+/// Name of the layer of the plate.
 pub const PLATE_LAYER: &str = "plate";
 
-/// Names of layers that the scene itself has, which no phenomenon may take.
+/// Names of layers that a scene has itself, and that no phenomenon may have.
 const RESERVED_NAMES: [&str; 4] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME];
 
-/// Names that programs give the channels and layers of the picture itself. A layer `Z` or `RGBA` makes OpenEXR's Python refuse a file;
-/// `Combined`, `Alpha` and `Depth` take the place of the picture's own in Blender, `rgba`, `alpha` and `depth` are what Nuke calls them.
-const NAMES_OF_READERS: [&str; 18] = [
+/// Names of the picture's own channels and layers in programs that read EXR files. A layer `Z` or `RGBA` makes OpenEXR's Python module refuse
+/// a file; `Combined`, `Alpha` and `Depth` replace the picture's own in Blender; Nuke calls them `rgba`, `alpha` and `depth`.
+const NAMES_RESERVED_BY_READERS: [&str; 18] = [
     "R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W", "RGB", "RGBA", "rgba", "Alpha", "alpha", "Depth", "depth",
     "Combined",
 ];
 
-/// Longest name of a phenomenon, bytes: Blender cuts the names of layers after as many, without what follows the dot.
-const LONGEST_NAME: usize = 63;
+/// Maximum length of a name, bytes: Blender truncates names of layers, without the suffix after the dot, to this length.
+const MAX_NAME_BYTES: usize = 63;
 
-/// A name becomes the name of EXR layers, so it may hold no dot and no control characters, and must be one that readers keep.
+/// Reads the name of a phenomenon. Its EXR layers have the same name, so it may not contain dots or control characters, and readers must not
+/// change it.
 pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
     let Value::Text(name) = &node.value else {
         let expected = format!("a name of {}", allowed_names());
         reader.report(node, ProblemKind::WrongType { expected, found: node.value.type_name() });
         return None;
     };
-    match name_fault(name) {
+    match name_problem(name) {
         None => Some(name.clone()),
         Some(reason) => {
             reader.report(node, ProblemKind::Conflict(reason));
@@ -83,29 +88,29 @@ pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
 
 fn allowed_names() -> String {
     let reserved = RESERVED_NAMES.join(", ");
-    format!("1 to {LONGEST_NAME} bytes of text without dots and control characters, and none of {reserved}")
+    format!("1 to {MAX_NAME_BYTES} bytes of text without dots and control characters, and none of {reserved}")
 }
 
-/// Why a phenomenon cannot be called so.
-fn name_fault(name: &str) -> Option<String> {
+/// Why a phenomenon cannot have this name.
+fn name_problem(name: &str) -> Option<String> {
     let is_control_or_dot = |character: char| character == '.' || character.is_control();
-    if NAMES_OF_READERS.contains(&name) {
-        let others = NAMES_OF_READERS.join(", ");
-        let fault = "cannot be a name, since programs that read EXR files take such a layer for the picture itself";
-        return Some(format!("{fault}; allowed: any but {others}"));
+    if NAMES_RESERVED_BY_READERS.contains(&name) {
+        let others = NAMES_RESERVED_BY_READERS.join(", ");
+        let problem = "cannot be a name, since programs that read EXR files take such a layer for the picture itself";
+        return Some(format!("{problem}; allowed: any but {others}"));
     }
-    if name.len() > LONGEST_NAME {
-        let fault = format!("is a name of {} bytes, which programs that read EXR files would cut", name.len());
-        return Some(format!("{fault}; allowed: {}", allowed_names()));
+    if name.len() > MAX_NAME_BYTES {
+        let problem = format!("is a name of {} bytes, which programs that read EXR files would truncate", name.len());
+        return Some(format!("{problem}; allowed: {}", allowed_names()));
     }
     if name.trim().is_empty() || RESERVED_NAMES.contains(&name) || name.contains(is_control_or_dot) {
-        let fault = "cannot be a name, which begins the names of EXR channels";
-        return Some(format!("{fault}; allowed: {}", allowed_names()));
+        let problem = "cannot be a name, since the names of EXR channels begin with it";
+        return Some(format!("{problem}; allowed: {}", allowed_names()));
     }
     None
 }
 
-/// What the values of several parameters say together.
+/// Checks combinations of parameters.
 pub(super) fn values(scene: &Scene, root: &Table, reader: &mut Reader) {
     camera(scene, root, reader);
     lights(scene, root, reader);
@@ -113,32 +118,32 @@ pub(super) fn values(scene: &Scene, root: &Table, reader: &mut Reader) {
 }
 
 /// Reports to `reader` an error of what was built from the table at the dotted `path` of the scene `root`, at the position of its key.
-pub fn report_build_error(fault: BuildError, path: String, root: &Table, reader: &mut Reader) {
-    let place = place(root, &format!("{path}.{}", fault.key));
+pub fn report_build_error(error: BuildError, path: String, root: &Table, reader: &mut Reader) {
+    let span = nearest_span(root, &format!("{path}.{}", error.key));
     reader.within(path, |reader| {
-        reader.within(fault.key, |reader| reader.report_at(place, fault.kind));
+        reader.within(error.key, |reader| reader.report_at(span, error.kind));
     });
 }
 
-/// A camera must look somewhere.
+/// The target of the camera must differ from its position.
 fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
-    let [position, target] = [&scene.camera.position, &scene.camera.target].map(|place| place.at(0.0));
+    let [position, target] = [&scene.camera.position, &scene.camera.target].map(|point| point.at(0.0));
     if position == target {
-        let kind = ProblemKind::Conflict("lies where the camera stands; allowed: any other place".into());
-        let place = place(root, "camera.target");
-        reader.within("camera", |r| r.within("target", |r| r.report_at(place, kind)));
+        let kind = ProblemKind::Conflict("is where the camera stands; allowed: any other point".into());
+        let span = nearest_span(root, "camera.target");
+        reader.within("camera", |r| r.within("target", |r| r.report_at(span, kind)));
     }
     field_of_view(scene, root, reader);
 }
 
-/// The field of view that follows from focal length and sensor is within the same limits as one that is stated.
+/// The field of view of a focal length and a sensor has the same limits as one that is stated.
 fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     let (camera, Range { min, max }) = (&scene.camera, VERTICAL_FOV_DEG);
     if camera.lens != Lens::Perspective {
         return;
     }
     let Some([narrowest, widest]) = camera.fov_of_focal_length() else { return };
-    // The limits themselves are met but for rounding.
+    // The limits themselves are allowed, with a tolerance for rounding.
     let is_allowed = |fov: f64| (min * (1.0 - 1e-9)..=max * (1.0 + 1e-9)).contains(&fov);
     let Some(fov) = [widest, narrowest].into_iter().find(|fov| !is_allowed(*fov)) else { return };
     let sensor = camera.sensor_height_mm;
@@ -156,33 +161,33 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     );
 }
 
-/// A lamp that shines somewhere must say where to, and a spot be full within the angle at which it ends. A fullness that the file does not
-/// state ends with the spot.
+/// A directed light needs a direction, and the inner cone of a spot must not exceed its outer cone. An inner cone that the file does not state
+/// is limited to the outer one.
 fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
     for (index, light) in scene.lights.iter().enumerate() {
         let path = format!("light.{index}");
-        let fault = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
-        if light.is_directed() && !light.has_direction() {
+        let error = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
+        if light.is_directed() && !light.has_valid_direction() {
             let reason = "is no direction; allowed: any three numbers that are not all 0".to_owned();
-            report_build_error(fault("direction", reason), path.clone(), root, reader);
+            report_build_error(error("direction", reason), path.clone(), root, reader);
         }
         let stated = ValuePath::root().key("light").index(index).key("inner_cone_deg").find(root).is_some();
         if light.kind == LightKind::Spot && stated && light.inner_cone_deg > light.outer_cone_deg {
             let reason = format!(
-                "a spot that is full up to {} degrees cannot be dark beyond {}; allowed: up to `outer_cone_deg`",
+                "a spot with full intensity up to {} degrees cannot end at {}; allowed: up to `outer_cone_deg`",
                 light.inner_cone_deg, light.outer_cone_deg
             );
-            report_build_error(fault("inner_cone_deg", reason), path, root, reader);
+            report_build_error(error("inner_cone_deg", reason), path, root, reader);
         }
     }
 }
 
-/// What belongs to a plate needs one.
+/// The depth and the exposure of a plate need its image.
 fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
-        let place = place(root, "plate.depth");
+        let span = nearest_span(root, "plate.depth");
         let kind = ProblemKind::Conflict("a depth needs an `image` that it belongs to".into());
-        reader.within("plate", |r| r.within("depth", |r| r.report_at(place, kind)));
+        reader.within("plate", |r| r.within("depth", |r| r.report_at(span, kind)));
     }
     if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {
         let reason = "an exposure needs an `image` that was taken with it".to_owned();
@@ -193,24 +198,6 @@ fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
             reader,
         );
     }
-}
-
-/// Where the value at a dotted path stands, or the nearest part of it that the file states.
-pub(super) fn place(root: &Table, path: &str) -> Option<Span> {
-    let mut value = None;
-    let mut span = None;
-    for segment in path.split('.') {
-        let node = match value.unwrap_or(&Value::Bool(false)) {
-            _ if value.is_none() => root.get(segment),
-            Value::Table(table) => table.get(segment),
-            Value::List(items) => segment.parse::<usize>().ok().and_then(|index| items.get(index)),
-            _ => None,
-        };
-        let Some(node) = node else { break };
-        span = Some(node.span.clone());
-        value = Some(&node.value);
-    }
-    span
 }
 
 #[cfg(test)]

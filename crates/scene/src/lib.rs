@@ -1,9 +1,9 @@
-//! The scene file: what it may say, and a checked scene that cannot be invalid.
+//! The scene file: its text, its parameters, and [`Scene`], which is valid once it is constructed.
 
 mod check;
+mod positions;
 pub mod report;
 pub mod schema;
-mod suggest;
 mod tables;
 pub mod template;
 mod text;
@@ -24,6 +24,7 @@ use bansho_environment::ground::GroundParameters;
 
 pub use self::{
     check::{PLATE_LAYER, report_build_error},
+    positions::Positions,
     report::SceneError,
     tables::{
         defaults::ImpliedBackdrop,
@@ -31,9 +32,9 @@ pub use self::{
         plate::PlatePictures,
     },
     text::{
-        edit, operation,
+        edit::{self, operation},
+        lines::LineColumn,
         path::{Segment, ValuePath},
-        positions::Positions,
     },
 };
 use self::{tables::defaults, text::toml};
@@ -41,27 +42,27 @@ use self::{tables::defaults, text::toml};
 /// The scene format that this version reads and writes.
 pub const FORMAT: i64 = 2;
 
-/// What the TOML `text` says, with the place of every value, unchecked.
+/// Parses the TOML `text` of a scene to values with spans, without checking them.
 ///
 /// # Errors
-/// The text is not TOML; the problem says where and why.
-pub fn values(text: &str) -> Result<Table, Problem> {
+/// The text is not TOML.
+pub fn parse_values(text: &str) -> Result<Table, Problem> {
     toml::parse(text)
 }
 
-/// A shared table of the scene file: one that is not a phenomenon.
+/// A shared table of the scene file: a table that is not a phenomenon.
 pub struct SharedTable {
-    /// Its name.
+    /// Its key.
     pub key: &'static str,
-    /// Whether there may be many (`[[light]]`).
-    pub many: bool,
+    /// Whether it is a list of tables (`[[light]]`).
+    pub is_list: bool,
     /// Its parameters.
     pub table: fn() -> &'static TableDescriptor,
-    /// Makes those of a scene that are keyed repeat every so many seconds, which must come back to where they began; the first that do not.
+    /// Makes the animated parameters of a scene periodic. Returns the first one whose values at the beginning and at the end differ.
     close_loop: fn(&mut Scene, f64) -> Option<String>,
 }
 
-/// Shared tables, in the order in which a scene should state them.
+/// The shared tables in their recommended order.
 pub const SHARED_TABLES: [SharedTable; 9] = [
     shared("picture", false, PictureParameters::table, |scene, seconds| scene.picture.close_loop(seconds)),
     shared("camera", false, CameraParameters::table, |scene, seconds| scene.camera.close_loop(seconds)),
@@ -76,11 +77,11 @@ pub const SHARED_TABLES: [SharedTable; 9] = [
 
 const fn shared(
     key: &'static str,
-    many: bool,
+    is_list: bool,
     table: fn() -> &'static TableDescriptor,
     close_loop: fn(&mut Scene, f64) -> Option<String>,
 ) -> SharedTable {
-    SharedTable { key, many, table, close_loop }
+    SharedTable { key, is_list, table, close_loop }
 }
 
 /// A phenomenon of the scene.
@@ -119,49 +120,49 @@ pub struct Scene {
     pub obstacles: Vec<ObstacleParameters>,
     /// Phenomena in the order of the file.
     pub instances: Vec<Instance>,
-    /// Which of sky, ground and lights the text does not state.
+    /// Which of sky, ground and lights are implied, since the text does not state them.
     pub implied: ImpliedBackdrop,
-    /// Seed of everything random: that of `[picture]`, or another that was asked for.
+    /// Seed of all random numbers: that of `[picture]`, or of [`SceneOptions`].
     pub seed: u64,
-    /// Length of the seamless loop that it is, s: a whole number of frames.
+    /// Length of the seamless loop, a whole number of frames, s; `None` if the scene does not loop.
     pub loop_s: Option<f64>,
 }
 
-/// What may be asked of a scene beside its text.
+/// Options of a scene that are not part of its text.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SceneOptions {
-    /// Another seed.
+    /// Replaces the scene's seed.
     pub seed: Option<u64>,
-    /// A seamless loop of about so many seconds.
+    /// Makes the scene a seamless loop of this length, rounded to whole frames, s.
     pub loop_s: Option<f64>,
-    /// Whether sky, ground and lamps that the scene's text does not state are seen; they light the scene either way.
+    /// Whether the implied sky, ground and lamps are visible. They light the scene in any case.
     pub implied_backdrop: bool,
 }
 
-/// Why a scene is no loop.
+/// Why a scene cannot loop.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LoopError {
     /// A loop shorter than two frames or longer than an hour.
     #[error("a loop of {seconds} s is out of range; allowed: {min} (two frames) to 3600 s")]
     Length {
-        /// What was asked for.
+        /// The requested length.
         seconds: f64,
-        /// Two frames.
+        /// The length of two frames.
         min: f64,
     },
-    /// Something keyed does not end as it begins.
+    /// An animated parameter has different values at the beginning and at the end.
     #[error(
-        "the loop of {seconds} s jumps: {what} differs between its first and its last moment; allowed: the same at 0 s and at {seconds} s"
+        "the loop of {seconds} s jumps: {path} differs between its beginning and its end; allowed: equal values at 0 s and at {seconds} s"
     )]
-    Jumps {
+    NotSeamless {
         /// Length of the loop.
         seconds: f64,
-        /// What is keyed.
-        what: String,
+        /// Path of the parameter.
+        path: String,
     },
 }
 
-/// The nearest whole number of frames.
+/// The length of a loop, rounded to whole frames.
 fn loop_length(seconds: f64, fps: FrameRate) -> Result<f64, LoopError> {
     let min = 2.0 * fps.frame_s();
     if !(min * 0.999..=3600.0).contains(&seconds) {
@@ -172,11 +173,11 @@ fn loop_length(seconds: f64, fps: FrameRate) -> Result<f64, LoopError> {
 }
 
 impl Scene {
-    /// Reads and checks the scene `text`; `file` is what errors call it. No asset is read and nothing is built: see
+    /// Parses and checks the scene `text`; `file` is its name in messages. No asset is read and nothing is built: see
     /// `bansho_render::CompiledScene` for that.
     ///
     /// # Errors
-    /// Every fault of the text, each with its place, what is wrong and what is allowed.
+    /// All problems of the text, each with its position, what is wrong and what is allowed.
     pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind]) -> Result<Self, SceneError> {
         let fail = |Problems { listed, omitted }| SceneError {
             file: file.to_owned(),
@@ -196,11 +197,11 @@ impl Scene {
         if reader.is_clean() { Ok(scene) } else { Err(fail(reader.into_problems())) }
     }
 
-    /// The scene as a shot has it: with another seed, as a seamless loop of about so many seconds, without what its text only implies.
+    /// Applies the options: replaces the seed, closes the loop, hides the implied backdrop.
     ///
     /// # Errors
-    /// A length that no loop has, or something keyed that does not end a loop as it begins it.
-    pub fn adapted(mut self, options: &SceneOptions) -> Result<Self, LoopError> {
+    /// The length of the loop is out of range, or an animated parameter has different values at its beginning and its end.
+    pub fn with_options(mut self, options: &SceneOptions) -> Result<Self, LoopError> {
         if let Some(seed) = options.seed {
             self.seed = seed;
         }
@@ -209,21 +210,21 @@ impl Scene {
         }
         self.loop_s = options.loop_s.map(|seconds| loop_length(seconds, self.picture.fps)).transpose()?;
         let Some(seconds) = self.loop_s else { return Ok(self) };
-        let jumps =
+        let discontinuity =
             |table: &SharedTable| (table.close_loop)(&mut self, seconds).map(|rest| parameters::path(table.key, &rest));
-        match SHARED_TABLES.iter().find_map(jumps) {
-            Some(what) => Err(LoopError::Jumps { seconds, what }),
+        match SHARED_TABLES.iter().find_map(discontinuity) {
+            Some(path) => Err(LoopError::NotSeamless { seconds, path }),
             None => Ok(self),
         }
     }
 
     fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
         check::root_keys(root, kinds, reader);
-        let (completed, implied) = defaults::complete(root, kinds);
-        Self::read_completed(&completed, kinds, implied, reader).looking_up(&completed)
+        let (completed, implied) = defaults::with_defaults(root, kinds);
+        Self::read_completed(&completed, kinds, implied, reader).with_camera_toward_sky(&completed)
     }
 
-    /// Reads a scene whose defaults that depend on other values are in `root`.
+    /// Reads a scene from a `root` that includes the defaults of [`defaults::with_defaults`].
     fn read_completed(root: &Table, kinds: &[PhenomenonKind], implied: ImpliedBackdrop, reader: &mut Reader) -> Self {
         let picture: PictureParameters = read_shared(root, "picture", reader);
         Self {
@@ -243,38 +244,33 @@ impl Scene {
         }
     }
 
-    /// A camera that is not told where to look, nor stands in the setting of its phenomena, sees the sky where that is all there is.
-    fn looking_up(mut self, root: &Table) -> Self {
-        let told = |key: &str| match root.get("camera").map(|node| &node.value) {
+    /// Points a camera without position and target at the sky if all phenomena are in the sky.
+    fn with_camera_toward_sky(mut self, root: &Table) -> Self {
+        let states = |key: &str| match root.get("camera").map(|node| &node.value) {
             Some(Value::Table(camera)) => camera.get(key).is_some(),
             _ => false,
         };
         let all_in_the_sky =
             !self.instances.is_empty() && self.instances.iter().all(|instance| instance.kind.in_the_sky);
-        if all_in_the_sky && self.obstacles.is_empty() && !self.has_plate() && !told("position") && !told("target") {
+        if all_in_the_sky && self.obstacles.is_empty() && !self.has_plate() && !states("position") && !states("target")
+        {
             self.camera.look_up();
-            if !told("vertical_fov_deg") {
+            if !states("vertical_fov_deg") {
                 self.camera.vertical_fov_deg = Animated::from(SKY_FOV_DEG);
             }
         }
         self
     }
 
-    /// Where the text of a scene states a parameter of the phenomenon `name`, or the nearest part of it: one-based line and column; of its
-    /// plate where that is the name. None where it states no such phenomenon.
-    pub fn position(&self, text: &str, name: &str, key: Option<&str>) -> Option<(usize, usize)> {
-        Positions::new(self, text).of(name, key)
-    }
-
-    /// Paths of all files that the scene names, as it names them.
+    /// The paths of all files that the scene names, as they are in its text.
     pub fn asset_paths(&self) -> Vec<String> {
         let plate = [&self.plate.image, &self.plate.depth].into_iter().flatten();
-        let solids = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
-        let own = plate.chain(solids).map(|path| path.0.clone());
-        own.chain(self.instances.iter().flat_map(|instance| instance.parameters.assets())).collect()
+        let obstacles = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
+        let shared = plate.chain(obstacles).map(|path| path.0.clone());
+        shared.chain(self.instances.iter().flat_map(|instance| instance.parameters.assets())).collect()
     }
 
-    /// Leaves sky, ground and lamps that the text does not state out of the picture; sky and lamps go on to light it.
+    /// Hides the implied sky, ground and lamps; sky and lamps still light the scene.
     fn hide_implied_backdrop(&mut self) {
         if let Some(sky) = self.sky.as_mut().filter(|_| self.implied.sky) {
             sky.visible = false;
@@ -287,13 +283,13 @@ impl Scene {
         }
     }
 
-    /// Whether a sky or a ground that the text states is seen.
+    /// Whether a sky or a ground that the text states is visible.
     pub fn shows_stated_backdrop(&self) -> bool {
         let sky = self.sky.as_ref().is_some_and(|sky| sky.visible) && !self.implied.sky;
         sky || self.ground.is_some() && !self.implied.ground
     }
 
-    /// Whether phenomena lie over a plate.
+    /// Whether the phenomena are composited over a plate.
     pub fn has_plate(&self) -> bool {
         self.plate.image.is_some()
     }
@@ -311,7 +307,7 @@ fn read_shared<P: Parameters>(root: &Table, key: &'static str, reader: &mut Read
     })
 }
 
-/// The tables of a list `[[key]]`, each with its place in the list.
+/// The tables of the list `[[key]]`.
 fn tables<'a>(root: &'a Table, key: &str, reader: &mut Reader) -> Vec<&'a Table> {
     let Some(node) = root.get(key) else { return Vec::new() };
     let mut tables = Vec::new();

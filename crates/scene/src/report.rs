@@ -1,4 +1,4 @@
-//! Problems as a person reads them: file, line, the line itself, what is wrong, what is allowed.
+//! Error messages: file, line and column, the problem, what is allowed, and the line itself.
 
 use std::fmt;
 
@@ -10,30 +10,28 @@ use bansho_base::{
     parameters::{Problem, ProblemKind},
 };
 
-use super::{
-    check,
-    text::{
-        lines::{Excerpt, Lines},
-        toml,
-    },
+use super::text::{
+    lines::{Excerpt, LineColumn, Lines},
+    path::nearest_span,
+    toml,
 };
 
-/// A scene that cannot be used, with every reason why.
+/// The problems of an invalid scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub struct SceneError {
-    /// Name of the file, as the caller calls it.
+    /// Name of the file in messages.
     pub file: String,
     /// Its text.
     pub text: String,
-    /// What is wrong, in the order of the file; never empty.
+    /// The problems in the order of the file; never empty.
     pub problems: Vec<Problem>,
-    /// How many problems there are beyond those: the first [`MAX_PROBLEMS`](bansho_base::parameters::MAX_PROBLEMS) are kept.
+    /// Number of further problems: only the first [`MAX_PROBLEMS`](bansho_base::parameters::MAX_PROBLEMS) are listed.
     pub omitted: usize,
 }
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, message) in self.faults().chain(self.more()).enumerate() {
+        for (index, message) in self.messages().chain(self.omitted_message()).enumerate() {
             write!(f, "{}{message}", if index > 0 { "\n\n" } else { "" })?;
         }
         Ok(())
@@ -41,26 +39,26 @@ impl fmt::Display for SceneError {
 }
 
 impl SceneError {
-    /// One fault of what stands at the dotted `path` of a text, or of the nearest part of it that the text states.
+    /// One problem at the dotted `path` of a text, or at the nearest table above it that the text contains.
     pub fn at(file: &str, text: &str, path: &str, kind: ProblemKind) -> Self {
-        let span = toml::parse(text).ok().and_then(|root| check::place(&root, path));
+        let span = toml::parse(text).ok().and_then(|root| nearest_span(&root, path));
         let problem = Problem { span, path: path.to_owned(), kind };
         Self { file: file.to_owned(), text: text.to_owned(), problems: vec![problem], omitted: 0 }
     }
 
-    /// Each fault that is listed, as a person reads it.
-    pub fn faults(&self) -> impl Iterator<Item = String> + '_ {
+    /// The message of each listed problem.
+    pub fn messages(&self) -> impl Iterator<Item = String> + '_ {
         let mut lines = Lines::new(&self.text);
         self.problems.iter().map(move |problem| self.message(problem, &mut lines))
     }
 
-    /// How many more faults there are than those that are listed, if there are more.
-    pub fn more(&self) -> Option<String> {
-        (self.omitted > 0).then(|| format!("{}: and {}", printable(&self.file), counted(self.omitted, "more fault")))
+    /// The message with the number of problems that are not listed, if there are any.
+    pub fn omitted_message(&self) -> Option<String> {
+        (self.omitted > 0).then(|| format!("{}: and {}", printable(&self.file), counted(self.omitted, "more problem")))
     }
 
-    /// One-based line and column (in characters) of a byte of the text.
-    pub fn position(&self, byte: usize) -> (usize, usize) {
+    /// Line and column of a byte of the text.
+    pub fn position(&self, byte: usize) -> LineColumn {
         Lines::new(&self.text).position(byte)
     }
 
@@ -70,12 +68,13 @@ impl SceneError {
         let Some(span) = &problem.span else {
             return format!("{file}: {message}");
         };
-        let (line, column) = lines.position(span.start);
-        let Excerpt { shown, before, marked } = lines.excerpt(span.clone());
+        let position = lines.position(span.start);
+        let Excerpt { text, before, marked } = lines.excerpt(span.clone());
+        let line = position.line;
         let gutter = " ".repeat(line.to_string().len());
         let (before, marked) = (" ".repeat(before), "^".repeat(marked));
-        let shown = with_control_pictures(&shown);
-        format!("{file}:{line}:{column}: {message}\n{gutter} |\n{line} | {shown}\n{gutter} | {before}{marked}")
+        let text = with_control_pictures(&text);
+        format!("{file}:{position}: {message}\n{gutter} |\n{line} | {text}\n{gutter} | {before}{marked}")
     }
 }
 
@@ -115,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_in_a_scene_steers_a_terminal_or_looks_like_another_error() {
+    fn control_characters_and_line_breaks_are_escaped() {
         let problem = Problem {
             span: Some(4..9),
             path: String::new(),
@@ -128,10 +127,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_listed_is_counted() {
+    fn problems_that_are_not_listed_are_counted() {
         let problem = Problem { span: None, path: "a".into(), kind: ProblemKind::Syntax("oops".into()) };
         let error = SceneError { file: "x".into(), text: String::new(), problems: vec![problem], omitted: 3 };
-        assert_eq!(error.to_string(), "x: a: oops\n\nx: and 3 more faults");
-        assert_eq!((error.faults().count(), error.more().as_deref()), (1, Some("x: and 3 more faults")));
+        assert_eq!(error.to_string(), "x: a: oops\n\nx: and 3 more problems");
+        assert_eq!((error.messages().count(), error.omitted_message().as_deref()), (1, Some("x: and 3 more problems")));
     }
 }

@@ -1,17 +1,17 @@
-//! A JSON schema of the scene file, for editors that complete and check while one types.
+//! The JSON schema of scene files, with which text editors complete keys and check values.
 
 use bansho_base::parameters::{Descriptor, Kind, TableDescriptor, Value};
 use serde_json::{Value as Json, json};
 
 use super::{FORMAT, PhenomenonKind, SHARED_TABLES};
 
-/// The schema (JSON Schema 2020-12) of scene files with these kinds of phenomena.
+/// The schema (JSON Schema 2020-12) of scene files for these kinds of phenomena.
 pub fn schema(kinds: &[PhenomenonKind]) -> Json {
     let mut properties = serde_json::Map::new();
     properties.insert("bansho".into(), json!({ "description": "Format version.", "const": FORMAT }));
     for shared in &SHARED_TABLES {
         let table = table((shared.table)(), false);
-        properties.insert(shared.key.into(), if shared.many { list_of(table) } else { table });
+        properties.insert(shared.key.into(), if shared.is_list { list_of(table) } else { table });
     }
     for kind in kinds {
         properties.insert(kind.key.into(), list_of(table((kind.table)(), true)));
@@ -30,9 +30,9 @@ fn list_of(item: Json) -> Json {
     json!({ "type": "array", "items": item })
 }
 
-fn table(descriptor: &TableDescriptor, phenomenon: bool) -> Json {
+fn table(descriptor: &TableDescriptor, is_phenomenon: bool) -> Json {
     let mut properties = serde_json::Map::new();
-    if phenomenon {
+    if is_phenomenon {
         properties.insert("name".into(), json!({ "type": "string", "description": "Unique name; names its layers." }));
         properties.insert("enabled".into(), json!({ "type": "boolean", "default": true }));
     }

@@ -1,23 +1,24 @@
-//! New scenes: short ones, of what is changed first, and ones of every parameter with its unit and what it is for, stated where the
-//! phenomenon is seen the better for it, and else a comment with its default, ready to be uncommented. Both draw the same picture.
+//! New scenes (`bansho new`): short ones with the parameters that users change first, and complete ones with every parameter, its purpose and
+//! its unit. In complete ones, parameters with other values than their defaults are stated; the others are comments with the default. Both
+//! draw the same picture.
 
 use bansho_base::parameters::{Descriptor, Kind, Table, TableDescriptor, Value};
 
 use super::{FORMAT, PhenomenonKind, SHARED_TABLES, SharedTable, text::toml};
 
-/// Shared tables that a scene need not have, and has only where the phenomenon's setting does.
+/// Optional shared tables, which a new scene only has if the phenomenon's setting has them.
 const OPTIONAL: [&str; 5] = ["plate", "sky", "ground", "light", "obstacle"];
 
-/// What is changed first in shared tables, beside what a setting states.
+/// Parameters of shared tables that users change first, in addition to those of the setting.
 const FIRST_SHARED: [(&str, &[&str]); 3] = [
     ("picture", &["size", "frames", "fps"]),
     ("camera", &["position", "target", "vertical_fov_deg"]),
     ("wind", &["velocity", "gust"]),
 ];
 
-/// A short scene with one phenomenon of `kind` in its setting: what one changes first, each with a brief comment.
+/// A short scene with one phenomenon of `kind` in its setting: the parameters that users change first, each with a brief comment.
 pub fn short(kind: &PhenomenonKind) -> String {
-    // A test holds that settings can be read.
+    // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
     let (several, others): (Vec<&SharedTable>, Vec<&SharedTable>) =
@@ -27,10 +28,11 @@ pub fn short(kind: &PhenomenonKind) -> String {
     for shared in others {
         let first = FIRST_SHARED.iter().find(|(key, _)| *key == shared.key).map_or(&[][..], |(_, keys)| keys);
         let stated = tables(&setting, shared.key);
-        let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-        let nothing = Table::default();
-        let usual = (stated.is_empty() && !first.is_empty()).then_some(&nothing);
-        for stated in stated.into_iter().chain(usual) {
+        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let empty = Table::default();
+        // A table with keys to change first is written even if the setting does not have it.
+        let unstated = (stated.is_empty() && !first.is_empty()).then_some(&empty);
+        for stated in stated.into_iter().chain(unstated) {
             brief_table(&mut text, &header, (shared.table)(), stated, first);
         }
     }
@@ -39,10 +41,10 @@ pub fn short(kind: &PhenomenonKind) -> String {
     text
 }
 
-/// Several tables of one kind, each on a line.
+/// A list of tables, one on each line.
 fn brief_list(text: &mut String, shared: &SharedTable, tables: &[&Table]) {
     text.push('\n');
-    comment(text, &format!("{} More of them can be added here.", (shared.table)().doc));
+    comment(text, &format!("{} More can be added here.", (shared.table)().doc));
     text.push_str(&format!("{} = [\n", shared.key));
     tables.iter().for_each(|table| text.push_str(&format!("    {},\n", Value::Table((*table).clone()))));
     text.push_str("]\n");
@@ -55,12 +57,13 @@ struct Line {
     comment: String,
 }
 
-/// A table with what it states and the `first` keys of it, then those of its lists that have first keys with one item each.
+/// A table with its `stated` values and its `first` keys, then its lists that have `first` keys, with one item each.
 fn brief_table(text: &mut String, header: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&str]) {
-    /// Longest assignment whose comment stands in the others' column.
-    const COLUMN: usize = 44;
+    /// Longest assignment whose comment is aligned with the others.
+    const MAX_ALIGNED: usize = 44;
     let lines = lines("", descriptor, stated, first);
-    let width = lines.iter().map(|line| line.assignment.len()).filter(|&length| length <= COLUMN).max().unwrap_or(0);
+    let width =
+        lines.iter().map(|line| line.assignment.len()).filter(|&length| length <= MAX_ALIGNED).max().unwrap_or(0);
     text.push_str(&format!("\n{header}\n"));
     lines.iter().for_each(|line| text.push_str(&format!("{:width$}   # {}\n", line.assignment, line.comment)));
     for parameter in descriptor.parameters.iter().filter(|parameter| stated.get(parameter.key).is_none()) {
@@ -75,17 +78,17 @@ fn brief_table(text: &mut String, header: &str, descriptor: &TableDescriptor, st
     }
 }
 
-/// What is stated in a table, and the `first` keys of it, tables within it too.
+/// The `stated` values and the `first` keys of a table and of its inner tables.
 fn lines(prefix: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&str]) -> Vec<Line> {
     let mut all = Vec::new();
     for parameter in &descriptor.parameters {
         let path = format!("{prefix}{}", parameter.key);
-        let own = stated.get(parameter.key).map(|node| &node.value);
+        let value = stated.get(parameter.key).map(|node| &node.value);
         if let Kind::Table(inner) = &parameter.kind {
-            let nothing = Table::default();
-            let own = if let Some(Value::Table(own)) = own { own } else { &nothing };
-            all.extend(lines(&format!("{path}."), inner(), own, first));
-        } else if let Some(value) = own.or(parameter.default.as_ref().filter(|_| first.contains(&path.as_str()))) {
+            let empty = Table::default();
+            let stated = if let Some(Value::Table(table)) = value { table } else { &empty };
+            all.extend(lines(&format!("{path}."), inner(), stated, first));
+        } else if let Some(value) = value.or(parameter.default.as_ref().filter(|_| first.contains(&path.as_str()))) {
             let assignment = format!("{path} = {value}");
             all.push(Line { comment: brief(parameter, assignment.len()), assignment });
         }
@@ -93,7 +96,8 @@ fn lines(prefix: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&s
     all
 }
 
-/// The first sentence of what is said of a parameter, or its beginning where that would make a long line after so many characters, and the unit.
+/// The first sentence of a parameter's documentation and its unit. If the line, which has `after` characters before the comment, becomes too
+/// long, the sentence is cut at its first colon or semicolon.
 fn brief(parameter: &Descriptor, after: usize) -> String {
     const WIDTH: usize = 110;
     let doc = parameter.doc.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -107,9 +111,9 @@ fn brief(parameter: &Descriptor, after: usize) -> String {
     format!("{sentence}{unit}")
 }
 
-/// A scene with one phenomenon of `kind` in its setting, each parameter explained in a comment.
+/// A complete scene with one phenomenon of `kind` in its setting, with a comment for each parameter.
 pub fn commented(kind: &PhenomenonKind) -> String {
-    // A test holds that settings can be read.
+    // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
     for shared in SHARED_TABLES {
@@ -118,7 +122,7 @@ pub fn commented(kind: &PhenomenonKind) -> String {
             table(&mut text, &format!("[{}]", shared.key), (shared.table)(), &Table::default());
         }
         for stated in stated {
-            let header = if shared.many { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+            let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
             table(&mut text, &header, (shared.table)(), stated);
         }
     }
@@ -127,7 +131,7 @@ pub fn commented(kind: &PhenomenonKind) -> String {
     text
 }
 
-/// The table or tables that are stated under a key.
+/// The table or the tables of a key.
 fn tables<'a>(setting: &'a Table, key: &str) -> Vec<&'a Table> {
     match setting.get(key).map(|node| &node.value) {
         Some(Value::Table(table)) => vec![table],
@@ -152,12 +156,12 @@ fn parameters(text: &mut String, prefix: &str, descriptor: &TableDescriptor, sta
         text.push('\n');
         comment(text, &explanation(parameter));
         let key = parameter.key;
-        let own = stated.get(key).map(|node| &node.value);
-        match (&parameter.kind, own, &parameter.default) {
-            (Kind::Table(inner), own, _) => {
-                let nothing = Table::default();
-                let own = if let Some(Value::Table(own)) = own { own } else { &nothing };
-                parameters(text, &format!("{prefix}{key}."), inner(), own);
+        let value = stated.get(key).map(|node| &node.value);
+        match (&parameter.kind, value, &parameter.default) {
+            (Kind::Table(inner), value, _) => {
+                let empty = Table::default();
+                let stated = if let Some(Value::Table(table)) = value { table } else { &empty };
+                parameters(text, &format!("{prefix}{key}."), inner(), stated);
             }
             (_, Some(value), _) => text.push_str(&format!("{prefix}{key} = {value}\n")),
             (_, None, Some(default)) => text.push_str(&format!("# {prefix}{key} = {default}\n")),

@@ -1,19 +1,20 @@
 //! A slab of fog before the camera: Beer's law, and light scattered toward the camera.
 //!
-//! The smallest complete phenomenon. What it needs, in the order in which a scene meets it:
+//! The smallest complete phenomenon. Its parts, in the order of their use:
 //!
 //! 1. **Parameters** ([`AbsorberParameters`]): the table of keys with defaults, limits and units. Reading, checking, error messages, the
 //!    schema and `--set` derive from it.
 //! 2. **[`Describe`]**: the key of the table in scene files, and [`Describe::build`], which makes the phenomenon and reports parameters
 //!    that contradict each other, each by its key.
-//! 3. **[`Phenomenon`]**: what is built once and shared. It states its name and AOVs, the luminance that automatic exposure needs, and
-//!    starts runs. Here nothing changes over time, so that a run is the phenomenon itself. What is simulated returns a state of its
-//!    own, which also implements `Stepped`.
-//! 4. **[`Run`]**: what others see of it ([`Publication`]: lights, extinction, obstacles), which depths it fills, and `prepare` for a frame.
-//! 5. **[`Prepared`]**: draws strips of pixels, in any order, on any thread. A pixel must get the same value in whatever strip it comes.
+//! 3. **[`Phenomenon`]**: built once, immutable and shared. It states its name and AOVs and the luminance for automatic exposure, and starts
+//!    runs. Here nothing changes over time, so a run is the phenomenon itself. A simulated phenomenon returns a state of its own, which also
+//!    implements `Stepped`.
+//! 4. **[`Run`]**: what it publishes to other phenomena ([`Publication`]: lights, extinction, obstacles), its depth intervals, and `prepare` for a
+//!    frame.
+//! 5. **[`Prepared`]**: draws strips of pixels, in any order, on any thread. The value of a pixel must not depend on its strip.
 //!
-//! Random numbers, where they are needed, come from `base::math::random::Key`, which is made of seed and name, never from a state that
-//! drawing changes: the same scene then gives the same bytes on any number of threads.
+//! Random numbers come from `base::math::random::Key`, which is made from seed and name, and not from a mutable state: the same scene then
+//! gives the same bytes with any number of threads.
 
 use std::sync::Arc;
 
@@ -33,9 +34,9 @@ use bansho::base::{
 bansho::base::parameters! {
     /// A slab of fog across the whole picture.
     pub struct AbsorberParameters {
-        /// Where it begins.
+        /// Distance of its front.
         near: f64 = 1.0, limits(Range::new(0.01, 1000.0)), unit("m");
-        /// Where it ends.
+        /// Distance of its back.
         far: f64 = 3.0, limits(Range::new(0.02, 1000.0)), unit("m");
         /// Extinction of red, green and blue.
         extinction: [f64; 3] = [0.5, 0.5, 0.5], limits(Range::new(0.0, 100.0)), unit("1/m");

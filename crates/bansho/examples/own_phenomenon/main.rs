@@ -1,7 +1,7 @@
-//! A phenomenon of one's own beside Bansho's: a slab of fog in front of a flame.
+//! A custom phenomenon together with one of Bansho: a slab of fog in front of a flame.
 //!
 //! `cargo run --release -p bansho --example own_phenomenon` prints the luminance of the flame with and without the fog. The phenomenon
-//! itself is in `absorber.rs`, whose documentation says what each part is for.
+//! itself is in `absorber.rs`, whose documentation describes all parts.
 
 mod absorber;
 

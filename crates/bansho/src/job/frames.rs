@@ -1,22 +1,23 @@
-//! Frame specifications as render farms write them: `0-239`, `0-239x10`, `1-9:2`, `17`, `-3-5`, `1-5,9`: read, and written for people.
+//! Parses lists of frames in the notation of render farms (`0-239`, `0-239x10`, `1-9:2`, `17`, `-3-5`, `1-5,9`), and formats such lists for
+//! messages.
 
-/// Most frames that one specification may name.
-pub const MOST_FRAMES: i64 = 10_000_000;
+/// Maximum number of frames of a list.
+pub const MAX_FRAMES: i64 = 10_000_000;
 
-/// A specification that means nothing.
+/// A list of frames that is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{part}` {fault}; allowed: 17, 0-239, 0-239x10 or 0-239:10 (every tenth), and lists such as 1-5,9")]
-pub struct FrameSpecError {
-    /// The part at fault.
-    pub part: String,
+#[error("`{range}` {kind}; allowed: 17, 0-239, 0-239x10 or 0-239:10 (every tenth), and lists such as 1-5,9")]
+pub struct FrameListError {
+    /// The invalid range.
+    pub range: String,
     /// What is wrong with it.
-    pub fault: FrameSpecFault,
+    pub kind: FrameListErrorKind,
 }
 
-/// What can be wrong with a part of a specification.
+/// What is wrong with a range of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FrameSpecFault {
-    /// It is not of the form of a range.
+pub enum FrameListErrorKind {
+    /// It does not have the form of a range.
     #[error("is no frame or range of frames")]
     Form,
     /// Its first frame comes after its last.
@@ -25,28 +26,28 @@ pub enum FrameSpecFault {
     /// Its step is zero.
     #[error("has a step of zero")]
     ZeroStep,
-    /// It names more frames than any shot has.
-    #[error("names more than {MOST_FRAMES} frames")]
+    /// The list has more frames than any shot.
+    #[error("makes more than {MAX_FRAMES} frames")]
     TooMany,
 }
 
-/// The frames that `spec` names, ascending, each once.
+/// The frames of the list `text`, ascending, each once.
 ///
 /// # Errors
-/// A part is no range, runs backward, has no step, or names too many frames.
-pub fn parse(spec: &str) -> Result<Vec<i64>, FrameSpecError> {
+/// A range is malformed, runs backward, or has a step of zero, or there are too many frames.
+pub fn parse(text: &str) -> Result<Vec<i64>, FrameListError> {
     let mut frames = Vec::new();
-    for part in spec.split(',') {
-        let fail = |fault| FrameSpecError { part: part.trim().to_owned(), fault };
-        let [first, last, step] = parse_part(part.trim()).ok_or(fail(FrameSpecFault::Form))?;
+    for range in text.split(',') {
+        let fail = |kind| FrameListError { range: range.trim().to_owned(), kind };
+        let FrameRange { first, last, step } = parse_range(range.trim()).ok_or(fail(FrameListErrorKind::Form))?;
         if first > last {
-            return Err(fail(FrameSpecFault::Backward));
+            return Err(fail(FrameListErrorKind::Backward));
         }
         if step == 0 {
-            return Err(fail(FrameSpecFault::ZeroStep));
+            return Err(fail(FrameListErrorKind::ZeroStep));
         }
-        if (last - first) / step + frames.len() as i64 >= MOST_FRAMES {
-            return Err(fail(FrameSpecFault::TooMany));
+        if (last - first) / step + frames.len() as i64 >= MAX_FRAMES {
+            return Err(fail(FrameListErrorKind::TooMany));
         }
         frames.extend((first..=last).step_by(step as usize));
     }
@@ -55,20 +56,26 @@ pub fn parse(spec: &str) -> Result<Vec<i64>, FrameSpecError> {
     Ok(frames)
 }
 
-/// First frame, last frame and step.
-fn parse_part(part: &str) -> Option<[i64; 3]> {
-    let (range, step) = match part.split_once(['x', ':']) {
+/// Every `step`-th frame from `first` to `last`.
+struct FrameRange {
+    first: i64,
+    last: i64,
+    step: i64,
+}
+
+fn parse_range(text: &str) -> Option<FrameRange> {
+    let (range, step) = match text.split_once(['x', ':']) {
         Some((range, step)) => (range, number(step)?),
-        None => (part, 1),
+        None => (text, 1),
     };
-    // A dash at the very front is a sign; the next one that follows a digit separates.
+    // A dash at the beginning is a sign; the first one that follows a digit separates the two numbers.
     let separator = range.char_indices().skip(1).find(|(at, c)| *c == '-' && range.as_bytes()[at - 1].is_ascii_digit());
     let (first, last) = match separator {
         Some((at, _)) => (signed(&range[..at])?, signed(&range[at + 1..])?),
-        None if part.contains(['x', ':']) => return None,
+        None if text.contains(['x', ':']) => return None,
         None => (signed(range)?, signed(range)?),
     };
-    Some([first, last, step])
+    Some(FrameRange { first, last, step })
 }
 
 fn number(text: &str) -> Option<i64> {
@@ -84,20 +91,20 @@ fn signed(text: &str) -> Option<i64> {
     }
 }
 
-/// The most ranges that [`ranges`] lists.
-const MOST_RANGES: usize = 100;
+/// Maximum number of ranges that [`format_ranges`] lists.
+const MAX_LISTED_RANGES: usize = 100;
 
-/// `3-14, 20` for ascending numbers; what comes after a hundred ranges is counted.
-pub(crate) fn ranges(numbers: &[i64]) -> String {
+/// `3-14, 20` for ascending numbers. After a hundred ranges, the remaining frames are counted.
+pub(crate) fn format_ranges(numbers: &[i64]) -> String {
     let mut runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
-    let shown: Vec<String> = runs.by_ref().take(MOST_RANGES).map(range).collect();
+    let shown: Vec<String> = runs.by_ref().take(MAX_LISTED_RANGES).map(format_range).collect();
     match runs.map(<[i64]>::len).sum() {
         0 => shown.join(", "),
         others => format!("{} and {others} more", shown.join(", ")),
     }
 }
 
-fn range(run: &[i64]) -> String {
+fn format_range(run: &[i64]) -> String {
     match run {
         [first, .., last] => format!("{first}-{last}"),
         run => run.iter().map(i64::to_string).collect(),
@@ -109,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_form_of_the_design_is_read() {
+    fn every_form_is_parsed() {
         assert_eq!(parse("17").unwrap(), [17]);
         assert_eq!(parse("0-3").unwrap(), [0, 1, 2, 3]);
         assert_eq!(parse("0-39x10").unwrap(), [0, 10, 20, 30]);
@@ -121,24 +128,24 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_with_the_part_at_fault() {
-        for (spec, part, fault) in [
-            ("9-1", "9-1", FrameSpecFault::Backward),
-            ("1-5,x", "x", FrameSpecFault::Form),
-            ("", "", FrameSpecFault::Form),
-            ("1-", "1-", FrameSpecFault::Form),
-            ("1-9x0", "1-9x0", FrameSpecFault::ZeroStep),
-            ("3x2", "3x2", FrameSpecFault::Form),
-            ("0-99999999999", "0-99999999999", FrameSpecFault::TooMany),
-            ("99999999999999999999", "99999999999999999999", FrameSpecFault::Form),
-            ("é-ü", "é-ü", FrameSpecFault::Form),
+    fn invalid_lists_are_refused_with_the_invalid_range() {
+        for (text, range, kind) in [
+            ("9-1", "9-1", FrameListErrorKind::Backward),
+            ("1-5,x", "x", FrameListErrorKind::Form),
+            ("", "", FrameListErrorKind::Form),
+            ("1-", "1-", FrameListErrorKind::Form),
+            ("1-9x0", "1-9x0", FrameListErrorKind::ZeroStep),
+            ("3x2", "3x2", FrameListErrorKind::Form),
+            ("0-99999999999", "0-99999999999", FrameListErrorKind::TooMany),
+            ("99999999999999999999", "99999999999999999999", FrameListErrorKind::Form),
+            ("é-ü", "é-ü", FrameListErrorKind::Form),
         ] {
-            assert_eq!(parse(spec).unwrap_err(), FrameSpecError { part: part.into(), fault }, "{spec}");
+            assert_eq!(parse(text).unwrap_err(), FrameListError { range: range.into(), kind }, "{text}");
         }
     }
 
     #[test]
-    fn runs_are_drawn_together_and_long_lists_end() {
+    fn consecutive_frames_become_ranges_and_long_lists_are_cut() {
         let many: Vec<i64> = (0..250).map(|number| 2 * number).collect();
         for (numbers, expected) in [
             (&[][..], ""),
@@ -146,8 +153,8 @@ mod tests {
             (&[-3, -2, -1, 0, 4, 6, 7], "-3-0, 4, 6-7"),
             (&[i64::MAX - 1, i64::MAX], "9223372036854775806-9223372036854775807"),
         ] {
-            assert_eq!(ranges(numbers), expected);
+            assert_eq!(format_ranges(numbers), expected);
         }
-        assert!(ranges(&many).ends_with(", 196, 198 and 150 more"));
+        assert!(format_ranges(&many).ends_with(", 196, 198 and 150 more"));
     }
 }

@@ -1,9 +1,9 @@
 //! From a scene file to pictures on disk: what `bansho render`, `bansho flipbook`, `bansho simulate` and `bansho streaks` do,
 //! for any program.
 //!
-//! [`Job`] says what is wanted; [`Job::prepare`] checks all of it and writes nothing; [`PreparedJob::run`] draws each
-//! frame while those before are compressed and written by whichever thread of the caller's rayon pool is free. A few
-//! frames are in memory at once, however many there are. Every file is whole or not there at all.
+//! [`Job`] contains the options; [`Job::prepare`] checks all of them and writes nothing; [`PreparedJob::run`] draws each frame while the
+//! threads of the caller's rayon pool compress and write earlier ones. The number of frames in memory is bounded, however long the shot
+//! is. Files are written atomically: each is complete or does not exist.
 
 mod checks;
 mod error;
@@ -11,9 +11,10 @@ mod export;
 mod flipbook;
 pub mod frames;
 mod observer;
+mod pipeline;
 mod render;
 mod scene_file;
-mod snapshots;
+mod sheet;
 #[cfg(feature = "rain")]
 mod streaks;
 #[cfg(test)]
@@ -27,65 +28,68 @@ use bansho_base::{
 };
 use bansho_render::display::BitDepth;
 
-pub use error::{Cause, Channels, Conflict, JobError, SheetKind};
+pub use error::{ChannelKind, ErrorCategory, JobError, OptionError, SheetKind};
+#[cfg(feature = "rain")]
+pub use error::{StreakList, StreaksError};
 pub use export::point_clouds::{PreparedSimulation, Simulate};
-pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook, contact_sheet::ContactBackground};
-pub use observer::{FrameDone, JobObserver, Note, Outline, Spot};
+pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook};
+pub use observer::{FilePosition, FrameDone, JobObserver, JobStarted, Warning};
 pub use render::{
     Summary,
+    contact_sheet::ContactBackground,
     prepare::{PreparedJob, check_scene, remarks},
 };
-pub use scene_file::{SCENE_BYTES, SceneFile};
+pub use scene_file::{MAX_SCENE_BYTES, SceneFile};
 #[cfg(feature = "rain")]
-pub use streaks::{ListKind, PreparedStreaks, StreakFormat, Streaks, StreaksError};
+pub use streaks::{PreparedStreaks, StreakFormat, Streaks};
 
-/// What is to be drawn, and where it goes. Begin with [`Job::new`], which takes everything from the scene.
+/// Renders a scene to files. Create it with [`Job::new`], which takes everything from the scene.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// The scene.
     pub scene: SceneFile,
-    /// Frame numbers, ascending; the whole shot (or one turn of the loop) when left out.
+    /// Frame numbers, ascending; `None` for the whole shot, or for one pass through the loop.
     pub frames: Option<Vec<i64>>,
-    /// Another picture size than the scene's, pixels.
+    /// Replaces the scene's picture size, pixels.
     pub size: Option<[usize; 2]>,
-    /// Only this part of the picture, identical to the same part of the whole.
+    /// Draws only this rectangle of the picture, with the same pixels as in the whole picture.
     pub crop: Option<Rect>,
-    /// Another seed than the scene's.
+    /// Replaces the scene's seed.
     pub seed: Option<u64>,
-    /// A seamless loop of about so many seconds.
+    /// Makes a seamless loop of this length, rounded to whole frames, s.
     pub loop_s: Option<f64>,
-    /// Whether the sky, ground and lamps that the scene does not state are left out of the picture, so that it keeps its alpha.
+    /// Whether the implied backdrop (sky, ground and lamps that the scene does not state) is invisible, so that the picture keeps its alpha.
     pub transparent: bool,
-    /// Whether each phenomenon gets a layer of its own (EXR).
+    /// Whether each phenomenon is written as a layer (EXR).
     pub layers: bool,
-    /// Whether phenomena write temperature, motion and the like (EXR).
+    /// Whether AOVs such as temperature and motion are written (EXR).
     pub aovs: bool,
-    /// Whether a JSON file beside each picture tells the figures of its frame (PNG and EXR).
-    pub figures: bool,
-    /// How display formats show the light.
+    /// Whether a JSON file with the metadata of the frame is written beside each picture (PNG and EXR).
+    pub metadata: bool,
+    /// The view transform of display formats.
     pub view: View,
-    /// Bits of each channel, where the format has a choice.
+    /// Bits of each channel, where the format supports both depths.
     pub bits: BitDepth,
-    /// What straight alpha is made for; left out it is [`AlphaConvention::Encoded`], but linear for the view `raw`, which encodes nothing.
+    /// Convention of straight alpha. `None` is [`AlphaConvention::Encoded`], but linear for the view `raw`, which encodes nothing.
     pub alpha: Option<AlphaConvention>,
-    /// Where frames go, such as `shot/frame.####.exr` or `fire.mp4`; `out/STEM/STEM.####.png` when left out.
+    /// The output, such as `shot/frame.####.exr` or `fire.mp4`; `None` is `out/STEM/STEM.####.png`.
     pub out: Option<PathBuf>,
-    /// One picture of so many frames: the first of several `frames`, or consecutive ones from a single frame on.
+    /// Draws this number of frames into one picture: the first of several `frames`, or consecutive ones from a single frame on.
     pub contact_sheet: Option<usize>,
-    /// What the frames of that picture are laid over.
+    /// Background of the frames of a contact sheet.
     pub contact_background: ContactBackground,
-    /// Whether whole frames of this very job that are there already stay.
+    /// Whether existing complete frames of this job are kept.
     pub resume: bool,
-    /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
+    /// Whether files that Bansho did not make may be overwritten. Files that the scene is read from never are.
     pub overwrite: bool,
-    /// Folder of snapshots of what is simulated in steps.
+    /// Folder of snapshots of phenomena that are simulated in steps.
     pub snapshots: Option<PathBuf>,
-    /// Frames between snapshots; a second's worth when left out.
+    /// Frames between snapshots; `None` for one snapshot a second.
     pub snapshot_every: Option<u64>,
 }
 
 impl Job {
-    /// All frames of `scene` as it is, to PNG files.
+    /// Writes all frames of `scene` to PNG files.
     pub fn new(scene: SceneFile) -> Self {
         Self {
             scene,
@@ -97,7 +101,7 @@ impl Job {
             transparent: false,
             layers: false,
             aovs: false,
-            figures: false,
+            metadata: false,
             view: View::DISPLAY,
             bits: BitDepth::Eight,
             alpha: None,

@@ -1,4 +1,4 @@
-//! What a job tells its caller on the way.
+//! What a job reports to its caller while it runs.
 
 use std::path::PathBuf;
 
@@ -11,29 +11,30 @@ use bansho_base::{
 };
 use bansho_media::format::OutputKind;
 use bansho_render::RenderError;
+use bansho_scene::LineColumn;
 
-/// Watches a job. Called from several threads.
+/// Observes a job. Its methods are called from several threads.
 pub trait JobObserver: Observer {
-    /// The work is about to begin.
-    fn started(&self, _outline: &Outline) {}
+    /// The job begins.
+    fn started(&self, _started: &JobStarted) {}
 
-    /// A frame is whole where it belongs. Frames may be finished in another order than that of their numbers.
+    /// A frame is complete in its file. Frames may be finished in another order than that of their numbers.
     fn frame_done(&self, _frame: &FrameDone) {}
 
-    /// Something that the user should know and that stops nothing.
-    fn note(&self, _note: &Note) {}
+    /// Something that the user should know; the job continues.
+    fn warning(&self, _warning: &Warning) {}
 }
 
 impl JobObserver for Unobserved {}
 
 /// What a job is about to do.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
-    /// Frames that were asked for.
-    pub total: usize,
-    /// Frames that are there already and stay as they are.
+pub struct JobStarted {
+    /// Number of frames, those that are kept included.
+    pub frames: usize,
+    /// Number of frames that exist already and are kept.
     pub kept: usize,
-    /// Size of each, pixels.
+    /// Size of each frame, pixels.
     pub size: [usize; 2],
 }
 
@@ -42,37 +43,37 @@ pub struct Outline {
 pub struct FrameDone {
     /// Its number.
     pub number: i64,
-    /// The file it is in; `None` where many frames share one.
+    /// Its file; `None` where one file contains many frames.
     pub path: Option<PathBuf>,
-    /// Frames drawn and written so far, this one too.
+    /// Number of frames drawn and written so far, including this one.
     pub drawn: usize,
 }
 
-/// A place in a scene file.
+/// A position in a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Spot {
-    /// What errors call the file.
+pub struct FilePosition {
+    /// The name of the file in messages.
     pub file: String,
-    /// One-based line and column (in characters).
-    pub position: (usize, usize),
+    /// Line and column in it.
+    pub position: LineColumn,
 }
 
-fn at(place: &Option<Spot>) -> String {
-    let shown = |spot: &Spot| format!("{}:{}:{}: ", spot.file, spot.position.0, spot.position.1);
-    place.as_ref().map(shown).unwrap_or_default()
+/// The position before a message, with a colon.
+fn prefix(position: &Option<FilePosition>) -> String {
+    position.as_ref().map(|FilePosition { file, position }| format!("{file}:{position}: ")).unwrap_or_default()
 }
 
-/// So many frames lie somewhere.
-fn lie(count: usize) -> String {
-    format!("{} {}", counted(count, "frame"), if count == 1 { "lies" } else { "lie" })
+/// `1 frame is` or `2 frames are`.
+fn frames_are(count: usize) -> String {
+    format!("{} {}", counted(count, "frame"), if count == 1 { "is" } else { "are" })
 }
 
-/// Something that the user should know and that stops nothing.
+/// Something that the user should know and that does not stop the job.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Note {
-    /// Frames beyond those of the scene.
-    #[error("{} outside the scene's own, {first} to {last}; drawn as if the scene went on", lie(*.count))]
+pub enum Warning {
+    /// Frames outside the scene's range.
+    #[error("{} outside the scene's range, {first} to {last}; the scene is continued there", frames_are(*.count))]
     OutsideScene {
         /// How many.
         count: usize,
@@ -81,8 +82,8 @@ pub enum Note {
         /// Its last.
         last: i64,
     },
-    /// Frames beyond one turn of a loop.
-    #[error("{} outside the loop's own, {first} to {last}; the loop is repeated", lie(*.count))]
+    /// Frames outside one pass through the loop.
+    #[error("{} outside the loop's range, {first} to {last}; the loop is repeated there", frames_are(*.count))]
     OutsideLoop {
         /// How many.
         count: usize,
@@ -91,62 +92,60 @@ pub enum Note {
         /// Its last.
         last: i64,
     },
-    /// 16 bits in a format that has other ideas.
+    /// 16 bits in a format that does not support them.
     #[error("the number of bits has no effect on .{}", .kind.extension())]
     BitsUnused {
         /// The format.
         kind: OutputKind,
     },
-    /// A picture that cannot be transparent.
-    #[error(
-        "the picture is not transparent: the scene states what is behind its phenomena, a plate, a sky or a ground"
-    )]
+    /// The picture cannot be transparent.
+    #[error("the picture is not transparent: the scene states its background, a plate, a sky or a ground")]
     TransparentUnused,
-    /// A convention of alpha where there is none.
+    /// An alpha convention for pictures without straight alpha.
     #[error("the alpha convention has no effect: the pictures have no straight alpha")]
     AlphaUnused,
-    /// A view in a scene-linear format.
+    /// A view for a scene-linear format.
     #[error("a view has no effect on .exr, which is scene-linear")]
     ViewUnused,
-    /// A film is made as a whole.
-    #[error("resuming has no effect on .{}, which is made as a whole", .kind.extension())]
+    /// A video cannot be resumed.
+    #[error("resuming has no effect on .{}, which is written as a whole", .kind.extension())]
     ResumeUnused {
         /// The format.
         kind: OutputKind,
     },
-    /// A contact sheet is made as a whole.
-    #[error("resuming has no effect on a sheet, which is made as a whole")]
+    /// A contact sheet cannot be resumed.
+    #[error("resuming has no effect on a sheet, which is written as a whole")]
     ResumeSheet,
     /// Nothing in the scene has a state.
     #[error("snapshots have no effect: nothing in this scene is simulated in steps")]
     SnapshotsUnused,
-    /// A snapshot that cannot be used.
-    #[error("{path}: not used: {reason}; it is made anew", path = .path.display())]
-    SnapshotRefused {
+    /// A snapshot that does not fit the scene, or is damaged.
+    #[error("{path}: not used: {reason}; it is replaced", path = .path.display())]
+    SnapshotRejected {
         /// Its file.
         path: PathBuf,
         /// Why.
         reason: RenderError,
     },
-    /// A snapshot that cannot be read.
+    /// A snapshot, or the folder of snapshots, cannot be read.
     #[error("{path}: not used: it cannot be read: {reason}", path = .path.display())]
     SnapshotUnreadable {
-        /// Its file, or the folder.
+        /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The message of the system.
         reason: String,
     },
-    /// A phenomenon will look other than one may expect.
-    #[error("{}{name}: {remark}", at(.place))]
+    /// A phenomenon may look different from what the user expects.
+    #[error("{}{name}: {remark}", prefix(.position))]
     Remark {
-        /// Where the scene says it.
-        place: Option<Spot>,
-        /// Its name in the scene.
+        /// Where the scene states the phenomenon, or the parameter.
+        position: Option<FilePosition>,
+        /// Name of the phenomenon in the scene.
         name: String,
-        /// What is to be said.
+        /// The remark.
         remark: Remark,
     },
     /// A flipbook without motion.
-    #[error("nothing in this scene writes its motion; the motion sheet is empty")]
+    #[error("no phenomenon of this scene has a motion AOV; the motion sheet is empty")]
     NoMotion,
 }

@@ -1,4 +1,4 @@
-//! The text of a scene, where it lies, and changes made to it for one job.
+//! The text of a scene, its folder, and the changes to it for one job.
 
 use std::{
     fs,
@@ -12,7 +12,7 @@ use bansho_base::{
     parameters::{ProblemKind, nearest},
 };
 use bansho_media::{
-    assets::InputLimits,
+    assets::{FileAssets, InputLimits},
     files::input::{self, InputError},
 };
 use bansho_render::CompiledScene;
@@ -24,71 +24,72 @@ use bansho_scene::{
 use super::error::JobError;
 use crate::{KINDS, parse_scene};
 
-/// Most bytes of a scene's text.
-pub const SCENE_BYTES: u64 = 16 << 20;
+/// Maximum size of a scene's text, bytes.
+pub const MAX_SCENE_BYTES: u64 = 16 << 20;
 
-/// A scene that was read, not yet checked.
+/// The file of a scene, read and not yet checked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneFile {
-    /// What errors call it.
+    /// Its name in messages.
     pub name: String,
-    /// Name without folder and extension, for outputs.
+    /// Its name without folder and extension, from which outputs are named.
     pub stem: String,
-    /// Folder that paths in it are relative to.
+    /// The folder to which paths in it are relative.
     pub folder: PathBuf,
-    /// The TOML.
+    /// Its text, TOML.
     pub text: String,
-    /// Changes for this job, each `key.path=value`.
+    /// Changes for this job, each in the form `key.path=value`.
     pub changes: Vec<String>,
-    /// What the files that it names may take, and where they may lie.
-    pub inputs: InputLimits,
+    /// Limits of the files that it names: their memory and their folder.
+    pub input_limits: InputLimits,
 }
 
 impl SceneFile {
     /// Reads the scene at `path`.
     ///
     /// # Errors
-    /// There is no such file, it is no ordinary one, it has more than [`SCENE_BYTES`], it cannot be read, or it is not UTF-8.
+    /// The file does not exist, is no regular file, is larger than [`MAX_SCENE_BYTES`], cannot be read, or is not UTF-8.
     pub fn read(path: &Path) -> Result<Self, JobError> {
-        let bytes = input::read(path, SCENE_BYTES).map_err(|source| {
-            let near = if is_missing(&source) { near(path) } else { None };
-            JobError::Unreadable { path: path.to_path_buf(), source, near }
+        let bytes = input::read(path, MAX_SCENE_BYTES).map_err(|source| {
+            let suggestion = if is_missing(&source) { suggest_file(path) } else { None };
+            JobError::Unreadable { path: path.to_path_buf(), source, suggestion }
         })?;
         Ok(Self {
             name: path.display().to_string(),
             stem: path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
             folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
-            text: text(path, bytes)?,
+            text: decode(path, bytes)?,
             changes: Vec::new(),
-            inputs: InputLimits::default(),
+            input_limits: InputLimits::default(),
         })
     }
 
-    /// Reads a scene from a `stream`, which errors and outputs call `name`; paths in it are relative to the current folder.
+    /// Reads a scene from a `stream`. Messages and outputs call it `name`; paths in it are relative to the current folder.
     ///
     /// # Errors
-    /// It has more than [`SCENE_BYTES`], it cannot be read, or it is not UTF-8.
+    /// It is larger than [`MAX_SCENE_BYTES`], cannot be read, or is not UTF-8.
     pub fn read_stream(name: &str, stream: impl Read) -> Result<Self, JobError> {
         let path = Path::new(name);
-        let bytes = input::read_stream(stream, SCENE_BYTES);
-        let bytes = bytes.map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source, near: None })?;
+        let bytes = input::read_stream(stream, MAX_SCENE_BYTES);
+        let bytes =
+            bytes.map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source, suggestion: None })?;
         Ok(Self {
             name: name.to_owned(),
             stem: name.to_owned(),
             folder: PathBuf::new(),
-            text: text(path, bytes)?,
+            text: decode(path, bytes)?,
             changes: Vec::new(),
-            inputs: InputLimits::default(),
+            input_limits: InputLimits::default(),
         })
     }
 
-    /// Makes the changes and reads the scene, without anything that it names.
+    /// Applies the changes and parses the scene. Files that it names are not read.
     ///
     /// # Errors
-    /// Faults of the file if it has any, at their lines; else those of the changes.
+    /// The problems of the file if it has any, with their lines; else those of the changes.
     pub fn parse(&self) -> Result<Scene, JobError> {
         let changed = match self.changed() {
-            // The text itself is at fault, which the parser says better.
+            // The text is not TOML: the parser has the better message.
             Err(JobError::Edit { source: EditError::Syntax(_), .. }) => self.text.clone(),
             changed => changed?,
         };
@@ -103,10 +104,10 @@ impl SceneFile {
         }
     }
 
-    /// Builds all that a `scene` that was read from this file shows, and reads what it names.
+    /// Builds a `scene` that was parsed from this file, and reads the files that it names.
     ///
     /// # Errors
-    /// Faults that only building shows, as those of [`parse`](Self::parse).
+    /// Problems that are only found by building, like those of [`parse`](Self::parse).
     pub fn compile(&self, scene: Scene, assets: &Arc<dyn Assets>) -> Result<Arc<CompiledScene>, JobError> {
         let errors = match CompiledScene::build(Arc::new(scene), assets.clone(), None) {
             Ok(compiled) => return Ok(Arc::new(compiled)),
@@ -115,7 +116,7 @@ impl SceneFile {
         if self.changes.is_empty() {
             return Err(JobError::Scene(Box::new(errors.located(&self.name, &self.text))));
         }
-        // Whose fault it is: the file's, if it has faults of its own.
+        // If the unchanged file has problems of its own, they are reported instead.
         let own = parse_scene(&self.name, &self.text).ok();
         match own.map(|own| CompiledScene::build(Arc::new(own), assets.clone(), None)) {
             Some(Err(own)) => Err(JobError::Scene(Box::new(own.located(&self.name, &self.text)))),
@@ -123,27 +124,33 @@ impl SceneFile {
         }
     }
 
-    fn as_changed(&self, error: SceneError) -> JobError {
-        JobError::SetScene(Box::new(SceneError { file: format!("{} as changed", self.name), ..error }))
+    /// Reads the files that the scene names from its folder, within its limits.
+    pub(crate) fn assets(&self) -> Arc<dyn Assets> {
+        Arc::new(FileAssets::with_limits(&self.folder, self.input_limits.clone()))
     }
 
-    /// A fault of what stands at the dotted `path`, which only showed when the scene was looked at from outside its text.
-    pub(crate) fn fault(&self, path: &str, kind: ProblemKind) -> JobError {
+    fn as_changed(&self, error: SceneError) -> JobError {
+        JobError::ChangedScene(Box::new(SceneError { file: format!("{} as changed", self.name), ..error }))
+    }
+
+    /// The error for a problem at the dotted `path`, with its line. For problems that only the job finds, such as too little memory.
+    pub(crate) fn error_at(&self, path: &str, kind: ProblemKind) -> JobError {
         let own = SceneError::at(&self.name, &self.text, path, kind.clone());
         let changed = self.changed().unwrap_or_else(|_| self.text.clone());
         let as_changed = SceneError::at(&format!("{} as changed", self.name), &changed, path, kind);
-        // Whose fault it is: the file's, if it says the same.
-        if stated(&own) == stated(&as_changed) {
+        // The file causes the problem if it has the same text there without the changes.
+        if marked_text(&own) == marked_text(&as_changed) {
             JobError::Scene(Box::new(own))
         } else {
-            JobError::SetScene(Box::new(as_changed))
+            JobError::ChangedScene(Box::new(as_changed))
         }
     }
 
+    /// The text with the changes.
     fn changed(&self) -> Result<String, JobError> {
         self.changes.iter().try_fold(self.text.clone(), |text, assignment| {
-            let refused = |source| JobError::Edit { assignment: assignment.clone(), source };
-            edit::set(&text, assignment, KINDS).map_err(refused)
+            let fail = |source| JobError::Edit { assignment: assignment.clone(), source };
+            edit::set(&text, assignment, KINDS).map_err(fail)
         })
     }
 }
@@ -153,16 +160,16 @@ fn is_missing(error: &InputError) -> bool {
 }
 
 /// The bytes of a scene as text.
-fn text(path: &Path, bytes: Vec<u8>) -> Result<String, JobError> {
+fn decode(path: &Path, bytes: Vec<u8>) -> Result<String, JobError> {
     String::from_utf8(bytes).map_err(|error| {
-        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
         JobError::NotUtf8 { path: path.to_path_buf(), line }
     })
 }
 
-/// The scene file beside `path`, which is not there, whose name is most like its.
-fn near(path: &Path) -> Option<PathBuf> {
+/// The scene in the folder of the missing file `path` whose name is most similar.
+fn suggest_file(path: &Path) -> Option<PathBuf> {
     let folder = path.parent()?;
     let listed = fs::read_dir(if folder.as_os_str().is_empty() { Path::new(".") } else { folder }).ok()?;
     let scenes =
@@ -170,11 +177,11 @@ fn near(path: &Path) -> Option<PathBuf> {
     let mut scenes: Vec<String> = scenes.collect();
     scenes.sort_unstable();
     let name = path.file_name()?.to_str()?;
-    let meant = nearest(name.strip_suffix(".toml").unwrap_or(name), scenes.iter().map(String::as_str))?;
-    Some(folder.join(format!("{meant}.toml")))
+    let similar = nearest(name.strip_suffix(".toml").unwrap_or(name), scenes.iter().map(String::as_str))?;
+    Some(folder.join(format!("{similar}.toml")))
 }
 
-/// The part of the text that the first fault of a scene marks.
-fn stated(error: &SceneError) -> Option<&str> {
+/// The text that the first problem of a scene marks.
+fn marked_text(error: &SceneError) -> Option<&str> {
     error.text.get(error.problems.first()?.span.clone()?)
 }

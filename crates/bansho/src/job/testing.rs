@@ -1,8 +1,8 @@
-//! A shot whose state and pictures are known, for tests of what drives it.
+//! A frame source with a known state and known pictures, for tests of what uses it.
 
 use std::sync::{
     Arc, Mutex,
-    atomic::{AtomicBool, AtomicUsize, Ordering},
+    atomic::{AtomicBool, Ordering},
 };
 
 use bansho_base::{
@@ -19,11 +19,11 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
 
 use super::{
     error::JobError,
-    observer::{JobObserver, Note},
+    observer::{JobObserver, Warning},
+    pipeline::{draw_frames::FrameSink, frame_source::FrameSource},
 };
-use crate::job::render::draw_frames::{FrameSink, FrameSource};
 
-/// A plan of a picture of one pixel with nothing in it.
+/// The plan of an empty picture of one pixel.
 pub(crate) fn plan() -> Arc<Plan> {
     let assets = Arc::new(MemoryAssets::default());
     let text = "bansho = 2\n[picture]\nsize = [1, 1]\nfps = 10\nfirst_frame = -4\n";
@@ -32,33 +32,28 @@ pub(crate) fn plan() -> Arc<Plan> {
     Arc::new(Plan::new(&compiled, &PlanOptions::default()).unwrap())
 }
 
-/// Takes a step for each frame, and counts them all.
-pub(crate) struct Counter {
-    pub(crate) steps: Arc<AtomicUsize>,
-}
-
-/// State: the frame that was stepped to.
-pub(crate) struct CounterShot {
+/// Takes one step for each frame and counts the steps. Its state is the number of the last frame.
+pub(crate) struct CountingSource {
     plan: Arc<Plan>,
-    steps: Arc<AtomicUsize>,
+    pub(crate) steps: usize,
     pub(crate) number: i64,
     drawn: bool,
 }
 
-impl Counter {
-    pub(crate) fn shot(&self) -> CounterShot {
+impl CountingSource {
+    pub(crate) fn new() -> Self {
         let plan = plan();
-        CounterShot { number: plan.frames().start - 1, plan, steps: self.steps.clone(), drawn: false }
+        Self { number: plan.frames().start - 1, plan, steps: 0, drawn: false }
     }
 }
 
-impl FrameSource for CounterShot {
+impl FrameSource for CountingSource {
     fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
         check(observer)?;
         if number < self.number {
             self.number = self.plan.frames().start - 1;
         }
-        self.steps.fetch_add((number - self.number) as usize, Ordering::Relaxed);
+        self.steps += (number - self.number) as usize;
         self.number = number;
         Ok(())
     }
@@ -73,7 +68,7 @@ impl FrameSource for CounterShot {
         std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
     }
 
-    fn recycle(&mut self, _spent: Frame) {}
+    fn recycle(&mut self, _recycled: Frame) {}
 
     fn snapshot(&self) -> Vec<u8> {
         state(self.number)
@@ -101,17 +96,17 @@ pub(crate) fn blank(plan: &Plan, number: i64) -> Frame {
     let beauty = Image::filled(1, 1, [number as f32; 4]);
     let header = plan.header(number, [7; 32]);
     let content = Rect::from_size(1, 1);
-    Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, figures: Vec::new(), content }
+    Frame { header, beauty, depth: None, channels: Vec::new(), opaque: false, metadata: Vec::new(), content }
 }
 
-/// Remembers what it is told, and stops the work when asked to.
+/// Records warnings, and cancels the job once `stop` is set.
 #[derive(Default)]
-pub(crate) struct Witness {
-    pub(crate) notes: Mutex<Vec<Note>>,
+pub(crate) struct RecordingObserver {
+    pub(crate) warnings: Mutex<Vec<Warning>>,
     pub(crate) stop: AtomicBool,
 }
 
-impl Observer for Witness {
+impl Observer for RecordingObserver {
     fn begin(&self, _stage: Stage) {}
 
     fn cancelled(&self) -> bool {
@@ -119,24 +114,24 @@ impl Observer for Witness {
     }
 }
 
-impl JobObserver for Witness {
-    fn note(&self, note: &Note) {
-        self.notes.lock().unwrap().push(note.clone());
+impl JobObserver for RecordingObserver {
+    fn warning(&self, warning: &Warning) {
+        self.warnings.lock().unwrap().push(warning.clone());
     }
 }
 
-/// Finishes frames by a function of their index and number, and knows how many were under way at once.
-pub(crate) struct Finisher<F> {
+/// Finishes frames by a function of their index and number.
+pub(crate) struct FunctionSink<F> {
     pub(crate) each: F,
-    pub(crate) window: usize,
+    pub(crate) max_in_flight: usize,
 }
 
-impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> FrameSink for Finisher<F> {
+impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> FrameSink for FunctionSink<F> {
     fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
     }
 
-    fn window(&self) -> usize {
-        self.window
+    fn max_in_flight(&self) -> usize {
+        self.max_in_flight
     }
 }

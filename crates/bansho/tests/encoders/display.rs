@@ -1,4 +1,4 @@
-//! The codes of display pictures, beside what the definitions give in double precision.
+//! The codes of display pictures, compared with the definitions in double precision.
 
 use bansho::{
     base::{
@@ -24,7 +24,7 @@ fn encoded(light: f64, is_raw: bool) -> f64 {
     }
 }
 
-/// Light over mid-gray that shines through, encoded, tells how much is covered (`AlphaConvention::Encoded`).
+/// The coverage follows from the encoded light over a mid-gray background (`AlphaConvention::Encoded`).
 fn encoded_coverage(light: f64, alpha: f64) -> f64 {
     let gray = math::pow((0.5 + 0.055) / 1.055, 2.4);
     let behind = encoded((light + (1.0 - alpha) * gray).min(1.0), false) - encoded(light, false);
@@ -64,7 +64,7 @@ impl Case {
         assert!(off <= most, "{}, alpha should be {coverage}", self.told(pixel, codes));
     }
 
-    /// Whether a color, and alpha as it was rounded, are what gray `light` gives.
+    /// Whether a color, and alpha after rounding, are those of gray `light`.
     fn color(&self, light: f64, color: [f64; 3], own_alpha: f64) -> bool {
         let (shown, wanted) = match self.alpha {
             None => (color, encoded(light, self.is_raw)),

@@ -1,4 +1,4 @@
-//! Films by ffmpeg, within what their codecs lose.
+//! Films by ffmpeg, within the losses of their codecs.
 
 use std::{path::Path, process::Command};
 
@@ -49,7 +49,7 @@ fn decoded(path: &Path, decoder: &[&str]) -> Vec<[u16; 4]> {
     numbers(&output.stdout).as_chunks().0.to_vec()
 }
 
-/// Writes the patches and compares the middle of each with what was shown; `alpha_off` and `color_off` are shares of the range.
+/// Writes the patches and compares the middle of each with the display picture; `alpha_off` and `color_off` are fractions of the range.
 fn check(
     name: &str,
     bits: BitDepth,

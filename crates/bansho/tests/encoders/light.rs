@@ -72,7 +72,7 @@ pub(crate) fn of_pixels(width: usize, height: usize, opaque: bool, pixel: impl F
         depth: Some(red),
         channels,
         opaque,
-        figures: Vec::new(),
+        metadata: Vec::new(),
         content: Rect::from_size(width, height),
     }
 }

@@ -1,5 +1,5 @@
-//! What files hold of light at and beyond the ends of its range: 0, just below 1, 1, above 1, infinite, not a number; in every depth, for rows
-//! of every width, through the same door that a job uses, and read by programs that are not Bansho.
+//! The codes in files for light at and beyond the ends of its range: 0, just below 1, 1, above 1, infinite, NaN; in every bit depth, for rows of
+//! every width, written by the same functions as in a job, and read by other programs.
 
 mod display;
 mod exr;
@@ -25,7 +25,7 @@ use bansho::{
     render::display::BitDepth,
 };
 
-/// How frames become a file.
+/// How frames are written to a file.
 struct Writing {
     view: View,
     bits: BitDepth,
@@ -38,7 +38,7 @@ impl Writing {
         Self { view: View::STANDARD, bits, alpha, gif_transparent: false }
     }
 
-    /// Writes `frames` and gives back what was shown of each; as they are, where the format takes light.
+    /// Writes `frames` and returns the display picture of each; a scene-linear format gets the frames themselves.
     fn write(&self, path: &Path, frames: &[Frame]) -> Vec<DisplayImage> {
         let size = [frames[0].beauty.width(), frames[0].beauty.height()];
         let options = SinkOptions {
@@ -57,7 +57,7 @@ impl Writing {
                 sink.write(slot, Picture::Linear(&frame)).unwrap();
                 continue;
             }
-            // Premultiplied light over black is the light itself.
+            // Over black, premultiplied light is unchanged.
             frame.opaque |= sink.picture_format() == PictureFormat::OpaqueDisplay;
             let shown = light::shown(&frame, &self.view, self.bits, self.alpha);
             sink.write(slot, Picture::Display(&shown, &[7; 32])).unwrap();

@@ -37,7 +37,7 @@ fn an_arc_has_a_thin_lower_edge_and_a_fading_top() {
     assert!((30..80).contains(&peak) && up > 3.0 * down, "peak {peak}, {up} up, {down} down");
 }
 
-/// Share of what the picture changes by that it changes around a place rather than toward it.
+/// The fraction of the change of the picture that is a rotation around `center` rather than a motion toward it.
 fn across_radii(film: &Film, center: [f64; 2]) -> f64 {
     let (mut around, mut all) = (0.0, 0.0);
     for row in 1..SMALL[1] - 1 {
@@ -126,11 +126,11 @@ fn a_transition_shows_no_jump() {
 
 /// Frames between which an in-between shape is renewed, and particles are born and die: every sixth, the first after the 45 steps before the shot.
 const RENEWALS: (i64, i64) = (6, 3);
-/// Frames from shape to shape, and so many before and after each are all looked at: there sheets part and join.
+/// Frames from shape to shape. All frames this close before and after a shape are tested, since sheets split and merge there.
 const TRANSITION: i64 = 140;
 const AROUND: i64 = 8;
 
-/// The thesis's scenes around all that happens in them (all of them where `BANSHO_ALL_FRAMES` is set, as in `.ci/long`), small, with a thirtieth of the particles, and without the sky behind, which would hide
+/// The scenes of the thesis around all their events (all frames if `BANSHO_ALL_FRAMES` is set, as in `.ci/long`), small, with a thirtieth of the particles, and without the sky behind, which would hide
 /// what changes.
 #[test]
 fn the_light_of_the_thesis_scenes_never_jumps() {

@@ -1,4 +1,4 @@
-//! Burners that only a file can say: gas from the surface of a glTF mesh.
+//! Burners that need a file: gas from the surface of a glTF mesh.
 
 use bansho::{
     base::{

@@ -87,7 +87,7 @@ fn haze_displaces_the_plate_around_the_flame_and_nowhere_else() {
     let (around, left, right) = (moved(130..190), moved(0..80), moved(240..320));
     assert!(around > 0.02, "{around} of the plate around the flame moves");
     assert_eq!((left, right), (0.0, 0.0), "the plate beside the flame stays");
-    // Without haze the flame only lays its light over the plate: nothing of that lies elsewhere.
+    // Without haze the flame only adds its light to the plate, which is not displaced.
     let bare = draw(&text.replace("diameter = 0.22", "diameter = 0.22\nflow = 0.0"));
     let darker = |(x, row): (usize, usize)| luminance(bare.row(0, row)[x]) - luminance(straight.row(0, row)[x]) > 0.02;
     let displaced = (0..180).flat_map(|row| (0..320).map(move |x| (x, row))).filter(|place| darker(*place)).count();

@@ -1,4 +1,4 @@
-//! Small films of scenes, and what can be measured on them.
+//! Small films of scenes, and measurements of them.
 
 use std::{ops::Range, path::PathBuf, sync::Arc};
 
@@ -17,7 +17,7 @@ pub(crate) fn scene_text(scene: &str) -> String {
     std::fs::read_to_string(scenes().join(format!("{scene}.toml"))).unwrap_or_else(|error| panic!("{scene}: {error}"))
 }
 
-/// What `look` sees in each of those frames.
+/// The results of `look` for each of those frames.
 fn look_at<T>(
     text: &str,
     size: [usize; 2],
@@ -27,7 +27,7 @@ fn look_at<T>(
 ) -> Vec<T> {
     let assets = Arc::new(FileAssets::new(scenes()));
     let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
-    let scene = scene.adapted(options).unwrap_or_else(|error| panic!("{error}"));
+    let scene = scene.with_options(options).unwrap_or_else(|error| panic!("{error}"));
     let compiled = CompiledScene::build(Arc::new(scene), assets, None).unwrap_or_else(|errors| panic!("{errors}"));
     let compiled = Arc::new(compiled);
     let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();
@@ -158,7 +158,7 @@ impl Film {
     }
 }
 
-/// Shares of the lit pixels that are red, orange and yellow to white, by the ratio of green to red in linear light.
+/// Fractions of the lit pixels that are red, orange and yellow to white, by the ratio of green to red in linear light.
 pub(crate) fn hues(film: &Film) -> [f64; 3] {
     let mut counts = [0.0; 3];
     for pixel in film.pixels().filter(|pixel| luminance(**pixel) > 0.01) {
@@ -175,7 +175,7 @@ pub(crate) fn hues(film: &Film) -> [f64; 3] {
     counts.map(|count| count / all)
 }
 
-/// Share of the length of gradients, along rows and columns, that lies in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
+/// Fraction of the length of gradients, along rows and columns, that is in bands: more than 8 pixels of one 8-bit code where 16 bits move by a
 /// quarter of a code.
 pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
     let codes = |depth| encoded(&draw(text, size, &[frame], &SceneOptions::default(), depth)[0]);
@@ -194,7 +194,7 @@ pub(crate) fn wide_bands(text: &str, size: [usize; 2], frame: i64) -> f64 {
     banded as f64 / gradient.max(1) as f64
 }
 
-/// Pixels of a line that lie in bands, and those of all its gradients.
+/// Number of pixels of a line that are in bands, and of those in gradients.
 fn bands_of_line(coarse: &[f32], fine: &[f32]) -> [usize; 2] {
     let (mut banded, mut gradient, mut start) = (0, 0, 0);
     for at in 1..=coarse.len() {
@@ -211,7 +211,7 @@ fn bands_of_line(coarse: &[f32], fine: &[f32]) -> [usize; 2] {
     [banded, gradient]
 }
 
-/// Compares a frame with its golden picture, or writes that when asked to; says what differs.
+/// Compares a frame with its golden picture and returns the differences. Writes the golden picture instead if `BANSHO_BLESS` is set.
 pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String> {
     // A bonfire of 100,000 particles would take longer than all other pictures together, and so would an aurora's of 120,000 that has to be
     // stepped far.

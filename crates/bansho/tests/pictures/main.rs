@@ -1,4 +1,4 @@
-//! The shipped scenes as pictures: small goldens, and for each scene numbers that a toy would fail.
+//! Pictures of the shipped scenes: small golden pictures, and for each scene measurements that a crude imitation would not pass.
 //!
 //! `BANSHO_BLESS=1 cargo test -p bansho --test pictures` rewrites the goldens; the reason goes into CHANGELOG.md under
 //! "Changes the picture".

@@ -27,7 +27,7 @@ fn rain_streaks_are_upright_and_brightest_near_the_lamp() {
         }
     }
     assert!(across > 1.3 * down, "across {across}, down {down}");
-    // The lamp stands in row 25, column 228; the dark far to its right is out of its light.
+    // The lamp is in row 25, column 228; the dark region far to its right is not lit by it.
     let (near, far) = (mean(&film, 35..75, 200..260), mean(&film, 35..75, 420..480));
     assert!(near > 2.0 * far, "the lamp's light falls off: {near} {far}");
 }
@@ -35,7 +35,7 @@ fn rain_streaks_are_upright_and_brightest_near_the_lamp() {
 #[test]
 fn headlights_light_a_cone_of_rain() {
     let film = Film::of("headlights", [480, 270], &[30], &SceneOptions::default());
-    // The lamps stand in row 148, columns 69 and 120, and shine to the right.
+    // The lamps are in row 148, columns 69 and 120, and emit to the right.
     let (beam, above, behind) =
         (mean(&film, 130..165, 130..190), mean(&film, 20..60, 80..140), mean(&film, 130..165, 0..50));
     assert!(beam > 10.0 * above && beam > 10.0 * behind, "{beam} {above} {behind}");

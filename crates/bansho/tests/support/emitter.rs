@@ -1,9 +1,9 @@
-//! A luminous disc that moves in steps: it falls, shines on others, and can bend light.
+//! A luminous disk that moves in steps: it falls, illuminates others, and can refract light.
 
 use std::sync::Arc;
 
 use bansho_base::{
-    frame::Figure,
+    frame::MetadataEntry,
     host::observer::{Cancelled, Observer},
     image::{Image, Rect},
     math::{
@@ -194,9 +194,9 @@ impl Prepared for PreparedEmitter<'_> {
         Rect::from_size(self.view.size[0], self.view.size[1])
     }
 
-    fn figures(&self) -> Vec<Figure> {
+    fn metadata(&self) -> Vec<MetadataEntry> {
         let depth = self.view.camera.depth(self.emitter.at(self.view.shutter.middle()));
-        vec![Figure { name: "depth", unit: "m", value: depth }]
+        vec![MetadataEntry { name: "depth", unit: "m", value: depth }]
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {

@@ -1,4 +1,4 @@
-//! Two phenomena that exist only to prove the traits: an absorber in closed form and a stepped emitter.
+//! Two phenomena for tests of the traits: an absorber in closed form and a stepped emitter.
 
 #[path = "../../examples/own_phenomenon/absorber.rs"]
 mod absorber;
@@ -27,7 +27,7 @@ pub(crate) fn kinds() -> [PhenomenonKind; 2] {
     [AbsorberParameters::KIND, EmitterParameters::KIND]
 }
 
-/// A camera at the origin that looks along -z; 45 pixels a meter at 1 m when the picture is 90 pixels high.
+/// A camera at the origin that looks along -z: 45 pixels per meter at 1 m if the picture is 90 pixels high.
 pub(crate) const CAMERA: &str = "\
 bansho = 2
 [picture]
@@ -63,7 +63,7 @@ pub(crate) fn plan_with(text: &str, options: &PlanOptions, assets: Arc<dyn Asset
     Planned::new(parse(text).unwrap_or_else(|error| panic!("{error}")), options, assets)
 }
 
-/// A loop of so many seconds.
+/// A loop of this length, s.
 pub(crate) fn looped(text: &str, seconds: f64) -> Result<Planned, String> {
     let scene = parse(text).map_err(|error| error.to_string())?;
     let adapted = SceneOptions { loop_s: Some(seconds), ..SceneOptions::default() };
@@ -80,7 +80,7 @@ pub(crate) fn render(text: &str, options: &PlanOptions, number: i64) -> Frame {
     draw(&mut plan(text, options).open(), number)
 }
 
-/// Absolute luminance that a pixel stands for.
+/// Absolute luminance of a pixel value.
 pub(crate) fn luminance(frame: &Frame, x: usize, y: usize) -> f64 {
     let [r, g, b, _] = frame.beauty.at(x, y);
     f64::from(bansho_base::color::luminance([r, g, b]))

@@ -1,4 +1,4 @@
-//! A scene that was read, compiled and planned, for tests of pictures.
+//! A parsed, compiled and planned scene, for tests of pictures.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -30,7 +30,7 @@ impl Planned {
         (adapted, options): (&SceneOptions, &PlanOptions),
         assets: Arc<dyn Assets>,
     ) -> Result<Self, String> {
-        let scene = scene.adapted(adapted).map_err(|error| error.to_string())?;
+        let scene = scene.with_options(adapted).map_err(|error| error.to_string())?;
         let compiled = CompiledScene::build(Arc::new(scene), assets, None);
         let compiled = Arc::new(compiled.map_err(|errors| errors.located("test.toml", "").to_string())?);
         let plan = Arc::new(Plan::new(&compiled, options).map_err(|error| error.to_string())?);

@@ -9,7 +9,7 @@ pub mod surroundings;
 use std::{fmt, sync::Arc};
 
 use crate::{
-    frame::Figure,
+    frame::MetadataEntry,
     geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer},
     image::{Image, Rect},
@@ -260,8 +260,8 @@ pub trait Prepared: Send + Sync {
     /// The value of a pixel must not depend on the strip in which it is drawn.
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip);
 
-    /// Figures of this frame, with unique names.
-    fn figures(&self) -> Vec<Figure> {
+    /// Metadata of this frame, entries with unique names.
+    fn metadata(&self) -> Vec<MetadataEntry> {
         Vec::new()
     }
 

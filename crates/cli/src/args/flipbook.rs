@@ -14,53 +14,51 @@ use super::{
     work::{OverwriteArgs, WorkArgs},
 };
 
-/// The sheets that are wanted.
+/// Options of a flipbook.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Writes NAME_color.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as gray), NAME_motion.png (16 bits: how far \
-each pixel moves to the next frame) and NAME.json (grid, frame rate, rectangles, how to read the motion). As .exr: color is \
+Writes NAME_color.png (sRGB, straight alpha), NAME_alpha.png (the same alpha as gray), NAME_motion.png (16 bits: the \
+motion of each pixel to the next frame) and NAME.json (grid, frame rate, rectangles, encoding of the motion). With .exr, color is \
 scene-linear with premultiplied alpha, motion is in pixels, and there is no alpha sheet.
 
 Examples:
-  bansho flipbook torch.toml --grid 8x8 --loop 2   64 frames, one turn of 2 s
+  bansho flipbook torch.toml --grid 8x8 --loop 2   64 frames, a loop of 2 s
   bansho flipbook torch.toml --grid 4x4 --size 128x256 -o game/torch.png")]
 pub(crate) struct FlipbookArgs {
     /// The scene file; `-` reads it from standard input.
     pub(crate) scene: PathBuf,
-    /// Columns and rows of the sheet; as many frames are drawn.
+    /// Columns and rows of the sheet. Their product is the number of frames.
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = values::parse_grid)]
     grid: [usize; 2],
-    /// Size of one frame; with `--crop auto` of the whole picture. [default: such that the sheet has up to 2048 pixels]
+    /// Size of one frame; with `--crop auto`, of the whole picture. [default: the sheet is up to 2048 pixels wide or high]
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::parse_size)]
     size: Option<[usize; 2]>,
-    /// What of the picture frames show: what is lit in any of them, or all. [default: auto; none with --size]
+    /// Crop the frames to the part of the picture that is lit in any of them, or not at all. [default: auto; none with --size]
     #[arg(long, value_name = "CROP", value_parser = values::flipbook_crop_parser())]
     crop: Option<FlipbookCrop>,
-    /// Where it goes: NAME.png or NAME.exr. [default: out/SCENE/SCENE.png]
+    /// Output: NAME.png or NAME.exr. [default: out/SCENE/SCENE.png]
     #[arg(short, long, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Fill the sheet with exactly one turn of a seamless loop of so many seconds; without it with the scene's first
-    /// frames.
+    /// Fill the sheet with a seamless loop of this length. If omitted, the sheet has consecutive frames of the scene.
     #[arg(long = "loop", value_name = "SECONDS", allow_hyphen_values = true, value_parser = values::parse_seconds)]
     loop_s: Option<f64>,
-    /// The first frame. [default: the scene's first]
+    /// Number of the first frame. [default: the scene's first]
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     first_frame: Option<i32>,
-    /// Another seed than the scene's.
+    /// Replace the scene's seed.
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = values::parse_seed)]
     seed: Option<u64>,
-    /// Change a setting of the scene for this once; may be repeated.
+    /// Change a setting of the scene for this run. May be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Bits of each channel of the color and alpha sheets.
+    /// Bits per channel of the color and alpha sheets.
     #[arg(long, default_value = "8", value_parser = values::bits_parser())]
     bits: BitDepth,
-    /// What straight alpha in .png is made for: engines that blend linear light (Unity, Unreal and Godot in 3-D, as usually
-    /// set up), or
-    /// `encoded` values (most user interfaces, three.js straight to the canvas). [default: linear]
+    /// Convention of straight alpha in .png: `linear` for engines that blend linear light (Unity, Unreal and Godot in 3-D with their usual
+    /// settings), `encoded` for those that blend encoded values (most user interfaces, three.js directly to the canvas). [default: linear]
     #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser())]
     alpha: Option<AlphaConvention>,
-    /// How the light is shown in .png.
+    /// View transform of .png.
     #[arg(long, default_value = "display", value_parser = values::view_parser())]
     view: View,
     #[command(flatten)]
@@ -72,7 +70,7 @@ pub(crate) struct FlipbookArgs {
 }
 
 impl FlipbookArgs {
-    /// The flipbook that is asked for.
+    /// The flipbook job.
     pub(crate) fn flipbook(&self) -> Result<Flipbook, JobError> {
         let scene = self.inputs.read(&self.scene, &self.set)?;
         Ok(Flipbook {

@@ -13,55 +13,59 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
-    flipbook::FlipbookArgs, input::InputArgs, render::RenderArgs, simulate::SimulateArgs, streaks::StreaksArgs,
-    work::WorkArgs,
+    flipbook::FlipbookArgs,
+    input::InputArgs,
+    render::RenderArgs,
+    simulate::SimulateArgs,
+    streaks::StreaksArgs,
+    work::{ProgressKind, WorkArgs},
 };
 
-/// Flames, rain and aurora for pictures: image sequences with alpha to lay over a plate.
+/// Fire, rain and aurora for pictures: image sequences with alpha, to composite over a plate.
 #[derive(Debug, Parser)]
 #[command(
     name = "bansho",
     version,
     after_help = "\
 Examples:
-  bansho new fire                      write fire.toml, a short scene to change
+  bansho new fire                      write fire.toml, a short scene to edit
   bansho render fire.toml              240 PNG files with alpha in out/fire/
-  bansho render fire.toml -o fire.mp4  a film
-  bansho render --help                 all that `render` can do
+  bansho render fire.toml -o fire.mp4  a video
+  bansho render --help                 all options of `render`
 
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 faulty scene, 4 no usable GPU, 130 or 143 interrupted."
+Exit codes: 0 success, 1 failure, 2 invalid usage, 3 invalid scene, 130 or 143 interrupted."
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
-/// What to do.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Write a new scene file: what one changes first, or every setting, each explained.
+    /// Write a new scene file: with the settings that are changed most often, or with all settings, each explained.
     New(NewArgs),
-    /// Check scene files and print the position of every error.
+    /// Check scene files and print every error with its position.
     Check(CheckArgs),
-    /// Rewrite a scene file of an older format for this version; comments stay.
+    /// Rewrite a scene file of an older format in the current one; comments are kept.
     Upgrade(UpgradeArgs),
-    /// Print the JSON schema of scene files, for editors that complete and check while one types.
+    /// Print the JSON schema of scene files, for completion and checks in text editors.
     Schema,
-    /// Draw a scene: files, a film, or a contact sheet.
+    /// Draw a scene to pictures, a video, or a contact sheet.
     Render(RenderArgs),
-    /// Draw a scene as a flipbook for game engines: color, alpha and motion sheets and a JSON.
+    /// Draw a scene as a flipbook for game engines: color, alpha and motion sheets, and a JSON file.
     Flipbook(FlipbookArgs),
-    /// Write streak textures of rain with every drop's diameter, velocity and opacity.
+    /// Write streak textures of rain, with the diameter, velocity and opacity of every drop.
     Streaks(StreaksArgs),
-    /// Simulate a scene and write its particles, for other programs.
+    /// Simulate a scene and write its particles for other programs.
     Simulate(SimulateArgs),
-    /// Print what the light of an aurora comes to, by the energy of its electrons, and whether that is what is observed.
+    /// Print the brightness of auroras for each energy of the electrons, and compare it with observations.
     Calibrate,
-    /// Open a scene in the studio, a program of its own: shape it with the mouse and see it at once.
+    /// Open a scene in the studio, a separate program for interactive editing.
     Studio(StudioArgs),
     /// Print a completion script for a shell.
     Completions(CompletionsArgs),
-    /// Print the manual page, or write those of all commands.
+    /// Print the manual page, or write the pages of all commands.
     Man(ManArgs),
 }
 
@@ -70,18 +74,18 @@ pub(crate) enum Command {
 #[command(after_help = "\
 Examples:
   bansho new fire                    fire.toml, a short scene of a flame sheet
-  bansho new fire --all              the same with every setting explained
+  bansho new fire --all              the same with all settings explained
   bansho new wet --kind rain         wet.toml, rain around a lamp
   bansho new --list                  the examples that come with the program
   bansho new camp --from campfire    camp.toml, a copy of the campfire")]
 pub(crate) struct NewArgs {
-    /// Name of the scene; `.toml` is added where it has no extension. A file that is there already stays as it is.
+    /// Name of the scene; `.toml` is added if it has no extension. An existing file is not overwritten.
     #[arg(required_unless_present = "list")]
     pub(crate) name: Option<PathBuf>,
-    /// What the scene shows: flame_sheet (the default), flame_particles, rain or aurora.
+    /// Kind of phenomenon: flame_sheet (the default), flame_particles, rain or aurora.
     #[arg(long, value_name = "KIND", conflicts_with = "from")]
     pub(crate) kind: Option<String>,
-    /// Write every setting with its purpose and allowed values, not only those that are changed most often.
+    /// Write all settings with their purpose and allowed values, not only those that are changed most often.
     #[arg(long, conflicts_with_all = ["from", "list"])]
     pub(crate) all: bool,
     /// Copy an example that comes with the program.
@@ -112,7 +116,7 @@ pub(crate) struct UpgradeArgs {
 /// `bansho studio`
 #[derive(Args, Debug)]
 pub(crate) struct StudioArgs {
-    /// The scene file; a new scene without it.
+    /// The scene file; if omitted, the studio opens a new scene.
     pub(crate) scene: Option<PathBuf>,
 }
 
@@ -129,7 +133,7 @@ pub(crate) struct CompletionsArgs {
 /// `bansho man`
 #[derive(Args, Debug)]
 pub(crate) struct ManArgs {
-    /// Folder to write the pages of all commands to; without it the main page is printed.
+    /// Write the pages of all commands to this folder; if omitted, the main page is printed.
     pub(crate) dir: Option<PathBuf>,
 }
 
@@ -146,7 +150,7 @@ mod tests {
             let Some(help) = command.get_after_help() else { continue };
             let (name, help) = (command.get_name(), help.to_string());
             assert!(help.lines().filter(|line| line.starts_with("  ")).all(|line| line.len() < 80), "{name}: {help}");
-            // Neighbors that are no examples would be one paragraph, broken by hand.
+            // Consecutive lines that are not examples would be a paragraph with fixed line breaks.
             let is_text = |line: &str| !line.is_empty() && !line.starts_with("  ");
             let lines: Vec<&str> = help.lines().collect();
             assert!(!lines.windows(2).any(|pair| is_text(pair[0]) && is_text(pair[1])), "{name}: {help}");

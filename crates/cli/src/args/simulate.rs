@@ -11,7 +11,7 @@ use super::{
     work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
-/// What to simulate, and where its particles go.
+/// Options of a simulation.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -19,21 +19,21 @@ Examples:
   bansho simulate torch.toml --particles gas.ply --frames 60   one
   bansho simulate torch.toml --particles gas.####.ply --snapshots states
 
-Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle at the middle of the frame's exposure: of a \
-particle flame with temperature (K) and density (kg/m^3), of an aurora with energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
+Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle in the middle of the frame's exposure; of a \
+particle flame also temperature (K) and density (kg/m^3), of an aurora also energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
 pub(crate) struct SimulateArgs {
     /// The scene file; `-` reads it from standard input.
     pub(crate) scene: PathBuf,
-    /// Where particles go, one .ply a frame; `####` or `%04d` stands for the frame number.
+    /// Output files, one .ply for each frame; `####` or `%04d` is replaced by the frame number.
     #[arg(long, value_name = "PATH")]
     particles: PathBuf,
     /// Frames: 0-239, 0-239x10 or 0-239:10 (every tenth), 17, -3-5, 1-5,9. [default: all]
     #[arg(long, value_name = "SPEC", allow_hyphen_values = true, value_parser = values::parse_frames)]
     frames: Option<Frames>,
-    /// Another seed than the scene's.
+    /// Replace the scene's seed.
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = values::parse_seed)]
     seed: Option<u64>,
-    /// Change a setting of the scene for this once; may be repeated.
+    /// Change a setting of the scene for this run. May be repeated.
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
     #[command(flatten)]
@@ -47,7 +47,7 @@ pub(crate) struct SimulateArgs {
 }
 
 impl SimulateArgs {
-    /// The simulation that is asked for.
+    /// The simulation job.
     pub(crate) fn simulation(&self) -> Result<Simulate, JobError> {
         let scene = self.inputs.read(&self.scene, &self.set)?;
         Ok(Simulate {

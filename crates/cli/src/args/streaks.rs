@@ -14,12 +14,12 @@ use super::{
 };
 use clap::Args;
 
-/// The textures that are wanted; without options the 24 of Yoshida, Dobashi and Yamamoto.
+/// Options of streak textures; the defaults give the 24 textures of Yoshida, Dobashi and Yamamoto.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Each texture shows all drops of one diameter in a cube of air, from the side, as they fall through one exposure. A pixel is \
-the share of it that they hide (opacity); a streak that leaves at an edge enters at the opposite one. Numbers are linear; \
-streaks.json says how to read them, and lists every drop with its diameter, velocity, opacity and place.
+Each texture shows all drops of one diameter in a cube of air, from the side, during one exposure. The value of a pixel is \
+the fraction of it that drops cover (opacity). The textures tile: a streak that leaves at an edge enters at the opposite one. Values are linear; \
+streaks.json describes how to read them, and lists every drop with its diameter, velocity, opacity and position.
 
 Examples:
   bansho streaks                                   24 textures in out/streaks/
@@ -30,7 +30,7 @@ pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
     #[arg(long, value_name = "R,...", default_value = "1,5,10,20", allow_hyphen_values = true, value_parser = values::parse_numbers)]
     rates: Numbers,
-    /// Drop diameters D, ascending, mm. Each stands for the drops up to half way to its neighbors.
+    /// Drop diameters D, ascending, mm. Each is a bin that extends half way to its neighbors.
     #[arg(
         long,
         value_name = "D,...",
@@ -39,38 +39,38 @@ pub(crate) struct StreaksArgs {
         value_parser = values::parse_numbers
     )]
     diameters: Numbers,
-    /// How long the shutter is open: seconds, such as 0.02 or 1/30.
+    /// Exposure time: seconds, such as 0.02 or 1/30.
     #[arg(long, value_name = "SECONDS", default_value = "1/30", allow_hyphen_values = true, value_parser = values::parse_exposure)]
     exposure_time: f64,
-    /// Pixels on a side of a texture.
+    /// Width and height of a texture, pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 512)]
     size: usize,
     /// Edge of the cube of air, m.
     #[arg(long, value_name = "METERS", default_value_t = 1.0, allow_hyphen_values = true)]
     cube_size: f64,
-    /// How fast drops fall: as measured by Gunn and Kinzer, or by the paper's formula for a rigid sphere.
+    /// Terminal velocity of drops: as measured by Gunn and Kinzer, or by the paper's formula for a rigid sphere.
     #[arg(long, default_value = "gunn_kinzer", value_parser = values::velocity_parser())]
     terminal_velocity: VelocityLaw,
-    /// Give each drop a diameter of its own within its bin, by the distribution.
+    /// Sample the diameter of each drop within its bin, from the drop size distribution.
     #[arg(long)]
     vary_diameter: bool,
-    /// Textures with other drops for each rate and diameter.
+    /// Number of textures with different drops for each rate and diameter.
     #[arg(long, value_name = "N", default_value_t = 1)]
     variants: u32,
-    /// Another seed, other drops.
+    /// Seed of the positions of the drops.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Light the drops from far away; the vector toward the light: right, up, toward the viewer.
+    /// Light the drops by a distant light; the vector toward it: right, up, toward the viewer.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = values::parse_vector)]
     light_direction: Option<[f64; 3]>,
 
-    /// The folder. [default: out/streaks]
+    /// Output folder. [default: out/streaks]
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
-    /// What the textures are written as.
+    /// File format of the textures.
     #[arg(long, default_value = "png", value_parser = values::streak_format_parser(), help_heading = "Output")]
     format: StreakFormat,
-    /// Bits of each channel of .png.
+    /// Bits per channel of .png.
     #[arg(long, default_value = "16", value_parser = values::bits_parser(), help_heading = "Output")]
     bits: BitDepth,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub(crate) struct StreaksArgs {
 }
 
 impl StreaksArgs {
-    /// The textures that are asked for.
+    /// The streak texture job.
     pub(crate) fn streaks(&self) -> Streaks {
         let Numbers(rates) = self.rates.clone();
         let Numbers(diameters) = self.diameters.clone();

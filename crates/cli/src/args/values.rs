@@ -1,10 +1,10 @@
-//! Values of options that are more than a word or a number.
+//! Parsers of option values.
 
 use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::frames::{self, FrameSpecError},
+    job::frames::{self, FrameListError},
     job::{ContactBackground, FlipbookCrop, StreakFormat},
     rain::drops::terminal_velocity::VelocityLaw,
     scene::picture::LARGEST_SIDE,
@@ -15,11 +15,11 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 #[derive(Clone, Debug)]
 pub(crate) struct Frames(pub(crate) Vec<i64>);
 
-pub(super) fn parse_frames(text: &str) -> Result<Frames, FrameSpecError> {
+pub(super) fn parse_frames(text: &str) -> Result<Frames, FrameListError> {
     frames::parse(text).map(Frames)
 }
 
-/// A value that is not of its form.
+/// A value that does not have the required form.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum ValueError {
     #[error("allowed: WIDTHxHEIGHT such as 1920x1080, 1 to {LARGEST_SIDE} on a side")]
@@ -32,26 +32,26 @@ pub(super) enum ValueError {
     Seed,
     #[error("allowed: a number of seconds, such as 4 or 2.5")]
     Seconds,
-    #[error("allowed: numbers with commas between, such as 1,5,10")]
+    #[error("allowed: numbers separated by commas, such as 1,5,10")]
     Numbers,
     #[error("allowed: a number of seconds, such as 0.02 or 1/30")]
     Exposure,
-    #[error("allowed: three numbers with commas between, such as 0,1,-0.5")]
+    #[error("allowed: three numbers separated by commas, such as 0,1,-0.5")]
     Vector,
     #[error("allowed: a number of bytes with a unit, such as 512MiB, 8GiB or 500MB")]
     Bytes,
-    #[error("there is no such folder; allowed: a folder that is there")]
+    #[error("the folder does not exist; allowed: an existing folder")]
     Folder,
 }
 
-/// Numbers with commas between.
+/// Numbers separated by commas.
 #[derive(Clone, Debug)]
 pub(crate) struct Numbers(pub(crate) Vec<f64>);
 
-/// Two whole numbers between 1 and `most`.
-fn pair(text: &str, most: usize) -> Option<[usize; 2]> {
+/// Two whole numbers between 1 and `max`.
+fn pair(text: &str, max: usize) -> Option<[usize; 2]> {
     let (first, second) = text.split_once(['x', 'X'])?;
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=most).contains(side));
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=max).contains(side));
     Some([side(first)?, side(second)?])
 }
 
@@ -79,7 +79,7 @@ pub(super) fn parse_seconds(text: &str) -> Result<f64, ValueError> {
     text.parse().ok().filter(|seconds: &f64| seconds.is_finite()).ok_or(ValueError::Seconds)
 }
 
-/// Finite numbers; nothing where one is no number.
+/// Finite numbers; `None` if one is not a number.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|number| number.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect()
 }
@@ -92,7 +92,7 @@ pub(super) fn parse_vector(text: &str) -> Result<[f64; 3], ValueError> {
     numbers(text).and_then(|numbers| numbers.try_into().ok()).ok_or(ValueError::Vector)
 }
 
-/// A time, or a fraction as on a camera's dial.
+/// A time in seconds, or a fraction such as 1/30.
 pub(super) fn parse_exposure(text: &str) -> Result<f64, ValueError> {
     let number = |text: &str| text.trim().parse::<f64>().ok();
     let seconds = match text.split_once('/') {

@@ -1,40 +1,51 @@
-//! How work is done, the same for several commands.
+//! Options that several commands have.
 
 use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::progress::ProgressKind;
+/// `--progress`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum ProgressKind {
+    /// A bar on stderr with frame rate and remaining time, if stderr is a terminal; then one line.
+    #[default]
+    Bar,
+    /// One JSON object a line on stdout: start, frame, done, error.
+    Json,
+    /// Only warnings and errors.
+    None,
+}
 
-/// Options of everything that draws.
+/// Options of all commands that run jobs.
 #[derive(Args, Debug)]
 pub(crate) struct WorkArgs {
-    /// Threads that draw and write. The pictures are the same for any number. [default: one for each core]
+    /// Number of threads. The pictures are the same for any number. [default: one for each core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Work")]
     pub(crate) threads: Option<u16>,
-    /// How progress is told.
+    /// How progress is reported.
     #[arg(long, value_enum, default_value_t, help_heading = "Work")]
     pub(crate) progress: ProgressKind,
-    /// Say at the end where the time went.
+    /// Print the time of each stage at the end.
     #[arg(long, help_heading = "Work")]
     pub(crate) stats: bool,
 }
 
-/// What may be written over.
+/// Options for existing files.
 #[derive(Args, Debug)]
 pub(crate) struct OverwriteArgs {
-    /// Write also over files that Bansho did not make. Files that it made are replaced without this; what the scene is read from never is.
+    /// Also overwrite files that Bansho did not make. Files that it made are overwritten without this option; files that the scene is read from
+    /// never are.
     #[arg(long, help_heading = "Output")]
     pub(crate) overwrite: bool,
 }
 
-/// Where what is simulated in steps is kept.
+/// Options for snapshots of a simulation.
 #[derive(Args, Debug)]
 pub(crate) struct StateArgs {
-    /// Keep the state of what is simulated in steps here, and begin from the nearest state.
+    /// Save snapshots of simulated phenomena in this folder, and start from the nearest one.
     #[arg(long, value_name = "DIR", help_heading = "Work")]
     pub(crate) snapshots: Option<PathBuf>,
-    /// Frames between snapshots. [default: a second's worth]
+    /// Frames between snapshots. [default: one snapshot a second]
     #[arg(long, value_name = "N", requires = "snapshots", help_heading = "Work")]
     pub(crate) snapshot_every: Option<u64>,
 }

@@ -6,13 +6,13 @@ use bansho::aurora::physics::{
     calibration::{CalibrationCheck, calibrate},
 };
 
-use crate::output::to_stdout;
+use crate::output::print;
 
-/// Prints the figures of the aurora's light, and what is demanded of them.
+/// Prints the calibration of the aurora's light, and checks it against observations.
 pub(crate) fn run() -> anyhow::Result<()> {
     let calibration = calibrate(atmosphere());
-    to_stdout(&calibration.to_string())?;
+    print(&calibration.to_string())?;
     let failed = calibration.checks.iter().filter(|check| !CalibrationCheck::holds(check)).count();
-    ensure!(failed == 0, "{failed} of {} demands do not hold", calibration.checks.len());
+    ensure!(failed == 0, "{failed} of {} requirements are not met", calibration.checks.len());
     Ok(())
 }

@@ -9,30 +9,31 @@ use bansho::{
 
 use crate::{
     args::{CheckArgs, InputArgs},
-    exit::{self, ReportedJobError},
-    output::{self, to_stdout},
+    exit::{self, ReportedError},
+    output::{print, print_message},
 };
 
-/// Checks every scene and tells all faults of all of them, and what stops nothing but will look other than one may expect.
+/// Checks all scenes, and prints their errors and warnings.
 pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
-    let mut last_fault = None;
+    let mut last_error = None;
     for path in &args.scenes {
         match describe(path, &args.inputs) {
-            Ok(line) => to_stdout(&line)?,
+            Ok(line) => print(&line)?,
             Err(error) => {
-                exit::report_job_error(&error);
-                last_fault = Some(error);
+                exit::print_job_error(&error);
+                last_error = Some(error);
             }
         }
     }
-    last_fault.map_or(Ok(()), |error| Err(ReportedJobError(error).into()))
+    last_error.map_or(Ok(()), |error| Err(ReportedError::Job(error).into()))
 }
 
+/// Checks a scene and returns its description.
 fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     let scene = inputs.read(path, &[])?;
     let (compiled, plan) = job::check_scene(&scene)?;
-    for remark in job::remarks(&scene, &compiled, &plan) {
-        output::tell("warning", &remark.to_string());
+    for warning in job::remarks(&scene, &compiled, &plan) {
+        print_message("warning", &warning.to_string());
     }
     let [width, height] = plan.size();
     let (fps, frames) = (plan.fps(), plan.frames());
@@ -43,9 +44,9 @@ fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     };
     let drawn = plan.scene().instances.iter().filter(|instance| instance.enabled);
     let names: Vec<&str> = drawn.map(|instance| instance.name.as_str()).collect();
-    let names = if names.is_empty() { "nothing in it".to_owned() } else { names.join(", ") };
+    let names = if names.is_empty() { "no phenomena".to_owned() } else { names.join(", ") };
     Ok(format!(
-        "{}: right. {width} x {height}, {numbers} at {rate} a second, EV100 {:.1}: {names}\n",
+        "{}: valid. {width} x {height}, {numbers} at {rate} fps, EV100 {:.1}: {names}\n",
         printable(&scene.name),
         plan.exposure_ev100
     ))

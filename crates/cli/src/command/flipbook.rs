@@ -1,13 +1,13 @@
 //! `bansho flipbook`
 
-use crate::{args::FlipbookArgs, progress};
+use crate::{args::FlipbookArgs, progress::JobResult};
 
-/// Draws a scene into sheets for game engines.
+/// Draws a scene as a flipbook for game engines.
 pub(crate) fn run(args: &FlipbookArgs) -> anyhow::Result<()> {
-    super::watched(&args.work, |watcher| {
+    super::run_job(&args.work, |reporter| {
         let flipbook = args.flipbook()?.prepare()?;
         let frames = flipbook.frame_count();
-        let summary = flipbook.run(watcher)?;
-        Ok(progress::Result { what: "frame", drawn: frames, kept: 0, files: summary.files })
+        let summary = flipbook.run(reporter)?;
+        Ok(JobResult { unit: "frame", drawn: frames, kept: 0, files: summary.files })
     })
 }

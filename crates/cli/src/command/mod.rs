@@ -1,13 +1,11 @@
-//! What each command does.
+//! The commands of the program.
 
 pub(crate) mod calibrate;
 pub(crate) mod check;
-pub(crate) mod completions;
 pub(crate) mod flipbook;
-pub(crate) mod man;
+pub(crate) mod generated;
 pub(crate) mod new;
 pub(crate) mod render;
-pub(crate) mod schema;
 pub(crate) mod simulate;
 pub(crate) mod streaks;
 pub(crate) mod studio;
@@ -18,18 +16,18 @@ use bansho::job::JobError;
 use crate::{
     args::WorkArgs,
     interrupt,
-    progress::{self, Watcher},
+    progress::{JobResult, ProgressReporter},
 };
 
-/// Does `work` in a pool of threads of its own, watched for the user.
-fn watched(
+/// Runs a job in a thread pool of its own, and reports its progress and its result.
+fn run_job(
     args: &WorkArgs,
-    work: impl FnOnce(&Watcher) -> Result<progress::Result, JobError> + Send,
+    job: impl FnOnce(&ProgressReporter) -> Result<JobResult, JobError> + Send,
 ) -> anyhow::Result<()> {
-    let watcher = Watcher::new(args.progress, args.stats);
-    interrupt::be_patient(watcher.telling_the_end());
-    // 0 stands for one thread for each core.
+    let reporter = ProgressReporter::new(args.progress, args.stats);
+    interrupt::set_grace_period(reporter.forced_exit_message());
+    // 0 is one thread for each core.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.map_or(0, usize::from)).build()?;
-    let result = pool.install(|| work(&watcher));
-    watcher.finish(result, pool.current_num_threads())
+    let result = pool.install(|| job(&reporter));
+    reporter.finish(result, pool.current_num_threads())
 }

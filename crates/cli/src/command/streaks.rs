@@ -1,12 +1,12 @@
 //! `bansho streaks`
 
-use crate::{args::StreaksArgs, progress};
+use crate::{args::StreaksArgs, progress::JobResult};
 
 /// Writes streak textures of rain.
 pub(crate) fn run(args: &StreaksArgs) -> anyhow::Result<()> {
-    super::watched(&args.work, |watcher| {
+    super::run_job(&args.work, |reporter| {
         let streaks = args.streaks().prepare()?;
-        let index = streaks.run(watcher)?;
-        Ok(progress::Result { what: "texture", drawn: streaks.texture_count(), kept: 0, files: vec![index] })
+        let index = streaks.run(reporter)?;
+        Ok(JobResult { unit: "texture", drawn: streaks.texture_count(), kept: 0, files: vec![index] })
     })
 }

@@ -6,65 +6,60 @@ use std::{
     process::{Command, ExitStatus},
 };
 
-use crate::args::StudioArgs;
+use crate::{args::StudioArgs, exit::ReportedError};
 
 /// The studio's program.
 const PROGRAM: &str = "bansho-studio";
 
-/// Why there is no studio.
+/// Why the studio does not run.
 #[derive(Debug, thiserror::Error)]
 enum StudioError {
     /// It is not installed.
     #[error(
-        "the studio is a program of its own, {PROGRAM}, and it is neither beside this one nor on the path; \
+        "the studio is a separate program, {PROGRAM}, which is neither in the folder of this one nor on the path; \
          from a checkout, `cargo install --path crates/studio` installs it"
     )]
     Missing,
     /// It cannot be started.
     #[error("{PROGRAM} cannot be started: {0}")]
     Start(io::Error),
-    /// There is nothing that a window could be seen on.
+    /// There is no display for a window.
     #[error(
         "there is no display for the studio's window: neither DISPLAY nor WAYLAND_DISPLAY is set; start it from a desktop session or \
          by `ssh -X`, or draw without a window: bansho render SCENE"
     )]
     NoDisplay,
-    /// It was ended from outside.
+    /// It was ended by a signal, or failed without a message.
     #[error("{PROGRAM} failed: {0}")]
     Failed(ExitStatus),
 }
-
-/// The studio failed, and has said why.
-#[derive(Debug, thiserror::Error)]
-#[error("{PROGRAM} failed")]
-pub(crate) struct AlreadyReported;
 
 /// Starts the studio and waits until its window is closed.
 pub(crate) fn run(args: &StudioArgs) -> anyhow::Result<()> {
     if !has_display() {
         return Err(StudioError::NoDisplay.into());
     }
-    let program = beside().unwrap_or_else(|| PathBuf::from(PROGRAM));
+    let program = in_own_folder().unwrap_or_else(|| PathBuf::from(PROGRAM));
     let status = Command::new(program).args(&args.scene).status().map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => StudioError::Missing,
         _ => StudioError::Start(error),
     })?;
     match status.code() {
         Some(0) => Ok(()),
-        Some(1) => Err(AlreadyReported.into()),
+        Some(1) => Err(ReportedError::OtherProgram.into()),
         _ => Err(StudioError::Failed(status).into()),
     }
 }
 
-/// Whether there is something to open a window on, as far as the environment says; where windows need no such variable, always.
+/// Whether the environment names a display. Always true on systems without such variables.
 fn has_display() -> bool {
     let needed = cfg!(all(unix, not(any(target_os = "macos", target_os = "ios", target_os = "android"))));
     let is_set = |name| env::var_os(name).is_some_and(|value| !value.is_empty());
     !needed || ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(is_set)
 }
 
-/// The studio that lies beside this program.
-fn beside() -> Option<PathBuf> {
+/// The studio in the folder of this program, if it is there.
+fn in_own_folder() -> Option<PathBuf> {
     let path = env::current_exe().ok()?.with_file_name(format!("{PROGRAM}{}", env::consts::EXE_SUFFIX));
     path.is_file().then_some(path)
 }

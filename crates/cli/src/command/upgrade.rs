@@ -7,15 +7,15 @@ use bansho::{
     scene::{FORMAT, edit},
 };
 
-use crate::{args::UpgradeArgs, output::to_stdout};
+use crate::{args::UpgradeArgs, output::print};
 
-/// Rewrites a scene in place, whole or not at all.
+/// Rewrites a scene in place, atomically.
 pub(crate) fn run(args: &UpgradeArgs) -> anyhow::Result<()> {
     let scene = SceneFile::read(&args.scene)?;
     let upgraded = match edit::upgrade(&scene.text) {
         Ok(upgraded) => upgraded,
         Err(error) => {
-            // The parser says the same with the place in the file.
+            // The parser reports the same problem with its position.
             scene.parse()?;
             return Err(error.into());
         }
@@ -23,10 +23,10 @@ pub(crate) fn run(args: &UpgradeArgs) -> anyhow::Result<()> {
     let name = args.scene.display().to_string();
     let name = printable(&name);
     match upgraded {
-        None => Ok(to_stdout(&format!("{name}: is of format {FORMAT} already; unchanged\n"))?),
+        None => Ok(print(&format!("{name}: already has format {FORMAT}; unchanged\n"))?),
         Some(text) => {
             atomic::write_bytes(&args.scene, text.as_bytes()).map_err(bansho::job::JobError::from)?;
-            Ok(to_stdout(&format!("{name}: rewritten for format {FORMAT}; comments kept\n"))?)
+            Ok(print(&format!("{name}: rewritten for format {FORMAT}; comments are kept\n"))?)
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A bar on the terminal.
+//! The progress bar.
 
 use std::{
     fmt::Write,
@@ -11,21 +11,21 @@ use std::{
 
 use bansho::{
     base::host::{plural::counted, printable::printable},
-    job::Outline,
+    job::JobStarted,
 };
 
-use super::Result;
-use crate::output::to_stderr;
+use super::JobResult;
+use crate::output::print_error_lines;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-/// Draws itself only where stderr is a terminal.
+/// A progress bar on stderr, drawn only if that is a terminal.
 pub(super) struct Bar {
     bar: ProgressBar,
-    /// Frames that were there before.
+    /// Number of frames that existed already.
     kept: Arc<AtomicU64>,
 }
 
-/// How fast `drawn` frames came, and how long the others will take: nobody knows before the first is there, which a long preroll comes before.
+/// The frame rate and the remaining time. Both are unknown before the first frame, which may come after a long preroll.
 fn pace(drawn: u64, per_second: f64, left: Duration) -> String {
     match drawn {
         0 => "before the first frame".to_owned(),
@@ -39,10 +39,10 @@ impl Bar {
     pub(super) fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
         let kept = Arc::new(AtomicU64::new(0));
-        let known = kept.clone();
+        let kept_frames = kept.clone();
         let write_pace = move |state: &ProgressState, text: &mut dyn Write| {
-            let drawn = state.pos().saturating_sub(known.load(Ordering::Relaxed));
-            // A pace that cannot be drawn is simply not drawn.
+            let drawn = state.pos().saturating_sub(kept_frames.load(Ordering::Relaxed));
+            // A failure is ignored: the text is missing from the bar.
             let _ = text.write_str(&pace(drawn, state.per_sec(), state.eta()));
         };
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
@@ -51,11 +51,11 @@ impl Bar {
         Self { bar, kept }
     }
 
-    /// Frames that are there already move the bar but do not count for the rate.
-    pub(super) fn started(&self, outline: &Outline) {
-        self.bar.set_length(outline.total as u64);
-        self.bar.set_position(outline.kept as u64);
-        self.kept.store(outline.kept as u64, Ordering::Relaxed);
+    /// Frames that are kept move the bar, but do not count for the rate.
+    pub(super) fn started(&self, started: &JobStarted) {
+        self.bar.set_length(started.frames as u64);
+        self.bar.set_position(started.kept as u64);
+        self.kept.store(started.kept as u64, Ordering::Relaxed);
         self.bar.reset_eta();
         self.bar.enable_steady_tick(Duration::from_millis(200));
     }
@@ -64,8 +64,8 @@ impl Bar {
         self.bar.inc(1);
     }
 
-    /// Does something to the terminal that the bar must not spoil.
-    pub(super) fn beside(&self, action: impl FnOnce()) {
+    /// Hides the bar during `action`, which prints to the terminal.
+    pub(super) fn suspend(&self, action: impl FnOnce()) {
         self.bar.suspend(action);
     }
 
@@ -73,19 +73,19 @@ impl Bar {
         self.bar.finish_and_clear();
     }
 
-    pub(super) fn done(&self, result: &Result, seconds: f64) {
+    pub(super) fn done(&self, result: &JobResult, seconds: f64) {
         self.clear();
-        let Result { what, drawn, kept, files } = result;
+        let JobResult { unit, drawn, kept, files } = result;
         let kept = if *kept > 0 {
-            format!(", {kept} {} there already", if *kept == 1 { "was" } else { "were" })
+            format!(", {kept} {} kept", if *kept == 1 { "was" } else { "were" })
         } else {
             String::new()
         };
         let files: Vec<String> = files.iter().map(|file| printable(&file.display().to_string()).into_owned()).collect();
         let rate = *drawn as f64 / seconds.max(1e-9);
-        to_stderr(&format!(
+        print_error_lines(&format!(
             "{} in {seconds:.2} s, {rate:.1} a second{kept}: {}",
-            counted(*drawn, what),
+            counted(*drawn, unit),
             files.join(", ")
         ));
     }
@@ -96,9 +96,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nobody_knows_the_time_that_is_left_before_the_first_frame() {
+    fn the_remaining_time_is_unknown_before_the_first_frame() {
         assert_eq!(pace(0, 0.0, Duration::ZERO), "before the first frame");
-        let told = pace(3, 1.5, Duration::from_secs(8));
-        assert!(told.starts_with("1.5 frames/s  8") && told.ends_with(" left"), "{told}");
+        let text = pace(3, 1.5, Duration::from_secs(8));
+        assert!(text.starts_with("1.5 frames/s  8") && text.ends_with(" left"), "{text}");
     }
 }

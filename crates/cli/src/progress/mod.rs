@@ -1,124 +1,116 @@
-//! What the user sees while a job runs.
+//! Reports the progress, warnings and result of a job.
 
 mod bar;
 mod json;
 
-use std::{sync::Arc, time::Instant};
+use std::{io, path::PathBuf, sync::Arc, time::Instant};
 
 use bansho::{
     Observer, Stage,
-    job::{FrameDone, JobError, JobObserver, Note, Outline},
+    job::{FrameDone, JobError, JobObserver, JobStarted, Warning},
 };
 
 use self::{bar::Bar, json::Json};
 use crate::{
-    exit::{self, ReportedJobError},
+    args::ProgressKind,
+    exit::{self, ReportedError},
     flags, interrupt,
-    output::{self, to_stderr},
+    output::{print_error_lines, print_message},
     stats::Stats,
 };
 
-/// `--progress`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum ProgressKind {
-    /// A bar on stderr with frames a second and the time left, where stderr is a terminal; then one line.
-    #[default]
-    Bar,
-    /// One JSON object a line on stdout: start, frame, done, error.
-    Json,
-    /// Nothing but warnings and errors.
+/// The form of the progress report.
+enum Display {
+    Bar(Bar),
+    Json(Json),
     None,
 }
 
-/// Where progress goes.
-enum Shown {
-    Bar(Bar),
-    Json(Json),
-    Nothing,
-}
-
-/// Watches a job for the user: progress, warnings, signals, times.
-pub(crate) struct Watcher {
-    shown: Arc<Shown>,
+/// Observes a job: reports its progress and warnings, cancels it after a signal, and measures its stages.
+pub(crate) struct ProgressReporter {
+    display: Arc<Display>,
     stats: Option<Stats>,
     since: Instant,
 }
 
-/// All work was done, but not all of its progress could be reported.
+/// The job is complete, but some events could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("progress was lost: {0}; all files are written")]
-struct Unwritten(std::io::Error);
+struct ProgressError(io::Error);
 
-/// What a job came to, for the last line.
-pub(crate) struct Result {
-    /// What one thing that was drawn is called.
-    pub(crate) what: &'static str,
+/// The result of a job, for the last line.
+pub(crate) struct JobResult {
+    /// What is counted: "frame" or "texture".
+    pub(crate) unit: &'static str,
+    /// Number drawn and written.
     pub(crate) drawn: usize,
+    /// Number of existing ones that were kept.
     pub(crate) kept: usize,
-    pub(crate) files: Vec<std::path::PathBuf>,
+    /// The files to name.
+    pub(crate) files: Vec<PathBuf>,
 }
 
-impl Watcher {
+impl ProgressReporter {
     pub(crate) fn new(kind: ProgressKind, stats: bool) -> Self {
-        let shown = match kind {
-            ProgressKind::Bar => Shown::Bar(Bar::new()),
-            ProgressKind::Json => Shown::Json(Json::default()),
-            ProgressKind::None => Shown::Nothing,
+        let display = match kind {
+            ProgressKind::Bar => Display::Bar(Bar::new()),
+            ProgressKind::Json => Display::Json(Json::default()),
+            ProgressKind::None => Display::None,
         };
-        Self { shown: Arc::new(shown), stats: stats.then(Stats::new), since: Instant::now() }
+        Self { display: Arc::new(display), stats: stats.then(Stats::new), since: Instant::now() }
     }
 
-    /// Tells how it ended, statistics last. `threads` drew.
+    /// Reports the result, and the statistics of a job with `threads` threads.
     ///
     /// # Errors
-    /// Why the job failed, or progress could not be written.
-    pub(crate) fn finish(&self, result: std::result::Result<Result, JobError>, threads: usize) -> anyhow::Result<()> {
+    /// The error of the job, or progress could not be written.
+    pub(crate) fn finish(&self, result: Result<JobResult, JobError>, threads: usize) -> anyhow::Result<()> {
         let seconds = self.since.elapsed().as_secs_f64();
         let result = result.map_err(|error| self.fail(error))?;
-        match &*self.shown {
-            Shown::Bar(bar) => bar.done(&result, seconds),
-            Shown::Json(json) => json.done(&result, seconds),
-            Shown::Nothing => {}
+        match &*self.display {
+            Display::Bar(bar) => bar.done(&result, seconds),
+            Display::Json(json) => json.done(&result, seconds),
+            Display::None => {}
         }
         if let Some(stats) = &self.stats {
-            to_stderr(&stats.table(result.drawn, threads));
+            print_error_lines(&stats.table(result.drawn, threads));
         }
-        match &*self.shown {
-            Shown::Json(json) => json.take_fault().map_or(Ok(()), |error| Err(Unwritten(error).into())),
-            Shown::Bar(_) | Shown::Nothing => Ok(()),
+        match &*self.display {
+            Display::Json(json) => json.take_error().map_or(Ok(()), |error| Err(ProgressError(error).into())),
+            Display::Bar(_) | Display::None => Ok(()),
         }
     }
 
-    /// What tells the user that a signal ended the program because the work did not stop by itself.
-    pub(crate) fn telling_the_end(&self) -> impl Fn() + Send + 'static {
-        const MESSAGE: &str = "stopped; whole files stay";
-        let shown = self.shown.clone();
+    /// Prints that a signal ended the program because the job did not stop in time.
+    pub(crate) fn forced_exit_message(&self) -> impl Fn() + Send + 'static {
+        const MESSAGE: &str = "stopped; finished files are kept";
+        let display = self.display.clone();
         move || {
-            if let Shown::Bar(bar) = &*shown {
+            if let Display::Bar(bar) = &*display {
                 bar.clear();
             }
-            output::tell("error", MESSAGE);
-            if let Shown::Json(json) = &*shown {
+            print_message("error", MESSAGE);
+            if let Display::Json(json) = &*display {
                 json.failed(MESSAGE, interrupt::exit_code());
             }
         }
     }
 
     fn fail(&self, error: JobError) -> anyhow::Error {
-        if let Shown::Bar(bar) = &*self.shown {
+        if let Display::Bar(bar) = &*self.display {
             bar.clear();
         }
-        exit::report_job_error(&error);
-        let message = flags::error(&error);
-        let reported = anyhow::Error::new(ReportedJobError(error));
-        if let Shown::Json(json) = &*self.shown {
+        exit::print_job_error(&error);
+        let message = flags::error_message(&error);
+        let reported = anyhow::Error::new(ReportedError::Job(error));
+        if let Display::Json(json) = &*self.display {
             json.failed(&message, exit::code(&reported));
         }
         reported
     }
 }
 
-impl Observer for Watcher {
+impl Observer for ProgressReporter {
     fn begin(&self, stage: Stage) {
         self.stats.iter().for_each(|stats| stats.begin(stage));
     }
@@ -128,29 +120,29 @@ impl Observer for Watcher {
     }
 
     fn cancelled(&self) -> bool {
-        interrupt::came()
+        interrupt::is_requested()
     }
 }
 
-impl JobObserver for Watcher {
-    fn started(&self, outline: &Outline) {
-        match &*self.shown {
-            Shown::Bar(bar) => bar.started(outline),
-            Shown::Json(json) => json.started(outline),
-            Shown::Nothing => {}
+impl JobObserver for ProgressReporter {
+    fn started(&self, started: &JobStarted) {
+        match &*self.display {
+            Display::Bar(bar) => bar.started(started),
+            Display::Json(json) => json.started(started),
+            Display::None => {}
         }
     }
 
     fn frame_done(&self, frame: &FrameDone) {
-        match &*self.shown {
-            Shown::Bar(bar) => bar.frame_done(),
-            Shown::Json(json) => json.frame_done(frame, self.since.elapsed().as_secs_f64()),
-            Shown::Nothing => {}
+        match &*self.display {
+            Display::Bar(bar) => bar.frame_done(),
+            Display::Json(json) => json.frame_done(frame, self.since.elapsed().as_secs_f64()),
+            Display::None => {}
         }
     }
 
-    fn note(&self, note: &Note) {
-        let warn = || output::tell("warning", &flags::note(note));
-        if let Shown::Bar(bar) = &*self.shown { bar.beside(warn) } else { warn() }
+    fn warning(&self, warning: &Warning) {
+        let warn = || print_message("warning", &flags::warning_message(warning));
+        if let Display::Bar(bar) = &*self.display { bar.suspend(warn) } else { warn() }
     }
 }

@@ -8,7 +8,7 @@ fn a_new_scene_passes_the_check_and_is_never_overwritten() {
     folder.succeed(&["new", "fire"]);
     assert_eq!(folder.names(), ["fire.toml"]);
     let check = folder.succeed(&["check", "fire.toml"]);
-    assert!(check.stdout.starts_with("fire.toml: right. 1280 x 720"), "{}", check.stdout);
+    assert!(check.stdout.starts_with("fire.toml: valid. 1280 x 720"), "{}", check.stdout);
     folder.write("fire.toml", "mine");
     let again = folder.run(&["new", "fire"]);
     assert_eq!((again.code, again.errors()), (Some(1), 1));
@@ -69,7 +69,7 @@ fn check_tells_of_every_scene() {
     folder.write("bad.toml", "bansho = 2\n[picture]\nsize = [0, 0]\n");
     let run = folder.run(&["check", "bad.toml", "scene.toml", "gone.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 2), "{}", run.stderr);
-    assert!(run.stdout.contains("scene.toml: right. 48 x 64, frames 0 to 5 at 30 a second"), "{}", run.stdout);
+    assert!(run.stdout.contains("scene.toml: valid. 48 x 64, frames 0 to 5 at 30 fps"), "{}", run.stdout);
     assert!(run.stdout.contains("left log"));
 }
 
@@ -177,7 +177,7 @@ fn the_studio_is_the_program_beside_this_one_and_where_there_is_none_it_says_how
     assert!(run().status.success());
     assert_eq!(folder.files("")["opened"], b"fire.toml\n");
 
-    // What the studio itself said is not said again.
+    // The studio's own message is not repeated.
     fs::write(&studio, "#!/bin/sh\necho 'error: no window' >&2\nexit 1\n").unwrap();
     let failed = run();
     assert_eq!((failed.status.code(), failed.stderr), (Some(1), b"error: no window\n".to_vec()));

@@ -1,23 +1,9 @@
-//! The real program: good and bad input, exit codes, interruptions, files.
+//! Tests of the program: valid and invalid input, exit codes, interruptions, output files.
 
-mod alpha;
-mod aurora;
-mod bad_input;
 mod commands;
-mod completeness;
-mod disk;
-mod figures;
-mod flipbook;
-mod inputs;
-mod interruptions;
-mod large_scenes;
-#[cfg(target_os = "linux")]
-mod memory;
-mod overwriting;
-mod particles;
-mod pictures;
-mod rain;
-mod rooms;
-mod streaks;
+mod crate_dependencies;
+mod input;
+mod output;
+mod phenomena;
+mod robustness;
 mod support;
-mod threads;

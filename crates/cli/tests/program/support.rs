@@ -1,4 +1,4 @@
-//! A folder to run the program in, and what is read back from it.
+//! A folder to run the program in, and readers of its output.
 
 use std::{
     collections::BTreeMap,
@@ -34,7 +34,7 @@ impl Folder {
         Self { folder: tempfile::tempdir().unwrap() }
     }
 
-    /// A folder that holds `scene.toml`.
+    /// A folder that contains `scene.toml`.
     pub(crate) fn with_scene(text: &str) -> Self {
         let folder = Self::new();
         folder.write("scene.toml", text);
@@ -61,14 +61,14 @@ impl Folder {
         Run::of(self.command(arguments).output().unwrap())
     }
 
-    /// Runs and must succeed.
+    /// Runs the program, which must succeed.
     pub(crate) fn succeed(&self, arguments: &[&str]) -> Run {
         let run = self.run(arguments);
         assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
         run
     }
 
-    /// Names of everything in it, folders with what they hold.
+    /// Paths of all files in it and in its folders.
     pub(crate) fn names(&self) -> Vec<String> {
         names(self.folder.path())
     }
@@ -114,7 +114,7 @@ impl Run {
     }
 }
 
-/// Waits until `done` says so; a program that hangs must not hang the tests.
+/// Waits until `done` returns true, for at most a minute, so that a program that hangs does not hang the tests.
 pub(crate) fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !done() {
@@ -146,7 +146,7 @@ pub(crate) fn decode_png(bytes: &[u8]) -> Png {
 }
 
 impl Png {
-    /// The bytes of a part, row after row.
+    /// The bytes of a rectangle, row by row.
     pub(crate) fn part(&self, [x, y, width, height]: [usize; 4]) -> Vec<u8> {
         let pixel = self.channels * usize::from(self.bits) / 8;
         let row = |row: usize| &self.bytes[(row * self.width + x) * pixel..][..width * pixel];
@@ -158,7 +158,7 @@ impl Png {
     }
 }
 
-/// Every channel of an EXR by name, and where its pixels lie.
+/// All channels of an EXR by name, and its data window.
 pub(crate) struct Exr {
     pub(crate) size: [usize; 2],
     pub(crate) origin: [i32; 2],

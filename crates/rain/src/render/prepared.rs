@@ -1,7 +1,7 @@
 //! A prepared frame of rain: streaks in chunks, and the medium of single scattering. It draws strips of the picture.
 
 use bansho_base::{
-    frame::Figure,
+    frame::MetadataEntry,
     image::Rect,
     phenomenon::{
         Prepared,
@@ -77,7 +77,7 @@ pub(crate) struct PreparedRain<'a> {
     /// Maximum distance of a streak, m.
     streaks_end: f64,
     single_scattering: Option<SingleScattering<'a>>,
-    figures: Vec<Figure>,
+    metadata: Vec<MetadataEntry>,
 }
 
 impl<'a> PreparedRain<'a> {
@@ -115,8 +115,8 @@ impl<'a> PreparedRain<'a> {
         let farthest = rain.reach(surroundings);
         let single_scattering =
             SingleScattering::new(&exposure, &lighting, sky_lighting.clone(), view, extinction, end, farthest);
-        let figures = frame.figures(chunks.iter().map(StreakChunk::count).sum(), billboards);
-        Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), single_scattering, figures }
+        let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
+        Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), single_scattering, metadata }
     }
 }
 
@@ -164,24 +164,24 @@ impl<'a> Frame<'a> {
         white.map_or(0.0, |white| (white * CULLING_FRACTION) as f32)
     }
 
-    /// Figures of the frame.
-    fn figures(&self, streaks: usize, billboards: usize) -> Vec<Figure> {
+    /// Metadata of the frame.
+    fn metadata(&self, streaks: usize, billboards: usize) -> Vec<MetadataEntry> {
         let t = self.view.shutter.middle();
         let sizes = DropSizeDistribution::marshall_palmer(self.rain.rate(t));
-        let figure = |name, unit, value| Figure { name, unit, value };
+        let entry = |name, unit, value| MetadataEntry { name, unit, value };
         vec![
-            figure("rain_rate", "mm/h", self.rain.rate(t)),
-            figure("drops_in_view", "", streaks as f64),
-            figure("billboards_in_view", "", billboards as f64),
-            figure("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
-            figure("visibility", "m", visibility(&sizes)),
+            entry("rain_rate", "mm/h", self.rain.rate(t)),
+            entry("drops_in_view", "", streaks as f64),
+            entry("billboards_in_view", "", billboards as f64),
+            entry("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
+            entry("visibility", "m", visibility(&sizes)),
         ]
     }
 }
 
 impl Prepared for PreparedRain<'_> {
-    fn figures(&self) -> Vec<Figure> {
-        self.figures.clone()
+    fn metadata(&self) -> Vec<MetadataEntry> {
+        self.metadata.clone()
     }
 
     fn bounds(&self, _slice: &DepthInterval) -> Rect {

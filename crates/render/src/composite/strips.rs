@@ -214,7 +214,7 @@ pub(crate) fn draw_frame(
         channels: channels(composition, planes),
         opaque,
         content,
-        figures: Vec::new(),
+        metadata: Vec::new(),
     })
 }
 

@@ -70,11 +70,11 @@ impl Difference {
     }
 }
 
-/// The same shot in thumbnail size, without layers, AOVs and figures.
+/// The same shot in thumbnail size, without layers, AOVs and metadata.
 pub(crate) fn thumbnail_plan(plan: &Plan) -> Plan {
     let longest = plan.size[0].max(plan.size[1]);
     let size = plan.size.map(|side| (side * THUMBNAIL_SIDE).div_ceil(longest));
-    Plan { layers: false, aovs: false, figures: false, ..plan.at_size(size) }
+    Plan { layers: false, aovs: false, metadata: false, ..plan.at_size(size) }
 }
 
 /// Display codes of a frame over black, from 0 to 1.

@@ -6,7 +6,7 @@ pub(crate) mod stepping;
 use std::sync::Arc;
 
 use bansho_base::{
-    frame::{Channel, FigureSet, Frame},
+    frame::{Channel, Frame, PhenomenonMetadata},
     geometry::point_cloud::PointCloud,
     host::observer::{self, Cancelled, Observer, Stage, StageGuard},
     image::Rect,
@@ -231,18 +231,18 @@ impl Shot {
         } else {
             strips::draw_frame(&composition, header, recycled, observer)?
         };
-        if self.context.plan.figures {
-            frame.figures = self.figures(&prepared);
+        if self.context.plan.metadata {
+            frame.metadata = self.metadata(&prepared);
         }
         Ok(Some(frame))
     }
 
-    /// The figures of every phenomenon that has any.
-    fn figures(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<FigureSet> {
+    /// The metadata of every phenomenon that has any.
+    fn metadata(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<PhenomenonMetadata> {
         let names = self.runs.iter().map(|run| run.info().name.to_owned());
-        let each = names.zip(prepared.iter().map(|prepared| prepared.figures()));
-        each.filter(|(_, figures)| !figures.is_empty())
-            .map(|(phenomenon, figures)| FigureSet { phenomenon, figures })
+        let each = names.zip(prepared.iter().map(|prepared| prepared.metadata()));
+        each.filter(|(_, entries)| !entries.is_empty())
+            .map(|(phenomenon, entries)| PhenomenonMetadata { phenomenon, entries })
             .collect()
     }
 
@@ -351,7 +351,7 @@ fn crop(whole: Frame, window: Rect) -> Option<Frame> {
         channels: channels.collect(),
         header: whole.header,
         opaque: whole.opaque,
-        figures: whole.figures,
+        metadata: whole.metadata,
         content: Rect::from_size(window.width, window.height),
     })
 }

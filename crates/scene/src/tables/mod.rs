@@ -1,4 +1,4 @@
-//! Tables of the scene file that are no phenomenon, and what follows for those that a text leaves out.
+//! The shared tables of a scene file, and the defaults of those that a text omits.
 
 pub(crate) mod defaults;
 pub mod picture;

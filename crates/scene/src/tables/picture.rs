@@ -1,4 +1,4 @@
-//! What a scene says of its picture, its plate and its lights.
+//! The tables `[picture]`, `[plate]` and `[[light]]`.
 
 use bansho_base::{
     color::MAX_EV100,
@@ -10,12 +10,12 @@ use bansho_base::{
 /// Largest side of a picture, pixels.
 pub const LARGEST_SIDE: f64 = 16_384.0;
 
-/// Frames a second, as a fraction.
+/// Frames per second, as a fraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct FrameRate {
     /// Frames.
     pub frames: u32,
-    /// In so many seconds.
+    /// The seconds that these frames take.
     pub seconds: u32,
 }
 
@@ -31,7 +31,7 @@ fn parse_fraction(text: &str) -> Option<FrameRate> {
     Some(FrameRate { frames: frames.trim().parse().ok()?, seconds: seconds.trim().parse().ok()? })
 }
 
-/// Decimal rates keep three places, which every rate in use needs at most.
+/// Decimal rates have three decimal places: no rate in use needs more.
 fn decimal(number: f64) -> FrameRate {
     let thousandths = (number * 1000.0).round() as u32;
     if thousandths.is_multiple_of(1000) {
@@ -82,106 +82,107 @@ impl Parameter for FrameRate {
 }
 
 bansho_base::parameters! {
-    /// The picture: its size, its frames, its exposure.
+    /// Size, frames and exposure of the picture.
     pub struct PictureParameters {
         /// Width and height.
         size: [i64; 2] = [1280, 720], limits(Range::new(1.0, LARGEST_SIDE)), unit("pixels");
-        /// How many frames the shot has.
+        /// Number of frames of the shot.
         frames: i64 = 240, limits(Range::new(1.0, 10_000_000.0)), unit("frames");
         /// Number of the first frame, at time 0.
         first_frame: i64 = 0, limits(Range::new(-1_000_000.0, 10_000_000.0));
-        /// Frames a second, as a number or as a fraction such as "24000/1001".
+        /// Frames per second, as a number or as a fraction such as "24000/1001".
         fps: FrameRate = FrameRate { frames: 30, seconds: 1 }, unit("1/s");
-        /// Exposure value at ISO 100, or "auto": that of the plate; without one chosen once a shot from what the scene holds.
+        /// Exposure value at ISO 100, or "auto": that of the plate; without a plate, measured once for the shot from the luminance of the scene.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
-        /// Temperature of the black body whose light is shown as white, as a camera is set: 4000 for a night sky. It changes what is made to
-        /// be looked at; EXR files keep the light and name that white. Left out it is 4000 where the sky is a night's, and else the display's, D65.
+        /// White balance: temperature of the black body whose light is displayed as white, such as 4000 for a night sky. It only changes display
+        /// formats; EXR files contain the unbalanced light, and state the white in their header. The default is 4000 for a night sky, else the
+        /// white of the display, D65.
         white_balance_k: Option<f64> = None, limits(Range::new(1500.0, 25_000.0)), unit("K");
-        /// Seed of everything random.
+        /// Seed of all random numbers.
         seed: i64 = 1, limits(Range::new(0.0, 9.0e15));
-        /// Pixels drawn beyond every edge; EXR files keep them outside the display window.
+        /// Pixels drawn beyond every edge; EXR files contain them outside the display window.
         overscan: i64 = 0, limits(Range::new(0.0, 4096.0)), unit("pixels");
     }
 }
 
 bansho_base::choice! {
-    /// What a plate's depth channel measures.
+    /// What the depth channel of a plate measures.
     pub enum DepthKind {
         /// Distance along the camera's axis.
         Axis = "axis",
         /// Distance from the camera.
         Distance = "distance",
-        /// Nearness: 1 / distance along the axis.
+        /// Inverse depth: 1 / distance along the axis.
         Inverse = "inverse",
     }
 }
 
 bansho_base::parameters! {
-    /// A picture to lay the phenomena over, and its depth for them to hide behind.
+    /// A picture over which the phenomena are composited, and its depth, which hides what is behind it.
     pub struct PlateParameters {
-        /// PNG, JPEG or EXR; `####` stands for the frame number.
+        /// PNG, JPEG or EXR; `####` is replaced by the frame number.
         image: Option<AssetPath> = None;
-        /// EXR whose `Z` (or only) channel is depth; the image's own `Z` when left out.
+        /// EXR whose channel `Z`, or whose only channel, is depth. The default is the channel `Z` of the image.
         depth: Option<AssetPath> = None;
         /// What the depth measures.
         depth_kind: DepthKind = DepthKind::Axis;
         /// Meters for each unit of the depth channel.
         depth_scale: f64 = 1.0, limits(Range::new(1e-6, 1e6)), unit("m");
         /// Exposure value at ISO 100 with which it was taken, so that its white is 1.2 * 2^EV cd/m^2: 15 in sunshine, 12 under heavy clouds, 4 in
-        /// a lit street at night. "auto": as the file records it (Exif, EXR), else assumed.
+        /// a lit street at night. "auto": that of the file (Exif, EXR), else an assumed value.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-MAX_EV100, MAX_EV100)), unit("EV");
     }
 }
 
 bansho_base::choice! {
-    /// Kind of a light.
+    /// Kind of light.
     pub enum LightKind {
-        /// Shines from a point in all directions.
+        /// Emits from a point in all directions.
         Point = "point",
-        /// Shines from infinitely far.
+        /// Emits from infinitely far away.
         Directional = "directional",
-        /// Shines from a point within a cone.
+        /// Emits from a point within a cone.
         Spot = "spot",
     }
 }
 
 bansho_base::parameters! {
-    /// A lamp, the moon or the sun. A scene of rain alone that states neither sky, ground nor light is lit by three street lamps.
+    /// A lamp, the moon or the sun. A scene with only rain that states neither sky, ground nor light is lit by three street lamps.
     pub struct LightParameters {
-        /// How it shines.
+        /// Kind of light.
         kind: LightKind = LightKind::Point;
-        /// Where it stands (point and spot).
+        /// Position (point and spot).
         position: Animated<[f64; 3]> = Animated::from([0.0, 3.0, 0.0]), unit("m");
-        /// Where it shines to (directional and spot).
+        /// Direction of the emitted light (directional and spot).
         direction: [f64; 3] = [0.0, -1.0, 0.0];
         /// Linear sRGB color; its luminance is scaled to `intensity`.
         color: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
         /// Luminous intensity (candela) of points and spots, illuminance (lux) of directional lights.
         intensity: Animated<f64> = Animated::from(100.0), limits(Range::new(0.0, 1e9)), unit("cd or lx");
-        /// Radius of the ball that a point or a spot is.
+        /// Radius of the sphere that emits the light (point and spot).
         radius: f64 = 0.05, limits(Range::new(1e-4, 100.0)), unit("m");
-        /// Whether the ball itself is seen.
+        /// Whether the sphere itself is visible.
         visible: bool = false;
-        /// Angle from the axis up to which a spot is full; at most `outer_cone_deg`.
+        /// Angle from the axis up to which a spot has full intensity; at most `outer_cone_deg`.
         inner_cone_deg: f64 = 15.0, limits(Range::new(0.0, 89.0)), unit("degrees");
-        /// Angle from the axis beyond which a spot is dark.
+        /// Angle from the axis beyond which a spot has no intensity.
         outer_cone_deg: f64 = 30.0, limits(Range::new(0.1, 90.0)), unit("degrees");
     }
 }
 
 impl LightParameters {
-    /// Whether it shines one way.
+    /// Whether it has a direction.
     pub fn is_directed(&self) -> bool {
         self.kind != LightKind::Point
     }
 
-    /// Whether its direction is one.
-    pub fn has_direction(&self) -> bool {
+    /// Whether the vector of its direction is not zero.
+    pub fn has_valid_direction(&self) -> bool {
         DVec3::from(self.direction).try_normalize().is_some()
     }
 
-    /// Whether it stands somewhere, so that its position matters.
-    pub fn stands(&self) -> bool {
+    /// Whether it has a position.
+    pub fn has_position(&self) -> bool {
         self.kind != LightKind::Directional
     }
 

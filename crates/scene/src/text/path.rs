@@ -1,35 +1,35 @@
-//! Paths of values in a scene: which value of which table.
+//! Paths of values in a scene.
 
 use std::fmt;
 
-use bansho_base::parameters::{Node, Table, Value};
+use bansho_base::parameters::{Node, Span, Table, Value};
 
-/// One step of a [`ValuePath`].
+/// One segment of a [`ValuePath`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Segment {
-    /// Into the value of a key.
+    /// The value of a key.
     Key(String),
-    /// Into an item of a list.
+    /// An item of a list.
     Index(usize),
 }
 
-/// A value of a scene, from the root inward, such as `flame_particles.0.burners.1.diameter`.
+/// The path of a value from the root of a scene, such as `flame_particles.0.burners.1.diameter`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ValuePath(Vec<Segment>);
 
 impl ValuePath {
-    /// The scene itself.
+    /// The path of the scene itself.
     pub fn root() -> Self {
         Self::default()
     }
 
-    /// The value of `key` within this value.
+    /// The path of the value of `key` within this value.
     #[must_use]
     pub fn key(&self, key: &str) -> Self {
         self.then(Segment::Key(key.to_owned()))
     }
 
-    /// Item `index` of the list at this path.
+    /// The path of item `index` of this list.
     #[must_use]
     pub fn index(&self, index: usize) -> Self {
         self.then(Segment::Index(index))
@@ -39,12 +39,12 @@ impl ValuePath {
         Self(self.0.iter().cloned().chain([segment]).collect())
     }
 
-    /// Its steps from the root inward.
+    /// Its segments, from the root.
     pub fn segments(&self) -> &[Segment] {
         &self.0
     }
 
-    /// The value that `root` states there; `None` where it states none.
+    /// The value at this path in `root`, if there is one.
     pub fn find<'a>(&self, root: &'a Table) -> Option<&'a Node> {
         let (first, rest) = self.0.split_first()?;
         let Segment::Key(key) = first else { return None };
@@ -67,4 +67,22 @@ impl fmt::Display for ValuePath {
         }
         Ok(())
     }
+}
+
+/// The span of the value at a dotted path, or of the nearest table above it that exists.
+pub(crate) fn nearest_span(root: &Table, path: &str) -> Option<Span> {
+    let mut value = None;
+    let mut span = None;
+    for segment in path.split('.') {
+        let node = match value.unwrap_or(&Value::Bool(false)) {
+            _ if value.is_none() => root.get(segment),
+            Value::Table(table) => table.get(segment),
+            Value::List(items) => segment.parse::<usize>().ok().and_then(|index| items.get(index)),
+            _ => None,
+        };
+        let Some(node) = node else { break };
+        span = Some(node.span.clone());
+        value = Some(&node.value);
+    }
+    span
 }

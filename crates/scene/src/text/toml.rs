@@ -1,4 +1,4 @@
-//! TOML to values with their places.
+//! Parses TOML to values with spans.
 
 use bansho_base::parameters::{Entry, Node, Problem, ProblemKind, Span, Table, Value};
 use toml_edit::{Document, Item, TableLike};
@@ -6,43 +6,43 @@ use toml_edit::{Document, Item, TableLike};
 /// The values of a TOML text.
 ///
 /// # Errors
-/// The text is not TOML; one problem says where and why.
+/// The text is not TOML, or has too many values.
 pub(crate) fn parse(text: &str) -> Result<Table, Problem> {
-    check_extent(text)?;
+    check_value_count(text)?;
     let document = Document::parse(text).map_err(|error| Problem {
-        span: error.span().or_else(|| deepest(text)),
+        span: error.span().or_else(|| too_deep_key(text)),
         path: String::new(),
         kind: ProblemKind::Syntax(error.message().replace('\n', "; ")),
     })?;
     Ok(table(document.as_table()))
 }
 
-/// Most values and tables of a text: in memory they take up to 1500 bytes for each sign that begins, ends or names one, 1.8 GB for so many.
-/// (Dots make tables of dotted keys.)
-pub(crate) const MOST_VALUES: usize = 1_200_000;
+/// Maximum number of values and tables of a text, counted by the characters `,[{=.` (dots make tables of dotted keys). Each takes up to
+/// 1500 bytes of memory: 1.8 GB for this number.
+pub(crate) const MAX_VALUES: usize = 1_200_000;
 
-/// Whether a text says no more than can be read, which is found out before it is parsed.
+/// Checks, before a text is parsed, that it has no more than [`MAX_VALUES`] values.
 ///
 /// # Errors
-/// It does; the problem says where it becomes too much.
-pub(crate) fn check_extent(text: &str) -> Result<(), Problem> {
-    let signs = text.bytes().enumerate().filter(|(_, byte)| matches!(byte, b',' | b'[' | b'{' | b'=' | b'.'));
-    match signs.map(|(at, _)| at).nth(MOST_VALUES) {
+/// It has more; the span is that of the first one too many.
+pub(crate) fn check_value_count(text: &str) -> Result<(), Problem> {
+    let characters = text.bytes().enumerate().filter(|(_, byte)| matches!(byte, b',' | b'[' | b'{' | b'=' | b'.'));
+    match characters.map(|(at, _)| at).nth(MAX_VALUES) {
         None => Ok(()),
         Some(at) => {
-            let kind = ProblemKind::TooManyValues { limit: MOST_VALUES };
+            let kind = ProblemKind::TooManyValues { limit: MAX_VALUES };
             Err(Problem { span: Some(at..at + 1), path: String::new(), kind })
         }
     }
 }
 
-/// The first line whose keys are nested deeper than the parser goes, which it does not say itself.
-fn deepest(text: &str) -> Option<Span> {
-    /// Parts of a dotted key that the parser allows.
-    const DEEPEST: usize = 80;
+/// The first line with a dotted key that is too deep for the parser, whose own error has no span.
+fn too_deep_key(text: &str) -> Option<Span> {
+    /// Segments of a dotted key at which the parser fails.
+    const MAX_SEGMENTS: usize = 80;
     let mut start = 0;
     for line in text.split_inclusive('\n') {
-        if line.bytes().filter(|byte| *byte == b'.').count() >= DEEPEST {
+        if line.bytes().filter(|byte| *byte == b'.').count() >= MAX_SEGMENTS {
             return Some(start..start + line.trim_end().len());
         }
         start += line.len();
@@ -59,7 +59,7 @@ fn table(source: &dyn TableLike) -> Table {
     Table { entries: source.iter().filter_map(entry).collect() }
 }
 
-/// A table or list of tables has no span of its own worth showing: its key stands for it.
+/// A list of tables has no useful span of its own, and gets that of its key.
 fn node(item: &Item, key_span: &Span) -> Option<Node> {
     match item {
         Item::None => None,
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_know_where_they_stand() {
+    fn values_have_spans() {
         let text = "a = 1\n[b]\nc = [2.5, \"x\"]\n[[d]]\ne = true\n[[d]]\n";
         let root = parse(text).unwrap();
         assert_eq!(root.get("a").unwrap().value, Value::Integer(1));
@@ -109,19 +109,19 @@ mod tests {
     }
 
     #[test]
-    fn what_says_too_much_is_refused_before_it_is_parsed() {
+    fn too_many_values_are_refused_before_parsing() {
         let text = |count: usize| format!("# no TOML at all\n{}", ",".repeat(count));
-        assert_eq!(check_extent(&text(MOST_VALUES)), Ok(()));
-        let problem = parse(&text(MOST_VALUES + 1)).unwrap_err();
-        let last = text(MOST_VALUES).len();
+        assert_eq!(check_value_count(&text(MAX_VALUES)), Ok(()));
+        let problem = parse(&text(MAX_VALUES + 1)).unwrap_err();
+        let last = text(MAX_VALUES).len();
         assert_eq!(
             (problem.kind, problem.span),
-            (ProblemKind::TooManyValues { limit: MOST_VALUES }, Some(last..last + 1))
+            (ProblemKind::TooManyValues { limit: MAX_VALUES }, Some(last..last + 1))
         );
     }
 
     #[test]
-    fn nothing_is_too_deep_for_an_answer() {
+    fn any_depth_gives_a_located_problem() {
         let deep = |open: &str, close: &str| format!("x = 1\na = {}1{}\n", open.repeat(100_000), close.repeat(100_000));
         let dotted = ["a"; 100_000].join(".");
         let texts =

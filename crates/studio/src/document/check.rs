@@ -11,7 +11,7 @@ use bansho::{
     scene::{
         Scene, ValuePath,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
@@ -20,7 +20,7 @@ use super::descriptors;
 /// The scene with the default options of `bansho render`.
 fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
     let options = SceneOptions { implied_backdrop: true, ..SceneOptions::default() };
-    let scene = Scene::parse(name, text, KINDS)?.adapted(&options);
+    let scene = Scene::parse(name, text, KINDS)?.with_options(&options);
     scene.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))
 }
 
@@ -73,7 +73,7 @@ impl Checker {
         text: &str,
         assets: &Arc<dyn Assets>,
     ) -> Option<Result<PlannedScene, SceneError>> {
-        let operations = draft_operations(&values(text).ok()?);
+        let operations = draft_operations(&parse_values(text).ok()?);
         let draft = operation::apply(text, &operations).ok().filter(|_| !operations.is_empty())?;
         let full = self.check(name, text, assets);
         let plan_draft = |full: PlannedScene| {
@@ -170,7 +170,7 @@ fn draft_operations(root: &Table) -> Vec<Operation> {
             for limit in kind.editor_hints.draft_limits {
                 let path = descriptors::within(&ValuePath::root().key(kind.key).index(index), limit.key);
                 if effective_number(root, &path).is_some_and(|number| number > limit.max as f64) {
-                    operations.push(Operation::Set { place: path, value: Value::Integer(limit.max) });
+                    operations.push(Operation::Set { path: path, value: Value::Integer(limit.max) });
                 }
             }
         }
@@ -213,8 +213,8 @@ mod tests {
     #[test]
     fn a_draft_has_fewer_particles_where_there_are_many() {
         let many = "bansho = 2\n[[aurora]]\n[[aurora]]\nparticles = { count = 500 }\n[[flame_particles]]\n";
-        let operations = draft_operations(&values(many).unwrap());
-        let mut paths: Vec<String> = operations.iter().map(|operation| operation.place().to_string()).collect();
+        let operations = draft_operations(&parse_values(many).unwrap());
+        let mut paths: Vec<String> = operations.iter().map(|operation| operation.path().to_string()).collect();
         paths.sort();
         assert_eq!(paths, ["aurora.0.particles.count", "flame_particles.0.particles"]);
         assert!(draft("bansho = 2\n[[flame_particles]]\n").is_some_and(|plan| plan.is_ok()));

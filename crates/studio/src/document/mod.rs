@@ -22,7 +22,7 @@ use bansho::{
     scene::{
         edit::EditError,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
@@ -251,7 +251,7 @@ impl Document {
     }
 
     fn parse(&mut self) {
-        match values(&self.text) {
+        match parse_values(&self.text) {
             Ok(values) => {
                 self.values = values;
                 self.syntax_problem = None;

@@ -61,7 +61,7 @@ fn collect_from_value(path: &ValuePath, node: &Node, kind: &Kind, found: &mut Ve
 
 #[cfg(test)]
 mod tests {
-    use bansho::scene::values;
+    use bansho::scene::parse_values;
 
     use super::*;
 
@@ -69,7 +69,7 @@ mod tests {
     fn plates_meshes_and_drawings_are_found_with_their_paths() {
         let text = "bansho = 2\n[plate]\nimage = \"a.png\"\n[[obstacle]]\nfile = \"b.glb\"\n[[aurora]]\n[[aurora]]\n\
             [[aurora.shapes]]\nsheets = [{ form = \"arc\" }, { svg_file = \"c.svg\" }]\n";
-        let found = named_files(&values(text).unwrap()).into_iter();
+        let found = named_files(&parse_values(text).unwrap()).into_iter();
         let found: Vec<_> = found.map(|FileReference { parameter, file }| (parameter.to_string(), file)).collect();
         let expected =
             [("plate.image", "a.png"), ("obstacle.0.file", "b.glb"), ("aurora.1.shapes.0.sheets.1.svg_file", "c.svg")];

@@ -94,7 +94,7 @@ pub mod operations {
     pub fn add(document: &Document, kind: &str) -> Vec<Operation> {
         let mut table = Table::default();
         table.push("name", Value::Text(free_name(kind, &document.phenomena())));
-        vec![Operation::Append { place: ValuePath::root().key(kind), value: Value::Table(table) }]
+        vec![Operation::Append { path: ValuePath::root().key(kind), value: Value::Table(table) }]
     }
 
     /// Adds a copy of `original` with a unique name.
@@ -106,7 +106,7 @@ pub mod operations {
         copy.push("name", Value::Text(free_name(&original.name, &document.phenomena())));
         let others = table.entries.iter().filter(|entry| entry.key != "name");
         others.for_each(|entry| copy.push(entry.key.clone(), entry.node.value.clone()));
-        vec![Operation::Append { place: ValuePath::root().key(original.id.kind), value: Value::Table(copy) }]
+        vec![Operation::Append { path: ValuePath::root().key(original.id.kind), value: Value::Table(copy) }]
     }
 
     /// Shows or hides a phenomenon.
@@ -114,8 +114,8 @@ pub mod operations {
         let path = entry.id.path().key("enabled");
         match (enabled, entry.enabled) {
             // Shown is the default.
-            (true, false) => Operation::Remove { place: path },
-            _ => Operation::Set { place: path, value: Value::Bool(enabled) },
+            (true, false) => Operation::Remove { path: path },
+            _ => Operation::Set { path: path, value: Value::Bool(enabled) },
         }
     }
 

@@ -14,7 +14,7 @@ use bansho::{
     scene::{
         Instance, PlateParameters, Scene, ValuePath,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
@@ -42,7 +42,7 @@ pub fn names(kind: &str) -> Vec<&'static str> {
 
 /// Plans of the stages of `phenomenon` in the scene `text`; `None` where the scene has errors or no such phenomenon.
 pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, phenomenon: PhenomenonId) -> Option<Vec<PlannedScene>> {
-    let root = values(text).ok()?;
+    let root = parse_values(text).ok()?;
     let plan = |stage: &str| {
         let scene = stage_scene(name, &stage_text(text, &root, phenomenon, stage)?, phenomenon)?;
         let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
@@ -57,11 +57,11 @@ fn stage_text(text: &str, root: &Table, phenomenon: PhenomenonId, stage: &str) -
     let hints = descriptors::phenomenon_kind(phenomenon.kind)?.editor_hints;
     let path = phenomenon.path();
     let stage = Value::Text(stage.to_owned());
-    let mut operations = vec![Operation::Set { place: path.key(hints.stage_key?), value: stage }];
+    let mut operations = vec![Operation::Set { path: path.key(hints.stage_key?), value: stage }];
     if let Some(handles) = hints.position_handles {
-        operations.push(Operation::Set { place: path.key(handles.key), value: Value::numbers([0.0; 3]) });
+        operations.push(Operation::Set { path: path.key(handles.key), value: Value::numbers([0.0; 3]) });
         let items = handles.items.map(|items| path.key(items)).filter(|items| items.find(root).is_some());
-        operations.extend(items.map(|place| Operation::Remove { place }));
+        operations.extend(items.map(|path| Operation::Remove { path }));
     }
     operation::apply(text, &operations).ok()
 }
@@ -85,7 +85,7 @@ fn stage_scene(name: &str, text: &str, phenomenon: PhenomenonId) -> Option<Scene
         instances: vec![alone],
         ..scene
     };
-    scene.adapted(&SceneOptions::default()).ok()
+    scene.with_options(&SceneOptions::default()).ok()
 }
 
 /// A camera that shows a rectangle of `width` x `height` m that stands at the origin.

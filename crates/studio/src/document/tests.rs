@@ -34,7 +34,7 @@ fn assets() -> Arc<dyn Assets> {
 }
 
 fn height(value: f64) -> Operation {
-    Operation::Set { place: ValuePath::root().key("flame_sheet").index(0).key("height"), value: Value::Number(value) }
+    Operation::Set { path: ValuePath::root().key("flame_sheet").index(0).key("height"), value: Value::Number(value) }
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn problems_have_lines_and_keep_the_last_valid_plan() {
     document.check_now(&assets());
     let error = document.error().unwrap();
     assert!(matches!(error.problems[0].kind, ProblemKind::OutOfRange { value: -5.0, .. }));
-    let line = error.position(error.problems[0].span.clone().unwrap().start).0;
+    let line = error.position(error.problems[0].span.clone().unwrap().start).line;
     assert_eq!(document.text().lines().nth(line - 1), Some("height = -5.0"));
     assert!(Arc::ptr_eq(document.plan().unwrap(), &good));
     document.undo();

@@ -11,7 +11,7 @@ use std::{
 
 use bansho::{
     Observer,
-    job::{FrameDone, Job, JobError, JobObserver, Outline, SceneFile},
+    job::{FrameDone, Job, JobError, JobObserver, JobStarted, SceneFile},
     media::assets::InputLimits,
 };
 
@@ -44,9 +44,9 @@ impl Observer for Progress {
 }
 
 impl JobObserver for Progress {
-    fn started(&self, outline: &Outline) {
-        self.total.store(outline.total, Ordering::Relaxed);
-        self.done.store(outline.kept, Ordering::Relaxed);
+    fn started(&self, started: &JobStarted) {
+        self.total.store(started.frames, Ordering::Relaxed);
+        self.done.store(started.kept, Ordering::Relaxed);
     }
 
     fn frame_done(&self, _frame: &FrameDone) {
@@ -69,7 +69,7 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
         folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
         text: text.to_owned(),
         changes: Vec::new(),
-        inputs: InputLimits::default(),
+        input_limits: InputLimits::default(),
     };
     let out = scene.folder.join("out").join(&scene.stem).join(format!("{}.####.png", scene.stem));
     Job { resume: number.is_none(), frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }

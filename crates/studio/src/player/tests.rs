@@ -57,7 +57,7 @@ fn rendered(text: &str, number: i64) -> Vec<[u8; 4]> {
 
 fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
     let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
-    let scene = Arc::new(parse_scene("scene", text).unwrap().adapted(&SceneOptions::default()).unwrap());
+    let scene = Arc::new(parse_scene("scene", text).unwrap().with_options(&SceneOptions::default()).unwrap());
     let compiled = Arc::new(CompiledScene::build(scene, assets, None).unwrap());
     let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
     let mut shot = Shot::open(compiled, Arc::new(plan));

@@ -105,7 +105,7 @@ mod tests {
         for NewScene { name, text } in NEW_SCENES {
             let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
             let quick = text.replace("[[aurora]]", "[[aurora]]\nparticles = { count = 2000 }");
-            let scene = Arc::new(parse_scene(name, &quick).unwrap().adapted(&SceneOptions::default()).unwrap());
+            let scene = Arc::new(parse_scene(name, &quick).unwrap().with_options(&SceneOptions::default()).unwrap());
             let compiled = Arc::new(CompiledScene::build(scene, assets, None).unwrap());
             let plan = Plan::new(&compiled, &PlanOptions { size: Some([96, 54]), ..PlanOptions::default() }).unwrap();
             let mut shot = Shot::open(compiled, Arc::new(plan));

@@ -231,7 +231,7 @@ impl Session {
             if is_keyed(&path) || (self.recording && keyframes::animatable(&path)) {
                 self.keyframe_operation(&path, value)
             } else {
-                Operation::Set { place: path, value }
+                Operation::Set { path: path, value }
             }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
@@ -258,7 +258,7 @@ impl Session {
         let camera = ValuePath::root().key(CAMERA);
         let [position, target, field] = ["position", "target", "vertical_fov_deg"].map(|key| camera.key(key));
         let stated = [&position, &target].map(|path| path.find(self.document.values()).is_some());
-        let changes_view = operations.iter().any(|operation| [&position, &target].contains(&operation.place()));
+        let changes_view = operations.iter().any(|operation| [&position, &target].contains(&operation.path()));
         let defaults = CameraParameters::default().to_table();
         let mut all = Vec::new();
         if changes_view && stated == [false; 2] {
@@ -266,7 +266,7 @@ impl Session {
                 let stated = path.find(self.document.values()).is_some();
                 let derived =
                     self.implied_value(&path).filter(|value| defaults.get(key).is_none_or(|node| node.value != *value));
-                all.extend(derived.filter(|_| !stated).map(|value| Operation::Set { place: path, value }));
+                all.extend(derived.filter(|_| !stated).map(|value| Operation::Set { path: path, value }));
             }
         }
         all.extend(operations);
@@ -275,7 +275,7 @@ impl Session {
 
     /// The operation that sets a keyframe at `path` at the current time.
     pub fn keyframe_operation(&self, path: &ValuePath, value: Value) -> Operation {
-        Operation::SetKeyframe { place: path.clone(), time: self.transport.time_s(), value }
+        Operation::SetKeyframe { path: path.clone(), time: self.transport.time_s(), value }
     }
 
     /// [`poll_player`](Self::poll_player), then [`advance_time`](Self::advance_time).

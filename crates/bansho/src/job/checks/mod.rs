@@ -1,5 +1,6 @@
-//! Checks before a job draws anything: files it may not overwrite, memory it would need, plates that are missing.
+//! Checks before anything is drawn: memory, missing plates, files that must not be overwritten. And at the end: whether all files still exist.
 
+pub(crate) mod finished_files;
 pub(crate) mod memory;
-pub(crate) mod overwrite;
+pub(crate) mod outputs;
 pub(crate) mod plates;

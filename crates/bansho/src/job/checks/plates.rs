@@ -1,14 +1,14 @@
-//! Whether the plate of every frame is there, found out before anything is drawn.
+//! Whether every frame has its plate, checked before anything is drawn.
 
 use bansho_base::{host::assets::AssetError, parameters::ProblemKind};
 use bansho_render::{CompiledScene, RenderError};
 
 use crate::job::{error::JobError, scene_file::SceneFile};
 
-/// Looks whether there is a file for each of the frames `numbers` of a plate; what a single picture holds was checked with the scene.
+/// Checks that a numbered plate has a file for each of the frames `numbers`. A plate of a single picture was checked with the scene.
 ///
 /// # Errors
-/// The first that is missing, at its place in the scene.
+/// The first missing file, with the position of its key in the scene.
 pub(crate) fn check(scene: &SceneFile, compiled: &CompiledScene, numbers: &[i64]) -> Result<(), JobError> {
     let plate = &compiled.scene().plate;
     for (key, path) in [("plate.image", &plate.image), ("plate.depth", &plate.depth)] {
@@ -17,22 +17,22 @@ pub(crate) fn check(scene: &SceneFile, compiled: &CompiledScene, numbers: &[i64]
         let Some(first) = numbers.iter().find(missing) else { continue };
         let Err(error) = compiled.assets().find(&path.0, *first) else { continue };
         let count = numbers.iter().filter(missing).count();
-        return Err(scene.fault(key, ProblemKind::Conflict(message(&error, *first, count, numbers.len()))));
+        return Err(scene.error_at(key, ProblemKind::Conflict(message(&error, *first, count, numbers.len()))));
     }
     Ok(())
 }
 
-fn message(error: &AssetError, first: i64, count: usize, of: usize) -> String {
+fn message(error: &AssetError, first: i64, count: usize, frames: usize) -> String {
     match count {
         1 => format!("{error}; it is the plate of frame {first}"),
-        _ => format!("{error}; it is the plate of frame {first}, and {count} of the {of} frames have none"),
+        _ => format!("{error}; it is the plate of frame {first}, and {count} of the {frames} frames have none"),
     }
 }
 
-/// A plate that was damaged or vanished while the work was done, at its place in the scene; any other error as it is.
-pub(crate) fn located(scene: &SceneFile, error: JobError) -> JobError {
+/// Adds the position in the scene to the error of a plate that was damaged or removed during the job. Other errors are unchanged.
+pub(crate) fn with_position(scene: &SceneFile, error: JobError) -> JobError {
     match error {
-        JobError::Render(RenderError::Plate(fault)) => scene.fault(&format!("plate.{}", fault.key), fault.kind),
+        JobError::Render(RenderError::Plate(error)) => scene.error_at(&format!("plate.{}", error.key), error.kind),
         other => other,
     }
 }

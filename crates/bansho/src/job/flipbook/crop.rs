@@ -1,4 +1,4 @@
-//! What of the picture the tiles of a flipbook need: what is ever lit, so that a small flame in a wide picture fills its tiles.
+//! The crop of a flipbook: the part of the picture that is lit in any frame, so that a small flame in a wide picture fills its tiles.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,45 +17,49 @@ use bansho_scene::picture::LARGEST_SIDE;
 use crate::job::{
     error::JobError,
     observer::JobObserver,
-    render::draw_frames::{FrameSink, draw_frames},
-    snapshots::Snapshots,
+    pipeline::{
+        draw_frames::{FrameSink, draw_frames},
+        snapshots::Snapshots,
+    },
 };
 
 bansho_base::choice! {
-    /// What of the picture the tiles of a flipbook show.
+    /// The part of the picture that the tiles of a flipbook show.
     pub enum FlipbookCrop {
-        /// The part that is lit or hides something in any frame, and two pixels around it.
+        /// The rectangle around all pixels with light or alpha in any frame, and a margin of two pixels.
         Auto = "auto",
-        /// All of it.
+        /// The whole picture.
         None = "none",
     }
 }
 
-/// Pixels around what is lit.
+/// Margin around the lit region, pixels.
 const MARGIN: usize = 2;
-/// Most that a picture is drawn larger than the scene says, so that its lit part fills the tiles.
-const MOST_ENLARGED: f64 = 2.0;
+/// Maximum enlargement of the picture, relative to the scene's size, so that its lit region fills the tiles.
+const MAX_ENLARGEMENT: f64 = 2.0;
 
-/// A part of a picture as shares of its width and height: left, top, right, bottom.
+/// A rectangle of a picture in fractions of its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Region {
+    /// Left and top.
     min: [f64; 2],
+    /// Right and bottom.
     max: [f64; 2],
 }
 
 impl Region {
-    /// The pixels `lit` of a picture of `size`, and one around, since what is drawn larger may reach there.
-    fn of(lit: &Rect, size: [usize; 2]) -> Self {
+    /// The pixels `lit` of a picture of `size`, and one more on each side, which a larger picture may light.
+    fn new(lit: &Rect, size: [usize; 2]) -> Self {
         let ([x, y], [right, bottom]) = ([lit.x, lit.y], [lit.right(), lit.bottom()]);
-        let share = |pixel: f64, side: usize| (pixel / side as f64).clamp(0.0, 1.0);
+        let fraction = |pixel: f64, side: usize| (pixel / side as f64).clamp(0.0, 1.0);
         Self {
-            min: [share(x as f64 - 1.0, size[0]), share(y as f64 - 1.0, size[1])],
-            max: [share(right as f64 + 1.0, size[0]), share(bottom as f64 + 1.0, size[1])],
+            min: [fraction(x as f64 - 1.0, size[0]), fraction(y as f64 - 1.0, size[1])],
+            max: [fraction(right as f64 + 1.0, size[0]), fraction(bottom as f64 + 1.0, size[1])],
         }
     }
 
-    /// The pixels of a picture of `size` that hold it and its margin; an even number of columns and rows where the picture has room.
-    pub(crate) fn within(&self, size: [usize; 2]) -> Rect {
+    /// The pixels of a picture of `size` that contain the region and its margin. Width and height are even where the picture is large enough.
+    pub(crate) fn pixels(&self, size: [usize; 2]) -> Rect {
         let side = |axis: usize| {
             let length = size[axis];
             let mut start = ((self.min[axis] * length as f64).floor() as usize).saturating_sub(MARGIN);
@@ -73,26 +77,27 @@ impl Region {
         Rect { x, y, width, height }
     }
 
-    /// The size at which a picture of `size` is drawn so that its part fits a tile of `most` pixels; `None` where nothing fits.
-    pub(crate) fn picture(&self, size: [usize; 2], most: [usize; 2]) -> Option<[usize; 2]> {
-        // Rounding outward takes a pixel on each side and evenness one more.
-        let room = |axis: usize| most[axis].checked_sub(2 * MARGIN + 3).filter(|&room| room > 0);
+    /// The size at which a picture of `size` has to be drawn so that the region fits into a tile of `max_tile` pixels; `None` if the tile is too
+    /// small.
+    pub(crate) fn picture_size(&self, size: [usize; 2], max_tile: [usize; 2]) -> Option<[usize; 2]> {
+        // Rounding outward adds a pixel on each side, and an even length one more.
+        let room = |axis: usize| max_tile[axis].checked_sub(2 * MARGIN + 3).filter(|&room| room > 0);
         let scale = |axis: usize| {
             let length = (self.max[axis] - self.min[axis]) * size[axis] as f64;
             Some(room(axis)? as f64 / length.max(1.0))
         };
         let largest = LARGEST_SIDE / size[0].max(size[1]) as f64;
-        let scale = scale(0)?.min(scale(1)?).min(MOST_ENLARGED).min(largest);
+        let scale = scale(0)?.min(scale(1)?).min(MAX_ENLARGEMENT).min(largest);
         Some(size.map(|side| ((side as f64 * scale).round() as usize).max(1)))
     }
 }
 
-/// The part of the picture that is lit or hides something in any of the frames `numbers`, as small pictures of them show; `None` where none has any.
-/// `exact` counts what is too dark for 8 bits too.
+/// The region with light or alpha in any of the frames `numbers`, found in small pictures of them; `None` if all are empty. `exact` includes
+/// light that is too dark for 8 bits.
 ///
 /// # Errors
-/// Those of drawing.
-pub(crate) fn lit(
+/// Drawing failed, or the observer canceled the job.
+pub(crate) fn lit_region(
     compiled: &Arc<CompiledScene>,
     plan: &Plan,
     numbers: &[i64],
@@ -100,47 +105,47 @@ pub(crate) fn lit(
     observer: &dyn JobObserver,
 ) -> Result<Option<Region>, JobError> {
     let whole = plan.scene().picture.size.map(|side| side as usize);
-    let shrunk = shrinking(whole);
-    let size = whole.map(|side| ((side as f64 / shrunk).round() as usize).max(1));
+    let reduction = reduction_factor(whole);
+    let size = whole.map(|side| ((side as f64 / reduction).round() as usize).max(1));
     let mut small = plan.at_size(size);
     (small.layers, small.aovs) = (false, false);
-    // Half a code of 8 bits, in codes of 16, of one pixel alone among those that a small one stands for.
-    let least = if exact { 1 } else { (128.0 / (shrunk * shrunk)).max(1.0) as u16 };
-    let probe = LitRegionProbe { lit: Mutex::default(), view: plan.display, least };
+    // Half an 8-bit code of a single pixel, averaged over the pixels of a small one, in 16-bit codes.
+    let min_alpha = if exact { 1 } else { (128.0 / (reduction * reduction)).max(1.0) as u16 };
+    let probe = LitRegionProbe { lit: Mutex::default(), view: plan.display, min_alpha };
     draw_frames(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &probe, observer)?;
     let lit = probe.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok((!lit.is_empty()).then(|| Region::of(&lit, size)))
+    Ok((!lit.is_empty()).then(|| Region::new(&lit, size)))
 }
 
-/// How many times smaller pictures are that show what is lit: four times, unless they would be tiny or large.
-fn shrinking(size: [usize; 2]) -> f64 {
+/// Reduction of the pictures in which the lit region is found: 4, unless the longer side would be outside 128 to 512 pixels.
+fn reduction_factor(size: [usize; 2]) -> f64 {
     let longest = size[0].max(size[1]) as f64;
     longest / (0.25 * longest).clamp(128.0, 512.0).min(longest)
 }
 
-/// Gathers what is lit in any frame.
+/// Collects the lit region of all frames.
 struct LitRegionProbe {
     lit: Mutex<Rect>,
     view: View,
-    /// Least alpha that counts, in codes of 16 bits; display pixels have alpha where they have light.
-    least: u16,
+    /// Smallest alpha of a lit pixel, 16-bit code. Display pixels have alpha where they have light.
+    min_alpha: u16,
 }
 
 impl FrameSink for LitRegionProbe {
     fn finish(&self, _index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
-        let own = bounds(frame, &self.view, self.least);
+        let frame_bounds = bounds(frame, &self.view, self.min_alpha);
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);
-        *lit = lit.union(&own);
+        *lit = lit.union(&frame_bounds);
         Ok(())
     }
 
-    fn window(&self) -> usize {
+    fn max_in_flight(&self) -> usize {
         usize::MAX
     }
 }
 
-/// The smallest rectangle around all pixels of a frame whose alpha is `least` or more.
-fn bounds(frame: &Frame, view: &View, least: u16) -> Rect {
+/// The smallest rectangle around all pixels of a frame whose alpha is at least `min_alpha`.
+fn bounds(frame: &Frame, view: &View, min_alpha: u16) -> Rect {
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     if frame.opaque {
         return Rect::from_size(width, height);
@@ -150,7 +155,7 @@ fn bounds(frame: &Frame, view: &View, least: u16) -> Rect {
     };
     let mut lit = Rect::default();
     for (y, row) in pixels.chunks_exact(width.max(1)).enumerate() {
-        let is_lit = |pixel: &[u16; 4]| pixel[3] >= least;
+        let is_lit = |pixel: &[u16; 4]| pixel[3] >= min_alpha;
         if let (Some(first), Some(last)) = (row.iter().position(is_lit), row.iter().rposition(is_lit)) {
             lit = lit.union(&Rect { x: first, y, width: last - first + 1, height: 1 });
         }
@@ -166,7 +171,7 @@ mod tests {
     use crate::job::testing;
 
     #[test]
-    fn what_is_lit_or_hides_something_is_found() {
+    fn pixels_with_light_or_alpha_are_found() {
         let mut frame = testing::blank(&testing::plan(), 0);
         frame.beauty = Image::filled(9, 7, [0.0; 4]);
         frame.content = Rect::from_size(9, 7);
@@ -180,42 +185,42 @@ mod tests {
     }
 
     #[test]
-    fn a_part_keeps_a_margin_and_even_sides_and_stays_within_its_picture() {
-        let region = Region::of(&Rect { x: 30, y: 10, width: 20, height: 40 }, [128, 72]);
-        let part = region.within([512, 288]);
-        // A small pixel is four, and two are left free: 29 * 4 - 2 = 114, 9 * 4 - 2 = 34.
-        assert_eq!(part, Rect { x: 114, y: 34, width: 92, height: 172 });
-        let region = Region::of(&Rect { x: 0, y: 0, width: 128, height: 72 }, [128, 72]);
-        assert_eq!(region.within([511, 287]), Rect::from_size(511, 287));
+    fn a_region_has_a_margin_and_even_sides_within_its_picture() {
+        let region = Region::new(&Rect { x: 30, y: 10, width: 20, height: 40 }, [128, 72]);
+        let pixels = region.pixels([512, 288]);
+        // A small pixel is four pixels, and the margin is two: 29 * 4 - 2 = 114, 9 * 4 - 2 = 34.
+        assert_eq!(pixels, Rect { x: 114, y: 34, width: 92, height: 172 });
+        let region = Region::new(&Rect { x: 0, y: 0, width: 128, height: 72 }, [128, 72]);
+        assert_eq!(region.pixels([511, 287]), Rect::from_size(511, 287));
         for size in [[511, 287], [77, 33], [3, 3], [1, 1]] {
-            let part = Region::of(&Rect { x: 60, y: 0, width: 9, height: 30 }, [128, 72]).within(size);
-            assert!(part.right() <= size[0] && part.bottom() <= size[1] && !part.is_empty(), "{part:?}");
+            let pixels = Region::new(&Rect { x: 60, y: 0, width: 9, height: 30 }, [128, 72]).pixels(size);
+            assert!(pixels.right() <= size[0] && pixels.bottom() <= size[1] && !pixels.is_empty(), "{pixels:?}");
         }
     }
 
     #[test]
-    fn a_picture_is_drawn_so_large_that_its_part_fills_a_tile() {
+    fn a_picture_is_enlarged_until_its_region_fills_a_tile() {
         let size = [512, 288];
-        let region = Region::of(&Rect { x: 53, y: 8, width: 22, height: 54 }, [128, 72]);
-        for most in [[256, 256], [128, 128], [64, 300], [100, 40]] {
-            let picture = region.picture(size, most).unwrap();
-            let part = region.within(picture);
-            assert!(part.width <= most[0] && part.height <= most[1], "{most:?}: {part:?}");
-            let fills = part.width + 8 > most[0] || part.height + 8 > most[1];
-            assert!(fills, "{most:?}: {part:?} of {picture:?}");
+        let region = Region::new(&Rect { x: 53, y: 8, width: 22, height: 54 }, [128, 72]);
+        for tile in [[256, 256], [128, 128], [64, 300], [100, 40]] {
+            let picture = region.picture_size(size, tile).unwrap();
+            let pixels = region.pixels(picture);
+            assert!(pixels.width <= tile[0] && pixels.height <= tile[1], "{tile:?}: {pixels:?}");
+            let fills = pixels.width + 8 > tile[0] || pixels.height + 8 > tile[1];
+            assert!(fills, "{tile:?}: {pixels:?} of {picture:?}");
         }
-        // Never so large that a speck becomes a tile.
-        let speck = Region::of(&Rect { x: 60, y: 30, width: 1, height: 1 }, [128, 72]);
-        assert_eq!(speck.picture(size, [256, 256]), Some([1024, 576]));
-        assert_eq!(speck.picture(size, [6, 256]), None);
+        // A single lit pixel is not enlarged without limit.
+        let speck = Region::new(&Rect { x: 60, y: 30, width: 1, height: 1 }, [128, 72]);
+        assert_eq!(speck.picture_size(size, [256, 256]), Some([1024, 576]));
+        assert_eq!(speck.picture_size(size, [6, 256]), None);
     }
 
     #[test]
-    fn small_pictures_are_neither_tiny_nor_large() {
-        for (size, shrunk) in
+    fn reduced_pictures_have_128_to_512_pixels() {
+        for (size, reduction) in
             [([512, 288], 4.0), ([1280, 720], 4.0), ([64, 48], 1.0), ([256, 144], 2.0), ([8192, 100], 16.0)]
         {
-            assert_eq!(shrinking(size), shrunk, "{size:?}");
+            assert_eq!(reduction_factor(size), reduction, "{size:?}");
         }
     }
 }

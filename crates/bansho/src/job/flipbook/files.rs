@@ -22,22 +22,50 @@ use bansho_render::{
 
 use super::{
     FlipbookSummary,
-    motion::{self, Color, Tile},
+    motion::{self, MotionField},
 };
-use crate::job::{error::JobError, render::finished_files::Finished};
+use crate::job::{checks::finished_files::FinishedFiles, error::JobError};
 
 use serde_json::{Value, json};
 
-/// Where a flipbook goes and what its sheets are.
+/// One frame of a flipbook.
+pub(crate) struct Tile {
+    header: FrameHeader,
+    color: Color,
+    motion: MotionField,
+}
+
+/// The colors of a frame in the form that the format needs.
+enum Color {
+    Display(DisplayImage),
+    Linear(Image<4>),
+}
+
+impl Tile {
+    /// Whether a phenomenon of the frame has a motion AOV.
+    pub(crate) fn has_motion(&self) -> bool {
+        self.motion.has_aov
+    }
+
+    fn display(&self) -> Option<&DisplayImage> {
+        if let Color::Display(picture) = &self.color { Some(picture) } else { None }
+    }
+
+    fn linear(&self) -> Option<&Image<4>> {
+        if let Color::Linear(picture) = &self.color { Some(picture) } else { None }
+    }
+}
+
+/// The names and the format of a flipbook's files.
 pub(crate) struct Files {
     /// `DIR/NAME`
     pub(crate) base: PathBuf,
     pub(crate) kind: OutputKind,
     pub(crate) view: View,
     pub(crate) bits: BitDepth,
-    /// What the straight alpha of PNG sheets is made for.
+    /// Convention of the straight alpha of PNG sheets.
     pub(crate) alpha: AlphaConvention,
-    /// Which files that are there may be written over.
+    /// Which existing files may be overwritten.
     pub(crate) overwrite: OverwritePolicy,
 }
 
@@ -46,34 +74,38 @@ impl Files {
         self.kind.is_scene_linear()
     }
 
-    /// Whether sheets hold light that 8 bits do not.
+    /// Whether sheets contain light that is too dark for 8 bits.
     pub(crate) fn is_exact(&self) -> bool {
         self.is_linear() || self.bits == BitDepth::Sixteen
     }
 
-    fn path(&self, ending: &str) -> PathBuf {
+    fn path(&self, suffix: &str) -> PathBuf {
         let mut name = self.base.clone().into_os_string();
-        name.push(ending);
+        name.push(suffix);
         name.into()
     }
 
-    fn sheet_path(&self, what: &str) -> PathBuf {
-        self.path(&format!("_{what}.{}", self.kind.extension()))
+    fn sheet_path(&self, sheet: &str) -> PathBuf {
+        self.path(&format!("_{sheet}.{}", self.kind.extension()))
     }
 
     /// All files, the JSON last.
     pub(crate) fn paths(&self) -> Vec<PathBuf> {
         let sheets: &[&str] = if self.is_linear() { &["color", "motion"] } else { &["color", "alpha", "motion"] };
-        sheets.iter().map(|what| self.sheet_path(what)).chain([self.path(".json")]).collect()
+        sheets.iter().map(|sheet| self.sheet_path(sheet)).chain([self.path(".json")]).collect()
     }
 
-    /// What color sheets keep of a frame.
-    pub(crate) fn color(&self, frame: &Frame, observer: &dyn Observer) -> Color {
+    /// The tile of a frame.
+    pub(crate) fn tile(&self, frame: &Frame, observer: &dyn Observer) -> Tile {
+        Tile { motion: MotionField::of_frame(frame), header: frame.header.clone(), color: self.color(frame, observer) }
+    }
+
+    fn color(&self, frame: &Frame, observer: &dyn Observer) -> Color {
         if self.is_linear() {
             return Color::Linear(frame.beauty.clone());
         }
         let _stage = StageGuard::begin(observer, Stage::View);
-        Color::Shown(display(frame, &self.view, self.bits, self.alpha))
+        Color::Display(display(frame, &self.view, self.bits, self.alpha))
     }
 
     /// Lays out the tiles and writes every file.
@@ -86,41 +118,42 @@ impl Files {
         observer: &dyn Observer,
     ) -> Result<FlipbookSummary, JobError> {
         let _stage = StageGuard::begin(observer, Stage::Write);
-        let finished = Finished::default();
-        let scale = if self.is_linear() { 1.0 } else { motion::scale(tiles) };
+        let finished = FinishedFiles::default();
+        let motion = tiles.iter().map(|tile| &tile.motion.pixels);
+        let scale = if self.is_linear() { 1.0 } else { motion::scale(motion) };
         check(observer).map_err(|_| JobError::Cancelled)?;
         if self.is_linear() {
             self.write_linear(sheet, tiles, &finished)?;
         } else {
-            self.write_shown(sheet, tiles, scale, &finished)?;
+            self.write_display(sheet, tiles, scale, &finished)?;
         }
         let text = format!("{:#}\n", self.description(plan, sheet, numbers, scale));
-        self.keep(self.path(".json"), text.as_bytes(), &finished)?;
+        self.write_file(self.path(".json"), text.as_bytes(), &finished)?;
         match finished.lost() {
             files if files.is_empty() => Ok(FlipbookSummary { files: self.paths() }),
             files => Err(JobError::FilesLost { files }),
         }
     }
 
-    /// Writes one of the files.
-    fn keep(&self, path: PathBuf, bytes: &[u8], finished: &Finished) -> Result<(), JobError> {
+    /// Writes one of the files, atomically.
+    fn write_file(&self, path: PathBuf, bytes: &[u8], finished: &FinishedFiles) -> Result<(), JobError> {
         atomic::write_bytes_with(&path, bytes, &self.overwrite)?;
-        finished.note(path);
+        finished.record(path);
         Ok(())
     }
 
-    fn write_linear(&self, sheet: &SheetLayout, tiles: &[Tile], finished: &Finished) -> Result<(), JobError> {
+    fn write_linear(&self, sheet: &SheetLayout, tiles: &[Tile], finished: &FinishedFiles) -> Result<(), JobError> {
         let header = FrameHeader { display_size: sheet.size(), data_origin: [0, 0], ..tiles[0].header.clone() };
         let colors: Vec<Image<4>> = tiles.iter().filter_map(|tile| tile.linear().cloned()).collect();
-        let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.clone()).collect();
+        let motion: Vec<Image<2>> = tiles.iter().map(|tile| tile.motion.pixels.clone()).collect();
         let motion = tile(&motion, sheet.columns, 0, [0.0; 2])?;
         let [width, height] = sheet.size();
         let pixels = motion.pixels().iter().map(|&[x, y]| [x, y, 0.0, 1.0]).collect();
         let motion =
             Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
-        for (what, beauty) in [("color", tile(&colors, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
-            let path = self.sheet_path(what);
-            let header = FrameHeader { fingerprint: fingerprint(tiles, what), ..header.clone() };
+        for (sheet, beauty) in [("color", tile(&colors, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
+            let path = self.sheet_path(sheet);
+            let header = FrameHeader { fingerprint: fingerprint(tiles, sheet), ..header.clone() };
             let content = Rect::from_size(beauty.width(), beauty.height());
             let frame = Frame {
                 header,
@@ -129,38 +162,38 @@ impl Files {
                 channels: Vec::new(),
                 opaque: false,
                 content,
-                figures: Vec::new(),
+                metadata: Vec::new(),
             };
             let bytes = exr::encode(&frame, &path)?;
-            self.keep(path, &bytes, finished)?;
+            self.write_file(path, &bytes, finished)?;
         }
         Ok(())
     }
 
-    fn write_shown(
+    fn write_display(
         &self,
         sheet: &SheetLayout,
         tiles: &[Tile],
         scale: f32,
-        finished: &Finished,
+        finished: &FinishedFiles,
     ) -> Result<(), JobError> {
-        let shown: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.shown().cloned()).collect();
-        let color = tile_display(&shown, sheet.columns, 0, [0; 4])?;
-        let alpha = DisplayImage { opaque: true, pixels: alpha(&color.pixels), ..color };
-        let coded = tiles.iter().map(|tile| DisplayImage {
-            width: tile.motion.width(),
-            height: tile.motion.height(),
+        let colors: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.display().cloned()).collect();
+        let color = tile_display(&colors, sheet.columns, 0, [0; 4])?;
+        let alpha = DisplayImage { opaque: true, pixels: alpha_as_gray(&color.pixels), ..color };
+        let motion = tiles.iter().map(|tile| DisplayImage {
+            width: tile.motion.pixels.width(),
+            height: tile.motion.pixels.height(),
             opaque: true,
             alpha: self.alpha,
             pixels: DisplayPixels::Sixteen(
-                tile.motion.pixels().iter().map(|&motion| motion::coded(motion, scale)).collect(),
+                tile.motion.pixels.pixels().iter().map(|&motion| motion::encode(motion, scale)).collect(),
             ),
         });
-        let motion = tile_display(&coded.collect::<Vec<_>>(), sheet.columns, 0, [0; 4])?;
-        for (what, picture) in [("color", &color), ("alpha", &alpha), ("motion", &motion)] {
-            let path = self.sheet_path(what);
-            let bytes = png::encode(picture, &fingerprint(tiles, what), PngEffort::Fast, &path)?;
-            self.keep(path, &bytes, finished)?;
+        let motion = tile_display(&motion.collect::<Vec<_>>(), sheet.columns, 0, [0; 4])?;
+        for (sheet, picture) in [("color", &color), ("alpha", &alpha), ("motion", &motion)] {
+            let path = self.sheet_path(sheet);
+            let bytes = png::encode(picture, &fingerprint(tiles, sheet), PngEffort::Fast, &path)?;
+            self.write_file(path, &bytes, finished)?;
         }
         Ok(())
     }
@@ -168,9 +201,9 @@ impl Files {
     fn description(&self, plan: &Plan, sheet: &SheetLayout, numbers: &[i64], scale: f32) -> Value {
         let fps = plan.fps();
         let frame = |(index, &number): (usize, &i64)| {
-            let place = sheet.cell_rect(index);
+            let rect = sheet.cell_rect(index);
             let time_s = index as f64 * fps.frame_s();
-            json!({ "number": number, "time_s": time_s, "x": place.x, "y": place.y, "width": place.width, "height": place.height })
+            json!({ "number": number, "time_s": time_s, "x": rect.x, "y": rect.y, "width": rect.width, "height": rect.height })
         };
         let color = match self.is_linear() {
             true => {
@@ -189,7 +222,7 @@ impl Files {
                 "alpha_convention": self.alpha.name(),
             }),
         };
-        let ([width, height], part) = (plan.size(), plan.window());
+        let ([width, height], crop) = (plan.size(), plan.window());
         let mut description = json!({
             "format": 1,
             "program": provenance::PROGRAM,
@@ -197,9 +230,9 @@ impl Files {
             "grid": [sheet.columns, sheet.rows()],
             "tile": sheet.cell,
             "picture": [width, height],
-            "crop": { "x": part.x, "y": part.y, "width": part.width, "height": part.height },
+            "crop": { "x": crop.x, "y": crop.y, "width": crop.width, "height": crop.height },
             "padding": {
-                "left": part.x, "top": part.y, "right": width - part.right(), "bottom": height - part.bottom(),
+                "left": crop.x, "top": crop.y, "right": width - crop.right(), "bottom": height - crop.bottom(),
             },
             "frame_count": sheet.count,
             "fps": f64::from(fps.frames) / f64::from(fps.seconds),
@@ -216,7 +249,7 @@ impl Files {
         description
     }
 
-    /// How an engine draws the color sheet: covering what is behind, or adding light to it.
+    /// How an engine draws the color sheet: over the background, or added to it.
     fn blend(&self) -> Value {
         if self.is_linear() {
             return json!({
@@ -237,7 +270,7 @@ impl Files {
                     "meaning": meaning,
                 }),
             ),
-            // Encoded values do not add up as light does; `screen` is far nearer, and never leaves the range.
+            // The sum of encoded values is not the encoded sum of light. `screen` is much closer to it, and never exceeds 1.
             AlphaConvention::Encoded => (
                 "sRGB-encoded",
                 "texture without sRGB decoding; the target is not decoded either",
@@ -265,19 +298,9 @@ impl Files {
         }
         json!({
             "file": file, "space": "linear", "meaning": meaning, "bits": 16,
-            "zero_code": motion::MIDDLE, "largest_code": u16::MAX, "scale_pixels": scale,
+            "zero_code": motion::ZERO_CODE, "largest_code": u16::MAX, "scale_pixels": scale,
             "formula": "pixels = (code - zero_code) / (largest_code - zero_code) * scale_pixels",
         })
-    }
-}
-
-impl Tile {
-    fn shown(&self) -> Option<&DisplayImage> {
-        if let Color::Shown(picture) = &self.color { Some(picture) } else { None }
-    }
-
-    fn linear(&self) -> Option<&Image<4>> {
-        if let Color::Linear(picture) = &self.color { Some(picture) } else { None }
     }
 }
 
@@ -285,8 +308,8 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Alpha as gray.
-fn alpha(pixels: &DisplayPixels) -> DisplayPixels {
+/// Alpha as a gray picture.
+fn alpha_as_gray(pixels: &DisplayPixels) -> DisplayPixels {
     match pixels {
         DisplayPixels::Eight(pixels) => {
             DisplayPixels::Eight(pixels.iter().map(|&[.., a]| [a, a, a, u8::MAX]).collect())
@@ -297,11 +320,11 @@ fn alpha(pixels: &DisplayPixels) -> DisplayPixels {
     }
 }
 
-/// A fingerprint that no single frame and no other sheet has.
-fn fingerprint(tiles: &[Tile], what: &str) -> [u8; 32] {
+/// The fingerprint of a sheet, which differs from those of frames and of other sheets.
+fn fingerprint(tiles: &[Tile], sheet: &str) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     tiles.iter().for_each(|tile| {
         hasher.update(&tile.header.fingerprint);
     });
-    *hasher.update(what.as_bytes()).finalize().as_bytes()
+    *hasher.update(sheet.as_bytes()).finalize().as_bytes()
 }

@@ -1,11 +1,9 @@
-//! Flipbooks for game engines: all frames in one sheet, their alpha and motion in sheets beside it, and a JSON that says
-//! how to read them.
+//! Flipbooks for game engines: all frames in one sheet, their alpha and motion in further sheets, and a JSON file that describes how to read
+//! them.
 
-pub(crate) mod contact_sheet;
 mod crop;
 mod files;
 mod motion;
-pub(crate) mod tiles;
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -21,68 +19,64 @@ use bansho_media::{
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot, display::BitDepth};
 use bansho_scene::{FrameRate, Scene, SceneOptions};
 
-use self::{files::Files, motion::Tile};
+use self::files::{Files, Tile};
 use super::{
-    error::{Conflict, JobError, SheetKind},
-    observer::{JobObserver, Note, Outline},
-    scene_file::SceneFile,
-    snapshots::Snapshots,
-};
-use crate::job::{
     checks::{
         memory::{self, MemoryRequest},
-        overwrite, plates,
+        outputs, plates,
     },
-    render::{draw_frames::draw_frames, output, prepare},
+    error::{JobError, OptionError, SheetKind},
+    observer::{JobObserver, JobStarted, Warning},
+    pipeline::{draw_frames::draw_frames, snapshots::Snapshots},
+    render::prepare,
+    scene_file::SceneFile,
+    sheet::{self, TileCollector},
 };
-use tiles::Gather;
 
 pub use self::crop::FlipbookCrop;
 
-/// A flipbook that is wanted. Begin with [`Flipbook::new`].
+/// A flipbook of a scene. Create it with [`Flipbook::new`].
 ///
-/// PNG: color in sRGB with straight alpha; alpha again, as gray, for engines that want it apart; motion in pixels to
-/// the next frame, in 16 bits around a middle that means none. EXR: color scene-linear with premultiplied alpha; motion in
-/// pixels as it is.
+/// PNG: color in sRGB with straight alpha; alpha also as a gray picture, for engines that read it separately; motion to the next frame in
+/// pixels, in 16 bits with a middle code for zero. EXR: color scene-linear with premultiplied alpha; motion in pixels.
 #[derive(Clone, Debug)]
 pub struct Flipbook {
     /// The scene.
     pub scene: SceneFile,
     /// Columns and rows of the sheet.
     pub grid: [usize; 2],
-    /// Size of one frame, pixels; in the scene's proportions so that the sheet is up to 2048 wide or high when left out.
+    /// Size of one frame, pixels. `None` chooses a size in the scene's proportions with which the sheet is up to 2048 wide or high.
     pub tile: Option<[usize; 2]>,
-    /// What of the picture tiles show. With a part of it, `tile` is the size of the whole picture; left out, it is such that the part fills
-    /// the tiles of a sheet of up to 2048 pixels, but at most twice the scene's.
+    /// The part of the picture that tiles show. If it is cropped, `tile` is the size of the whole picture; `None` then chooses a size with
+    /// which the part fills the tiles of a sheet of up to 2048 pixels, but at most twice the scene's size.
     pub crop: FlipbookCrop,
-    /// The first frame; the scene's first when left out.
+    /// The first frame; `None` for the scene's first.
     pub first_frame: Option<i64>,
-    /// Another seed than the scene's.
+    /// Replaces the scene's seed.
     pub seed: Option<u64>,
-    /// A seamless loop of so many seconds; the sheet then holds exactly one turn, at whatever frame rate that takes.
+    /// Makes a seamless loop of this length, s. The sheet then contains exactly one pass through it, at the frame rate that follows from this.
     pub loop_s: Option<f64>,
-    /// How PNG sheets show the light.
+    /// The view transform of PNG sheets.
     pub view: View,
-    /// Bits of each channel of PNG sheets, but for motion.
+    /// Bits of each channel of PNG sheets, except motion, which always has 16.
     pub bits: BitDepth,
-    /// What the straight alpha of PNG sheets is made for; left out it is [`AlphaConvention::Linear`], since engines blend sprites in linear
-    /// light.
+    /// Convention of the straight alpha of PNG sheets. `None` is [`AlphaConvention::Linear`], since engines blend sprites in linear light.
     pub alpha: Option<AlphaConvention>,
-    /// Where it goes: `DIR/NAME.png` stands for `NAME_color.png` and so on; `out/STEM/STEM.png` when left out.
+    /// The output: `DIR/NAME.png` for `NAME_color.png` and so on. `None` is `out/STEM/STEM.png`.
     pub out: Option<PathBuf>,
-    /// Whether files that Bansho did not make may be written over. What the scene is read from never is.
+    /// Whether files that Bansho did not make may be overwritten. Files that the scene is read from never are.
     pub overwrite: bool,
 }
 
-/// What a flipbook became.
+/// The result of a flipbook job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlipbookSummary {
     /// Its files, the JSON last.
     pub files: Vec<PathBuf>,
 }
 
-/// Largest side of a sheet of frames whose size is not given, pixels.
-const USUAL_SIDE: usize = 2048;
+/// Largest side of a sheet if the size of its frames is not given, pixels.
+const DEFAULT_SHEET_SIDE: usize = 2048;
 
 impl Flipbook {
     /// A flipbook of `grid` columns and rows from the first frames of `scene`.
@@ -103,17 +97,17 @@ impl Flipbook {
         }
     }
 
-    /// Checks everything: the scene and what it names, the options, whether the sheets can be written. Writes nothing.
+    /// Checks everything: the scene and the files that it names, the options, whether the sheets can be written. Writes nothing.
     ///
     /// # Errors
-    /// The first thing that stands in the way; of the scene all faults at once.
+    /// The first obstacle; of the scene, all problems at once.
     pub fn prepare(&self) -> Result<PreparedFlipbook, JobError> {
         let mut scene = self.scene.parse()?;
         let [columns, rows] = self.grid;
         let sheet = SheetLayout { count: columns.saturating_mul(rows), columns, cell: self.cell(&scene), gutter: 0 };
-        let sheet = tiles::checked(sheet, SheetKind::Flipbook)?;
+        let sheet = sheet::check_layout(sheet, SheetKind::Flipbook)?;
         if let Some(seconds) = self.loop_s {
-            scene.picture.fps = turn_rate(sheet.count, seconds)?;
+            scene.picture.fps = loop_frame_rate(sheet.count, seconds)?;
         }
         let options = PlanOptions {
             size: Some(sheet.cell),
@@ -122,29 +116,29 @@ impl Flipbook {
             display: self.view,
             ..PlanOptions::default()
         };
-        let wish = SceneOptions { seed: self.seed, loop_s: self.loop_s, implied_backdrop: false };
-        let compiled = self.scene.compile(scene.adapted(&wish)?, &prepare::assets(&self.scene))?;
+        let scene_options = SceneOptions { seed: self.seed, loop_s: self.loop_s, implied_backdrop: false };
+        let compiled = self.scene.compile(scene.with_options(&scene_options)?, &self.scene.assets())?;
         let plan = Arc::new(Plan::new(&compiled, &options)?);
         let first = self.first_frame.unwrap_or(plan.frames().start);
         let numbers: Vec<i64> = (first..first.saturating_add(sheet.count as i64)).collect();
         plates::check(&self.scene, &compiled, &numbers)?;
         let frames = numbers.len();
-        let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.bits), own_size: true };
-        memory::check(&self.scene, &compiled, &plan, wanted)?;
-        let overwrite = OverwritePolicy::new(overwrite::inputs(&self.scene, &plan, &numbers), self.overwrite);
+        let request = MemoryRequest { frames, tiles: frames, display: Some(self.bits), size_is_option: true };
+        memory::check(&self.scene, &compiled, &plan, request)?;
+        let overwrite = OverwritePolicy::new(outputs::input_files(&self.scene, &plan, &numbers), self.overwrite);
         let files = self.files(overwrite)?;
-        overwrite::check(&files.overwrite, files.paths())?;
-        let (scene, own_size, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
-        Ok(PreparedFlipbook { scene, compiled, plan, sheet, own_size, crop, numbers, files })
+        outputs::check_overwriting(&files.overwrite, files.paths())?;
+        let (scene, size_is_option, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
+        Ok(PreparedFlipbook { scene, compiled, plan, sheet, size_is_option, crop, numbers, files })
     }
 
-    /// Size of a frame: as asked for, or the scene's made small enough for a sheet of the usual side.
+    /// Size of a tile: that of the options, or the scene's, reduced until the sheet is no larger than [`DEFAULT_SHEET_SIDE`].
     fn cell(&self, scene: &Scene) -> [usize; 2] {
         let [columns, rows] = self.grid;
         let [width, height] = scene.picture.size.map(|side| side as usize);
         self.tile.unwrap_or_else(|| {
-            let sides = (columns.saturating_mul(width)).max(rows.saturating_mul(height)).max(USUAL_SIDE);
-            [width, height].map(|side| (side * USUAL_SIDE / sides).max(1))
+            let sides = (columns.saturating_mul(width)).max(rows.saturating_mul(height)).max(DEFAULT_SHEET_SIDE);
+            [width, height].map(|side| (side * DEFAULT_SHEET_SIDE / sides).max(1))
         })
     }
 
@@ -157,23 +151,23 @@ impl Flipbook {
             OutputKind::Apng | OutputKind::Gif | OutputKind::Mp4 | OutputKind::Mov | OutputKind::Webm => false,
         };
         if !is_picture || pattern.is_numbered() {
-            return Err(Conflict::Sheet { path, allowed: "NAME.png or NAME.exr" }.into());
+            return Err(OptionError::SheetFormat { path, allowed: "NAME.png or NAME.exr" }.into());
         }
         let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
         let base = path.with_extension("");
         let files = Files { base, kind: pattern.kind(), view: self.view, bits: self.bits, alpha, overwrite };
-        files.paths().iter().try_for_each(|path| output::check_writable(path))?;
+        files.paths().iter().try_for_each(|path| outputs::check_writable(path))?;
         Ok(files)
     }
 }
 
-/// A flipbook that can be made, as far as can be known without doing so.
+/// A checked flipbook, ready to run.
 pub struct PreparedFlipbook {
     scene: SceneFile,
     compiled: Arc<CompiledScene>,
     plan: Arc<Plan>,
     sheet: SheetLayout,
-    own_size: bool,
+    size_is_option: bool,
     crop: FlipbookCrop,
     numbers: Vec<i64>,
     files: Files,
@@ -188,54 +182,53 @@ impl PreparedFlipbook {
     /// Draws all frames in the caller's rayon pool and writes the sheets.
     ///
     /// # Errors
-    /// The observer asked to stop, or a sheet cannot be written.
+    /// The observer canceled the job, or a sheet cannot be written.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
         let Self { scene, compiled, numbers, files, .. } = self;
-        observer.started(&Outline { total: numbers.len(), kept: 0, size: self.sheet.cell });
-        let located = |error| plates::located(scene, error).of_whole("a flipbook");
-        let (plan, sheet) = &self.cropped(observer).map_err(located)?;
-        let gather = Gather::new(sheet.count, observer, |frame, observer| Tile::of(frame, files, observer));
+        observer.started(&JobStarted { frames: numbers.len(), kept: 0, size: self.sheet.cell });
+        let with_position = |error| plates::with_position(scene, error).for_single_file("a flipbook");
+        let (plan, sheet) = &self.cropped(observer).map_err(with_position)?;
+        let collector = TileCollector::new(sheet.count, observer, |frame, observer| files.tile(frame, observer));
         let mut shot = Shot::open(compiled.clone(), plan.clone());
-        draw_frames(&mut shot, numbers, &Snapshots::default(), &gather, observer).map_err(located)?;
-        let tiles = gather.into_tiles();
-        if !tiles.iter().any(|tile| tile.has_motion) {
-            observer.note(&Note::NoMotion);
+        draw_frames(&mut shot, numbers, &Snapshots::default(), &collector, observer).map_err(with_position)?;
+        let tiles = collector.into_tiles();
+        if !tiles.iter().any(Tile::has_motion) {
+            observer.warning(&Warning::NoMotion);
         }
-        files.write(plan, sheet, numbers, &tiles, observer).map_err(|error| error.of_whole("a flipbook"))
+        files.write(plan, sheet, numbers, &tiles, observer).map_err(|error| error.for_single_file("a flipbook"))
     }
-}
 
-impl PreparedFlipbook {
-    /// The plan and the sheet of what tiles show: first it must be known what is lit.
+    /// The plan and the layout of the cropped flipbook. Finding the lit region draws small pictures of all frames.
     fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, SheetLayout), JobError> {
-        let all = || Ok((self.plan.clone(), self.sheet));
+        let uncropped = || Ok((self.plan.clone(), self.sheet));
         if self.crop == FlipbookCrop::None {
-            return all();
+            return uncropped();
         }
         let exact = self.files.is_exact();
-        let region = crop::lit(&self.compiled, &self.plan, &self.numbers, exact, observer)?;
-        let most = [self.sheet.columns, self.sheet.rows()].map(|tiles| USUAL_SIDE / tiles);
+        let region = crop::lit_region(&self.compiled, &self.plan, &self.numbers, exact, observer)?;
+        let max_tile = [self.sheet.columns, self.sheet.rows()].map(|tiles| DEFAULT_SHEET_SIDE / tiles);
         let whole = self.plan.scene().picture.size.map(|side| side as usize);
         let fitting = |region: crop::Region| {
-            let size = if self.own_size { self.plan.size() } else { region.picture(whole, most)? };
-            let part = region.within(size);
-            // All of it is drawn as it is without a crop.
-            (part != Rect::from_size(size[0], size[1])).then_some((size, part))
+            let size = if self.size_is_option { self.plan.size() } else { region.picture_size(whole, max_tile)? };
+            let crop = region.pixels(size);
+            // A crop to the whole picture is drawn like a flipbook without a crop.
+            (crop != Rect::from_size(size[0], size[1])).then_some((size, crop))
         };
-        let Some((size, part)) = region.and_then(fitting) else { return all() };
-        let plan = Arc::new(self.plan.cropped(size, part)?);
-        let sheet = tiles::checked(SheetLayout { cell: [part.width, part.height], ..self.sheet }, SheetKind::Flipbook)?;
+        let Some((size, crop)) = region.and_then(fitting) else { return uncropped() };
+        let plan = Arc::new(self.plan.cropped(size, crop)?);
+        let layout = SheetLayout { cell: [crop.width, crop.height], ..self.sheet };
+        let sheet = sheet::check_layout(layout, SheetKind::Flipbook)?;
         let frames = self.numbers.len();
-        let wanted = MemoryRequest { frames, tiles: frames, display: Some(self.files.bits), own_size: true };
-        memory::check(&self.scene, &self.compiled, &plan, wanted)?;
+        let request = MemoryRequest { frames, tiles: frames, display: Some(self.files.bits), size_is_option: true };
+        memory::check(&self.scene, &self.compiled, &plan, request)?;
         Ok((plan, sheet))
     }
 }
 
 /// The frame rate at which `count` frames last `seconds`.
-fn turn_rate(count: usize, seconds: f64) -> Result<FrameRate, Conflict> {
+fn loop_frame_rate(count: usize, seconds: f64) -> Result<FrameRate, OptionError> {
     if !(0.01..=3600.0).contains(&seconds) {
-        return Err(Conflict::LoopLength(seconds));
+        return Err(OptionError::LoopLength(seconds));
     }
     Ok(FrameRate { frames: count as u32 * 1000, seconds: (seconds * 1000.0).round() as u32 })
 }

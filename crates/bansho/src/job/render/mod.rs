@@ -1,25 +1,31 @@
-//! Carrying out a prepared job.
+//! Renders a scene to files or to a contact sheet: `bansho render`.
 
-pub(crate) mod draw_frames;
-pub(crate) mod figures;
-pub(crate) mod finished_files;
-pub(crate) mod in_flight;
+pub(crate) mod contact_sheet;
+pub(crate) mod metadata;
 pub(crate) mod output;
 pub(crate) mod prepare;
 pub(crate) mod resume;
 
 use std::{path::PathBuf, sync::atomic::AtomicUsize};
 
+use bansho_base::{
+    frame::Frame,
+    host::observer::{Observer, Stage, StageGuard},
+};
+use bansho_media::{
+    imageops::sprite_sheet::SheetLayout,
+    output::sink::{FrameSlot, Picture},
+};
 use bansho_render::Shot;
 
 use super::{
+    checks::{finished_files::FinishedFiles, plates},
     error::JobError,
-    observer::{JobObserver, Outline},
+    observer::{JobObserver, JobStarted},
+    pipeline::draw_frames::draw_frames,
+    sheet::TileCollector,
 };
-use crate::job::{checks::plates, flipbook::contact_sheet};
-use draw_frames::draw_frames;
-use finished_files::Finished;
-use output::ToFiles;
+use output::FileWriter;
 use prepare::PreparedJob;
 
 /// What a job did.
@@ -27,9 +33,9 @@ use prepare::PreparedJob;
 pub struct Summary {
     /// Frames drawn.
     pub drawn: usize,
-    /// Frames that were there already.
+    /// Frames that existed already and were kept.
     pub kept: usize,
-    /// The first file that it wrote or would have written.
+    /// The file of the first frame.
     pub first_file: PathBuf,
 }
 
@@ -37,28 +43,28 @@ impl PreparedJob {
     /// Draws and writes everything, in the caller's rayon pool.
     ///
     /// # Errors
-    /// The observer asked to stop, or the first failure of a frame. Frames that were finished by then stay, whole;
-    /// nothing else does. Frames that were finished and are there no longer, or not whole, when all are.
+    /// The observer canceled the job, or a frame failed; finished frames are kept, and nothing else is written. Or finished frames were removed
+    /// or changed before the job ended.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<Summary, JobError> {
-        self.notes.iter().for_each(|note| observer.note(note));
-        let finished = Finished::default();
-        let numbers = self.missing(&finished);
+        self.warnings.iter().for_each(|warning| observer.warning(warning));
+        let finished = FinishedFiles::default();
+        let numbers = self.missing_frames(&finished);
         let kept = self.frames.len() - numbers.len();
         let size = [self.plan.window().width, self.plan.window().height];
-        observer.started(&Outline { total: self.frames.len(), kept, size });
+        observer.started(&JobStarted { frames: self.frames.len(), kept, size });
         let done = match &self.sheet {
-            Some(sheet) => contact_sheet::run(self, sheet, observer),
+            Some(sheet) => self.run_contact_sheet(sheet, observer),
             None if numbers.is_empty() => Ok(()),
             None => self.run_files(&numbers, size, &finished, observer),
         };
         let kind = self.format.pattern.kind();
-        done.map_err(|error| match plates::located(&self.scene, error) {
-            error if self.sheet.is_some() => error.of_whole("a sheet"),
-            error if !kind.is_sequence() => error.of_whole("a film"),
+        done.map_err(|error| match plates::with_position(&self.scene, error) {
+            error if self.sheet.is_some() => error.for_single_file("a sheet"),
+            error if !kind.is_sequence() => error.for_single_file("a video"),
             error => error,
         })?;
         if self.sheet.is_none() && kind.is_sequence() {
-            self.check_all_there(&finished)?;
+            self.check_all_present(&finished)?;
         }
         Ok(Summary { drawn: numbers.len(), kept, first_file: self.format.pattern.path(self.frames[0]) })
     }
@@ -67,14 +73,41 @@ impl PreparedJob {
         &self,
         numbers: &[i64],
         size: [usize; 2],
-        finished: &Finished,
+        finished: &FinishedFiles,
         observer: &dyn JobObserver,
     ) -> Result<(), JobError> {
-        let window = rayon::current_num_threads() + 1;
-        let sink = self.format.open(&self.plan, numbers.len(), size, window)?;
-        let files = ToFiles { format: &self.format, sink, window, observer, drawn: AtomicUsize::new(0), finished };
+        let max_in_flight = rayon::current_num_threads() + 1;
+        let sink = self.format.open(&self.plan, numbers.len(), size, max_in_flight)?;
+        let drawn = AtomicUsize::new(0);
+        let files = FileWriter { format: &self.format, sink, max_in_flight, observer, drawn, finished };
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
         draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
         Ok(files.sink.finish()?)
+    }
+
+    /// Draws all frames into one picture and writes it.
+    fn run_contact_sheet(&self, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
+        let sink = self.format.open(&self.plan, 1, sheet.size(), 1)?;
+        let make_tile = |frame: &mut Frame, observer: &dyn Observer| {
+            contact_sheet::tile(frame, self.contact_background, &self.format, observer)
+        };
+        let collector = TileCollector::new(sheet.count, observer, make_tile);
+        let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
+        draw_frames(&mut shot, &self.frames, &self.snapshots, &collector, observer)?;
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        let picture = contact_sheet::compose(&collector.into_tiles(), sheet)?;
+        let fingerprint = self.contact_sheet_fingerprint();
+        sink.write(FrameSlot { index: 0, number: self.frames[0] }, Picture::Display(&picture, &fingerprint))?;
+        Ok(sink.finish()?)
+    }
+
+    /// The fingerprint of the sheet, which differs from that of any frame.
+    fn contact_sheet_fingerprint(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        for &number in &self.frames {
+            hasher.update(&self.plan.frame_fingerprint(number, self.compiled.assets().as_ref()));
+        }
+        hasher.update(self.contact_background.name().as_bytes());
+        self.format.fingerprint(*hasher.update(b"contact sheet").finalize().as_bytes())
     }
 }

@@ -1,4 +1,4 @@
-//! Checking a job before anything is drawn or written.
+//! Checks a job before anything is drawn or written.
 
 use std::{
     path::{Path, PathBuf},
@@ -7,11 +7,9 @@ use std::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
-    host::assets::Assets,
     phenomenon::Remark,
 };
 use bansho_media::{
-    assets::FileAssets,
     files::{
         naming::{self, OutputPattern},
         overwrite_policy::OverwritePolicy,
@@ -23,38 +21,36 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
 use bansho_scene::{Positions, SceneOptions};
 
 use super::{
-    figures,
-    output::{self, Format},
+    contact_sheet::{self, ContactBackground},
+    metadata,
+    output::Format,
 };
 use crate::job::{
     Job,
     checks::{
         memory::{self, MemoryRequest},
-        overwrite, plates,
+        outputs, plates,
     },
-    error::{Channels, Conflict, JobError, SheetKind},
-    flipbook::{
-        contact_sheet::{self, ContactBackground},
-        tiles::{self, MOST_TILES},
-    },
-    observer::{Note, Spot},
+    error::{ChannelKind, JobError, OptionError, SheetKind},
+    observer::{FilePosition, Warning},
+    pipeline::snapshots::Snapshots,
     scene_file::SceneFile,
-    snapshots::Snapshots,
+    sheet::{self, MAX_TILES},
 };
 
-/// A job that can be carried out, as far as can be known without doing so.
+/// A checked job, ready to run.
 pub struct PreparedJob {
     pub(crate) scene: SceneFile,
     pub(crate) compiled: Arc<CompiledScene>,
     pub(crate) plan: Arc<Plan>,
     pub(crate) frames: Vec<i64>,
     pub(crate) format: Format,
-    /// Where all frames go into one picture.
+    /// The layout of a contact sheet, if all frames go into one picture.
     pub(crate) sheet: Option<SheetLayout>,
     pub(crate) contact_background: ContactBackground,
     pub(crate) resume: bool,
     pub(crate) snapshots: Snapshots,
-    pub(crate) notes: Vec<Note>,
+    pub(crate) warnings: Vec<Warning>,
 }
 
 impl PreparedJob {
@@ -63,92 +59,91 @@ impl PreparedJob {
         &self.plan
     }
 
-    /// The frames that were asked for, ascending.
+    /// The frames of the job, ascending.
     pub fn frames(&self) -> &[i64] {
         &self.frames
     }
 
-    /// Where frames go.
+    /// The output files.
     pub fn output(&self) -> &OutputPattern {
         &self.format.pattern
     }
 
-    /// What the user should know before the work begins.
-    pub fn notes(&self) -> &[Note] {
-        &self.notes
+    /// What the user should know before the job begins.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
     }
 }
 
-/// Reads the files that a scene names from the folder it lies in, within its limits.
-pub(crate) fn assets(scene: &SceneFile) -> Arc<dyn Assets> {
-    Arc::new(FileAssets::with_limits(&scene.folder, scene.inputs.clone()))
-}
-
-/// Checks a scene and all it names, and plans it as it is.
+/// Checks a scene and all files that it names, and plans its shot without further options.
 ///
 /// # Errors
-/// What the scene would be refused for.
+/// The problems of the scene, a missing plate, or too little memory.
 pub fn check_scene(scene: &SceneFile) -> Result<(Arc<CompiledScene>, Plan), JobError> {
     let compiled = scene.compile(
-        scene.parse()?.adapted(&SceneOptions { implied_backdrop: true, ..SceneOptions::default() })?,
-        &assets(scene),
+        scene.parse()?.with_options(&SceneOptions { implied_backdrop: true, ..SceneOptions::default() })?,
+        &scene.assets(),
     )?;
     let plan = Plan::new(&compiled, &PlanOptions::default())?;
-    // With its overscan, as EXR is drawn.
-    let widest = PlanOptions { overscan: true, ..PlanOptions::default() };
-    let widest =
-        Plan::with_exposure_and_loop_start(plan.scene().clone(), &widest, plan.exposure_ev100, plan.loop_start)?;
+    // With the overscan, which EXR files have.
+    let with_overscan = PlanOptions { overscan: true, ..PlanOptions::default() };
+    let with_overscan =
+        Plan::with_exposure_and_loop_start(plan.scene().clone(), &with_overscan, plan.exposure_ev100, plan.loop_start)?;
     let frames = (plan.frames().end - plan.frames().start) as usize;
-    let request = MemoryRequest { frames, tiles: 0, display: Some(BitDepth::Eight), own_size: false };
-    memory::check(scene, &compiled, &widest, request)?;
+    let request = MemoryRequest { frames, tiles: 0, display: Some(BitDepth::Eight), size_is_option: false };
+    memory::check(scene, &compiled, &with_overscan, request)?;
     plates::check(scene, &compiled, &plan.frames().collect::<Vec<_>>())?;
     Ok((compiled, plan))
 }
 
-/// What users should know of how the phenomena of a scene will look, each at its place in the file.
-pub fn remarks(scene: &SceneFile, compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<Note> {
+/// Warnings about how the phenomena of a scene will look, each with its position in the file.
+pub fn remarks(scene: &SceneFile, compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<Warning> {
     let remarks = bansho_render::remarks::remarks(compiled, plan);
     if remarks.is_empty() {
         return Vec::new();
     }
     let mut positions = Positions::new(plan.scene(), &scene.text);
-    let note = |(name, remark): (String, Remark)| {
-        let position = positions.of(&name, remark.key.as_deref());
-        let place = position.map(|position| Spot { file: scene.name.clone(), position });
-        Note::Remark { place, name, remark }
+    let warning = |(name, remark): (String, Remark)| {
+        let position = positions.find(&name, remark.key.as_deref());
+        let position = position.map(|position| FilePosition { file: scene.name.clone(), position });
+        Warning::Remark { position, name, remark }
     };
-    remarks.into_iter().map(note).collect()
+    remarks.into_iter().map(warning).collect()
 }
 
 impl Job {
-    /// Checks everything: the scene and what it names, the options, whether the output can be written. Writes nothing.
+    /// Checks everything: the scene and the files that it names, the options, whether the output can be written. Writes nothing.
     ///
     /// # Errors
-    /// The first thing that stands in the way; of the scene all faults at once.
+    /// The first obstacle; of the scene, all problems at once.
     pub fn prepare(&self) -> Result<PreparedJob, JobError> {
         let scene = self.scene.parse()?;
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
-        self.check_figures(kind)?;
+        self.check_metadata(kind)?;
         let alpha = alpha_convention(self.alpha, self.view, AlphaConvention::Encoded)?;
-        let compiled = self.scene.compile(scene.adapted(&self.scene_options())?, &assets(&self.scene))?;
+        let compiled = self.scene.compile(scene.with_options(&self.scene_options())?, &self.scene.assets())?;
         let plan = Arc::new(Plan::new(&compiled, &self.plan_options(kind))?);
-        let frames = self.chosen_frames(&plan)?;
+        let frames = self.selected_frames(&plan)?;
         plates::check(&self.scene, &compiled, &frames)?;
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
         let pattern = OutputPattern::parse(&self.output_path(), files)?;
-        output::check_writable(&pattern.path(frames[0]))?;
-        let overwrite = OverwritePolicy::new(overwrite::inputs(&self.scene, &plan, &frames), self.overwrite);
-        overwrite::check(&overwrite, self.outputs(&pattern, &frames))?;
+        outputs::check_writable(&pattern.path(frames[0]))?;
+        let overwrite = OverwritePolicy::new(outputs::input_files(&self.scene, &plan, &frames), self.overwrite);
+        outputs::check_overwriting(&overwrite, self.outputs(&pattern, &frames))?;
         let tile = [plan.window().width, plan.window().height];
-        let sheet = self.contact_sheet.map(|tiles| tiles::holding(tiles, tile, contact_sheet::GUTTER)).transpose()?;
+        let sheet = self
+            .contact_sheet
+            .map(|tiles| sheet::nearly_square_layout(tiles, tile, contact_sheet::GUTTER))
+            .transpose()?;
         memory::check(&self.scene, &compiled, &plan, self.memory_request(kind, frames.len()))?;
-        let snapshots = snapshots(self.snapshots.as_deref(), self.snapshot_every, (&compiled, &plan), &overwrite)?;
+        let snapshots = SnapshotOptions { folder: self.snapshots.as_deref(), interval: self.snapshot_every };
+        let snapshots = snapshots.prepare(&compiled, &plan, &overwrite)?;
         let mut prepared = PreparedJob {
             scene: self.scene.clone(),
-            format: Format { pattern, view: self.view, bits: self.bits, alpha, figures: self.figures, overwrite },
+            format: Format { pattern, view: self.view, bits: self.bits, alpha, metadata: self.metadata, overwrite },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
-            notes: Vec::new(),
+            warnings: Vec::new(),
             compiled,
             plan,
             frames,
@@ -156,7 +151,7 @@ impl Job {
             contact_background: self.contact_background,
             snapshots,
         };
-        prepared.notes = self.notes(&prepared);
+        prepared.warnings = self.warnings(&prepared);
         Ok(prepared)
     }
 
@@ -169,18 +164,18 @@ impl Job {
 
     fn memory_request(&self, kind: OutputKind, frames: usize) -> MemoryRequest {
         let display = (!kind.is_scene_linear()).then_some(self.bits);
-        MemoryRequest { frames, tiles: self.contact_sheet.unwrap_or(0), display, own_size: self.size.is_some() }
+        MemoryRequest { frames, tiles: self.contact_sheet.unwrap_or(0), display, size_is_option: self.size.is_some() }
     }
 
     /// Every file that will be written.
     fn outputs<'a>(&self, pattern: &'a OutputPattern, frames: &'a [i64]) -> impl Iterator<Item = PathBuf> + use<'a> {
         let single = self.contact_sheet.is_some() || !pattern.kind().is_sequence();
         let frames = if single { &frames[..1] } else { frames };
-        let with_figures = self.figures;
+        let with_metadata = self.metadata;
         frames.iter().flat_map(move |&number| {
             let picture = pattern.path(number);
-            let figures = with_figures.then(|| figures::path(&picture));
-            [Some(picture), figures].into_iter().flatten()
+            let metadata = with_metadata.then(|| metadata::path(&picture));
+            [Some(picture), metadata].into_iter().flatten()
         })
     }
 
@@ -188,25 +183,28 @@ impl Job {
         let path = self.output_path();
         let kind = OutputPattern::parse(&path, 2)?.kind();
         if self.contact_sheet.is_some() && kind != OutputKind::Png {
-            return Err(Conflict::Sheet { path, allowed: ".png" }.into());
+            return Err(OptionError::SheetFormat { path, allowed: ".png" }.into());
         }
         Ok(kind)
     }
 
-    /// Layers and AOVs need a file that holds them.
-    fn check_channels(&self, kind: OutputKind) -> Result<(), Conflict> {
-        let what = match (self.layers, self.aovs) {
-            (true, _) => Channels::Layers,
-            (_, true) => Channels::Aovs,
+    /// Layers and AOVs need a format with many channels.
+    fn check_channels(&self, kind: OutputKind) -> Result<(), OptionError> {
+        let channels = match (self.layers, self.aovs) {
+            (true, _) => ChannelKind::Layers,
+            (_, true) => ChannelKind::Aovs,
             _ => return Ok(()),
         };
-        if kind.is_scene_linear() { Ok(()) } else { Err(Conflict::NoChannels { what, path: self.output_path() }) }
+        if kind.is_scene_linear() {
+            return Ok(());
+        }
+        Err(OptionError::ChannelsUnsupported { channels, path: self.output_path() })
     }
 
-    /// Figures lie beside a picture of one frame.
-    fn check_figures(&self, kind: OutputKind) -> Result<(), Conflict> {
-        if self.figures && (self.contact_sheet.is_some() || !kind.is_sequence()) {
-            return Err(Conflict::NoFigures { path: self.output_path() });
+    /// Metadata needs a picture for each frame.
+    fn check_metadata(&self, kind: OutputKind) -> Result<(), OptionError> {
+        if self.metadata && (self.contact_sheet.is_some() || !kind.is_sequence()) {
+            return Err(OptionError::MetadataUnsupported { path: self.output_path() });
         }
         Ok(())
     }
@@ -222,111 +220,126 @@ impl Job {
             crop: self.crop,
             layers: self.layers,
             aovs: self.aovs,
-            figures: self.figures,
+            metadata: self.metadata,
             display: self.view,
         }
     }
 
-    fn chosen_frames(&self, plan: &Plan) -> Result<Vec<i64>, JobError> {
-        let frames = chosen_frames(self.frames.as_deref(), plan)?;
+    fn selected_frames(&self, plan: &Plan) -> Result<Vec<i64>, JobError> {
+        let frames = selected_frames(self.frames.as_deref(), plan)?;
         match self.contact_sheet {
-            Some(tiles) if !(1..=MOST_TILES).contains(&tiles) => {
-                Err(Conflict::Tiles { of: SheetKind::Contact, tiles, most: MOST_TILES }.into())
+            Some(tiles) if !(1..=MAX_TILES).contains(&tiles) => {
+                Err(OptionError::TileCount { sheet: SheetKind::Contact, tiles, max: MAX_TILES }.into())
             }
             None => Ok(frames),
-            // All of a shot, or from one frame on: one after the other, also beyond its end.
+            // No frames or a single one given: consecutive frames from the first, also beyond the end of the shot.
             Some(tiles) if self.frames.is_none() || frames.len() == 1 => {
                 Ok((frames[0]..frames[0].saturating_add(tiles as i64)).collect())
             }
-            Some(tiles) if frames.len() < tiles => Err(Conflict::FewFrames { tiles, frames: frames.len() }.into()),
+            Some(tiles) if frames.len() < tiles => {
+                Err(OptionError::TooFewFrames { tiles, frames: frames.len() }.into())
+            }
             Some(tiles) => Ok(frames[..tiles].to_vec()),
         }
     }
 
-    fn notes(&self, job: &PreparedJob) -> Vec<Note> {
+    fn warnings(&self, job: &PreparedJob) -> Vec<Warning> {
         let kind = job.format.pattern.kind();
-        let mut notes: Vec<Note> = outside(&job.plan, &job.frames).into_iter().collect();
-        notes.extend(remarks(&self.scene, &job.compiled, &job.plan));
+        let mut warnings: Vec<Warning> = outside_range(&job.plan, &job.frames).into_iter().collect();
+        warnings.extend(remarks(&self.scene, &job.compiled, &job.plan));
         if self.bits == BitDepth::Sixteen && !kind.takes_sixteen_bits() {
-            notes.push(Note::BitsUnused { kind });
+            warnings.push(Warning::BitsUnused { kind });
         }
         let scene = job.plan.scene();
         if self.transparent && (scene.has_plate() || scene.shows_stated_backdrop()) {
-            notes.push(Note::TransparentUnused);
+            warnings.push(Warning::TransparentUnused);
         }
         let has_alpha = kind.has_straight_alpha() && !job.plan.scene().has_plate() && job.sheet.is_none();
         if self.alpha.is_some() && !has_alpha {
-            notes.push(Note::AlphaUnused);
+            warnings.push(Warning::AlphaUnused);
         }
-        // With a plate the view matters to EXR too: the plate is taken back through it.
+        // With a plate, the view also affects EXR: the inverse view is applied to the plate.
         if kind.is_scene_linear() && self.view != View::DISPLAY && !job.plan.scene().has_plate() {
-            notes.push(Note::ViewUnused);
+            warnings.push(Warning::ViewUnused);
         }
         if self.resume && !job.resume {
-            notes.push(if job.sheet.is_some() { Note::ResumeSheet } else { Note::ResumeUnused { kind } });
+            warnings.push(if job.sheet.is_some() { Warning::ResumeSheet } else { Warning::ResumeUnused { kind } });
         }
         if self.snapshots.is_some() && job.snapshots == Snapshots::default() {
-            notes.push(Note::SnapshotsUnused);
+            warnings.push(Warning::SnapshotsUnused);
         }
-        notes
+        warnings
     }
 }
 
-/// What straight alpha is made for: as asked for, else as `usual`; linear where the view encodes nothing.
+/// The convention of straight alpha: `option`, or `default` if it is `None`. For the view `raw`, which encodes nothing, the default is linear.
 ///
 /// # Errors
-/// Encoded alpha of a view that encodes nothing.
+/// Encoded alpha for the view `raw`.
 pub(crate) fn alpha_convention(
-    asked: Option<AlphaConvention>,
+    option: Option<AlphaConvention>,
     view: View,
-    usual: AlphaConvention,
-) -> Result<AlphaConvention, Conflict> {
-    match asked {
-        Some(AlphaConvention::Encoded) if view == View::RAW => Err(Conflict::RawAlpha),
+    default: AlphaConvention,
+) -> Result<AlphaConvention, OptionError> {
+    match option {
+        Some(AlphaConvention::Encoded) if view == View::RAW => Err(OptionError::RawAlpha),
         None if view == View::RAW => Ok(AlphaConvention::Linear),
-        asked => Ok(asked.unwrap_or(usual)),
+        option => Ok(option.unwrap_or(default)),
     }
 }
 
-/// The frames that are asked for, ascending; at least one.
-pub(crate) fn chosen_frames(asked: Option<&[i64]>, plan: &Plan) -> Result<Vec<i64>, JobError> {
-    let mut frames = asked.map_or_else(|| plan.frames().collect(), <[i64]>::to_vec);
+/// The frames of a job, ascending: `option`, or all frames of the plan if it is `None`.
+///
+/// # Errors
+/// The list is empty.
+pub(crate) fn selected_frames(option: Option<&[i64]>, plan: &Plan) -> Result<Vec<i64>, OptionError> {
+    let mut frames = option.map_or_else(|| plan.frames().collect(), <[i64]>::to_vec);
     frames.sort_unstable();
     frames.dedup();
-    if frames.is_empty() { Err(Conflict::NoFrames.into()) } else { Ok(frames) }
+    if frames.is_empty() { Err(OptionError::NoFrames) } else { Ok(frames) }
 }
 
-/// Snapshots in `folder`, `every` so many frames; none where nothing in the plan has a state.
-///
-/// # Errors
-/// No frame between snapshots, or a file in the folder that must stay.
-pub(crate) fn snapshots(
-    folder: Option<&Path>,
-    every: Option<u64>,
-    (compiled, plan): (&CompiledScene, &Plan),
-    overwrite: &OverwritePolicy,
-) -> Result<Snapshots, JobError> {
-    let second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
-    let every = every.unwrap_or(second);
-    match folder {
-        _ if every == 0 => Err(Conflict::SnapshotStep(every).into()),
-        Some(folder) if compiled.is_stepped() => {
-            let snapshots = Snapshots::new(folder.to_path_buf(), plan, every, overwrite.clone());
-            snapshots.check()?;
-            Ok(snapshots)
+/// The snapshots that a job may read and write.
+pub(crate) struct SnapshotOptions<'a> {
+    /// Their folder; `None` for no snapshots.
+    pub(crate) folder: Option<&'a Path>,
+    /// Frames between them; `None` for one snapshot a second.
+    pub(crate) interval: Option<u64>,
+}
+
+impl SnapshotOptions<'_> {
+    /// Checks the options. There are no snapshots if nothing in the scene has a state.
+    ///
+    /// # Errors
+    /// An interval of zero, or a file in the folder that must not be overwritten.
+    pub(crate) fn prepare(
+        &self,
+        compiled: &CompiledScene,
+        plan: &Plan,
+        overwrite: &OverwritePolicy,
+    ) -> Result<Snapshots, JobError> {
+        let frames_per_second = (1.0 / plan.fps().frame_s()).round().max(1.0) as u64;
+        let interval = self.interval.unwrap_or(frames_per_second);
+        match self.folder {
+            _ if interval == 0 => Err(OptionError::SnapshotInterval(interval).into()),
+            Some(folder) if compiled.is_stepped() => {
+                let snapshots = Snapshots::new(folder.to_path_buf(), plan, interval, overwrite.clone());
+                snapshots.check()?;
+                Ok(snapshots)
+            }
+            _ => Ok(Snapshots::default()),
         }
-        _ => Ok(Snapshots::default()),
     }
 }
 
-/// How many frames lie outside the shot's own.
-pub(crate) fn outside(plan: &Plan, frames: &[i64]) -> Option<Note> {
-    let own = plan.frames();
-    let count = frames.iter().filter(|frame| !own.contains(frame)).count();
-    let (first, last) = (own.start, own.end - 1);
+/// A warning if some frames lie outside the range of the shot.
+pub(crate) fn outside_range(plan: &Plan, frames: &[i64]) -> Option<Warning> {
+    let range = plan.frames();
+    let count = frames.iter().filter(|frame| !range.contains(frame)).count();
+    let (first, last) = (range.start, range.end - 1);
     match (count, plan.loop_s()) {
         (0, _) => None,
-        (_, Some(_)) => Some(Note::OutsideLoop { count, first, last }),
-        (_, None) => Some(Note::OutsideScene { count, first, last }),
+        (_, Some(_)) => Some(Warning::OutsideLoop { count, first, last }),
+        (_, None) => Some(Warning::OutsideScene { count, first, last }),
     }
 }

@@ -1,4 +1,4 @@
-//! The pictures of streak textures.
+//! Writes the pictures of streak textures.
 
 use std::{
     f64::consts::PI,
@@ -23,53 +23,61 @@ use bansho_render::display::BitDepth;
 use super::{StreakFormat, Streaks, Texture};
 use crate::job::error::JobError;
 
-/// Version of the program, on which files depend.
+/// Version of the program, which is part of the fingerprint.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// A distant light on the drops.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lit {
+pub(crate) struct DistantLight {
     /// Unit vector toward it: right, up, toward the viewer.
     pub(crate) toward: DVec3,
-    /// Radiance of an opaque drop for each unit of illuminance, 1/sr: red, green, blue.
+    /// Radiance of an opaque drop for unit illuminance, 1/sr: red, green, blue.
     pub(crate) radiance: [f32; 3],
 }
 
-impl Lit {
-    pub(crate) fn new(toward: [f64; 3], lens: &DropPhaseFunction) -> Self {
+impl DistantLight {
+    pub(crate) fn new(toward: [f64; 3], phase_function: &DropPhaseFunction) -> Self {
         let toward = DVec3::from(toward).normalize();
-        // The light travels against `toward`, and goes on to the viewer along z.
-        let phase = lens.phase(-toward.z as f32);
+        // The light travels along `-toward`, and is scattered to the viewer along z.
+        let phase = phase_function.phase(-toward.z as f32);
         Self { toward, radiance: phase.map(|phase| phase / (4.0 * PI) as f32) }
     }
 }
 
-/// Where textures go and what they are.
-pub(crate) struct Writer {
+/// Writes textures in one format to one folder.
+pub(crate) struct TextureWriter {
     pub(crate) folder: PathBuf,
     pub(crate) format: StreakFormat,
     pub(crate) bits: BitDepth,
-    pub(crate) light: Option<Lit>,
-    /// Which files that are there may be written over.
+    pub(crate) light: Option<DistantLight>,
+    /// Which existing files may be overwritten.
     pub(crate) overwrite: OverwritePolicy,
     pub(crate) streaks: Streaks,
 }
 
-/// What was written of one texture.
+/// The scales of the pictures of one texture.
 #[derive(Clone, Debug)]
-pub(crate) struct Written {
-    /// Opacity of the largest code, of a PNG.
+pub(crate) struct WrittenTexture {
+    /// Of a PNG: the opacity of the largest code.
     pub(crate) scale: Option<f32>,
-    /// File and scale of the lit picture, of a PNG.
-    pub(crate) lit: Option<(String, f32)>,
+    /// The lit picture beside a PNG.
+    pub(crate) lit: Option<LitPicture>,
 }
 
-impl Writer {
+/// A PNG of the radiance of drops that a light shines on.
+#[derive(Clone, Debug)]
+pub(crate) struct LitPicture {
+    pub(crate) file: String,
+    /// The radiance of the largest code.
+    pub(crate) scale: f32,
+}
+
+impl TextureWriter {
     pub(crate) fn index_path(&self) -> PathBuf {
         self.folder.join("streaks.json")
     }
 
-    /// `streak_RATE_DIAMETER.png`, the variant behind it where there are several.
+    /// `streak_RATE_DIAMETER.png`, or `streak_RATE_DIAMETER_VARIANT.png` if there are several variants.
     pub(crate) fn name(&self, texture: &Texture) -> String {
         let variant = if self.streaks.variants > 1 { format!("_{}", texture.variant) } else { String::new() };
         let extension = self.format.name();
@@ -81,34 +89,34 @@ impl Writer {
         (self.light.is_some() && self.format == StreakFormat::Png).then(|| file.replace(".png", "_lit.png"))
     }
 
-    /// The files that the texture `file` becomes.
+    /// The files of the texture `file`.
     pub(crate) fn files(&self, file: &str) -> impl Iterator<Item = PathBuf> + use<> {
         let names = [Some(file.to_owned()), self.lit_name(file)];
         let folder = self.folder.clone();
         names.into_iter().flatten().map(move |name| folder.join(name))
     }
 
-    /// Writes a file, whole or not at all.
-    pub(crate) fn keep(&self, path: &Path, bytes: &[u8]) -> Result<(), JobError> {
+    /// Writes a file, atomically.
+    pub(crate) fn write_file(&self, path: &Path, bytes: &[u8]) -> Result<(), JobError> {
         Ok(atomic::write_bytes_with(path, bytes, &self.overwrite)?)
     }
 
-    /// Writes what a texture becomes.
-    pub(crate) fn write(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+    /// Writes the pictures of a texture.
+    pub(crate) fn write(&self, file: &str, opacity: &Image<1>) -> Result<WrittenTexture, JobError> {
         match self.format {
             StreakFormat::Png => self.write_png(file, opacity),
             StreakFormat::Exr => self.write_exr(file, opacity),
         }
     }
 
-    fn write_png(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+    fn write_png(&self, file: &str, opacity: &Image<1>) -> Result<WrittenTexture, JobError> {
         let scale = self.write_measured(file, 1, opacity, opacity.pixels().as_flattened())?;
         let lit = self.light.zip(self.lit_name(file)).map(|(light, name)| {
             let radiance: Vec<f32> = self.radiance(&light, opacity).into_flattened();
             let scale = self.write_measured(&name, 3, opacity, &radiance)?;
-            Ok::<_, JobError>((name, scale))
+            Ok::<_, JobError>(LitPicture { file: name, scale })
         });
-        Ok(Written { scale: Some(scale), lit: lit.transpose()? })
+        Ok(WrittenTexture { scale: Some(scale), lit: lit.transpose()? })
     }
 
     fn write_measured(&self, file: &str, channels: usize, image: &Image<1>, values: &[f32]) -> Result<f32, JobError> {
@@ -116,13 +124,13 @@ impl Writer {
         let picture = MeasuredImage::from_values(size, channels, values, self.bits == BitDepth::Sixteen);
         let path = self.folder.join(file);
         let bytes = png::encode_measured(&picture, &self.fingerprint(file), PngEffort::Fast, &path)?;
-        self.keep(&path, &bytes)?;
+        self.write_file(&path, &bytes)?;
         Ok(picture.scale)
     }
 
-    fn write_exr(&self, file: &str, opacity: &Image<1>) -> Result<Written, JobError> {
+    fn write_exr(&self, file: &str, opacity: &Image<1>) -> Result<WrittenTexture, JobError> {
         let values = opacity.pixels().as_flattened();
-        // Without a light the streaks are a white veil of their opacity.
+        // Without a light, the radiance is the opacity: white streaks.
         let radiance = match &self.light {
             Some(light) => self.radiance(light, opacity),
             None => values.iter().map(|&opacity| [opacity; 3]).collect(),
@@ -135,27 +143,27 @@ impl Writer {
             |name: &str, values: Vec<f32>| Channel { name: name.to_owned(), precision: Precision::Single, values };
         let channels = vec![channel("opacity", values.to_vec())];
         let (header, content) = (self.header(file, opacity), Rect::from_size(width, height));
-        let frame = Frame { header, beauty, depth: None, channels, opaque: false, figures: Vec::new(), content };
+        let frame = Frame { header, beauty, depth: None, channels, opaque: false, metadata: Vec::new(), content };
         let path = self.folder.join(file);
-        self.keep(&path, &exr::encode(&frame, &path)?)?;
-        Ok(Written { scale: None, lit: None })
+        self.write_file(&path, &exr::encode(&frame, &path)?)?;
+        Ok(WrittenTexture { scale: None, lit: None })
     }
 
-    fn radiance(&self, light: &Lit, opacity: &Image<1>) -> Vec<[f32; 3]> {
+    fn radiance(&self, light: &DistantLight, opacity: &Image<1>) -> Vec<[f32; 3]> {
         opacity.pixels().iter().map(|[opacity]| light.radiance.map(|radiance| radiance * opacity)).collect()
     }
 
     fn header(&self, file: &str, image: &Image<1>) -> FrameHeader {
-        let unit: [[f32; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+        let identity: [[f32; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
         FrameHeader {
             number: 0,
-            // Numbers are as they are: 1.0 is 1.0.
+            // So that readers do not scale the values.
             exposure_ev100: ev100_of_white_luminance(1.0) as f32,
             white_balance_k: None,
             fps: [30, 1],
             exposure_time_s: self.streaks.cube.exposure as f32,
             camera: CameraHeader {
-                world_to_camera: unit,
+                world_to_camera: identity,
                 world_to_ndc: None,
                 vertical_fov_deg: None,
                 lens: None,
@@ -167,7 +175,7 @@ impl Writer {
         }
     }
 
-    /// A fingerprint of all that a file's pixels depend on.
+    /// The fingerprint of everything that the pixels of a file depend on.
     fn fingerprint(&self, file: &str) -> [u8; 32] {
         let Streaks { cube, law, diameters, seed, light, bits, variants, .. } = &self.streaks;
         let mut hasher = blake3::Hasher::new();

@@ -1,4 +1,4 @@
-//! The index of streak textures: what every picture holds, drop by drop, and how to read it.
+//! The index of streak textures: the drops of every picture, and how to read it.
 
 use std::f64::consts::PI;
 
@@ -13,15 +13,15 @@ use bansho_render::display::BitDepth;
 
 use super::{
     StreakFormat, Streaks, Texture,
-    files::{Writer, Written},
+    files::{LitPicture, TextureWriter, WrittenTexture},
 };
 
 use serde_json::{Value, json};
 
-/// One texture as the index tells it.
+/// The description of one texture.
 pub(crate) struct Entry {
     pub(crate) file: String,
-    about: Value,
+    description: Value,
 }
 
 impl Entry {
@@ -31,12 +31,12 @@ impl Entry {
         file: String,
         drops: Vec<FallingDrop>,
         image: &Image<1>,
-        written: Written,
+        written: WrittenTexture,
     ) -> Self {
         let opacities = image.pixels().as_flattened();
         let mean = opacities.iter().map(|&opacity| f64::from(opacity)).sum::<f64>() / opacities.len() as f64;
         let largest = opacities.iter().fold(0.0_f32, |largest, &opacity| largest.max(opacity));
-        let mut about = json!({
+        let mut description = json!({
             "file": file,
             "rate_mm_per_h": texture.rate,
             "diameter_mm": texture.bin.diameter_mm,
@@ -47,13 +47,13 @@ impl Entry {
             "largest_opacity": largest,
         });
         if let Some(scale) = written.scale {
-            about["opacity_scale"] = json!(scale);
+            description["opacity_scale"] = json!(scale);
         }
-        if let Some((lit, scale)) = written.lit {
-            about["lit"] = json!({ "file": lit, "radiance_scale": scale });
+        if let Some(LitPicture { file, scale }) = written.lit {
+            description["lit"] = json!({ "file": file, "radiance_scale": scale });
         }
-        about["drops"] = drops.iter().map(|drop| describe_drop(cube, drop)).collect();
-        Self { file, about }
+        description["drops"] = drops.iter().map(|drop| describe_drop(cube, drop)).collect();
+        Self { file, description }
     }
 }
 
@@ -69,12 +69,12 @@ fn describe_drop(cube: &StreakCube, drop: &FallingDrop) -> Value {
     })
 }
 
-/// The whole index.
+/// The index of all textures.
 pub(crate) fn describe(
     streaks: &Streaks,
     cube: &StreakCube,
-    writer: &Writer,
-    rains: &[DropSizeDistribution],
+    writer: &TextureWriter,
+    distributions: &[DropSizeDistribution],
     entries: &[Entry],
 ) -> Value {
     let bins = SizeBin::around(&streaks.diameters);
@@ -88,7 +88,7 @@ pub(crate) fn describe(
         "exposure_s": cube.exposure,
         "velocity": streaks.law.name(),
         "air": { "density_kg_per_m3": cube.terminal_velocity.air.density, "viscosity_pa_s": cube.terminal_velocity.air.viscosity },
-        "diameters": if cube.spread { "each drop's own, within its bin" } else { "the bin's" },
+        "diameters": if cube.spread { "sampled within the bin for each drop" } else { "that of the bin" },
         "seed": streaks.seed,
         "how_to_read": how_to_read(streaks, writer),
     });
@@ -99,14 +99,14 @@ pub(crate) fn describe(
             "space": "ACEScg",
         });
     }
-    index["rain"] = streaks.rates.iter().zip(rains).map(rain).collect();
+    index["rain"] = streaks.rates.iter().zip(distributions).map(rain).collect();
     index["bins"] = bins.iter().map(|bin| describe_bin(bin, cube)).collect();
-    index["textures"] = entries.iter().map(|entry| entry.about.clone()).collect();
+    index["textures"] = entries.iter().map(|entry| entry.description.clone()).collect();
     index
 }
 
-/// What pixels and numbers mean.
-fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
+/// The meaning of pixels and numbers.
+fn how_to_read(streaks: &Streaks, writer: &TextureWriter) -> Value {
     let pixel = match (streaks.format, streaks.bits) {
         (StreakFormat::Exr, _) => "opacity = channel `opacity.V`, and A in half precision".to_owned(),
         (StreakFormat::Png, bits) => {
@@ -114,18 +114,18 @@ fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
             format!("opacity = code / {largest} * opacity_scale, linear: no gamma")
         }
     };
-    let mut about = json!({
+    let mut description = json!({
         "pixel": pixel,
-        "opacity": "share of the pixel that drops hide, averaged over the exposure; laid over a picture: picture * (1 - opacity) + drops",
+        "opacity": "fraction of the pixel that drops cover, averaged over the exposure; to composite over a picture: picture * (1 - opacity) + drops",
         "tiling": "the texture repeats in both directions: a streak that leaves at an edge enters at the opposite one",
         "axes": "position_m is right, up, toward the viewer, from the lower left far corner; \
-                 the drop's middle when the shutter opens, from where it falls straight down by length_m",
-        "drop": "a round, steady drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on it and \
-                 `mean_opacity` across it; it hides (pi/4) D^2 whatever the exposure",
+                 the center of the drop when the shutter opens; it then falls straight down by length_m",
+        "drop": "a round, steady drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on the axis, \
+                 `mean_opacity` across the streak; it covers (pi/4) D^2 for any exposure",
         "rain": "Marshall and Palmer 1948: 8000 exp(-4.1 R^-0.21 D) drops per m^3 and mm; \
-                 with these velocities it brings down 14 to 18 % more than R",
-        "extinction": "extinction_per_m counts what drops hide (Q = 1) over all diameters; \
-                       visibility_m counts diffraction too (Q = 2), to 2 % of contrast",
+                 with these velocities its rain rate is 14 to 18 % higher than R",
+        "extinction": "extinction_per_m is geometric (Q = 1), over all diameters; \
+                       visibility_m includes diffraction (Q = 2), for 2 % of contrast",
     });
     if writer.light.is_some() {
         let lit = match streaks.format {
@@ -138,16 +138,16 @@ fn how_to_read(streaks: &Streaks, writer: &Writer) -> Value {
                  that faces the light, premultiplied, linear ACEScg"
             }
         };
-        about["lit"] = json!(lit);
+        description["lit"] = json!(lit);
     }
-    about
+    description
 }
 
 fn describe_rain(rate: f64, sizes: &DropSizeDistribution, bins: &[SizeBin], cube: &StreakCube) -> Value {
     let whole = extinction(sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL);
     let within = |range| extinction(sizes, ExtinctionEfficiency::Geometric, range);
     let in_bins: f64 = bins.iter().map(|bin| within(bin.range_mm)).sum();
-    let mut about = json!({
+    let mut description = json!({
         "rate_mm_per_h": rate,
         "drops_per_m3": sizes.count(DropSizeDistribution::ALL),
         "drops_per_m3_in_bins": bins.iter().map(|bin| bin.count(sizes)).sum::<f64>(),
@@ -157,9 +157,9 @@ fn describe_rain(rate: f64, sizes: &DropSizeDistribution, bins: &[SizeBin], cube
         "extinction_per_m": whole,
         "extinction_per_m_in_bins": in_bins,
     });
-    // Without rain one sees to infinity, which JSON cannot say.
-    about["visibility_m"] = Some(visibility(sizes)).filter(|visibility| visibility.is_finite()).into();
-    about
+    // Without rain the visibility is infinite, which JSON has no number for.
+    description["visibility_m"] = Some(visibility(sizes)).filter(|visibility| visibility.is_finite()).into();
+    description
 }
 
 fn describe_bin(bin: &SizeBin, cube: &StreakCube) -> Value {

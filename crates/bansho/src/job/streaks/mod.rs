@@ -1,6 +1,6 @@
-//! Streak textures of rain by themselves: pictures of opacity, and an index with every drop.
+//! Streak textures of rain (`bansho streaks`): pictures of opacity, and an index with every drop.
 
-mod fault;
+mod check;
 mod files;
 mod index;
 
@@ -10,7 +10,7 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use bansho_base::host::observer::check;
+use bansho_base::host::observer;
 use bansho_media::{
     MediaError,
     files::overwrite_policy::{InputFiles, OverwritePolicy},
@@ -26,56 +26,51 @@ use bansho_rain::{
 use bansho_render::display::BitDepth;
 
 use self::{
-    files::{Lit, Writer},
+    files::{DistantLight, TextureWriter},
     index::Entry,
 };
 use super::{
-    error::JobError,
-    observer::{FrameDone, JobObserver, Outline},
-};
-use crate::job::{
-    checks::overwrite,
-    render::{finished_files::Finished, output},
+    checks::{finished_files::FinishedFiles, outputs},
+    error::{JobError, StreaksError},
+    observer::{FrameDone, JobObserver, JobStarted},
 };
 
 use rayon::prelude::*;
 
-pub use fault::{ListKind, StreaksError};
-
 bansho_base::choice! {
-    /// What streak textures are written as.
+    /// File format of streak textures.
     pub enum StreakFormat {
-        /// Gray PNG, linear, with a scale; with a light, color PNG beside it.
+        /// Gray PNG, linear, with a scale; if there is a light, also a color PNG.
         Png = "png",
-        /// EXR: opacity as 32-bit float; with a light, radiance in R, G, B.
+        /// EXR: opacity as 32-bit float; if there is a light, radiance in R, G, B.
         Exr = "exr",
     }
 }
 
-/// Streak textures that are wanted. Begin with [`Streaks::default`]: the paper's 24.
+/// A set of streak textures. [`Streaks::default`] is the 24 textures of the paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Streaks {
     /// Rain rates R, mm/h, ascending from 0.
     pub rates: Vec<f64>,
     /// Drop diameters D, mm, ascending.
     pub diameters: Vec<f64>,
-    /// The cube of air, its texture and exposure; its `fall` is made of [`law`](Self::law).
+    /// The cube of air, its texture and exposure; its `terminal_velocity` is replaced by [`law`](Self::law).
     pub cube: StreakCube,
-    /// Where terminal velocities come from.
+    /// The law of terminal velocity.
     pub law: VelocityLaw,
-    /// Textures of other drops for each rate and diameter.
+    /// Number of textures with different drops for each rate and diameter.
     pub variants: u32,
-    /// Where drops come from.
+    /// Seed of the positions of the drops.
     pub seed: u64,
-    /// Vector toward a light: right, up, toward the viewer.
+    /// Vector toward a distant light, if there is one: right, up, toward the viewer.
     pub light: Option<[f64; 3]>,
-    /// What files are written.
+    /// File format.
     pub format: StreakFormat,
     /// Bits of each channel of PNG files.
     pub bits: BitDepth,
-    /// The folder; `out/streaks` when left out.
+    /// The output folder; `None` is `out/streaks`.
     pub out: Option<PathBuf>,
-    /// Whether files that Bansho did not make may be written over.
+    /// Whether files that Bansho did not make may be overwritten.
     pub overwrite: bool,
 }
 
@@ -97,7 +92,7 @@ impl Default for Streaks {
     }
 }
 
-/// One texture of many.
+/// One texture of the set.
 struct Texture<'a> {
     rate: f64,
     sizes: &'a DropSizeDistribution,
@@ -109,12 +104,12 @@ impl Streaks {
     /// Checks everything, and that the folder can be written. Writes nothing.
     ///
     /// # Errors
-    /// The first thing that makes no sense or stands in the way.
+    /// The first parameter that is out of range, or the first file that cannot be written.
     pub fn prepare(&self) -> Result<PreparedStreaks, JobError> {
-        fault::check(self)?;
+        check::check(self)?;
         let air = FallAir::default();
         if self.law == VelocityLaw::RigidSphere {
-            // Where the drops of a bin have diameters of their own, its ends stand for them.
+            // If each drop has its own diameter within its bin, the ends of the bin are checked too.
             let bins = SizeBin::around(&self.diameters);
             let ends = bins.iter().filter(|_| self.cube.spread).flat_map(|bin| bin.range_mm);
             for diameter_mm in self.diameters.iter().copied().chain(ends) {
@@ -122,84 +117,87 @@ impl Streaks {
             }
         }
         let cube = StreakCube { terminal_velocity: TerminalVelocity { law: self.law, air }, ..self.cube };
-        let light = self.light.map(|toward| Lit::new(toward, &DropPhaseFunction::new()));
+        let light = self.light.map(|toward| DistantLight::new(toward, &DropPhaseFunction::new()));
         let folder = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join("streaks"));
         let overwrite = OverwritePolicy::new(InputFiles::default(), self.overwrite);
-        let writer = Writer { folder, format: self.format, bits: self.bits, light, overwrite, streaks: self.clone() };
-        output::check_writable(&writer.index_path())?;
+        let writer =
+            TextureWriter { folder, format: self.format, bits: self.bits, light, overwrite, streaks: self.clone() };
+        outputs::check_writable(&writer.index_path())?;
         let prepared = PreparedStreaks { streaks: self.clone(), cube, writer };
-        overwrite::check(&prepared.writer.overwrite, prepared.files())?;
+        outputs::check_overwriting(&prepared.writer.overwrite, prepared.files())?;
         Ok(prepared)
     }
 }
 
-/// Streak textures that can be made, as far as can be known without doing so.
+/// Checked streak textures, ready to run.
 pub struct PreparedStreaks {
     streaks: Streaks,
     cube: StreakCube,
-    writer: Writer,
+    writer: TextureWriter,
 }
 
-/// Drops that are drawn between two looks at the observer.
-const DROPS_AT_ONCE: usize = 2048;
+/// Number of drops that are drawn between two checks for cancellation.
+const DROPS_PER_CHECK: usize = 2048;
 
 impl PreparedStreaks {
-    /// How many textures there will be.
+    /// Number of textures.
     pub fn texture_count(&self) -> usize {
         self.streaks.rates.len() * self.streaks.diameters.len() * self.streaks.variants as usize
     }
 
     /// Every file that will be written.
     fn files(&self) -> Vec<PathBuf> {
-        let rains: Vec<DropSizeDistribution> = self.rains();
-        let textures = self.textures(&rains);
+        let distributions = self.drop_size_distributions();
+        let textures = self.textures(&distributions);
         let pictures = textures.iter().flat_map(|texture| self.writer.files(&self.writer.name(texture)));
         pictures.chain([self.writer.index_path()]).collect()
     }
 
-    fn rains(&self) -> Vec<DropSizeDistribution> {
+    /// One distribution for each rain rate.
+    fn drop_size_distributions(&self) -> Vec<DropSizeDistribution> {
         self.streaks.rates.iter().map(|&rate| DropSizeDistribution::marshall_palmer(rate)).collect()
     }
 
-    /// Draws and writes all textures in the caller's rayon pool, the index last. Gives the path of the index.
+    /// Draws and writes all textures in the caller's rayon pool, then the index, whose path is returned.
     ///
-    /// An index that is there from before is removed first, so that whatever index there is describes the files beside it.
+    /// An existing index is removed first, so that an index always describes the files beside it.
     ///
     /// # Errors
-    /// The observer asked to stop, or a file cannot be written. Textures that were finished stay, whole. Textures that were finished and are
-    /// there no longer when all are.
+    /// The observer canceled the job, or a file cannot be written; finished textures are kept. Or finished textures were removed or changed
+    /// before the job ended.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<PathBuf, JobError> {
         let index = self.writer.index_path();
-        observer.started(&Outline { total: self.texture_count(), kept: 0, size: [self.cube.size; 2] });
-        self.remove(&index)?;
-        let rains = self.rains();
+        observer.started(&JobStarted { frames: self.texture_count(), kept: 0, size: [self.cube.size; 2] });
+        self.remove_index(&index)?;
+        let distributions = self.drop_size_distributions();
         let done = AtomicUsize::new(0);
-        let finished = Finished::default();
+        let finished = FinishedFiles::default();
         let entries: Vec<Entry> = self
-            .textures(&rains)
+            .textures(&distributions)
             .par_iter()
             .enumerate()
             .map(|(number, texture)| {
-                let entry = self.make(texture, observer)?;
-                self.writer.files(&entry.file).for_each(|file| finished.note(file));
+                let entry = self.write_texture(texture, observer)?;
+                self.writer.files(&entry.file).for_each(|file| finished.record(file));
                 let drawn = done.fetch_add(1, Ordering::Relaxed) + 1;
                 let path = Some(self.writer.folder.join(&entry.file));
                 observer.frame_done(&FrameDone { number: number as i64, path, drawn });
                 Ok(entry)
             })
             .collect::<Result<_, JobError>>()?;
-        check(observer).map_err(|_| JobError::StreaksCancelled)?;
-        let text = format!("{:#}\n", index::describe(&self.streaks, &self.cube, &self.writer, &rains, &entries));
-        self.writer.keep(&index, text.as_bytes())?;
-        finished.note(index.clone());
+        check_cancelled(observer)?;
+        let text =
+            format!("{:#}\n", index::describe(&self.streaks, &self.cube, &self.writer, &distributions, &entries));
+        self.writer.write_file(&index, text.as_bytes())?;
+        finished.record(index.clone());
         match finished.lost() {
             files if files.is_empty() => Ok(index),
             files => Err(JobError::FilesLost { files }),
         }
     }
 
-    /// Removes the index of another run, which a run that is stopped would make wrong.
-    fn remove(&self, index: &Path) -> Result<(), JobError> {
+    /// Removes the index of an earlier run, which would be wrong if this run is canceled.
+    fn remove_index(&self, index: &Path) -> Result<(), JobError> {
         if self.writer.overwrite.check(index).is_err() {
             return Err(MediaError::NotMadeByBansho { path: index.to_path_buf() }.into());
         }
@@ -209,10 +207,10 @@ impl PreparedStreaks {
         }
     }
 
-    fn textures<'a>(&self, rains: &'a [DropSizeDistribution]) -> Vec<Texture<'a>> {
+    fn textures<'a>(&self, distributions: &'a [DropSizeDistribution]) -> Vec<Texture<'a>> {
         let bins = SizeBin::around(&self.streaks.diameters);
         let mut textures = Vec::with_capacity(self.texture_count());
-        for (&rate, sizes) in self.streaks.rates.iter().zip(rains) {
+        for (&rate, sizes) in self.streaks.rates.iter().zip(distributions) {
             for &bin in &bins {
                 textures.extend((0..self.streaks.variants).map(|variant| Texture { rate, sizes, bin, variant }));
             }
@@ -220,16 +218,20 @@ impl PreparedStreaks {
         textures
     }
 
-    fn make(&self, texture: &Texture, observer: &dyn JobObserver) -> Result<Entry, JobError> {
+    fn write_texture(&self, texture: &Texture, observer: &dyn JobObserver) -> Result<Entry, JobError> {
         let drops = self.cube.drops(texture.sizes, &texture.bin, self.streaks.seed, texture.variant);
         let mut image = self.cube.draw(&[]);
-        for drops in drops.chunks(DROPS_AT_ONCE) {
-            check(observer).map_err(|_| JobError::StreaksCancelled)?;
+        for drops in drops.chunks(DROPS_PER_CHECK) {
+            check_cancelled(observer)?;
             self.cube.draw_over(drops, &mut image);
         }
-        check(observer).map_err(|_| JobError::StreaksCancelled)?;
+        check_cancelled(observer)?;
         let file = self.writer.name(texture);
         let written = self.writer.write(&file, &image)?;
         Ok(Entry::new(texture, &self.cube, file, drops, &image, written))
     }
+}
+
+fn check_cancelled(observer: &dyn JobObserver) -> Result<(), JobError> {
+    observer::check(observer).map_err(|_| JobError::StreaksCancelled)
 }

@@ -23,7 +23,7 @@ impl Session {
     /// Sets `parameter` to the file `file`.
     pub fn relink(&mut self, parameter: &ValuePath, file: &Path) {
         let value = self.relative_name(file);
-        self.edit("relink", &[Operation::Set { place: parameter.clone(), value }]);
+        self.edit("relink", &[Operation::Set { path: parameter.clone(), value }]);
         self.reload_assets();
     }
 
@@ -50,7 +50,7 @@ impl Session {
             self.add_mesh(selection, name);
         } else if PICTURES.contains(&extension.as_str()) {
             let parameter = ValuePath::root().key("plate").key("image");
-            self.edit("plate", &[Operation::Set { place: parameter, value: name }]);
+            self.edit("plate", &[Operation::Set { path: parameter, value: name }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             let reason = "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) can be added";
@@ -76,6 +76,6 @@ impl Session {
         let mut item = Table::default();
         item.push(import.shape_key, Value::Text(import.shape.into()));
         item.push(import.file_key, name);
-        self.edit("mesh", &[Operation::Append { place: path.key(import.list), value: Value::Table(item) }]);
+        self.edit("mesh", &[Operation::Append { path: path.key(import.list), value: Value::Table(item) }]);
     }
 }

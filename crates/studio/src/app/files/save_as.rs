@@ -51,7 +51,7 @@ pub(super) fn with_moved_paths(session: &Session, to: &Path) -> Result<Arc<str>,
             None => path_from_new_folder(&name, &before, &after),
         };
         if new != name {
-            operations.push(Operation::Set { place: parameter, value: Value::Text(new) });
+            operations.push(Operation::Set { path: parameter, value: Value::Text(new) });
         }
     }
     let text = session.document.text();

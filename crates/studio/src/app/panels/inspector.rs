@@ -126,7 +126,7 @@ fn list_ui(
             _ => Vec::new(),
         };
         // An item of a default list can only be changed after the scene states the list.
-        let state_list = Operation::Set { place: path.clone(), value: Value::List(items.clone()) };
+        let state_list = Operation::Set { path: path.clone(), value: Value::List(items.clone()) };
         let before = if is_stated || items.is_empty() { Vec::new() } else { vec![state_list] };
         if let (true, Kind::Table(inner)) = (items.is_empty() && implies_one_item(path), item) {
             // Editing the implied item states it in the scene.
@@ -137,7 +137,7 @@ fn list_ui(
             list_item_ui(ui, session, &path.index(index), item, &node.value, filter, &before);
         }
         if ui.button(format!("Add to {}", key_label(parameter.key))).clicked() {
-            let append = Operation::Append { place: path.clone(), value: initial_value(item) };
+            let append = Operation::Append { path: path.clone(), value: initial_value(item) };
             session.edit("add", &[before.as_slice(), &[append]].concat());
         }
     });
@@ -156,7 +156,7 @@ fn list_item_ui(
 ) {
     ui.horizontal(|ui| {
         if icon::button_ui(ui, Icon::Cross, &format!("Remove {path}")).clicked() {
-            session.edit("remove", &[before, &[Operation::Remove { place: path.clone() }]].concat());
+            session.edit("remove", &[before, &[Operation::Remove { path: path.clone() }]].concat());
         }
         match kind {
             Kind::Table(inner) => section_ui(ui, session, path, &path.to_string(), inner(), filter),
@@ -164,7 +164,7 @@ fn list_item_ui(
                 let label = ui.label(path.to_string()).id;
                 if let Some(value) = (ValueEditor { kind, unit: "", label, default: None }).ui(ui, value) {
                     session
-                        .edit(&path.to_string(), &[before, &[Operation::Set { place: path.clone(), value }]].concat());
+                        .edit(&path.to_string(), &[before, &[Operation::Set { path: path.clone(), value }]].concat());
                 }
             }
         }
@@ -186,7 +186,7 @@ fn row_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, parameter: &Desc
             if ui.button("Set").labelled_by(label).clicked() {
                 session.edit(
                     parameter.key,
-                    &[Operation::Set { place: path.clone(), value: initial_value(&parameter.kind) }],
+                    &[Operation::Set { path: path.clone(), value: initial_value(&parameter.kind) }],
                 );
             }
             return;
@@ -224,7 +224,7 @@ fn name_ui(ui: &mut Ui, name: RichText) -> Response {
 fn reset_button_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, parameter: &Descriptor, stated: bool) {
     let name = format!("Default of {}", key_label(parameter.key));
     if stated && icon::button_ui(ui, Icon::Reset, &name).clicked() {
-        session.edit("default", &[Operation::Remove { place: path.clone() }]);
+        session.edit("default", &[Operation::Remove { path: path.clone() }]);
     }
 }
 
@@ -241,7 +241,7 @@ fn key_button_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, stated: O
     };
     if icon::button_ui(ui, icon, &format!("{doc}: {path}")).clicked() {
         match here {
-            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { place: path.clone(), time }]),
+            Some(time) => session.edit("key", &[Operation::RemoveKeyframe { path: path.clone(), time }]),
             None => session.set_keyframe(path, present),
         }
     }

@@ -27,7 +27,7 @@ pub(crate) fn problems_ui(ui: &mut Ui, session: &Session) -> Option<ProblemActio
         ui.strong(format!("{faults}; the last good picture stays"));
         egui::ScrollArea::vertical().max_height(120.0).show(ui, |ui| {
             for problem in &error.problems {
-                let line = problem.span.as_ref().map(|span| error.position(span.start).0);
+                let line = problem.span.as_ref().map(|span| error.position(span.start).line);
                 let text = line.map_or_else(|| problem.to_string(), |line| format!("line {line}: {problem}"));
                 let color = ui.visuals().error_fg_color;
                 ui.horizontal_wrapped(|ui| {

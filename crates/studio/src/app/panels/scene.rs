@@ -23,10 +23,10 @@ pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selec
         ui.push_id((entry.id.kind, entry.id.index), |ui| phenomenon_ui(ui, session, selection, &entry));
     }
     ui.separator();
-    for shared in SHARED_TABLES.iter().filter(|table| !table.many) {
+    for shared in SHARED_TABLES.iter().filter(|table| !table.is_list) {
         row_ui(ui, selection, Selection { key: shared.key, index: None }, shared.key);
     }
-    for shared in SHARED_TABLES.iter().filter(|table| table.many) {
+    for shared in SHARED_TABLES.iter().filter(|table| table.is_list) {
         let count = match session.document.values().get(shared.key).map(|node| &node.value) {
             Some(Value::List(items)) => items.len(),
             _ => 0,
@@ -36,7 +36,7 @@ pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selec
             let response = row_ui(ui, selection, own.clone(), &format!("{} {}", shared.key, index + 1));
             response.context_menu(|ui| {
                 if ui.button("Remove").clicked() {
-                    session.edit("remove", &[Operation::Remove { place: own.path() }]);
+                    session.edit("remove", &[Operation::Remove { path: own.path() }]);
                     *selection = Selection::default();
                 }
             });
@@ -64,10 +64,10 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
             }
         }
         ui.separator();
-        for shared in SHARED_TABLES.iter().filter(|table| table.many) {
+        for shared in SHARED_TABLES.iter().filter(|table| table.is_list) {
             if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
                 let path = ValuePath::root().key(shared.key);
-                session.edit("add", &[Operation::Append { place: path, value: Value::Table(Table::default()) }]);
+                session.edit("add", &[Operation::Append { path: path, value: Value::Table(Table::default()) }]);
                 ui.close();
             }
         }
@@ -104,7 +104,7 @@ fn phenomenon_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Select
         ui.close();
     }
     if ui.button("Remove").clicked() {
-        session.edit("remove", &[Operation::Remove { place: entry.id.path() }]);
+        session.edit("remove", &[Operation::Remove { path: entry.id.path() }]);
         *selection = Selection::default();
         ui.close();
     }
@@ -124,7 +124,7 @@ fn rename_ui(ui: &mut Ui, session: &mut Session, entry: &PhenomenonEntry) {
             ui.data_mut(|data| data.remove::<String>(draft_id));
             if !name.trim().is_empty() && name != entry.name {
                 let path = entry.id.path().key("name");
-                session.edit("rename", &[Operation::Set { place: path, value: Value::Text(name.trim().to_owned()) }]);
+                session.edit("rename", &[Operation::Set { path: path, value: Value::Text(name.trim().to_owned()) }]);
                 ui.close();
             }
         }

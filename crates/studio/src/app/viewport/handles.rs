@@ -38,7 +38,7 @@ pub(super) fn handles(session: &Session) -> Vec<Handle> {
 fn positioned_handles(session: &Session) -> Vec<Handle> {
     let Some(plan) = session.plan() else { return Vec::new() };
     let time = session.transport.time_s();
-    let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.stands());
+    let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.has_position());
     let mut handles: Vec<Handle> = lights
         .map(|(index, light)| Handle {
             path: ValuePath::root().key("light").index(index).key("position"),

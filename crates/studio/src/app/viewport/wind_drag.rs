@@ -48,7 +48,7 @@ impl WindDrag {
                 self.set_keyframe(session, velocity);
             }
         } else {
-            session.edit(LABEL, &[Operation::Set { place: velocity_path(), value: Value::numbers(velocity) }]);
+            session.edit(LABEL, &[Operation::Set { path: velocity_path(), value: Value::numbers(velocity) }]);
         }
     }
 

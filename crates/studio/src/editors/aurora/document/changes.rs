@@ -69,11 +69,11 @@ impl AuroraDrawing {
         sheet.push("svg_file", file);
         let sheets = Value::List(vec![Value::Table(sheet).into()]);
         if self.is_stated() {
-            return vec![Operation::Set { place: self.shape(0).key("sheets"), value: sheets }];
+            return vec![Operation::Set { path: self.shape(0).key("sheets"), value: sheets }];
         }
         let mut shape = Table::default();
         shape.push("sheets", sheets);
-        vec![Operation::Append { place: self.path.key("shapes"), value: Value::Table(shape) }]
+        vec![Operation::Append { path: self.path.key("shapes"), value: Value::Table(shape) }]
     }
 
     /// Sets the points of sheet `sheet`.
@@ -113,7 +113,7 @@ impl AuroraDrawing {
         change.push("sheet", Value::Integer(sheet as i64 + 1));
         change.push("length_fraction", Value::Number(at));
         let mut operations =
-            vec![Operation::Append { place: self.shape(shape).key("split"), value: Value::Table(change) }];
+            vec![Operation::Append { path: self.shape(shape).key("split"), value: Value::Table(change) }];
         // A link of the split sheet becomes one of its first half.
         let update_link = |link: &LinkParameters| match link.from_length_fraction {
             None if link.from == sheet as i64 + 1 => {
@@ -138,7 +138,7 @@ impl AuroraDrawing {
         change.push("sheets", list(ends.map(|end| end.sheet as i64 + 1)));
         change.push("ends", list(ends.map(|end| i64::from(end.last))));
         let mut operations =
-            vec![Operation::Append { place: self.shape(shape).key("merge"), value: Value::Table(change) }];
+            vec![Operation::Append { path: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
         let at = |end: SheetEnd| {
             let line = before.get(end.sheet)?;
@@ -206,7 +206,7 @@ impl AuroraDrawing {
     pub fn add_shape(&self) -> Vec<Operation> {
         let mut shape = Table::default();
         shape.push("sheets", sheet_list(&self.sheets(self.arrivals().len() - 1)));
-        let shape = Operation::Append { place: self.path.key("shapes"), value: Value::Table(shape) };
+        let shape = Operation::Append { path: self.path.key("shapes"), value: Value::Table(shape) };
         // Default shapes must be stated before another can follow them.
         if self.is_stated() { vec![shape] } else { vec![shape.clone(), shape] }
     }
@@ -225,17 +225,17 @@ impl AuroraDrawing {
             ];
             keys.into_iter().filter(|(_, stated)| *stated).map(|(key, _)| key).collect()
         });
-        let of_next = stated.into_iter().map(|key| Operation::Remove { place: self.shape(1).key(key) });
-        of_next.chain([Operation::Remove { place: self.shape(shape) }]).collect()
+        let of_next = stated.into_iter().map(|key| Operation::Remove { path: self.shape(1).key(key) });
+        of_next.chain([Operation::Remove { path: self.shape(shape) }]).collect()
     }
 
     /// Sets the duration of the transition to shape `shape`, s.
     pub fn retime(&self, shape: usize, transition_s: f64) -> Vec<Operation> {
         let path = self.shape(shape);
         let in_frames = self.parameters.shapes.get(shape).is_some_and(|shape| shape.transition_frames.is_some());
-        let frames = in_frames.then(|| Operation::Remove { place: path.key("transition_frames") });
+        let frames = in_frames.then(|| Operation::Remove { path: path.key("transition_frames") });
         let seconds = Value::Number((transition_s.max(0.1) * 100.0).round() / 100.0);
-        frames.into_iter().chain([Operation::Set { place: path.key("transition_s"), value: seconds }]).collect()
+        frames.into_iter().chain([Operation::Set { path: path.key("transition_s"), value: seconds }]).collect()
     }
 
     /// Duration of the transition to shape `shape`, s.
@@ -331,10 +331,9 @@ impl AuroraDrawing {
         let Some(old) = self.parameters.shapes.get(shape).map(|shape| &shape.sheets) else {
             let mut shape = Table::default();
             shape.push("sheets", sheet_list(sheets));
-            return vec![Operation::Append { place: self.path.key("shapes"), value: Value::Table(shape) }];
+            return vec![Operation::Append { path: self.path.key("shapes"), value: Value::Table(shape) }];
         };
-        list_edits(&path, old, sheets)
-            .unwrap_or_else(|| vec![Operation::Set { place: path, value: sheet_list(sheets) }])
+        list_edits(&path, old, sheets).unwrap_or_else(|| vec![Operation::Set { path: path, value: sheet_list(sheets) }])
     }
 }
 
@@ -349,7 +348,7 @@ fn list_edits(path: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]
         (0..old.len()).filter(|&index| rest.next_if(|sheet| **sheet == old[index]).is_none()).collect();
     if rest.peek().is_none() {
         // From the last to the first, so that indices stay valid.
-        return Some(gone.iter().rev().map(|&index| Operation::Remove { place: path.index(index) }).collect());
+        return Some(gone.iter().rev().map(|&index| Operation::Remove { path: path.index(index) }).collect());
     }
     let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
     let behind = old.iter().rev().zip(new.iter().rev()).take_while(same).count();
@@ -360,10 +359,10 @@ fn list_edits(path: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]
     let pairs = old.iter().zip(new).take(kept.min(made)).enumerate();
     let mut operations: Vec<Operation> =
         pairs.flat_map(|(sheet, (old, new))| differences(&path.index(sheet), old, new)).collect();
-    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { place: path.index(sheet) }));
+    operations.extend((made..kept).rev().map(|sheet| Operation::Remove { path: path.index(sheet) }));
     let added = new.get(kept..).filter(|_| made > kept).unwrap_or_default();
     operations.extend(
-        added.iter().map(|sheet| Operation::Append { place: path.clone(), value: Value::Table(non_default(sheet)) }),
+        added.iter().map(|sheet| Operation::Append { path: path.clone(), value: Value::Table(non_default(sheet)) }),
     );
     Some(operations)
 }
@@ -387,8 +386,8 @@ fn differences(path: &ValuePath, old: &SheetParameters, new: &SheetParameters) -
     let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
     let change = |key: &'static str| match (old.get(key), new.get(key)) {
         (old, new) if old == new => None,
-        (_, Some(node)) => Some(Operation::Set { place: path.key(key), value: node.value.clone() }),
-        (_, None) => Some(Operation::Remove { place: path.key(key) }),
+        (_, Some(node)) => Some(Operation::Set { path: path.key(key), value: node.value.clone() }),
+        (_, None) => Some(Operation::Remove { path: path.key(key) }),
     };
     keys.filter_map(change).collect()
 }

@@ -27,7 +27,7 @@ use bansho::{
         ValuePath,
         edit::EditError,
         operation::{self, Operation},
-        values,
+        parse_values,
     },
 };
 
@@ -157,7 +157,7 @@ impl Document {
         assets: &Arc<dyn Assets>,
     ) -> Result<AuroraDrawing, ShapeEditError> {
         let text = operation::apply(self.text(), operations)?;
-        let root = values(&text).map_err(|problem| ShapeEditError::Invalid(problem.to_string()))?;
+        let root = parse_values(&text).map_err(|problem| ShapeEditError::Invalid(problem.to_string()))?;
         let drawing = AuroraDrawing::read(&root, index, assets)?;
         self.apply_text(label, text, root);
         Ok(drawing)

@@ -152,10 +152,10 @@ impl AuroraDrawing {
     pub(super) fn set_list(&self, shape: usize, key: &str, tables: Vec<Table>) -> Operation {
         let path = self.shape(shape).key(key);
         if tables.is_empty() {
-            return Operation::Remove { place: path };
+            return Operation::Remove { path: path };
         }
         Operation::Set {
-            place: path,
+            path,
             value: Value::List(tables.into_iter().map(|table| Value::Table(table).into()).collect()),
         }
     }

@@ -1,0 +1,326 @@
+//! Snapshots on disk: the state of stepped phenomena at regular intervals, so that a shot reaches any frame in few steps.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use bansho_base::host::observer::{Observer, Stage, StageGuard};
+use bansho_media::files::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
+use bansho_render::Plan;
+
+use super::frame_source::FrameSource;
+use crate::job::{
+    checks::outputs,
+    error::JobError,
+    observer::{JobObserver, Warning},
+};
+
+/// The folder of snapshots and the interval between them. Files are called `state.<frame>.bansho`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Snapshots {
+    /// `None` if nothing in the scene has a state, or no snapshots were requested.
+    folder: Option<PathBuf>,
+    first_frame: i64,
+    interval: u64,
+    /// Length of the loop in frames, if the shot is a loop.
+    loop_frames: Option<i64>,
+    /// Which existing files may be overwritten.
+    overwrite: OverwritePolicy,
+}
+
+impl Snapshots {
+    /// Snapshots in `folder` at every `interval`-th frame, counted from the scene's first.
+    pub(crate) fn new(folder: PathBuf, plan: &Plan, interval: u64, overwrite: OverwritePolicy) -> Self {
+        let frames = plan.frames();
+        let loop_frames = plan.loop_s().map(|_| frames.end - frames.start);
+        Self { folder: Some(folder), first_frame: frames.start, interval, loop_frames, overwrite }
+    }
+
+    /// Checks that every file in the folder with the name of a snapshot may be overwritten, since unusable ones are replaced.
+    ///
+    /// # Errors
+    /// A file is not a snapshot of Bansho, or the scene is read from it.
+    pub(crate) fn check(&self) -> Result<(), JobError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        // A folder that cannot be read is reported when it is used.
+        let mut numbers = numbers(&resolved(folder)).unwrap_or_default();
+        numbers.sort_unstable();
+        outputs::check_overwriting(&self.overwrite, numbers.into_iter().map(|number| self.path(folder, number)))
+    }
+
+    /// The frame of the first pass through the loop that shows the same as frame `number`.
+    fn wrapped_frame(&self, number: i64) -> i64 {
+        self.loop_frames.map_or(number, |length| self.first_frame + (number - self.first_frame).rem_euclid(length))
+    }
+
+    fn path(&self, folder: &Path, number: i64) -> PathBuf {
+        folder.join(format!("state.{number}.bansho"))
+    }
+
+    /// Advances `shot`, which is at frame `last`, toward frame `number`: restores the latest usable snapshot, then steps to each frame before
+    /// `number` at which a snapshot is due or was unusable, and writes it.
+    ///
+    /// # Errors
+    /// The observer canceled the job, or a snapshot cannot be written.
+    pub(crate) fn warm_up(
+        &self,
+        shot: &mut dyn FrameSource,
+        last: Option<i64>,
+        number: i64,
+        stop_on_failure: &dyn Observer,
+        observer: &dyn JobObserver,
+    ) -> Result<(), JobError> {
+        if self.folder.is_none() {
+            return Ok(());
+        }
+        let (last, number) = (last.map(|last| self.wrapped_frame(last)), self.wrapped_frame(number));
+        let past = last.filter(|&last| last <= number);
+        let sought = {
+            let _stage = StageGuard::begin(stop_on_failure, Stage::Load);
+            self.seek(shot, past, number, observer)
+        };
+        let earliest = sought.unusable.iter().copied().fold(self.first_frame, i64::min);
+        let first = sought.restored.or(past).map_or(earliest, |reached| reached.saturating_add(1));
+        for stop in (first..number).filter(|stop| self.is_due(*stop) || sought.unusable.contains(stop)) {
+            shot.advance(stop, stop_on_failure)?;
+            self.save(shot, stop, stop_on_failure)?;
+        }
+        Ok(())
+    }
+
+    /// Restores the latest usable snapshot after frame `past` and not after `number`. Warns of those that are damaged or belong to another
+    /// scene.
+    fn seek(
+        &self,
+        shot: &mut dyn FrameSource,
+        past: Option<i64>,
+        number: i64,
+        observer: &dyn JobObserver,
+    ) -> SeekResult {
+        let mut result = SeekResult::default();
+        let Some(folder) = &self.folder else { return result };
+        let mut candidates = match numbers(folder) {
+            Ok(numbers) => numbers,
+            Err(error) => {
+                observer.warning(&Warning::SnapshotUnreadable { path: folder.clone(), reason: error.to_string() });
+                return result;
+            }
+        };
+        candidates.retain(|&candidate| past.is_none_or(|past| candidate > past) && candidate <= number);
+        candidates.sort_unstable();
+        for candidate in candidates.into_iter().rev() {
+            let path = self.path(folder, candidate);
+            match read(&path).map(|bytes| shot.restore(&bytes)) {
+                Ok(Ok(())) => {
+                    result.restored = Some(candidate);
+                    return result;
+                }
+                Ok(Err(reason)) => observer.warning(&Warning::SnapshotRejected { path, reason }),
+                Err(error) => observer.warning(&Warning::SnapshotUnreadable { path, reason: error.to_string() }),
+            }
+            result.unusable.push(candidate);
+        }
+        result
+    }
+
+    /// Whether a snapshot is due at frame `number`.
+    fn is_due(&self, number: i64) -> bool {
+        number.abs_diff(self.first_frame).is_multiple_of(self.interval)
+    }
+
+    /// Writes the state at frame `number` if a snapshot is due or exists there, unless the file already contains this state.
+    pub(crate) fn save(&self, shot: &dyn FrameSource, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let number = self.wrapped_frame(number);
+        let path = self.path(folder, number);
+        if !self.is_due(number) && !path.exists() {
+            return Ok(());
+        }
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        let state = shot.snapshot();
+        if read(&path).is_ok_and(|existing| existing == state) {
+            return Ok(());
+        }
+        Ok(atomic::write_bytes_with(&path, &state, &self.overwrite)?)
+    }
+}
+
+/// The contents of a regular file: reading a pipe would block, reading a device might not end.
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is no ordinary file"));
+    }
+    fs::read(path)
+}
+
+/// What a search for a snapshot found.
+#[derive(Default)]
+struct SeekResult {
+    /// The frame whose snapshot was restored.
+    restored: Option<i64>,
+    /// Later frames with unusable snapshots.
+    unusable: Vec<i64>,
+}
+
+/// Frames that have a snapshot; none if the folder does not exist.
+fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let number = |entry: io::Result<fs::DirEntry>| {
+        let name = entry.ok()?.file_name();
+        name.to_str()?.strip_prefix("state.")?.strip_suffix(".bansho")?.parse().ok()
+    };
+    Ok(entries.filter_map(number).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bansho_base::{host::observer::Unobserved, phenomenon::SnapshotError};
+    use bansho_render::RenderError;
+
+    use super::*;
+    use crate::job::{
+        error::OptionError,
+        pipeline::draw_frames::draw_frames,
+        testing::{self, CountingSource, FunctionSink, RecordingObserver, plan},
+    };
+
+    fn snapshots(folder: &tempfile::TempDir) -> Snapshots {
+        Snapshots::new(folder.path().join("states"), &plan(), 5, OverwritePolicy::default())
+    }
+
+    /// Draws the frames and returns how many steps that took.
+    fn steps(snapshots: &Snapshots, numbers: &[i64], observer: &RecordingObserver) -> usize {
+        let mut source = CountingSource::new();
+        let sink = FunctionSink { each: |_, _| Ok(()), max_in_flight: 4 };
+        draw_frames(&mut source, numbers, snapshots, &sink, observer).unwrap();
+        source.steps
+    }
+
+    #[test]
+    fn states_are_written_at_intervals_and_save_steps() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        let all: Vec<i64> = (-4..12).collect();
+        assert_eq!(steps(&snapshots, &all, &RecordingObserver::default()), 16);
+        let mut written = numbers(snapshots.folder.as_deref().unwrap()).unwrap();
+        written.sort_unstable();
+        assert_eq!(written, [-4, 1, 6, 11]);
+        // From the state at 6, and then from that at 11.
+        assert_eq!(steps(&snapshots, &[8, 9, 12], &RecordingObserver::default()), 2 + 1 + 1);
+        // A state before the frame that was reached is not used.
+        assert_eq!(steps(&snapshots, &[9, 11], &RecordingObserver::default()), 3);
+    }
+
+    #[test]
+    fn a_damaged_state_is_reported_skipped_and_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &RecordingObserver::default());
+        let path = snapshots.path(snapshots.folder.as_deref().unwrap(), 6);
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, b"BANSHOSScut").unwrap();
+        let observer = RecordingObserver::default();
+        assert_eq!(steps(&snapshots, &[6, 7], &observer), 6, "from the state at 1");
+        let reason = RenderError::Snapshot(SnapshotError::Damaged);
+        assert_eq!(*observer.warnings.lock().unwrap(), [Warning::SnapshotRejected { path: path.clone(), reason }]);
+        assert_eq!(fs::read(&path).unwrap(), whole);
+    }
+
+    #[test]
+    fn an_unusable_state_is_replaced_though_its_frame_is_not_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &RecordingObserver::default());
+        // Also a state that was not due, as a job with another interval leaves it.
+        let states = snapshots.folder.as_deref().unwrap();
+        let paths = [5, 6].map(|number| snapshots.path(states, number));
+        paths.iter().for_each(|path| fs::write(path, b"").unwrap());
+        let observer = RecordingObserver::default();
+        assert_eq!(steps(&snapshots, &[8], &observer), 7, "from the state at 1");
+        assert_eq!(observer.warnings.lock().unwrap().len(), 2);
+        assert_eq!(paths.map(|path| fs::read(path).unwrap()), [5, 6].map(testing::state));
+        let again = RecordingObserver::default();
+        assert_eq!(
+            (steps(&snapshots, &[8], &again), again.warnings.lock().unwrap().len()),
+            (2, 0),
+            "from the state at 6"
+        );
+    }
+
+    #[test]
+    fn warming_up_writes_the_states_that_are_due_before_its_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        assert_eq!(steps(&snapshots, &[8, 13], &RecordingObserver::default()), 18);
+        let mut written = numbers(snapshots.folder.as_deref().unwrap()).unwrap();
+        written.sort_unstable();
+        assert_eq!(written, [-4, 1, 6, 11]);
+    }
+
+    #[test]
+    fn other_files_in_the_folder_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["state..bansho", "state.x.bansho", "state.5", "notes.txt"] {
+            fs::write(folder.path().join(name), b"mine").unwrap();
+        }
+        assert_eq!(numbers(folder.path()).unwrap(), Vec::<i64>::new());
+        assert_eq!(numbers(&folder.path().join("gone")).unwrap(), Vec::<i64>::new());
+    }
+
+    #[test]
+    #[cfg(feature = "fire")]
+    fn states_of_the_renderer_carry_the_mark() {
+        use bansho_base::host::assets::MemoryAssets;
+        use bansho_media::files::provenance;
+        use bansho_render::{PlanOptions, Shot};
+
+        let assets = Arc::new(MemoryAssets::default());
+        let text = "bansho = 2\n[[flame_particles]]\nparticles = 60\n";
+        let compiled = crate::compile_scene("test", text, assets).unwrap();
+        let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
+        let shot = Shot::open(compiled, Arc::new(plan));
+        assert!(shot.snapshot().starts_with(&provenance::SNAPSHOT_MAGIC));
+    }
+
+    #[test]
+    fn a_foreign_file_with_the_name_of_a_snapshot_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut snapshots = snapshots(&folder);
+        let path = snapshots.path(snapshots.folder.as_deref().unwrap(), 6);
+        snapshots.check().unwrap();
+        steps(&snapshots, &(-4..9).collect::<Vec<_>>(), &RecordingObserver::default());
+        snapshots.check().unwrap();
+        fs::write(&path, "somebody's work").unwrap();
+        let refused = snapshots.check();
+        assert!(
+            matches!(&refused, Err(JobError::Option(OptionError::NotMadeByBansho { path: file, others: 0 })) if *file == path)
+        );
+        snapshots.overwrite = OverwritePolicy::any();
+        snapshots.check().unwrap();
+        steps(&snapshots, &[8], &RecordingObserver::default());
+        assert_eq!(fs::read(&path).unwrap(), testing::state(6));
+    }
+
+    #[test]
+    fn a_loop_writes_the_states_of_one_pass() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut snapshots = snapshots(&folder);
+        snapshots.loop_frames = Some(10);
+        assert_eq!([-4, 5, 6, 16, -5].map(|number| snapshots.wrapped_frame(number)), [-4, 5, -4, -4, 5]);
+        let mut shot = CountingSource::new();
+        snapshots.save(&shot, 6, &Unobserved).unwrap();
+        assert_eq!(numbers(snapshots.folder.as_deref().unwrap()).unwrap(), [-4]);
+        let observer = RecordingObserver::default();
+        snapshots.warm_up(&mut shot, None, 7, &observer, &observer).unwrap();
+        assert_eq!(shot.number, -5);
+        // The frames of the second pass are those of the first.
+        snapshots.warm_up(&mut shot, None, 15, &observer, &observer).unwrap();
+        assert_eq!(shot.number, 1);
+    }
+}

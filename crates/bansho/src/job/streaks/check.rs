@@ -1,0 +1,64 @@
+//! Checks of the parameters of streak textures.
+
+use super::Streaks;
+use crate::job::error::{MAX_DROPS, StreakList, StreaksError};
+use bansho_rain::drops::size_distribution::{DropSizeDistribution, SizeBin};
+
+/// Checks all parameters.
+///
+/// # Errors
+/// The first parameter that is out of range.
+pub(crate) fn check(streaks: &Streaks) -> Result<(), StreaksError> {
+    check_list(StreakList::RainRates, &streaks.rates)?;
+    check_list(StreakList::DropDiameters, &streaks.diameters)?;
+    let cube = &streaks.cube;
+    if !(1e-6..=10.0).contains(&cube.exposure) {
+        return Err(StreaksError::Exposure(cube.exposure));
+    }
+    if !(8..=4096).contains(&cube.size) {
+        return Err(StreaksError::TextureSize(cube.size));
+    }
+    if !(1e-3..=100.0).contains(&cube.edge) {
+        return Err(StreaksError::CubeSize(cube.edge));
+    }
+    if !(1..=1000).contains(&streaks.variants) {
+        return Err(StreaksError::Variants(streaks.variants));
+    }
+    if streaks.light.is_some_and(|light| !light.iter().map(|x| x * x).sum::<f64>().is_normal()) {
+        return Err(StreaksError::LightDirection);
+    }
+    check_counts(streaks)
+}
+
+fn check_list(list: StreakList, values: &[f64]) -> Result<(), StreaksError> {
+    let [min, max] = list.limits();
+    if values.is_empty() {
+        return Err(StreaksError::EmptyList(list));
+    }
+    for (index, &value) in values.iter().enumerate() {
+        let number = index + 1;
+        if !(min..=max).contains(&value) {
+            return Err(StreaksError::ValueOutOfRange { list, number, value });
+        }
+        if let Some(&previous) = index.checked_sub(1).and_then(|before| values.get(before))
+            && value <= previous
+        {
+            return Err(StreaksError::NotAscending { list, number, value, previous });
+        }
+    }
+    Ok(())
+}
+
+fn check_counts(streaks: &Streaks) -> Result<(), StreaksError> {
+    let bins = SizeBin::around(&streaks.diameters);
+    for &rate in &streaks.rates {
+        let sizes = DropSizeDistribution::marshall_palmer(rate);
+        for bin in &bins {
+            let drops = streaks.cube.mean_count(&sizes, bin);
+            if drops > f64::from(MAX_DROPS) {
+                return Err(StreaksError::TooManyDrops { rate, diameter_mm: bin.diameter_mm, drops });
+            }
+        }
+    }
+    Ok(())
+}

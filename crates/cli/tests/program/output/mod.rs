@@ -1,0 +1,7 @@
+//! What the program writes: pictures, alpha, metadata, flipbooks, and what it does not overwrite.
+
+mod alpha;
+mod flipbook;
+mod metadata;
+mod overwriting;
+mod pictures;

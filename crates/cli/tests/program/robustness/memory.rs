@@ -1,0 +1,58 @@
+//! Pictures that need more memory than there is.
+
+use std::process::Command;
+
+use crate::support::{FLAME, Folder, Run};
+
+/// Runs the program with a limit of its memory, kB.
+fn run_within(folder: &Folder, kilobytes: usize, arguments: &str) -> Run {
+    let program = env!("CARGO_BIN_EXE_bansho");
+    let limited = format!("ulimit -v {kilobytes}; exec {program} {arguments} --threads 1");
+    Run::of(Command::new("sh").args(["-c", &limited]).current_dir(folder.path("")).output().unwrap())
+}
+
+fn check_within(folder: &Folder, kilobytes: usize, scene: &str) -> Run {
+    let limited = format!("ulimit -v {kilobytes}; exec {} check {scene}", env!("CARGO_BIN_EXE_bansho"));
+    Run::of(Command::new("sh").args(["-c", &limited]).current_dir(folder.path("")).output().unwrap())
+}
+
+#[test]
+fn pictures_larger_than_memory_are_refused_with_the_size_that_would_fit() {
+    let folder = Folder::with_scene(FLAME);
+    let run = run_within(&folder, 4_000_000, "render scene.toml --size 16384x16384 --frames 0 --out big.png");
+    assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("--size: 16384 x 16384 pixels would take "), "{}", run.stderr);
+    let most: f64 = run.stderr.split("allowed: up to ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((4000.0..12_000.0).contains(&most), "{}", run.stderr);
+    let part = "render scene.toml --size 16384x16384 --crop 0,0,64,64 --frames 0 --out part.png";
+    assert_eq!(run_within(&folder, 4_000_000, part).code, Some(0), "a part of it fits");
+}
+
+#[test]
+fn a_scene_larger_than_memory_is_told_at_its_line_by_check_and_render() {
+    let large = Folder::with_scene(&FLAME.replace("48, 64", "16384, 16000"));
+    let wide = Folder::with_scene(&FLAME.replace("seed = 7", "overscan = 4096"));
+    for (folder, expected, out) in [
+        (large, "scene.toml:4:8: picture.size: 16384 x 16000 pixels would take ", "big.png"),
+        (wide, "scene.toml:6:12: picture.overscan: 8240 x 8256 pixels with this overscan would take ", "big.exr"),
+    ] {
+        for run in [
+            run_within(&folder, 2_000_000, &format!("render scene.toml --frames 0 --out {out}")),
+            check_within(&folder, 2_000_000, "scene.toml"),
+        ] {
+            assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+            assert!(run.stderr.contains(expected) && run.stderr.contains("allowed: up to "), "{}", run.stderr);
+        }
+        assert_eq!(folder.names(), ["scene.toml"]);
+    }
+}
+
+#[test]
+fn channels_that_there_is_no_memory_for_are_counted() {
+    let folder = Folder::with_scene(FLAME);
+    let run =
+        run_within(&folder, 2_500_000, "render scene.toml --size 6000x6000 --aovs --layers --frames 0 --out a.exr");
+    assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("6000 x 6000 pixels with "), "{}", run.stderr);
+    assert!(run.stderr.contains(" more channels would take "), "{}", run.stderr);
+}

@@ -1,0 +1,88 @@
+//! Suggests existing paths for a path that does not exist in a scene.
+
+use bansho_base::parameters::{Kind, Table, TableDescriptor, Value, nearest};
+
+use crate::{PhenomenonKind, SHARED_TABLES, text::toml};
+
+/// Maximum number of suggestions.
+const MAX_SUGGESTIONS: usize = 3;
+
+/// Tables that every scene has, even if its text does not contain them.
+const IMPLICIT_TABLES: [&str; 4] = ["picture", "camera", "wind", "air"];
+
+/// Paths of the scene `text` that are similar to the path `segments`, the most likely first: parameters with the same name in tables that the
+/// scene has, else the parameter with the most similar name.
+pub(super) fn suggest_paths(text: &str, segments: &[&str], kinds: &[PhenomenonKind]) -> Vec<String> {
+    let Ok(root) = toml::parse(text) else { return Vec::new() };
+    let known = known_paths(&root, kinds);
+    let (first, rest) = (segments[0], &segments[1..]);
+    let tables = kinds.iter().map(|kind| kind.key).chain(SHARED_TABLES.iter().map(|table| table.key));
+    let tables = tables.filter(|key| root.get(key).is_some() || IMPLICIT_TABLES.contains(key));
+    if let Some(table) = nearest(first, tables).filter(|_| !rest.is_empty()) {
+        return vec![format!("{table}.{}", rest.join("."))];
+    }
+    let paths_ending_with = |segments: &[&str]| -> Vec<String> {
+        let matches = || known.iter().filter(|path| path.ends_with(segments));
+        // The parameter of a table is preferred to that of a table within it.
+        let shortest = matches().map(Vec::len).min();
+        matches().filter(|path| Some(path.len()) == shortest).take(MAX_SUGGESTIONS).map(|path| path.join(".")).collect()
+    };
+    let last = [segments[segments.len() - 1]];
+    let mut suggestions = paths_ending_with(segments);
+    if suggestions.is_empty() {
+        suggestions = paths_ending_with(&last);
+    }
+    if suggestions.is_empty() {
+        let names = known.iter().filter_map(|path| path.last().copied());
+        suggestions = nearest(last[0], names).map_or_else(Vec::new, |name| paths_ending_with(&[name]));
+    }
+    suggestions
+}
+
+/// Paths of all parameters of the tables that a scene has, its phenomena first.
+fn known_paths(root: &Table, kinds: &[PhenomenonKind]) -> Vec<Vec<&'static str>> {
+    let mut known = Vec::new();
+    let kinds = kinds.iter().map(|kind| (kind.key, kind.table));
+    for (key, table) in kinds.chain(SHARED_TABLES.iter().map(|shared| (shared.key, shared.table))) {
+        let stated: Vec<&Value> = root.get(key).map(|node| &node.value).into_iter().collect();
+        if !stated.is_empty() || IMPLICIT_TABLES.contains(&key) {
+            add_parameters(&mut known, &[key], table(), &stated);
+        }
+    }
+    known
+}
+
+/// Adds the paths of all parameters of the table at `path`. `stated` are its values in the scene's text: several where it is a list.
+fn add_parameters(
+    known: &mut Vec<Vec<&'static str>>,
+    path: &[&'static str],
+    table: &TableDescriptor,
+    stated: &[&Value],
+) {
+    for parameter in &table.parameters {
+        let path = [path, &[parameter.key]].concat();
+        let stated = values_of_key(stated, parameter.key);
+        match &parameter.kind {
+            Kind::Table(inner) => add_parameters(known, &path, inner(), &stated),
+            // Parameters of items can only be set if the list has items.
+            Kind::List { item, .. }
+                if !stated.is_empty()
+                    && let Kind::Table(inner) = **item =>
+            {
+                add_parameters(known, &path, inner(), &stated);
+            }
+            _ => {}
+        }
+        known.push(path);
+    }
+}
+
+/// The values of a key in tables, and in the tables of lists.
+fn values_of_key<'a>(values: &[&'a Value], key: &str) -> Vec<&'a Value> {
+    let in_table = |value: &'a Value| if let Value::Table(table) = value { table.get(key) } else { None };
+    let found = values.iter().flat_map(|value| match value {
+        Value::List(items) => items.iter().filter_map(|item| in_table(&item.value)).collect::<Vec<_>>(),
+        value => in_table(value).into_iter().collect(),
+    });
+    found.map(|node| &node.value).collect()
+}
