@@ -152,7 +152,7 @@ fn png_frame(criterion: &mut Criterion) {
     group.bench_function("plain", |bencher| bencher.iter(|| black_box(plain_png(pixels))));
     let file = encode();
     group.bench_function("is it whole", |bencher| {
-        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Png)))
+        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Png)));
     });
     group.finish();
 }
@@ -165,7 +165,7 @@ fn exr_frame(criterion: &mut Criterion) {
     group.bench_function("plain", |bencher| bencher.iter(|| black_box(plain_exr(&frame))));
     let file = encode();
     group.bench_function("is it whole", |bencher| {
-        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Exr)))
+        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Exr)));
     });
     group.finish();
 }

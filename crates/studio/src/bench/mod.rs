@@ -165,7 +165,7 @@ fn apply_edit(session: &mut Session, bench_scene: &BenchScene, progress: f64) ->
             .map(|point| Value::numbers(point).into());
         let sheets = ValuePath::root().key("aurora").index(0).key("shapes").index(0).key("sheets");
         let path = sheets.index(0).key("points");
-        let stroke = Operation::Set { path: path, value: Value::List(points.into()) };
+        let stroke = Operation::Set { path, value: Value::List(points.into()) };
         aurora::edit_shapes(session, "move point", &[stroke], 0)?;
         return Ok(());
     };

@@ -170,7 +170,7 @@ fn draft_operations(root: &Table) -> Vec<Operation> {
             for limit in kind.editor_hints.draft_limits {
                 let path = descriptors::within(&ValuePath::root().key(kind.key).index(index), limit.key);
                 if effective_number(root, &path).is_some_and(|number| number > limit.max as f64) {
-                    operations.push(Operation::Set { path: path, value: Value::Integer(limit.max) });
+                    operations.push(Operation::Set { path, value: Value::Integer(limit.max) });
                 }
             }
         }

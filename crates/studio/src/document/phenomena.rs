@@ -114,8 +114,8 @@ pub mod operations {
         let path = entry.id.path().key("enabled");
         match (enabled, entry.enabled) {
             // Shown is the default.
-            (true, false) => Operation::Remove { path: path },
-            _ => Operation::Set { path: path, value: Value::Bool(enabled) },
+            (true, false) => Operation::Remove { path },
+            _ => Operation::Set { path, value: Value::Bool(enabled) },
         }
     }
 

@@ -231,7 +231,7 @@ impl Session {
             if is_keyed(&path) || (self.recording && keyframes::animatable(&path)) {
                 self.keyframe_operation(&path, value)
             } else {
-                Operation::Set { path: path, value }
+                Operation::Set { path, value }
             }
         };
         let operations: Vec<Operation> = values.into_iter().map(operation).collect();
@@ -266,7 +266,7 @@ impl Session {
                 let stated = path.find(self.document.values()).is_some();
                 let derived =
                     self.implied_value(&path).filter(|value| defaults.get(key).is_none_or(|node| node.value != *value));
-                all.extend(derived.filter(|_| !stated).map(|value| Operation::Set { path: path, value }));
+                all.extend(derived.filter(|_| !stated).map(|value| Operation::Set { path, value }));
             }
         }
         all.extend(operations);

@@ -67,7 +67,7 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
         for shared in SHARED_TABLES.iter().filter(|table| table.is_list) {
             if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
                 let path = ValuePath::root().key(shared.key);
-                session.edit("add", &[Operation::Append { path: path, value: Value::Table(Table::default()) }]);
+                session.edit("add", &[Operation::Append { path, value: Value::Table(Table::default()) }]);
                 ui.close();
             }
         }
@@ -124,7 +124,7 @@ fn rename_ui(ui: &mut Ui, session: &mut Session, entry: &PhenomenonEntry) {
             ui.data_mut(|data| data.remove::<String>(draft_id));
             if !name.trim().is_empty() && name != entry.name {
                 let path = entry.id.path().key("name");
-                session.edit("rename", &[Operation::Set { path: path, value: Value::Text(name.trim().to_owned()) }]);
+                session.edit("rename", &[Operation::Set { path, value: Value::Text(name.trim().to_owned()) }]);
                 ui.close();
             }
         }

@@ -21,7 +21,7 @@ impl PictureTexture {
                 *shown = serial;
             }
             None => {
-                self.uploaded = Some((ctx.load_texture(name, color_image(picture), TextureOptions::LINEAR), serial))
+                self.uploaded = Some((ctx.load_texture(name, color_image(picture), TextureOptions::LINEAR), serial));
             }
         }
     }

@@ -81,7 +81,7 @@ fn lengthen_shot(session: &mut Session, until_s: f64) {
     let frames = session.transport.frames();
     if frames.end() - frames.start() + 1 < needed {
         let path = ValuePath::root().key("picture").key("frames");
-        session.edit("add shape", &[Operation::Set { path: path, value: Value::Integer(needed) }]);
+        session.edit("add shape", &[Operation::Set { path, value: Value::Integer(needed) }]);
     }
 }
 

@@ -333,7 +333,7 @@ impl AuroraDrawing {
             shape.push("sheets", sheet_list(sheets));
             return vec![Operation::Append { path: self.path.key("shapes"), value: Value::Table(shape) }];
         };
-        list_edits(&path, old, sheets).unwrap_or_else(|| vec![Operation::Set { path: path, value: sheet_list(sheets) }])
+        list_edits(&path, old, sheets).unwrap_or_else(|| vec![Operation::Set { path, value: sheet_list(sheets) }])
     }
 }
 

@@ -152,7 +152,7 @@ impl AuroraDrawing {
     pub(super) fn set_list(&self, shape: usize, key: &str, tables: Vec<Table>) -> Operation {
         let path = self.shape(shape).key(key);
         if tables.is_empty() {
-            return Operation::Remove { path: path };
+            return Operation::Remove { path };
         }
         Operation::Set {
             path,
