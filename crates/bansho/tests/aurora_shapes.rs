@@ -232,7 +232,7 @@ fn faults_stand_at_their_sheet_and_point() {
             "[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n[[aurora.shapes]]\nmerge = [{ ends = [0.5, 0] }]\n",
             "the point at 0.5 of sheet 1 is not an end",
         ),
-        ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split (shape 1): the first shape has none before it"),
+        ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split (shape 1): the first shape has no previous one"),
         (
             "[[aurora.shapes]]\nsheets = [{ svg_file = \"shapes.svg\", svg_path_id = \"middle\" }]\n",
             "test.toml:4:52: aurora.0.shapes.0.sheets.0.svg_path_id (shape 1, sheet 1): shapes.svg: has no stroke of the id `middle`",

@@ -26,7 +26,7 @@ Examples:
   bansho render fire.toml --contact-sheet 16       16 frames in one picture
   bansho render fire.toml --crop 600,200,128,128   a part of the picture
   bansho render fire.toml --set flame_sheet.height=1.2 --set wind.gust=0.5
-  bansho render fire.toml --resume                 continue after an interruption
+  bansho render fire.toml --resume                 continue after interruption
 
 A PNG composites exactly over black in programs with the convention of --alpha, an EXR over any background. Rendering can be interrupted at any time: finished frames are kept, and no file with a final name is incomplete.")]
 pub(crate) struct RenderArgs {
