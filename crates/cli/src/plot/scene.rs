@@ -1,0 +1,338 @@
+//! What a scene states: keyed parameters over time, and the transfer curves of a flame sheet (Ohshima & Itahashi).
+
+use std::path::Path;
+
+use bansho::{
+    KINDS, Scene, SceneError,
+    base::{
+        color::srgb_from_acescg,
+        math::curve::{Curve, Interpolation},
+        parameters::{
+            Descriptor, InterpolationName, Kind, ModelError, Node, Parameters, ProblemKind, Reader,
+            Table as SceneTable, Value, nearest,
+        },
+    },
+    fire::sheet::{Coloring, FlameSheetParameters},
+    job::{JobError, SceneFile},
+    scene::{SHARED_TABLES, values},
+};
+
+use super::{
+    PlotError,
+    black_body::{code, display_color},
+    figure::{Axis, ColorStrip, Figure, Panel, Plot, Rgb, Series, Style, Table, bounds, color},
+    ticks,
+};
+
+/// Samples of a transfer curve.
+const CURVE_SAMPLES: usize = 256;
+/// Rows of a table over time that are allowed.
+const MOST_ROWS: usize = 1_000_000;
+
+// ---- Keyed parameters.
+
+/// One step from the root of a scene to a value.
+#[derive(Clone, Debug)]
+enum Step {
+    Key(String),
+    /// An item of a list: its index, and its `name` if it has one.
+    Item {
+        index: usize,
+        name: Option<String>,
+    },
+}
+
+/// A value of a scene, with the way to it.
+struct Stated<'a> {
+    steps: Vec<Step>,
+    node: &'a Node,
+}
+
+impl Stated<'_> {
+    /// The path as `--set` takes it.
+    fn path(&self) -> String {
+        let step = |step: &Step| match step {
+            Step::Key(key) => key.clone(),
+            Step::Item { index, .. } => index.to_string(),
+        };
+        self.steps.iter().map(step).collect::<Vec<_>>().join(".")
+    }
+
+    /// Whether `path` means this value: list items by index or name, or all of a list.
+    fn is_meant_by(&self, path: &[&str]) -> bool {
+        matches(&self.steps, path)
+    }
+
+    fn is_keyed(&self) -> bool {
+        matches!(&self.node.value, Value::Table(table) if table.get("keys").is_some())
+    }
+}
+
+fn matches(steps: &[Step], path: &[&str]) -> bool {
+    match (steps.split_first(), path.split_first()) {
+        (None, None) => true,
+        (Some((Step::Key(key), steps)), Some((first, path))) => key == first && matches(steps, path),
+        (Some((Step::Item { index, name }, steps)), Some((first, rest))) => {
+            let is_picked = *first == index.to_string() || name.as_deref() == Some(*first);
+            is_picked && matches(steps, rest) || matches(steps, path)
+        }
+        _ => false,
+    }
+}
+
+/// Every value of a scene; keyed values are not entered.
+fn all_values<'a>(table: &'a SceneTable, steps: &[Step], found: &mut Vec<Stated<'a>>) {
+    for entry in &table.entries {
+        add_value(&entry.node, [steps, &[Step::Key(entry.key.clone())]].concat(), found);
+    }
+}
+
+fn add_value<'a>(node: &'a Node, steps: Vec<Step>, found: &mut Vec<Stated<'a>>) {
+    let stated = Stated { steps: steps.clone(), node };
+    let is_keyed = stated.is_keyed();
+    found.push(stated);
+    match &node.value {
+        Value::Table(table) if !is_keyed => all_values(table, &steps, found),
+        Value::List(items) => {
+            for (index, item) in items.iter().enumerate() {
+                if let Value::Table(table) = &item.value {
+                    let name = match table.get("name").map(|name| &name.value) {
+                        Some(Value::Text(name)) => Some(name.clone()),
+                        _ => None,
+                    };
+                    add_value(item, [&steps[..], &[Step::Item { index, name }]].concat(), found);
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Why a path means no keyed value.
+#[derive(Clone, Debug, thiserror::Error)]
+enum PathError {
+    #[error("--path: the scene states no such value{}; keyed in it: {keyed}", did_you_mean(.hint))]
+    Unknown { hint: Option<String>, keyed: String },
+    #[error("--path: is not keyed{}; keyed in the scene: {keyed}", did_you_mean(.hint))]
+    NotKeyed { hint: Option<String>, keyed: String },
+}
+
+fn did_you_mean(hint: &Option<String>) -> String {
+    hint.as_ref().map(|hint| format!(", did you mean `{hint}`?")).unwrap_or_default()
+}
+
+/// The keyed values that `path` means.
+fn find<'a, 'b>(file: &SceneFile, all: &'b [Stated<'a>], path: &str) -> Result<Vec<&'b Stated<'a>>, JobError> {
+    let segments: Vec<&str> = path.split('.').map(str::trim).collect();
+    let meant: Vec<&Stated> = all.iter().filter(|stated| stated.is_meant_by(&segments)).collect();
+    let keyed: Vec<&Stated> = meant.iter().copied().filter(|stated| stated.is_keyed()).collect();
+    if !keyed.is_empty() {
+        return Ok(keyed);
+    }
+    let paths: Vec<String> = all.iter().filter(|stated| stated.is_keyed()).map(Stated::path).collect();
+    let hint = nearest(path, paths.iter().map(String::as_str)).map(str::to_owned);
+    let keyed = if paths.is_empty() { "nothing".to_owned() } else { paths.join(", ") };
+    let (at, error) = match meant.first() {
+        Some(stated) => (stated.path(), PathError::NotKeyed { hint, keyed }),
+        None => (path.to_owned(), PathError::Unknown { hint, keyed }),
+    };
+    let kind = ProblemKind::Model(ModelError::new(error));
+    Err(JobError::SetScene(Box::new(SceneError::at(&file.name, &file.text, &at, kind))))
+}
+
+/// A keyed value as one curve per component.
+fn curves(node: &Node) -> Vec<Curve> {
+    let Value::Table(table) = &node.value else { return Vec::new() };
+    let interpolation = match table.get("interpolation").map(|node| &node.value) {
+        Some(Value::Text(name)) => InterpolationName::from_name(name).unwrap_or_default(),
+        _ => InterpolationName::default(),
+    };
+    let Some(Value::List(keys)) = table.get("keys").map(|node| &node.value) else { return Vec::new() };
+    let key = |key: &Node| match &key.value {
+        Value::List(pair) => Some((pair.first()?.value.as_number()?, components(&pair.get(1)?.value)?)),
+        _ => None,
+    };
+    let keys: Vec<(f64, Vec<f64>)> = keys.iter().filter_map(key).collect();
+    let count = keys.iter().map(|(_, values)| values.len()).min().unwrap_or(0);
+    let curve = |c: usize| {
+        let points = keys.iter().map(|(time, values)| [*time, values[c]]).collect();
+        // The scene was checked with the same curve.
+        Curve::new(points, Interpolation::from(interpolation)).ok()
+    };
+    (0..count).filter_map(curve).collect()
+}
+
+fn components(value: &Value) -> Option<Vec<f64>> {
+    match value {
+        Value::List(items) => items.iter().map(|item| item.value.as_number()).collect(),
+        value => value.as_number().map(|number| vec![number]),
+    }
+}
+
+/// The unit of the parameter that some steps lead to.
+fn unit(steps: &[Step]) -> &'static str {
+    let mut keys = steps.iter().filter_map(|step| match step {
+        Step::Key(key) => Some(key.as_str()),
+        Step::Item { .. } => None,
+    });
+    let root = keys.next().unwrap_or_default();
+    let shared = SHARED_TABLES.iter().find(|table| table.key == root).map(|table| table.table);
+    let Some(table) = shared.or_else(|| KINDS.iter().find(|kind| kind.key == root).map(|kind| kind.table)) else {
+        return "";
+    };
+    let mut parameters: &[Descriptor] = &table().parameters;
+    let mut unit = "";
+    for key in keys {
+        let Some(descriptor) = parameters.iter().find(|descriptor| descriptor.key == key) else { break };
+        unit = descriptor.unit;
+        parameters = inner_table(&descriptor.kind);
+    }
+    unit
+}
+
+fn inner_table(kind: &Kind) -> &'static [Descriptor] {
+    match kind {
+        Kind::Table(table) => &table().parameters,
+        Kind::Optional(inner) | Kind::Auto(inner) | Kind::Animated(inner) => inner_table(inner),
+        Kind::List { item, .. } => inner_table(item),
+        _ => &[],
+    }
+}
+
+/// Keyed parameters over the time of the shot.
+///
+/// # Errors
+/// The scene is faulty, or a path means nothing that is keyed.
+pub(crate) fn parameters(file: &SceneFile, paths: &[String]) -> anyhow::Result<Figure> {
+    let scene = file.parse()?;
+    let root = values(&file.text).unwrap_or_default();
+    let mut all = Vec::new();
+    all_values(&root, &[], &mut all);
+    let mut meant = Vec::new();
+    for path in paths {
+        meant.extend(find(file, &all, path)?);
+    }
+    let picture = &scene.picture;
+    let frames = picture.frames.max(1) as usize;
+    if frames > MOST_ROWS {
+        return Err(PlotError::Rows { option: "picture.frames", rows: frames as f64, most: MOST_ROWS as f64 }.into());
+    }
+    let end = frames as f64 * picture.fps.frame_s();
+    let mut table = Table::new(["frame", "time_s"]);
+    table.rows = (0..=frames)
+        .map(|index| vec![picture.first_frame as f64 + index as f64, index as f64 * picture.fps.frame_s()])
+        .collect();
+    let x = Axis::linear("Time", "s", [0.0, end]);
+    let mut panels = Vec::new();
+    for stated in meant {
+        panels.push(Panel::Plot(parameter_plot(stated, &x, &mut table)));
+    }
+    let title = format!("Keyed parameters of {}", Path::new(&file.name).file_name().unwrap_or_default().display());
+    Ok(Figure { title, panels, table })
+}
+
+/// The plot of one keyed parameter; its values are added to the table.
+fn parameter_plot(stated: &Stated, x: &Axis, table: &mut Table) -> Plot {
+    let (path, unit, curves) = (stated.path(), unit(&stated.steps), curves(stated.node));
+    let names: &[&str] = if curves.len() == 1 { &[""] } else { &["x", "y", "z", "w"] };
+    let mut series = Vec::new();
+    for (c, curve) in curves.iter().enumerate() {
+        let name = names.get(c).copied().unwrap_or_default();
+        let column = table.columns.len();
+        table.columns.push(if name.is_empty() { path.clone() } else { format!("{path}.{name}") });
+        for row in &mut table.rows {
+            row.push(curve.eval(row[1]));
+        }
+        let label = if name.is_empty() { "value".to_owned() } else { name.to_owned() };
+        series.push(Series { label, color: color(c), style: Style::Line, points: table.points(1, column) });
+    }
+    let keys: Vec<[f64; 2]> = curves.iter().flat_map(|curve| curve.points().iter().copied()).collect();
+    let shown = series.iter().flat_map(|series| &series.points).map(|point| point[1]);
+    let range = bounds(shown).unwrap_or([0.0, 1.0]);
+    series.push(Series { label: "keys".to_owned(), color: color(6), style: Style::Markers, points: keys });
+    Plot { x: x.clone(), y: Axis::linear(&path, unit, ticks::rounded(range, 4)), series }
+}
+
+// ---- Transfer curves.
+
+/// The flame sheet of that name, or the first.
+fn flame_sheet(
+    file: &SceneFile,
+    scene: &Scene,
+    name: Option<&str>,
+) -> Result<(String, FlameSheetParameters), PlotError> {
+    const KIND: &str = "flame_sheet";
+    let sheets: Vec<_> = scene.instances.iter().filter(|instance| instance.kind.key == KIND).collect();
+    let found = match name {
+        None => sheets.first(),
+        Some(name) => sheets.iter().find(|sheet| sheet.name == name),
+    };
+    let Some(sheet) = found else {
+        let names: Vec<&str> = sheets.iter().map(|sheet| sheet.name.as_str()).collect();
+        return Err(match name.filter(|_| !names.is_empty()) {
+            None => PlotError::NoPhenomenon { scene: file.name.clone(), kind: KIND },
+            Some(name) => PlotError::NoSuchName {
+                scene: file.name.clone(),
+                kind: KIND,
+                name: name.to_owned(),
+                hint: did_you_mean(&nearest(name, names.iter().copied()).map(str::to_owned)),
+                allowed: names.join(", "),
+            },
+        });
+    };
+    let parameters = FlameSheetParameters::read_table(&sheet.parameters.canonical(), &mut Reader::new(), &[]);
+    Ok((sheet.name.clone(), parameters))
+}
+
+/// Red, green and blue of eq. (7), and sharpening, eq. (6), of a flame sheet.
+///
+/// # Errors
+/// The scene is faulty, or has no such flame sheet.
+pub(crate) fn transfer_curves(file: &SceneFile, name: Option<&str>) -> anyhow::Result<Figure> {
+    let scene = file.parse()?;
+    let (name, sheet) = flame_sheet(file, &scene, name)?;
+    let (light, is_display) = (sheet.color.light(), sheet.color.kind == Coloring::RgbCurves);
+    let columns = ["s", "sharpen", "r", "g", "b"];
+    let mut table = Table::new(columns);
+    let mut colors = Vec::new();
+    for index in 0..=CURVE_SAMPLES {
+        let s = index as f64 / CURVE_SAMPLES as f64;
+        let acescg = light(s);
+        let rgb = if is_display {
+            [&sheet.color.red, &sheet.color.green, &sheet.color.blue].map(|curve| curve.eval(s))
+        } else {
+            srgb_from_acescg(acescg.map(|value| value as f32)).map(f64::from)
+        };
+        colors.push(if is_display { rgb.map(|value| (value * 255.0).round() as u8) } else { shown(acescg, rgb) });
+        table.rows.push([&[s, sheet.texture.sharpen.eval(s)][..], &rgb].concat());
+    }
+    let x = Axis::linear("T₁ of eq. (6), T₂ of eq. (7)", "", [0.0, 1.0]);
+    let curve = |label: &str, color: Rgb, column: usize| Series {
+        label: label.to_owned(),
+        color,
+        style: Style::Line,
+        points: table.points(0, column),
+    };
+    let [_, high] = table.bounds(&[2, 3, 4]).unwrap_or([0.0, 1.0]);
+    let low = table.bounds(&[2, 3, 4]).map_or(0.0, |[low, _]| low.min(0.0));
+    let y = if is_display { "R, G, B, eq. (7), sRGB-encoded" } else { "R, G, B, eq. (7), linear sRGB" };
+    let rgb = vec![curve("red", [213, 50, 40], 2), curve("green", [0, 140, 70], 3), curve("blue", [30, 90, 200], 4)];
+    let sharpen = vec![curve("C(T₁)", color(6), 1)];
+    let panels = vec![
+        Panel::Plot(Plot {
+            x: x.clone(),
+            y: Axis::linear("Sharpened T₂ = C(T₁), eq. (6)", "", [0.0, 1.0]),
+            series: sharpen,
+        }),
+        Panel::Plot(Plot { x: x.clone(), y: Axis::linear(y, "", ticks::rounded([low, high], 5)), series: rgb }),
+        Panel::Colors(ColorStrip { x, colors }),
+    ];
+    Ok(Figure { title: format!("Transfer curves of the flame sheet \"{name}\" (Ohshima & Itahashi)"), panels, table })
+}
+
+/// The display color of light whose largest component is `brightest` in linear sRGB of the brightest flame.
+fn shown(acescg: [f64; 3], srgb: [f64; 3]) -> Rgb {
+    let brightest = srgb.into_iter().fold(0.0, f64::max).min(1.0) as f32;
+    let hue = display_color(acescg).map(bansho::base::color::decode_srgb8);
+    hue.map(|value| code(value * brightest))
+}
