@@ -20,7 +20,7 @@ use bansho::{
 use crate::{
     args::{Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::to_stdout,
-    plot::{PlotError, aurora, black_body, csv, draw, figure::Figure, metadata, rain, scene},
+    plot::{PlotError, aurora, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves},
 };
 
 /// Plots what is asked for.
@@ -51,11 +51,11 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
         }
         PlotCommand::Quenching(args) => finish("quenching", &aurora::quenching(), &args.output, &[]),
         PlotCommand::Parameters(args) => {
-            let figure = scene::parameters(&read(&args.scene)?, &args.path)?;
+            let figure = parameters::figure(&read(&args.scene)?, &args.path)?;
             finish("parameters", &figure, &args.output, std::slice::from_ref(&args.scene))
         }
         PlotCommand::TransferCurves(args) => {
-            let figure = scene::transfer_curves(&read(&args.scene)?, args.name.as_deref())?;
+            let figure = transfer_curves::figure(&read(&args.scene)?, args.name.as_deref())?;
             finish("transfer-curves", &figure, &args.output, std::slice::from_ref(&args.scene))
         }
         PlotCommand::Metadata(args) => finish("metadata", &metadata::figure(&args.files)?, &args.output, &args.files),

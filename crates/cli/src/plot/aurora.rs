@@ -23,7 +23,7 @@ const QUENCHING: &str = include_str!("data/quenching.csv");
 /// Decades of a rate that are shown below its maximum.
 const DECADES: f64 = 1e-4;
 /// Fraction of its maximum below which a profile ends for the altitude axis.
-const FAINT: f64 = 1e-3;
+const FAINT: f64 = 0.02;
 
 /// The color of a line, dark enough for white paper.
 fn line_color(line: &Line) -> Rgb {
@@ -45,13 +45,16 @@ fn altitude_axis(table: &Table, columns: &[usize]) -> Axis {
         table.rows.iter().filter(|row| row[column] > FAINT * most).map(|row| row[0]).fold(LOWEST_KM, f64::max)
     };
     let top = columns.iter().map(reach).fold(LOWEST_KM + 40.0, f64::max);
-    Axis::linear("Altitude", "km", ticks::rounded([LOWEST_KM, top], 7))
+    Axis::linear("Altitude", "km", [LOWEST_KM, ticks::rounded([0.0, top], 12)[1]])
 }
 
 /// Volume emission rate of every line by altitude, for an energy in eV and an energy flux in mW/m^2.
 pub(crate) fn emission(energy_ev: f64, flux_mw_per_m2: f64, shape: SpectrumShape) -> Figure {
     let profile = Emission::new(atmosphere(), shape.spectrum()).profile(energy_ev);
-    let name = |line: &Line| format!("{}_photons_per_m3_s", line.name.to_lowercase().replace([' ', '+'], "_"));
+    let name = |line: &Line| {
+        let name = line.name.to_lowercase().replace("n2+", "n2_ion").replace([' ', '.'], "_");
+        format!("{name}_photons_per_m3_s")
+    };
     let mut table = Table::new(["altitude_km".to_owned()].into_iter().chain(LINES.iter().map(name)));
     for (level, photons) in profile.iter().enumerate() {
         let rate = |line: &Line| flux_mw_per_m2 * line.photons * photons[line.emitter.index()];
@@ -115,9 +118,9 @@ pub(crate) fn deposition(energies_ev: &[f64], shape: SpectrumShape) -> Figure {
         }
     }
     Figure {
-        title: format!("Ionization by precipitating electrons ({}), per mW/m²", shape.name()),
+        title: format!("Ionization by electrons of 1 mW/m² ({}); deposited energy is 35 eV q", shape.name()),
         panels: vec![Panel::Plot(Plot {
-            x: Axis::log("Ionization rate q; 35 eV q is the deposited energy", "m⁻³ s⁻¹", [DECADES * most, most]),
+            x: Axis::log("Ionization rate q", "m⁻³ s⁻¹", [DECADES * most, most]),
             y: altitude_axis(&table, &columns),
             series,
         })],
@@ -161,7 +164,7 @@ pub(crate) fn quenching() -> Figure {
         title: "Fraction of excited states that radiate: quenching by N₂, O₂ and O".to_owned(),
         panels: vec![Panel::Plot(Plot {
             x: Axis::linear("Radiated fraction", "", [0.0, 1.02]),
-            y: Axis::linear("Altitude", "km", ticks::rounded([LOWEST_KM, top.min(500.0)], 7)),
+            y: Axis::linear("Altitude", "km", [LOWEST_KM, top.min(500.0)]),
             series,
         })],
         table,

@@ -19,7 +19,7 @@ use super::{
 const REFERENCE: &str = include_str!("data/black_body.csv");
 
 /// Red, green and blue curves.
-const RGB: [(&str, Rgb); 3] = [("red", [213, 50, 40]), ("green", [0, 140, 70]), ("blue", [30, 90, 200])];
+pub(super) const RGB: [(&str, Rgb); 3] = [("red", [213, 50, 40]), ("green", [0, 140, 70]), ("blue", [30, 90, 200])];
 
 /// Lowest luminance of the logarithmic axis, cd/m^2: what an eye adapted to the dark still sees.
 const DARKEST: f64 = 1e-6;
@@ -106,10 +106,10 @@ fn luminance_plot(table: &Table, x: &Axis) -> Plot {
         x: x.clone(),
         y: Axis::log("Luminance", "cd/m²", [DARKEST, brightest]),
         series: vec![
-            Series { label: "Bansho".to_owned(), color: PALETTE[6], style: Style::Line, points },
+            Series { label: "Bansho".to_owned(), color: PALETTE[0], style: Style::Line, points },
             Series {
                 label: "Planck's law, CIE 1931 observer".to_owned(),
-                color: PALETTE[1],
+                color: PALETTE[6],
                 style: Style::Markers,
                 points: reference,
             },
@@ -126,25 +126,26 @@ fn color_plot(table: &Table, x: &Axis) -> Plot {
         // Bodies too dark for single precision have no color.
         points: table.points(0, 1 + c).into_iter().filter(|point| point[1] != 0.0).collect(),
     };
-    let markers = (0..3).map(|c| Series {
-        label: format!("{}, Planck's law", RGB[c].0),
-        color: RGB[c].1,
+    let markers = Series {
+        label: "Planck's law, CIE 1931 observer".to_owned(),
+        color: PALETTE[6],
         style: Style::Markers,
-        points: reference.iter().map(|row| [row[0], row[2 + c]]).collect(),
-    });
+        points: (0..3).flat_map(|c| reference.iter().map(move |row| [row[0], row[2 + c]])).collect(),
+    };
     let [low, high] = table.bounds(&[1, 2, 3]).unwrap_or([0.0, 1.0]);
     Plot {
         x: x.clone(),
         y: Axis::linear("Linear sRGB of luminance 1", "", ticks::rounded([low, high.min(6.0)], 5)),
-        series: (0..3).map(curve).chain(markers).collect(),
+        series: (0..3).map(curve).chain([markers]).collect(),
     }
 }
 
-/// Colors as a display shows them at the greatest brightness that it has for each.
+/// Colors as a display shows them at the greatest brightness that it has for each; black below [`DARKEST`].
 fn strip(temperatures: Temperatures) -> Vec<Rgb> {
     let color = |index: usize| {
         let t = (index as f64 + 0.5) / STRIP_COLORS as f64;
-        display_color(light(math::lerp(temperatures.from, temperatures.to, t)).acescg)
+        let light = light(math::lerp(temperatures.from, temperatures.to, t));
+        if light.ln_luminance < math::ln(DARKEST) { [0; 3] } else { display_color(light.acescg) }
     };
     (0..STRIP_COLORS).map(color).collect()
 }

@@ -21,7 +21,7 @@ const TOP: f64 = 36.0;
 /// Space below a panel for the labels of its x axis.
 const BOTTOM: f64 = 48.0;
 /// Space between panels that share their x axis.
-const GAP: f64 = 12.0;
+const GAP: f64 = 18.0;
 /// Height of a strip of colors.
 const STRIP: f64 = 34.0;
 

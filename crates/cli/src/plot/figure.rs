@@ -74,10 +74,14 @@ impl Axis {
         Self { label: label.to_owned(), unit: unit.to_owned(), scale: Scale::Linear, range }
     }
 
-    /// A logarithmic axis over whole decades.
+    /// A logarithmic axis over whole decades; a short one ends at 1, 2 or 5 times a power of ten.
     pub(crate) fn log(label: &str, unit: &str, range: [f64; 2]) -> Self {
-        let [low, high] = range.map(math::log10);
-        let range = [(low + 1e-9).floor(), (high - 1e-9).ceil()].map(|decade| math::pow(10.0, decade));
+        let ends: &[f64] = if range[1] < 1e3 * range[0] { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let decade = |value: f64| math::pow(10.0, (math::log10(value) + 1e-9).floor());
+        let [low, high] = range.map(decade);
+        let low = ends.iter().map(|end| end * low).filter(|end| *end <= range[0] * 1.000_001).fold(low, f64::max);
+        let above = ends.iter().map(|end| end * high).chain([10.0 * high]);
+        let range = [low, above.filter(|end| *end >= range[1] * 0.999_999).fold(10.0 * high, f64::min)];
         Self { label: label.to_owned(), unit: unit.to_owned(), scale: Scale::Log, range }
     }
 

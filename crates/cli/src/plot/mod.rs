@@ -1,7 +1,7 @@
 //! `bansho plot`: figures of what the models compute.
 //!
-//! [`figure`] describes a figure as plain data; [`rain`], [`aurora`], [`black_body`], [`scene`] and [`metadata`] make one for each subject from the
-//! library's own functions. [`draw`] lays a figure out on a [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
+//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`] and [`metadata`] make one
+//! from the library's own functions. [`draw`] lays a figure out on a [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
 pub(crate) mod black_body;
@@ -11,26 +11,16 @@ pub(crate) mod draw;
 pub(crate) mod figure;
 mod font;
 pub(crate) mod metadata;
+pub(crate) mod parameters;
 pub(crate) mod rain;
 mod raster;
-pub(crate) mod scene;
 mod svg;
 mod ticks;
+pub(crate) mod transfer_curves;
 
 use std::path::PathBuf;
 
 use bansho::job::ErrorCategory;
-
-impl PlotError {
-    /// Whose fault it is, for exit codes.
-    pub(crate) fn category(&self) -> ErrorCategory {
-        match self {
-            Self::NoPhenomenon { .. } => ErrorCategory::Scene,
-            Self::NotMetadata { .. } | Self::NoNumbers { .. } => ErrorCategory::Work,
-            _ => ErrorCategory::Usage,
-        }
-    }
-}
 
 /// Why a figure cannot be made as asked for.
 #[derive(Debug, thiserror::Error)]
@@ -70,4 +60,20 @@ pub(crate) enum PlotError {
     /// Metadata without a number.
     #[error("{}: none of these files states a number of a phenomenon; allowed: metadata of a scene whose phenomena report some", path.display())]
     NoNumbers { path: PathBuf },
+}
+
+impl PlotError {
+    /// Whose fault it is, for exit codes.
+    pub(crate) fn category(&self) -> ErrorCategory {
+        match self {
+            Self::NoPhenomenon { .. } => ErrorCategory::Scene,
+            Self::NotMetadata { .. } | Self::NoNumbers { .. } => ErrorCategory::Work,
+            _ => ErrorCategory::Usage,
+        }
+    }
+}
+
+/// A hint at the name that was probably meant.
+fn did_you_mean(name: &Option<String>) -> String {
+    name.as_ref().map(|name| format!(", did you mean `{name}`?")).unwrap_or_default()
 }

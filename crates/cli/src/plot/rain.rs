@@ -62,12 +62,11 @@ pub(crate) fn drop_sizes(rates_mm_per_h: &[f64]) -> Figure {
     };
     let mut series: Vec<Series> = rates_mm_per_h.iter().enumerate().map(curve).collect();
     let reference = rows::<3>(MARSHALL_PALMER);
-    for (index, rate) in rates_mm_per_h.iter().enumerate() {
-        let points: Vec<_> = reference.iter().filter(|row| row[0] == *rate).map(|row| [row[1], row[2]]).collect();
-        if !points.is_empty() {
-            let label = format!("{} mm/h, diameters of the paper", number(*rate));
-            series.push(Series { label, color: color(index), style: Style::Markers, points });
-        }
+    let is_shown = |row: &&[f64; 3]| rates_mm_per_h.contains(&row[0]);
+    let points: Vec<_> = reference.iter().filter(is_shown).map(|row| [row[1], row[2]]).collect();
+    if !points.is_empty() {
+        let label = "formula at the paper's diameters".to_owned();
+        series.push(Series { label, color: color(6), style: Style::Markers, points });
     }
     Figure {
         title: "Drop size distribution of Marshall and Palmer (1948), eq. (1)".to_owned(),

@@ -28,10 +28,13 @@ fn step(span: f64, count: usize) -> f64 {
     [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= least * 0.999).unwrap_or(least)
 }
 
-/// A range extended to whole steps of its ticks.
+/// A range extended to half the distance of its about `count` ticks. What is negative by a hundredth of it counts as 0.
 pub(super) fn rounded([low, high]: [f64; 2], count: usize) -> [f64; 2] {
     let span = if high > low { high - low } else { low.abs().max(1.0) };
-    let step = step(span, count);
+    // One number is in the middle.
+    let [low, high] = if high > low { [low, high] } else { [low - 0.5 * span, low + 0.5 * span] };
+    let low = if (-0.01 * span..0.0).contains(&low) { 0.0 } else { low };
+    let step = step(span, 2 * count);
     let whole = |value: f64, round: fn(f64) -> f64, slack: f64| round(value / step + slack) * step;
     let [low, top] = [whole(low, f64::floor, 1e-9), whole(high, f64::ceil, -1e-9)];
     [low, if top > low { top } else { low + step }]
@@ -65,16 +68,16 @@ fn exponent(value: f64) -> i32 {
 }
 
 fn log([low, high]: [f64; 2], count: usize) -> Ticks {
-    let (first, last) = (math::log10(low).round() as i32, math::log10(high).round() as i32);
+    let (first, last) = ((math::log10(low) - 1e-9).ceil() as i32, (math::log10(high) + 1e-9).floor() as i32);
     let every = (1..).find(|every| (last - first) / every < count.max(1) as i32).unwrap_or(1);
-    let minor = (first..last).flat_map(|decade| {
+    let minor = (first - 1..=last).flat_map(|decade| {
         let factors = if every == 1 { 2..10 } else { 1..2 };
         factors.map(move |factor| f64::from(factor) * math::pow(10.0, f64::from(decade)))
     });
     let labelled = (first..=last).filter(|decade| (decade - first) % every == 0);
     Ticks {
         major: labelled.map(|decade| (math::pow(10.0, f64::from(decade)), power_of_ten(decade))).collect(),
-        minor: minor.collect(),
+        minor: minor.filter(|value| (low..=high).contains(value)).collect(),
     }
 }
 
@@ -110,10 +113,7 @@ mod tests {
     fn labels_are_round_numbers() {
         let linear = |range| labels(&Axis::linear("", "", range), 6);
         assert_eq!(linear([0.0, 10_000.0]), ["0", "2000", "4000", "6000", "8000", "10000"]);
-        assert_eq!(
-            linear([-0.5, 1.0]),
-            ["−0.5", "0.0", "0.5", "1.0"].map(|label| if label == "0.0" { "0" } else { label })
-        );
+        assert_eq!(linear([-0.5, 1.0]), ["−0.5", "0", "0.5", "1.0"]);
         assert_eq!(linear([0.0, 3e7]), ["0", "0.5×10⁷", "1.0×10⁷", "1.5×10⁷", "2.0×10⁷", "2.5×10⁷", "3.0×10⁷"]);
         let log = |range| labels(&Axis::log("", "", range), 6);
         assert_eq!(log([0.1, 1e4]), ["10⁻¹", "1", "10", "10²", "10³", "10⁴"]);
@@ -124,6 +124,7 @@ mod tests {
     fn ranges_are_extended_to_ticks() {
         assert_eq!(rounded([0.02, 9.17], 6), [0.0, 10.0]);
         assert_eq!(rounded([0.0, 1.0], 6), [0.0, 1.0]);
-        assert_eq!(rounded([3.0, 3.0], 4), [3.0, 4.0]);
+        assert_eq!(rounded([-0.001, 0.9], 5), [0.0, 0.9]);
+        assert_eq!(rounded([3.0, 3.0], 4), [1.5, 4.5]);
     }
 }

@@ -1,35 +1,27 @@
-//! What a scene states: keyed parameters over time, and the transfer curves of a flame sheet (Ohshima & Itahashi).
+//! Keyed parameters of a scene over time.
 
 use std::path::Path;
 
 use bansho::{
-    KINDS, Scene, SceneError,
+    KINDS, SceneError,
     base::{
-        color::srgb_from_acescg,
         math::curve::{Curve, Interpolation},
         parameters::{
-            Descriptor, InterpolationName, Kind, ModelError, Node, Parameters, ProblemKind, Reader,
-            Table as SceneTable, Value, nearest,
+            Descriptor, InterpolationName, Kind, ModelError, Node, ProblemKind, Table as SceneTable, Value, nearest,
         },
     },
-    fire::sheet::{Coloring, FlameSheetParameters},
     job::{JobError, SceneFile},
     scene::{SHARED_TABLES, values},
 };
 
 use super::{
-    PlotError,
-    black_body::{code, display_color},
-    figure::{Axis, ColorStrip, Figure, Panel, Plot, Rgb, Series, Style, Table, bounds, color},
+    PlotError, did_you_mean,
+    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color},
     ticks,
 };
 
-/// Samples of a transfer curve.
-const CURVE_SAMPLES: usize = 256;
 /// Rows of a table over time that are allowed.
 const MOST_ROWS: usize = 1_000_000;
-
-// ---- Keyed parameters.
 
 /// One step from the root of a scene to a value.
 #[derive(Clone, Debug)]
@@ -111,14 +103,10 @@ fn add_value<'a>(node: &'a Node, steps: Vec<Step>, found: &mut Vec<Stated<'a>>) 
 /// Why a path means no keyed value.
 #[derive(Clone, Debug, thiserror::Error)]
 enum PathError {
-    #[error("--path: the scene states no such value{}; keyed in it: {keyed}", did_you_mean(.hint))]
+    #[error("the scene states no such value for --path{}; keyed in it: {keyed}", did_you_mean(.hint))]
     Unknown { hint: Option<String>, keyed: String },
-    #[error("--path: is not keyed{}; keyed in the scene: {keyed}", did_you_mean(.hint))]
+    #[error("is not keyed, as --path needs it{}; keyed in the scene: {keyed}", did_you_mean(.hint))]
     NotKeyed { hint: Option<String>, keyed: String },
-}
-
-fn did_you_mean(hint: &Option<String>) -> String {
-    hint.as_ref().map(|hint| format!(", did you mean `{hint}`?")).unwrap_or_default()
 }
 
 /// The keyed values that `path` means.
@@ -203,7 +191,7 @@ fn inner_table(kind: &Kind) -> &'static [Descriptor] {
 ///
 /// # Errors
 /// The scene is faulty, or a path means nothing that is keyed.
-pub(crate) fn parameters(file: &SceneFile, paths: &[String]) -> anyhow::Result<Figure> {
+pub(crate) fn figure(file: &SceneFile, paths: &[String]) -> anyhow::Result<Figure> {
     let scene = file.parse()?;
     let root = values(&file.text).unwrap_or_default();
     let mut all = Vec::new();
@@ -251,88 +239,4 @@ fn parameter_plot(stated: &Stated, x: &Axis, table: &mut Table) -> Plot {
     let range = bounds(shown).unwrap_or([0.0, 1.0]);
     series.push(Series { label: "keys".to_owned(), color: color(6), style: Style::Markers, points: keys });
     Plot { x: x.clone(), y: Axis::linear(&path, unit, ticks::rounded(range, 4)), series }
-}
-
-// ---- Transfer curves.
-
-/// The flame sheet of that name, or the first.
-fn flame_sheet(
-    file: &SceneFile,
-    scene: &Scene,
-    name: Option<&str>,
-) -> Result<(String, FlameSheetParameters), PlotError> {
-    const KIND: &str = "flame_sheet";
-    let sheets: Vec<_> = scene.instances.iter().filter(|instance| instance.kind.key == KIND).collect();
-    let found = match name {
-        None => sheets.first(),
-        Some(name) => sheets.iter().find(|sheet| sheet.name == name),
-    };
-    let Some(sheet) = found else {
-        let names: Vec<&str> = sheets.iter().map(|sheet| sheet.name.as_str()).collect();
-        return Err(match name.filter(|_| !names.is_empty()) {
-            None => PlotError::NoPhenomenon { scene: file.name.clone(), kind: KIND },
-            Some(name) => PlotError::NoSuchName {
-                scene: file.name.clone(),
-                kind: KIND,
-                name: name.to_owned(),
-                hint: did_you_mean(&nearest(name, names.iter().copied()).map(str::to_owned)),
-                allowed: names.join(", "),
-            },
-        });
-    };
-    let parameters = FlameSheetParameters::read_table(&sheet.parameters.canonical(), &mut Reader::new(), &[]);
-    Ok((sheet.name.clone(), parameters))
-}
-
-/// Red, green and blue of eq. (7), and sharpening, eq. (6), of a flame sheet.
-///
-/// # Errors
-/// The scene is faulty, or has no such flame sheet.
-pub(crate) fn transfer_curves(file: &SceneFile, name: Option<&str>) -> anyhow::Result<Figure> {
-    let scene = file.parse()?;
-    let (name, sheet) = flame_sheet(file, &scene, name)?;
-    let (light, is_display) = (sheet.color.light(), sheet.color.kind == Coloring::RgbCurves);
-    let columns = ["s", "sharpen", "r", "g", "b"];
-    let mut table = Table::new(columns);
-    let mut colors = Vec::new();
-    for index in 0..=CURVE_SAMPLES {
-        let s = index as f64 / CURVE_SAMPLES as f64;
-        let acescg = light(s);
-        let rgb = if is_display {
-            [&sheet.color.red, &sheet.color.green, &sheet.color.blue].map(|curve| curve.eval(s))
-        } else {
-            srgb_from_acescg(acescg.map(|value| value as f32)).map(f64::from)
-        };
-        colors.push(if is_display { rgb.map(|value| (value * 255.0).round() as u8) } else { shown(acescg, rgb) });
-        table.rows.push([&[s, sheet.texture.sharpen.eval(s)][..], &rgb].concat());
-    }
-    let x = Axis::linear("T₁ of eq. (6), T₂ of eq. (7)", "", [0.0, 1.0]);
-    let curve = |label: &str, color: Rgb, column: usize| Series {
-        label: label.to_owned(),
-        color,
-        style: Style::Line,
-        points: table.points(0, column),
-    };
-    let [_, high] = table.bounds(&[2, 3, 4]).unwrap_or([0.0, 1.0]);
-    let low = table.bounds(&[2, 3, 4]).map_or(0.0, |[low, _]| low.min(0.0));
-    let y = if is_display { "R, G, B, eq. (7), sRGB-encoded" } else { "R, G, B, eq. (7), linear sRGB" };
-    let rgb = vec![curve("red", [213, 50, 40], 2), curve("green", [0, 140, 70], 3), curve("blue", [30, 90, 200], 4)];
-    let sharpen = vec![curve("C(T₁)", color(6), 1)];
-    let panels = vec![
-        Panel::Plot(Plot {
-            x: x.clone(),
-            y: Axis::linear("Sharpened T₂ = C(T₁), eq. (6)", "", [0.0, 1.0]),
-            series: sharpen,
-        }),
-        Panel::Plot(Plot { x: x.clone(), y: Axis::linear(y, "", ticks::rounded([low, high], 5)), series: rgb }),
-        Panel::Colors(ColorStrip { x, colors }),
-    ];
-    Ok(Figure { title: format!("Transfer curves of the flame sheet \"{name}\" (Ohshima & Itahashi)"), panels, table })
-}
-
-/// The display color of light whose largest component is `brightest` in linear sRGB of the brightest flame.
-fn shown(acescg: [f64; 3], srgb: [f64; 3]) -> Rgb {
-    let brightest = srgb.into_iter().fold(0.0, f64::max).min(1.0) as f32;
-    let hue = display_color(acescg).map(bansho::base::color::decode_srgb8);
-    hue.map(|value| code(value * brightest))
 }
