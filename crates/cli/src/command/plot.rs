@@ -7,11 +7,11 @@ use std::{
 
 use bansho::{
     base::host::printable::printable,
-    job::{JobError, SceneFile},
+    job::{Conflict, JobError, SceneFile},
     media::{
         output::{
             atomic,
-            overwrite_policy::{InputFiles, OverwritePolicy},
+            overwrite_policy::{InputFiles, OverwriteError, OverwritePolicy},
         },
         png,
     },
@@ -90,6 +90,13 @@ fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBu
     let mut files = InputFiles::default();
     inputs.iter().for_each(|input| files.insert(input));
     let policy = OverwritePolicy::new(files, output.policy.overwrite);
+    policy.check(&path).map_err(|kept| {
+        let path = path.clone();
+        JobError::Conflict(match kept {
+            OverwriteError::Input => Conflict::OverInput { path },
+            OverwriteError::Unmarked => Conflict::Unmarked { path, others: 0 },
+        })
+    })?;
     atomic::write_bytes_with(&path, &bytes, &policy).map_err(JobError::from)?;
     Ok(to_stdout(&format!("{}: written\n", printable(&path.display().to_string())))?)
 }

@@ -151,7 +151,8 @@ pub(crate) fn quenching() -> Figure {
     let curve = |(index, state): (usize, &(&str, &str, Rgb))| Series {
         label: state.0.to_owned(),
         color: state.2,
-        style: Style::Line,
+        // Its curve is mostly that of the other nitrogen.
+        style: if index == 3 { Style::Dashed } else { Style::Line },
         points: table.points(1 + index, 0),
     };
     let reference = rows::<5>(QUENCHING);
@@ -163,7 +164,7 @@ pub(crate) fn quenching() -> Figure {
     Figure {
         title: "Fraction of excited states that radiate: quenching by N₂, O₂ and O".to_owned(),
         panels: vec![Panel::Plot(Plot {
-            x: Axis::linear("Radiated fraction", "", [0.0, 1.02]),
+            x: Axis::linear("Radiated fraction", "", [-0.02, 1.02]),
             y: Axis::linear("Altitude", "km", [LOWEST_KM, top.min(500.0)]),
             series,
         })],

@@ -165,7 +165,8 @@ pub(crate) fn streak_opacity(exposure_times_s: &[f64], law: VelocityLaw) -> Figu
         title: format!("Opacity of rain streaks by exposure time T, terminal velocity v: {}", law.name()),
         panels: vec![Panel::Plot(Plot {
             x: diameter_axis(),
-            y: Axis::log("Opacity on the axis, D / (v T)", "", [low, high.max(1.001 * low)]),
+            // Below the lowest curve is room for the legend.
+            y: Axis::log("Opacity on the axis, D / (v T)", "", [0.25 * low, high]),
             series,
         })],
         table,

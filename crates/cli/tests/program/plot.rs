@@ -182,7 +182,7 @@ fn metadata_are_plotted_over_the_frames() {
     assert_eq!(run.code, Some(2), "{}", run.stderr);
     fs::copy(folder.path("0.json"), folder.path("0.csv")).unwrap();
     let run = folder.run(&["plot", "metadata", "0.csv", "-o", "0.csv", "--overwrite"]);
-    assert!(run.code == Some(1) && run.stderr.contains("0.csv: is a file that"), "{}", run.stderr);
+    assert!(run.code == Some(2) && run.stderr.contains("0.csv: is a file that"), "{}", run.stderr);
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn foreign_files_stay() {
     for name in ["a.svg", "a.csv", "a.png"] {
         folder.write(name, "<svg>by hand</svg>");
         let run = folder.run(&["plot", "quenching", "-o", name]);
-        assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
         assert!(run.stderr.contains("--overwrite to replace what is there"), "{}", run.stderr);
         assert_eq!(fs::read_to_string(folder.path(name)).unwrap(), "<svg>by hand</svg>");
         folder.succeed(&["plot", "quenching", "-o", name, "--overwrite"]);
