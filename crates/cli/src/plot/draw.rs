@@ -28,6 +28,8 @@ const STRIP: f64 = 34.0;
 const TITLE_SIZE: f64 = 14.0;
 const LABEL_SIZE: f64 = 13.0;
 const NUMBER_SIZE: f64 = 12.0;
+/// How much wider the fonts may be that show an SVG: Arial, and its bold letters.
+const WIDER: f64 = 1.08;
 /// Height of capital letters and digits, em.
 const CAP_HEIGHT: f64 = 0.69;
 
@@ -83,7 +85,7 @@ fn draw(figure: &Figure, canvas: &mut dyn Canvas) {
     let title = TextStyle {
         at: [0.5 * (LEFT + WIDTH - RIGHT), 23.0],
         anchor: Anchor::Middle,
-        size: TITLE_SIZE.min(TITLE_SIZE * (WIDTH - 16.0) / font::width(&figure.title, TITLE_SIZE).max(1.0)),
+        size: TITLE_SIZE.min(TITLE_SIZE * (WIDTH - 16.0) / (WIDER * font::width(&figure.title, TITLE_SIZE)).max(1.0)),
         bold: true,
         vertical: false,
     };
@@ -328,7 +330,7 @@ fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn Ca
         return;
     }
     let widest = plot.series.iter().map(|series| font::width(&series.label, NUMBER_SIZE)).fold(0.0, f64::max);
-    let width = SAMPLE + 3.0 * PADDING + widest;
+    let width = SAMPLE + 3.0 * PADDING + WIDER * widest;
     let height = LINE_HEIGHT * plot.series.len() as f64 + PADDING;
     let inset = 10.0;
     let columns = [area.right - inset - width, area.left + inset, 0.5 * (area.left + area.right - width)];

@@ -65,7 +65,9 @@ pub(crate) fn figure(paths: &[PathBuf]) -> Result<Figure, PlotError> {
         };
         let series: Vec<Series> = group.iter().enumerate().map(curve).collect();
         let range = bounds(series.iter().flat_map(|series| &series.points).map(|point| point[1]));
-        let y = Axis::linear(&group[0].name, &group[0].unit, ticks::rounded(range.unwrap_or([0.0, 1.0]), 4));
+        // The name of a single curve stands beside its axis, since it has no legend.
+        let label = if let [one] = group { format!("{}: {}", one.phenomenon, one.name) } else { group[0].name.clone() };
+        let y = Axis::linear(&label, &group[0].unit, ticks::rounded(range.unwrap_or([0.0, 1.0]), 4));
         panels.push(Panel::Plot(Plot { x: x.clone(), y, series }));
     }
     Ok(Figure { title: format!("Metadata of frames {first} to {last}"), panels, table })

@@ -30,7 +30,11 @@ fn step(span: f64, count: usize) -> f64 {
 
 /// A range extended to half the distance of its about `count` ticks. What is negative by a hundredth of it counts as 0.
 pub(super) fn rounded([low, high]: [f64; 2], count: usize) -> [f64; 2] {
-    let span = if high > low { high - low } else { low.abs().max(1.0) };
+    let span = match high - low {
+        span if span > 0.0 => span,
+        _ if low == 0.0 => 1.0,
+        _ => low.abs(),
+    };
     // One number is in the middle.
     let [low, high] = if high > low { [low, high] } else { [low - 0.5 * span, low + 0.5 * span] };
     let low = if (-0.01 * span..0.0).contains(&low) { 0.0 } else { low };
@@ -125,6 +129,6 @@ mod tests {
         assert_eq!(rounded([0.02, 9.17], 6), [0.0, 10.0]);
         assert_eq!(rounded([0.0, 1.0], 6), [0.0, 1.0]);
         assert_eq!(rounded([-0.001, 0.9], 5), [0.0, 0.9]);
-        assert_eq!(rounded([3.0, 3.0], 4), [1.5, 4.5]);
+        assert_eq!((rounded([3.0, 3.0], 4), rounded([0.0, 0.0], 4)), ([1.5, 4.5], [-0.6, 0.6]));
     }
 }
