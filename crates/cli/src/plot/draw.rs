@@ -14,7 +14,7 @@ use super::{
 /// Width of a figure, CSS pixels.
 const WIDTH: f64 = 640.0;
 /// Space left and right of the panels.
-const LEFT: f64 = 74.0;
+const LEFT: f64 = 84.0;
 const RIGHT: f64 = 22.0;
 /// Space above the first panel, for the title.
 const TOP: f64 = 36.0;
@@ -117,6 +117,11 @@ impl Area {
         (self.left..=self.right).contains(&x) && (self.top..=self.bottom).contains(&y)
     }
 
+    /// With a margin.
+    fn grown(&self, by: f64) -> Self {
+        Self { left: self.left - by, right: self.right + by, top: self.top - by, bottom: self.bottom + by }
+    }
+
     fn corners(&self) -> [[f64; 2]; 2] {
         [[self.left, self.top], [self.right, self.bottom]]
     }
@@ -176,16 +181,7 @@ fn draw_plot(plot: &Plot, area: &Area, labels_x: bool, canvas: &mut dyn Canvas) 
     if labels_x {
         draw_x_labels(&plot.x, &x_ticks, x_of, area, canvas);
     }
-    let caption = plot.y.caption();
-    let fitting = LABEL_SIZE.min(LABEL_SIZE * (area.bottom - area.top + 20.0) / font::width(&caption, LABEL_SIZE));
-    let style = TextStyle {
-        at: [19.0, 0.5 * (area.top + area.bottom)],
-        anchor: Anchor::Middle,
-        size: fitting,
-        bold: false,
-        vertical: true,
-    };
-    canvas.text(&caption, &style);
+    draw_y_caption(&plot.y, &y_ticks, area, canvas);
     draw_legend(plot, area, &drawn, canvas);
 }
 
@@ -236,7 +232,29 @@ fn draw_x_labels(axis: &Axis, ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &A
         bold: false,
         vertical: false,
     };
-    canvas.text(&axis.caption(), &style);
+    canvas.text(&axis.caption(&ticks.factor), &style);
+}
+
+/// Beside the axis: in one line, or a long label above its unit.
+fn draw_y_caption(axis: &Axis, ticks: &Ticks, area: &Area, canvas: &mut dyn Canvas) {
+    let room = area.bottom - area.top;
+    let (whole, unit) =
+        (axis.caption(&ticks.factor), Axis { label: String::new(), ..axis.clone() }.caption(&ticks.factor));
+    let lines = if WIDER * font::width(&whole, LABEL_SIZE) <= room || unit.is_empty() {
+        vec![(whole, 20.0)]
+    } else {
+        vec![(axis.label.clone(), 14.0), (unit.trim().to_owned(), 30.0)]
+    };
+    for (line, x) in lines {
+        let style = TextStyle {
+            at: [x, 0.5 * (area.top + area.bottom)],
+            anchor: Anchor::Middle,
+            size: LABEL_SIZE.min(LABEL_SIZE * room / (WIDER * font::width(&line, LABEL_SIZE)).max(1.0)),
+            bold: false,
+            vertical: true,
+        };
+        canvas.text(&line, &style);
+    }
 }
 
 /// Style of numbers and legends.
@@ -338,7 +356,7 @@ fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn Ca
     let candidates = columns
         .iter()
         .flat_map(|&left| rows.iter().map(move |&top| Area { left, right: left + width, top, bottom: top + height }));
-    let hidden = |area: &Area| drawn.iter().filter(|&&point| area.contains(point)).count();
+    let hidden = |area: &Area| drawn.iter().filter(|&&point| area.grown(6.0).contains(point)).count();
     let Some(place) = candidates.min_by_key(hidden) else { return };
     canvas.rectangle(place.corners(), [255; 3], 0.85);
     canvas.line(&place.outline(), &Stroke { color: [190; 3], width: 0.7, dash: None });

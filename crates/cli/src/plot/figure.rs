@@ -85,9 +85,14 @@ impl Axis {
         Self { label: label.to_owned(), unit: unit.to_owned(), scale: Scale::Log, range }
     }
 
-    /// Label and unit, as printed along the axis.
-    pub(crate) fn caption(&self) -> String {
-        if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
+    /// Label and unit, as printed along the axis; its numbers are multiples of `factor`.
+    pub(crate) fn caption(&self, factor: &str) -> String {
+        match [factor, &self.unit].map(str::is_empty) {
+            [true, true] => self.label.clone(),
+            [true, false] => format!("{} ({})", self.label, self.unit),
+            [false, true] => format!("{} ({factor})", self.label),
+            [false, false] => format!("{} ({factor} {})", self.label, self.unit),
+        }
     }
 }
 
@@ -139,6 +144,11 @@ pub(crate) const PALETTE: [Rgb; 8] = [
 /// The color of curve `index`.
 pub(crate) fn color(index: usize) -> Rgb {
     PALETTE[index % PALETTE.len()]
+}
+
+/// A unit of the library with raised digits.
+pub(crate) fn pretty_unit(unit: &str) -> String {
+    unit.replace("^2", "²").replace("^3", "³")
 }
 
 /// Numbers in rows and columns.

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::{
     PlotError,
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color},
+    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color, pretty_unit},
     ticks,
 };
 
@@ -67,7 +67,7 @@ pub(crate) fn figure(paths: &[PathBuf]) -> Result<Figure, PlotError> {
         let range = bounds(series.iter().flat_map(|series| &series.points).map(|point| point[1]));
         // The name of a single curve stands beside its axis, since it has no legend.
         let label = if let [one] = group { format!("{}: {}", one.phenomenon, one.name) } else { group[0].name.clone() };
-        let y = Axis::linear(&label, &group[0].unit, ticks::rounded(range.unwrap_or([0.0, 1.0]), 4));
+        let y = Axis::linear(&label, &pretty_unit(&group[0].unit), ticks::padded(range.unwrap_or([0.0, 1.0])));
         panels.push(Panel::Plot(Plot { x: x.clone(), y, series }));
     }
     Ok(Figure { title: format!("Metadata of frames {first} to {last}"), panels, table })

@@ -16,7 +16,7 @@ use bansho::{
 
 use super::{
     PlotError, did_you_mean,
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color},
+    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color, pretty_unit},
     ticks,
 };
 
@@ -219,6 +219,16 @@ pub(crate) fn figure(file: &SceneFile, paths: &[String]) -> anyhow::Result<Figur
     Ok(Figure { title, panels, table })
 }
 
+/// The points of a curve at the frames, and at its keys and just before them, where it may jump.
+fn drawn(curve: &Curve, at_frames: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let end = at_frames.last().map_or(0.0, |point| point[0]);
+    let times = curve.points().iter().flat_map(|key| [key[0] - 1e-6, key[0]]);
+    let keys = times.filter(|time| (0.0..=end).contains(time)).map(|time| [time, curve.eval(time)]);
+    let mut points: Vec<[f64; 2]> = at_frames.iter().copied().chain(keys).collect();
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    points
+}
+
 /// The plot of one keyed parameter; its values are added to the table.
 fn parameter_plot(stated: &Stated, x: &Axis, table: &mut Table) -> Plot {
     let (path, unit, curves) = (stated.path(), unit(&stated.steps), curves(stated.node));
@@ -232,11 +242,16 @@ fn parameter_plot(stated: &Stated, x: &Axis, table: &mut Table) -> Plot {
             row.push(curve.eval(row[1]));
         }
         let label = if name.is_empty() { "value".to_owned() } else { name.to_owned() };
-        series.push(Series { label, color: color(c), style: Style::Line, points: table.points(1, column) });
+        series.push(Series {
+            label,
+            color: color(c),
+            style: Style::Line,
+            points: drawn(curve, &table.points(1, column)),
+        });
     }
     let keys: Vec<[f64; 2]> = curves.iter().flat_map(|curve| curve.points().iter().copied()).collect();
     let shown = series.iter().flat_map(|series| &series.points).map(|point| point[1]);
     let range = bounds(shown).unwrap_or([0.0, 1.0]);
     series.push(Series { label: "keys".to_owned(), color: color(6), style: Style::Markers, points: keys });
-    Plot { x: x.clone(), y: Axis::linear(&path, unit, ticks::rounded(range, 4)), series }
+    Plot { x: x.clone(), y: Axis::linear(&path, &pretty_unit(unit), ticks::padded(range)), series }
 }

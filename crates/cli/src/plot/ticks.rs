@@ -11,6 +11,8 @@ pub(super) struct Ticks {
     pub(super) major: Vec<(f64, String)>,
     /// Numbers without one.
     pub(super) minor: Vec<f64>,
+    /// The power of ten that the labels are multiples of; empty if that is 1.
+    pub(super) factor: String,
 }
 
 /// Ticks for an axis that has room for about `count` labels.
@@ -30,18 +32,23 @@ fn step(span: f64, count: usize) -> f64 {
 
 /// A range extended to half the distance of its about `count` ticks. What is negative by a hundredth of it counts as 0.
 pub(super) fn rounded([low, high]: [f64; 2], count: usize) -> [f64; 2] {
-    let span = match high - low {
-        span if span > 0.0 => span,
-        _ if low == 0.0 => 1.0,
-        _ => low.abs(),
-    };
-    // One number is in the middle.
-    let [low, high] = if high > low { [low, high] } else { [low - 0.5 * span, low + 0.5 * span] };
+    let [low, high] = if high > low { [low, high] } else { padded([low, low]) };
+    let span = high - low;
     let low = if (-0.01 * span..0.0).contains(&low) { 0.0 } else { low };
     let step = step(span, 2 * count);
     let whole = |value: f64, round: fn(f64) -> f64, slack: f64| round(value / step + slack) * step;
     let [low, top] = [whole(low, f64::floor, 1e-9), whole(high, f64::ceil, -1e-9)];
     [low, if top > low { top } else { low + step }]
+}
+
+/// A range with a margin, so that no curve lies on the frame.
+pub(super) fn padded([low, high]: [f64; 2]) -> [f64; 2] {
+    let margin = match high - low {
+        span if span > 0.0 => 0.06 * span,
+        _ if low == 0.0 => 0.5,
+        _ => 0.5 * low.abs(),
+    };
+    [low - margin, high + margin]
 }
 
 fn linear([low, high]: [f64; 2], count: usize) -> Ticks {
@@ -56,11 +63,11 @@ fn linear([low, high]: [f64; 2], count: usize) -> Ticks {
     let decimals = (-exponent(step / unit)).max(0) as usize;
     let label = |value: f64| match value / unit {
         zero if zero.abs() < 1e-9 * step / unit => "0".to_owned(),
-        value if scaled => format!("{}×10{}", signed(&format!("{value:.decimals$}")), superscript(power)),
         value => signed(&format!("{value:.decimals$}")),
     };
     let is_five = (step / math::pow(10.0, f64::from(exponent(step))) - 5.0).abs() < 0.5;
     Ticks {
+        factor: if scaled { power_of_ten(power) } else { String::new() },
         major: multiples(step).map(|value| (value, label(value))).collect(),
         minor: multiples(step / if is_five { 5.0 } else { 4.0 }).collect(),
     }
@@ -81,6 +88,7 @@ fn log([low, high]: [f64; 2], count: usize) -> Ticks {
     let labelled = (first..=last).filter(|decade| (decade - first) % every == 0);
     Ticks {
         major: labelled.map(|decade| (math::pow(10.0, f64::from(decade)), power_of_ten(decade))).collect(),
+        factor: String::new(),
         minor: minor.filter(|value| (low..=high).contains(value)).collect(),
     }
 }
@@ -118,7 +126,9 @@ mod tests {
         let linear = |range| labels(&Axis::linear("", "", range), 6);
         assert_eq!(linear([0.0, 10_000.0]), ["0", "2000", "4000", "6000", "8000", "10000"]);
         assert_eq!(linear([-0.5, 1.0]), ["−0.5", "0", "0.5", "1.0"]);
-        assert_eq!(linear([0.0, 3e7]), ["0", "0.5×10⁷", "1.0×10⁷", "1.5×10⁷", "2.0×10⁷", "2.5×10⁷", "3.0×10⁷"]);
+        assert_eq!(linear([0.0, 3e7]), ["0", "0.5", "1.0", "1.5", "2.0", "2.5", "3.0"]);
+        let axis = Axis::linear("q", "1/m", [0.0, 3e7]);
+        assert_eq!(axis.caption(&ticks(&axis, 6).factor), "q (10⁷ 1/m)");
         let log = |range| labels(&Axis::log("", "", range), 6);
         assert_eq!(log([0.1, 1e4]), ["10⁻¹", "1", "10", "10²", "10³", "10⁴"]);
         assert_eq!(log([1e-6, 1e10]).len(), 6);
@@ -129,6 +139,6 @@ mod tests {
         assert_eq!(rounded([0.02, 9.17], 6), [0.0, 10.0]);
         assert_eq!(rounded([0.0, 1.0], 6), [0.0, 1.0]);
         assert_eq!(rounded([-0.001, 0.9], 5), [0.0, 0.9]);
-        assert_eq!((rounded([3.0, 3.0], 4), rounded([0.0, 0.0], 4)), ([1.5, 4.5], [-0.6, 0.6]));
+        assert_eq!((rounded([3.0, 3.0], 4), rounded([0.0, 0.0], 8)), ([1.5, 4.5], [-0.5, 0.5]));
     }
 }
