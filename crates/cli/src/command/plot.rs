@@ -9,7 +9,7 @@ use bansho::{
     base::host::printable::printable,
     job::{Conflict, JobError, SceneFile},
     media::{
-        output::{
+        files::{
             atomic,
             overwrite_policy::{InputFiles, OverwriteError, OverwritePolicy},
         },
@@ -94,7 +94,7 @@ fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBu
         let path = path.clone();
         JobError::Conflict(match kept {
             OverwriteError::Input => Conflict::OverInput { path },
-            OverwriteError::Unmarked => Conflict::Unmarked { path, others: 0 },
+            OverwriteError::NotMadeByBansho => Conflict::Unmarked { path, others: 0 },
         })
     })?;
     atomic::write_bytes_with(&path, &bytes, &policy).map_err(JobError::from)?;

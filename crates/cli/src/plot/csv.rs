@@ -1,6 +1,6 @@
 //! Tables as CSV (RFC 4180), and back.
 
-use bansho::media::output::provenance;
+use bansho::media::files::provenance;
 
 use super::figure::Table;
 

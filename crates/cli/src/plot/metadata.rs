@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho::media::input;
+use bansho::media::files::input;
 use serde_json::Value;
 
 use super::{

@@ -3,7 +3,7 @@
 use bansho::rain::{
     drops::{
         size_distribution::DropSizeDistribution,
-        terminal_velocity::{Air, TerminalVelocity, VelocityLaw},
+        terminal_velocity::{FallAir, TerminalVelocity, VelocityLaw},
     },
     streaks::coverage::Streak,
 };
@@ -82,7 +82,7 @@ pub(crate) fn drop_sizes(rates_mm_per_h: &[f64]) -> Figure {
 /// Terminal velocity in still air at 20 degrees Celsius and 1013.25 hPa: both laws, and the measurements.
 pub(crate) fn terminal_velocity() -> Figure {
     let measured: Vec<[f64; 2]> = rows::<2>(GUNN_KINZER);
-    let law = |law| TerminalVelocity { law, air: Air::default() };
+    let law = |law| TerminalVelocity { law, air: FallAir::default() };
     let laws = [law(VelocityLaw::GunnKinzer), law(VelocityLaw::RigidSphere)];
     let mut diameters = diameters_mm();
     diameters.extend(measured.iter().map(|point| point[0]));
@@ -122,7 +122,7 @@ pub(crate) fn terminal_velocity() -> Figure {
 
 /// Opacity on the axis of a streak, D / (v T), at exposure times in s.
 pub(crate) fn streak_opacity(exposure_times_s: &[f64], law: VelocityLaw) -> Figure {
-    let velocity = TerminalVelocity { law, air: Air::default() };
+    let velocity = TerminalVelocity { law, air: FallAir::default() };
     let name = |time: &f64| format!("opacity_at_{}_s", number(*time));
     let mut table = Table::new(["diameter_mm".to_owned()].into_iter().chain(exposure_times_s.iter().map(name)));
     // A drop of no diameter has no streak.

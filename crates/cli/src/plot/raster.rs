@@ -1,7 +1,7 @@
 //! Figures as pixels.
 
 use ab_glyph::OutlineCurve;
-use bansho::{AlphaConvention, DisplayImage, base::image::DisplayPixels};
+use bansho::{AlphaConvention, DisplayImage, base::frame::DisplayPixels};
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, StrokeDash, Transform};
 
 use super::{

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use bansho::media::output::provenance;
+use bansho::media::files::provenance;
 
 use super::{
     canvas::{Anchor, Canvas, Stroke, TextStyle},
