@@ -7,7 +7,7 @@ use std::{
 
 use bansho::{
     base::host::printable::printable,
-    job::{Conflict, JobError, SceneFile},
+    job::{JobError, OptionError, SceneFile},
     media::{
         files::{
             atomic,
@@ -19,7 +19,7 @@ use bansho::{
 
 use crate::{
     args::{Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
-    output::to_stdout,
+    output::print,
     plot::{PlotError, aurora, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves},
 };
 
@@ -74,7 +74,7 @@ fn read(path: &Path) -> Result<SceneFile, JobError> {
 fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBuf]) -> anyhow::Result<()> {
     let path = output.out.clone().unwrap_or_else(|| Path::new("out/plots").join(name).with_extension("svg"));
     if path.as_os_str() == "-" {
-        return Ok(to_stdout(&csv::encode(&figure.title, &figure.table))?);
+        return Ok(print(&csv::encode(&figure.title, &figure.table))?);
     }
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let bytes = match extension.to_str() {
@@ -92,11 +92,11 @@ fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBu
     let policy = OverwritePolicy::new(files, output.policy.overwrite);
     policy.check(&path).map_err(|kept| {
         let path = path.clone();
-        JobError::Conflict(match kept {
-            OverwriteError::Input => Conflict::OverInput { path },
-            OverwriteError::NotMadeByBansho => Conflict::Unmarked { path, others: 0 },
+        JobError::Option(match kept {
+            OverwriteError::Input => OptionError::OutputIsInput { path },
+            OverwriteError::NotMadeByBansho => OptionError::NotMadeByBansho { path, others: 0 },
         })
     })?;
     atomic::write_bytes_with(&path, &bytes, &policy).map_err(JobError::from)?;
-    Ok(to_stdout(&format!("{}: written\n", printable(&path.display().to_string())))?)
+    Ok(print(&format!("{}: written\n", printable(&path.display().to_string())))?)
 }

@@ -11,7 +11,7 @@ use bansho::{
         },
     },
     job::{JobError, SceneFile},
-    scene::{SHARED_TABLES, values},
+    scene::{SHARED_TABLES, parse_values},
 };
 
 use super::{
@@ -125,7 +125,7 @@ fn find<'a, 'b>(file: &SceneFile, all: &'b [Stated<'a>], path: &str) -> Result<V
         None => (path.to_owned(), PathError::Unknown { hint, keyed }),
     };
     let kind = ProblemKind::Model(ModelError::new(error));
-    Err(JobError::SetScene(Box::new(SceneError::at(&file.name, &file.text, &at, kind))))
+    Err(JobError::ChangedScene(Box::new(SceneError::at(&file.name, &file.text, &at, kind))))
 }
 
 /// A keyed value as one curve per component.
@@ -193,7 +193,7 @@ fn inner_table(kind: &Kind) -> &'static [Descriptor] {
 /// The scene is faulty, or a path means nothing that is keyed.
 pub(crate) fn figure(file: &SceneFile, paths: &[String]) -> anyhow::Result<Figure> {
     let scene = file.parse()?;
-    let root = values(&file.text).unwrap_or_default();
+    let root = parse_values(&file.text).unwrap_or_default();
     let mut all = Vec::new();
     all_values(&root, &[], &mut all);
     let mut meant = Vec::new();
