@@ -225,7 +225,7 @@ fn foreign_files_stay() {
         folder.write(name, "<svg>by hand</svg>");
         let run = folder.run(&["plot", "quenching", "-o", name]);
         assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
-        assert!(run.stderr.contains("--overwrite to replace what is there"), "{}", run.stderr);
+        assert!(run.stderr.contains("or --overwrite to replace it"), "{}", run.stderr);
         assert_eq!(fs::read_to_string(folder.path(name)).unwrap(), "<svg>by hand</svg>");
         folder.succeed(&["plot", "quenching", "-o", name, "--overwrite"]);
         // Now it is one of ours.
