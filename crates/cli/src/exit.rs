@@ -7,6 +7,7 @@ use bansho::job::{ErrorCategory, JobError};
 use crate::{
     flags, interrupt,
     output::{print_error_lines, print_message},
+    plot::PlotError,
 };
 
 /// The command failed.
@@ -38,7 +39,8 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
         Some(ReportedError::Job(job)) => Some(job),
         _ => error.downcast_ref::<JobError>(),
     };
-    match job.map(JobError::category) {
+    let plot = || error.downcast_ref().map(PlotError::category);
+    match job.map(JobError::category).or_else(plot) {
         Some(ErrorCategory::Usage) => USAGE,
         Some(ErrorCategory::Scene) => SCENE,
         Some(ErrorCategory::Cancelled) => interrupt::exit_code(),

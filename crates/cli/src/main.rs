@@ -6,6 +6,7 @@ mod exit;
 mod flags;
 mod interrupt;
 mod output;
+mod plot;
 mod progress;
 mod stats;
 
@@ -48,6 +49,7 @@ fn run(command: &Command) -> anyhow::Result<()> {
         Command::Streaks(args) => command::streaks::run(args),
         Command::Simulate(args) => command::simulate::run(args),
         Command::Calibrate => command::calibrate::run(),
+        Command::Plot(args) => command::plot::run(args),
         Command::Studio(args) => command::studio::run(args),
         Command::Completions(args) => command::generated::run_completions(args),
         Command::Man(args) => command::generated::run_man(args),

@@ -2,6 +2,7 @@
 
 mod flipbook;
 mod input;
+mod plot;
 mod render;
 mod simulate;
 mod streaks;
@@ -15,9 +16,11 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use self::{
     flipbook::FlipbookArgs,
     input::InputArgs,
+    plot::{PlotArgs, PlotCommand, PlotOutputArgs},
     render::RenderArgs,
     simulate::SimulateArgs,
     streaks::StreaksArgs,
+    values::Numbers,
     work::{ProgressKind, WorkArgs},
 };
 
@@ -61,6 +64,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Print the brightness of auroras for each energy of the electrons, and compare it with observations.
     Calibrate,
+    /// Plot what the models compute, and what a scene states, as SVG, PNG or CSV.
+    Plot(PlotArgs),
     /// Open a scene in the studio, a separate program for interactive editing.
     Studio(StudioArgs),
     /// Print a completion script for a shell.

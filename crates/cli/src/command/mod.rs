@@ -5,6 +5,7 @@ pub(crate) mod check;
 pub(crate) mod flipbook;
 pub(crate) mod generated;
 pub(crate) mod new;
+pub(crate) mod plot;
 pub(crate) mod render;
 pub(crate) mod simulate;
 pub(crate) mod streaks;

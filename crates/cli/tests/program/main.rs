@@ -5,5 +5,6 @@ mod crate_dependencies;
 mod input;
 mod output;
 mod phenomena;
+mod plot;
 mod robustness;
 mod support;

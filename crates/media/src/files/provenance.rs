@@ -10,6 +10,8 @@
 //! | WebM | a tag that begins with `BANSHO:` | before or after the frames |
 //! | JSON | `"program"`, second after `"format"` | start |
 //! | PLY | a comment that begins with `Bansho:` | header |
+//! | SVG | a comment that begins with `bansho:` | after the first tag |
+//! | CSV | a comment that begins with `bansho:` | first line |
 //! | snapshot | its first eight bytes | start |
 //!
 //! A file that was truncated after its mark, for example by a power failure, still has it. Without a mark are a truncated MOV, a file
@@ -29,8 +31,8 @@ pub const PROGRAM: &str = concat!("Bansho ", env!("CARGO_PKG_VERSION"));
 /// First bytes of a snapshot of a simulation.
 pub const SNAPSHOT_MAGIC: [u8; 8] = *b"BANSHOSS";
 
-/// Comment of GIF files, and tag of films.
-pub(crate) const COMMENT_TAG: &str = concat!("bansho:version=", env!("CARGO_PKG_VERSION"));
+/// Comment of GIF, SVG and CSV files, and tag of films.
+pub const COMMENT_TAG: &str = concat!("bansho:version=", env!("CARGO_PKG_VERSION"));
 /// Prefix of all keys, names and comments that mark a file.
 const PREFIX: &[u8] = b"bansho:";
 
@@ -68,6 +70,8 @@ fn has_mark(path: &Path) -> io::Result<bool> {
         }
         head if head.get(4..8) == Some(b"ftyp") => in_film(&mut file, length)?,
         head if head.starts_with(b"ply\n") => in_ply(head),
+        head if head.starts_with(b"<svg") => in_svg(head),
+        head if head.starts_with(b"# ") => starts_with_prefix(&head[2..]),
         head if head.starts_with(&SNAPSHOT_MAGIC) => true,
         head => in_json(head),
     })
@@ -164,6 +168,13 @@ fn find_box(file: &mut File, within: Range<u64>, expected: [u8; 4]) -> io::Resul
 fn in_ply(head: &[u8]) -> bool {
     let mut lines = head.split(|&byte| byte == b'\n').take_while(|line| *line != b"end_header");
     lines.any(|line| line.strip_prefix(b"comment ").is_some_and(starts_with_prefix))
+}
+
+/// Whether the comment after the first tag is the mark.
+fn in_svg(head: &[u8]) -> bool {
+    let Some(end) = head.iter().position(|&byte| byte == b'>') else { return false };
+    let rest = head[end + 1..].trim_ascii_start();
+    rest.strip_prefix(b"<!-- ").is_some_and(starts_with_prefix)
 }
 
 fn in_json(head: &[u8]) -> bool {
@@ -265,6 +276,12 @@ mod tests {
         assert!(is_marked_with(&ply::encode(&PointCloud::default())));
         assert!(!is_marked_with(b"ply\nformat ascii 1.0\ncomment by hand\nend_header\ncomment Bansho: \n"));
         assert!(is_marked_with(b"BANSHOSS and a state") && !is_marked_with(b"BANSHO"));
+        for text in ["<svg width=\"9\">\n<!-- bansho:version=1 -->", "# bansho:version=1; title\nx,y\n"] {
+            assert!(is_marked_with(text.as_bytes()) && !is_marked_with(text.replace("bansho", "by hand").as_bytes()));
+        }
+        for other in ["<svg/><!-- by hand --><!-- bansho:version=1 -->", "<svg", "# ", "x\n# bansho:version=1"] {
+            assert!(!is_marked_with(other.as_bytes()), "{other}");
+        }
         let json = |text: &str| is_marked_with(text.as_bytes());
         assert!(json(&format!("{{\n  \"format\": 12,\n  \"program\": \"{PROGRAM}\"\n}}")));
         assert!(json("{\"format\":1,\"program\":\"Bansho 9\",\"size\":"), "cut off");

@@ -40,6 +40,16 @@ pub fn encode(
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
+/// As [`encode`], small and without a fingerprint: a picture for documents that is not a frame of a scene.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_document(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
+    let size = checked_size(picture, path)?;
+    compress(picture, size, None, PngEffort::Small)
+        .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
+}
+
 /// As [`encode`], without a fingerprint: a frame of a film.
 pub(crate) fn encode_frame(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;

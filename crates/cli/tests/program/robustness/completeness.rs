@@ -144,6 +144,7 @@ fn text_that_cannot_be_written_is_an_error() {
         &["completions", "bash"],
         &["man"],
         &["calibrate"],
+        &["plot", "quenching", "-o", "-"],
         &["--help"],
         &["render", "--help"],
         &["--version"],

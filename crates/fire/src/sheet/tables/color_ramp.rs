@@ -60,6 +60,21 @@ fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
     }
 }
 
+/// The factor that gives the brightest color luminance 1.
+fn luminance_scale(color: &ColorParameters) -> f64 {
+    let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
+    let max_luminance = (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
+    if max_luminance > 0.0 { 1.0 / max_luminance } else { 0.0 }
+}
+
+impl ColorParameters {
+    /// Color over T2, eq. (7), as linear ACEScg whose brightest value has luminance 1.
+    pub fn light(&self) -> impl Fn(f64) -> [f64; 3] + '_ {
+        let scale = luminance_scale(self);
+        move |t2| unscaled_color(self, t2).map(|value| value * scale)
+    }
+}
+
 /// Gray value of a stage before coloring.
 fn stage_value(stage: Stage, t1: f64, t2: f64) -> f64 {
     if stage == Stage::Sharpened { t2 } else { t1 }
@@ -77,10 +92,7 @@ impl ColorRamp {
     /// The table for parameters that were [checked](Self::check).
     pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: Stage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
-        let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
-        let max_luminance =
-            (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
-        let scale = if max_luminance > 0.0 { 1.0 / max_luminance } else { 0.0 };
+        let scale = luminance_scale(color);
         let light = |t1: f64| {
             let t2 = sharpen.eval(t1);
             match stage {

@@ -1,0 +1,79 @@
+//! `bansho plot`: figures of what the models compute.
+//!
+//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`] and [`metadata`] make one
+//! from the library's own functions. [`draw`] lays a figure out on a [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
+
+pub(crate) mod aurora;
+pub(crate) mod black_body;
+mod canvas;
+pub(crate) mod csv;
+pub(crate) mod draw;
+pub(crate) mod figure;
+mod font;
+pub(crate) mod metadata;
+pub(crate) mod parameters;
+pub(crate) mod rain;
+mod raster;
+mod svg;
+mod ticks;
+pub(crate) mod transfer_curves;
+
+use std::path::PathBuf;
+
+use bansho::job::ErrorCategory;
+
+/// Why a figure cannot be made as asked for.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PlotError {
+    /// A range without numbers.
+    #[error("{option}: {from} to {to} {unit} is no range; allowed: a start below its end")]
+    EmptyRange {
+        /// The option of its start.
+        option: &'static str,
+        from: f64,
+        to: f64,
+        unit: &'static str,
+    },
+    /// More rows than a table may have.
+    #[error("{option}: the table would have {rows} rows; allowed: up to {most}")]
+    Rows {
+        /// The option that decides how many.
+        option: &'static str,
+        rows: f64,
+        most: f64,
+    },
+    /// The name of the output is not that of a format.
+    #[error("{}: the extension says the format; allowed: .svg, .png or .csv, or `-` for CSV on standard output", path.display())]
+    Extension { path: PathBuf },
+    /// A figure with more panels than a picture has room for.
+    #[error("{}: a picture of {panels} panels; allowed: fewer, or .svg", path.display())]
+    Panels { path: PathBuf, panels: usize },
+    /// A scene without a phenomenon that has such curves.
+    #[error("{scene}: has no {kind}; allowed: a scene with one")]
+    NoPhenomenon { scene: String, kind: &'static str },
+    /// A scene in which no phenomenon has that name.
+    #[error("--name: {scene} has no {kind} `{name}`{hint}; allowed: {allowed}")]
+    NoSuchName { scene: String, kind: &'static str, name: String, hint: String, allowed: String },
+    /// A file that is not what `render --metadata` writes.
+    #[error("{}: {problem}; allowed: a JSON file that `bansho render --metadata` wrote", path.display())]
+    NotMetadata { path: PathBuf, problem: String },
+    /// Metadata without a number.
+    #[error("{}: none of these files states a number of a phenomenon; allowed: metadata of a scene whose phenomena report some", path.display())]
+    NoNumbers { path: PathBuf },
+}
+
+impl PlotError {
+    /// Whose fault it is, for exit codes.
+    pub(crate) fn category(&self) -> ErrorCategory {
+        match self {
+            Self::NoPhenomenon { .. } => ErrorCategory::Scene,
+            Self::NotMetadata { .. } | Self::NoNumbers { .. } => ErrorCategory::Work,
+            _ => ErrorCategory::Usage,
+        }
+    }
+}
+
+/// A hint at the name that was probably meant.
+fn did_you_mean(name: &Option<String>) -> String {
+    name.as_ref().map(|name| format!(", did you mean `{name}`?")).unwrap_or_default()
+}

@@ -1,0 +1,258 @@
+//! `bansho plot`: its numbers, its files, its errors.
+
+use std::{collections::HashSet, fs};
+
+use crate::support::{FLAME, Folder, decode_png};
+
+/// Columns and rows of a figure's table; empty cells are NaN.
+struct Csv {
+    columns: Vec<String>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Csv {
+    fn of(arguments: &[&str]) -> Self {
+        let run = Folder::new().succeed(&[&["plot"], arguments, &["-o", "-"]].concat());
+        Self::parse(&run.stdout)
+    }
+
+    fn parse(text: &str) -> Self {
+        assert!(text.starts_with("# bansho:version="), "{text}");
+        let mut lines = text.lines().skip(1);
+        let columns: Vec<String> = lines.next().unwrap().split(',').map(str::to_owned).collect();
+        let cell = |cell: &str| if cell.is_empty() { f64::NAN } else { cell.parse().unwrap() };
+        let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(cell).collect()).collect();
+        assert!(rows.iter().all(|row| row.len() == columns.len()));
+        Self { columns, rows }
+    }
+
+    fn row(&self, abscissa: f64) -> &[f64] {
+        self.rows.iter().find(|row| (row[0] - abscissa).abs() < 1e-6).unwrap()
+    }
+
+    /// Abscissa of the largest number of a column.
+    fn peak(&self, column: usize) -> f64 {
+        self.rows.iter().max_by(|a, b| a[column].total_cmp(&b[column])).unwrap()[0]
+    }
+}
+
+fn near(found: f64, expected: f64, relative: f64) -> bool {
+    (found / expected - 1.0).abs() <= relative
+}
+
+#[test]
+fn black_bodies_are_a_table_of_all_kelvins() {
+    let table = Csv::of(&["black-body"]);
+    assert_eq!((table.rows.len(), table.columns.len()), (10_000, 8));
+    assert_eq!((&table.columns[0][..], &table.columns[7][..]), ("temperature_k", "ln_luminance_cd_per_m2"));
+    // Near the white of sRGB.
+    assert!(table.row(6500.0)[1..7].iter().all(|value| near(*value, 1.0, 0.05)));
+    // 3.02182e7 cd/m^2 and linear sRGB (1.77072, 0.844444, 0.272137) at 3000 K.
+    let row = table.row(3000.0);
+    assert!((row[7] - 3.02182e7_f64.ln()).abs() < 1e-4, "{row:?}");
+    assert!(near(row[1], 1.77072, 1e-3) && near(row[2], 0.844444, 1e-3) && near(row[3], 0.272137, 1e-3), "{row:?}");
+    let few = Csv::of(&["black-body", "--from", "1000", "--to", "2000", "--step", "250"]);
+    let kelvins: Vec<f64> = few.rows.iter().map(|row| row[0]).collect();
+    assert_eq!(kelvins, [1000.0, 1250.0, 1500.0, 1750.0, 2000.0]);
+}
+
+#[test]
+fn drops_fall_as_gunn_and_kinzer_measured() {
+    let table = Csv::of(&["terminal-velocity"]);
+    // Between 5.17 m/s at 1.4 mm and 5.65 m/s at 1.6 mm.
+    assert!(near(table.row(1.5)[1], 5.41, 1e-6));
+    assert_eq!((table.row(2.0)[1], table.row(2.0)[3]), (6.49, 6.49));
+    assert!(table.row(5.0)[2] > 1.28 * table.row(5.0)[1], "rigid spheres fall faster");
+}
+
+#[test]
+fn drop_sizes_are_those_of_marshall_and_palmer() {
+    let table = Csv::of(&["drop-sizes", "--rates", "1,20"]);
+    assert_eq!(table.columns[2], "n_at_20_mm_per_h_per_m3_mm");
+    assert_eq!(table.row(0.0)[1..], [8000.0, 8000.0]);
+    assert!(near(table.row(1.0)[1], 132.581, 1e-5) && near(table.row(2.0)[2], 101.092, 1e-5));
+}
+
+#[test]
+fn streaks_fade_with_the_exposure_time() {
+    let table = Csv::of(&["streak-opacity", "--exposure-times", "1/30,1/60"]);
+    assert!(near(table.row(1.0)[1], 0.0074442, 1e-4) && near(table.row(1.0)[2], 0.014888, 1e-4));
+    let sphere = Csv::of(&["streak-opacity", "--exposure-times", "0.001", "--terminal-velocity", "rigid_sphere"]);
+    assert!(near(sphere.row(0.5)[1], 0.24284, 1e-4));
+}
+
+#[test]
+fn electrons_stop_and_air_glows_at_the_known_altitudes() {
+    let table = Csv::of(&["deposition", "--energies-ev", "1000,10000"]);
+    // Fang et al. (2010): 158.35 and 104.68 km.
+    assert!((table.peak(1) - 158.35).abs() <= 2.0 && (table.peak(2) - 104.68).abs() <= 2.0);
+    let emission = Csv::of(&["emission", "--energy-ev", "5000", "--flux-mw-per-m2", "10"]);
+    assert_eq!(emission.columns.len(), 8);
+    assert_eq!(emission.columns[1], "o_557_7_nm_photons_per_m3_s");
+    // Green near 114.8 km as observed, red above 200 km.
+    assert!((emission.peak(1) - 114.8).abs() < 5.0 && emission.peak(2) > 200.0);
+    let twice = Csv::of(&["emission", "--energy-ev", "5000", "--flux-mw-per-m2", "20"]);
+    assert!(near(twice.row(110.0)[1], 2.0 * emission.row(110.0)[1], 1e-6));
+}
+
+#[test]
+fn low_red_light_is_quenched() {
+    let table = Csv::of(&["quenching"]);
+    // O(1S) at 90 km: 0.6599; O(1D) at 300 km: 0.5967.
+    assert!(near(table.row(90.0)[1], 0.6599, 0.01) && near(table.row(300.0)[2], 0.5967, 0.01));
+}
+
+const KEYED: &str = "
+[wind]
+velocity = { keys = [[0.0, [0.0, 0.0, 0.0]], [0.1, [1.0, 0.0, -2.0]]], interpolation = \"linear\" }
+gust = 0.5
+";
+
+#[test]
+fn keyed_parameters_are_plotted_over_the_shot() {
+    let folder = Folder::with_scene(&format!("{FLAME}{KEYED}"));
+    let run = folder.succeed(&["plot", "parameters", "scene.toml", "--path", "wind.velocity", "-o", "-"]);
+    let table = Csv::parse(&run.stdout);
+    assert_eq!(table.columns, ["frame", "time_s", "wind.velocity.x", "wind.velocity.y", "wind.velocity.z"]);
+    assert_eq!(table.rows.len(), 7);
+    assert_eq!(table.row(3.0)[1..], [0.1, 1.0, 0.0, -2.0]);
+    let svg = folder.succeed(&["plot", "parameters", "scene.toml", "--path", "wind.velocity"]);
+    assert_eq!(svg.stdout, "out/plots/parameters.svg: written\n");
+    let svg = fs::read_to_string(folder.path("out/plots/parameters.svg")).unwrap();
+    assert!(svg.contains(">wind.velocity (m/s)<") && svg.contains(">Time (s)<"), "{svg}");
+}
+
+#[test]
+fn paths_that_mean_nothing_keyed_are_located() {
+    let folder = Folder::with_scene(&format!("{FLAME}{KEYED}"));
+    for (path, told) in [
+        ("wind.velocty", "did you mean `wind.velocity`?"),
+        ("wind.gust", "scene.toml:17:8: wind.gust: is not keyed"),
+        ("nothing", "keyed in it: wind.velocity"),
+    ] {
+        let run = folder.run(&["plot", "parameters", "scene.toml", "--path", path]);
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{path}: {}", run.stderr);
+        assert!(run.stderr.contains(told), "{path}: {}", run.stderr);
+    }
+    let run = folder.run(&["plot", "parameters", "scen.toml", "--path", "wind.velocity"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+}
+
+#[test]
+fn transfer_curves_are_those_of_the_scene() {
+    let scene = FLAME.replace(
+        "name = \"left log\"",
+        "name = \"left log\"\ncolor.kind = \"rgb_curves\"\ncolor.red = [[0, 0], [1, 0.5]]",
+    );
+    let folder = Folder::with_scene(&scene);
+    let run = folder.succeed(&["plot", "transfer-curves", "scene.toml", "--name", "left log", "-o", "-"]);
+    let table = Csv::parse(&run.stdout);
+    assert_eq!(table.columns, ["s", "sharpen", "r", "g", "b"]);
+    assert_eq!((table.row(0.0)[2], table.row(0.5)[2], table.row(1.0)[2]), (0.0, 0.25, 0.5));
+    let run = folder.run(&["plot", "transfer-curves", "scene.toml", "--name", "left lag"]);
+    assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("did you mean `left log`?"), "{}", run.stderr);
+    let rain = Folder::with_scene("bansho = 2\n[[rain]]\n");
+    let run = rain.run(&["plot", "transfer-curves", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+}
+
+#[test]
+fn metadata_are_plotted_over_the_frames() {
+    let folder = Folder::new();
+    for frame in 0..3 {
+        let text = format!(
+            "{{\"format\": 1, \"frame\": {frame}, \"phenomena\": {{\"shower\": \
+             {{\"rate\": {{\"value\": {frame}.5, \"unit\": \"mm/h\"}}, \"far\": {{\"value\": null, \"unit\": \"m\"}}}}}}}}"
+        );
+        folder.write(&format!("{frame}.json"), &text);
+    }
+    let run = folder.succeed(&["plot", "metadata", "2.json", "0.json", "1.json", "-o", "-"]);
+    let table = Csv::parse(&run.stdout);
+    assert_eq!(table.columns, ["frame", "shower far (m)", "shower rate (mm/h)"]);
+    let rates: Vec<f64> = table.rows.iter().map(|row| row[2]).collect();
+    assert!(rates == [0.5, 1.5, 2.5] && table.rows.iter().all(|row| row[1].is_nan()));
+    folder.succeed(&["plot", "metadata", "0.json", "-o", "one.png"]);
+    folder.write("other.json", "{\"frame\": 1}");
+    let run = folder.run(&["plot", "metadata", "other.json"]);
+    assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("other.json: states no `phenomena`; allowed: "), "{}", run.stderr);
+    // What it is made from is never replaced.
+    let run = folder.run(&["plot", "metadata", "0.json", "-o", "0.json"]);
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
+    fs::copy(folder.path("0.json"), folder.path("0.csv")).unwrap();
+    let run = folder.run(&["plot", "metadata", "0.csv", "-o", "0.csv", "--overwrite"]);
+    assert!(run.code == Some(2) && run.stderr.contains("0.csv: is a file that"), "{}", run.stderr);
+}
+
+#[test]
+fn figures_have_axes_colors_and_the_same_bytes_every_time() {
+    let folder = Folder::new();
+    for name in
+        ["black-body", "drop-sizes", "terminal-velocity", "streak-opacity", "emission", "deposition", "quenching"]
+    {
+        for extension in ["svg", "png", "csv"] {
+            let file = format!("{name}.{extension}");
+            let made = || {
+                folder.succeed(&["plot", name, "-o", &file]);
+                fs::read(folder.path(&file)).unwrap()
+            };
+            assert!(made() == made(), "{file}");
+        }
+        let png = decode_png(&fs::read(folder.path(&format!("{name}.png"))).unwrap());
+        let colors: HashSet<&[u8]> = png.bytes.chunks(png.channels).collect();
+        assert!(png.width == 1600 && colors.len() > 50, "{name}: {} x {}", png.width, png.height);
+    }
+    let svg = |name: &str| fs::read_to_string(folder.path(&format!("{name}.svg"))).unwrap();
+    for (name, label) in [
+        ("black-body", "Temperature T (K)"),
+        ("black-body", "Luminance (cd/m²)"),
+        ("drop-sizes", "Number density n(D) (m⁻³ mm⁻¹)"),
+        ("terminal-velocity", "Terminal velocity v (m/s)"),
+        ("streak-opacity", "Drop diameter D (mm)"),
+        ("emission", "Altitude (km)"),
+        ("deposition", "Ionization rate q (m⁻³ s⁻¹)"),
+        ("quenching", "Radiated fraction"),
+    ] {
+        assert!(svg(name).contains(&format!(">{label}</text>")), "{name}: {label}");
+    }
+}
+
+#[test]
+fn foreign_files_stay() {
+    let folder = Folder::new();
+    for name in ["a.svg", "a.csv", "a.png"] {
+        folder.write(name, "<svg>by hand</svg>");
+        let run = folder.run(&["plot", "quenching", "-o", name]);
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+        assert!(run.stderr.contains("or --overwrite to replace it"), "{}", run.stderr);
+        assert_eq!(fs::read_to_string(folder.path(name)).unwrap(), "<svg>by hand</svg>");
+        folder.succeed(&["plot", "quenching", "-o", name, "--overwrite"]);
+        // Now it is one of ours.
+        folder.succeed(&["plot", "terminal-velocity", "-o", name]);
+    }
+}
+
+#[test]
+fn what_cannot_be_plotted_is_one_clear_error() {
+    let folder = Folder::new();
+    for (arguments, told) in [
+        (&["blak-body"][..], "a similar subcommand exists: 'black-body'"),
+        (&["black-body", "--from", "0"], "allowed: a number from 1 to 10000 K"),
+        (&["black-body", "--to", "1e99"], "allowed: a number from 1 to 10000 K"),
+        (&["black-body", "--from", "3000", "--to", "2000"], "--from: 3000 to 2000 K is no range"),
+        (&["black-body", "--step", "0.01", "--from", "nan"], "allowed: a number"),
+        (&["drop-sizes", "--rates", "5,-1"], "each from 0.01 to 500 mm/h"),
+        (&["streak-opacity", "--exposure-times", "1/0"], "each from 0.000001 to 10 s"),
+        (&["emission", "--energy-ev", "10"], "allowed: a number from 100 to 100000 eV"),
+        (&["emission", "--flux-mw-per-m2", "-5"], "allowed: a number from 0.001 to 10000 mW/m^2"),
+        (&["emission", "--spectrum", "maxwelian"], "a similar value exists: 'maxwellian'"),
+        (&["deposition", "--energies-ev", "1000,1e9"], "each from 100 to 100000 eV"),
+        (&["quenching", "-o", "figure.pdf"], "allowed: .svg, .png or .csv"),
+    ] {
+        let run = folder.run(&[&["plot"], arguments].concat());
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{arguments:?}: {}", run.stderr);
+        assert!(run.stderr.contains(told), "{arguments:?}: {}", run.stderr);
+    }
+    assert_eq!(folder.names(), Vec::<String>::new());
+}
