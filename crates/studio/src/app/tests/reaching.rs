@@ -39,7 +39,7 @@ fn parameters_are_found_by_name_and_description() {
     find(&mut harness, "Octaves");
     harness.get_by_role_and_label(Role::SpinButton, "octaves");
     assert!(harness.query_by_role_and_label(Role::SpinButton, "height").is_none());
-    find(&mut harness, "scroll speed");
+    find(&mut harness, "sheet heights per second");
     harness.get_by_role_and_label(Role::SpinButton, "speed");
     find(&mut harness, "no such thing");
     harness.get_by_label("Nothing here is called so.");
