@@ -49,7 +49,7 @@ fn black_bodies_are_a_table_of_all_kelvins() {
     assert!(table.row(6500.0)[1..7].iter().all(|value| near(*value, 1.0, 0.05)));
     // 3.02182e7 cd/m^2 and linear sRGB (1.77072, 0.844444, 0.272137) at 3000 K.
     let row = table.row(3000.0);
-    assert!((row[7] - 3.02182e7_f64.ln()).abs() < 1e-4, "{row:?}");
+    assert!((row[7] - 17.22395).abs() < 1e-4, "{row:?}");
     assert!(near(row[1], 1.77072, 1e-3) && near(row[2], 0.844444, 1e-3) && near(row[3], 0.272137, 1e-3), "{row:?}");
     let few = Csv::of(&["black-body", "--from", "1000", "--to", "2000", "--step", "250"]);
     let kelvins: Vec<f64> = few.rows.iter().map(|row| row[0]).collect();
