@@ -9,7 +9,7 @@ LINE = '<path d="M1 5L9 5"/>'
 
 def _drawing(name: str, content: Content, code: int | tuple[int, ...] = 3, words: str = "", **more) -> Case:
     # What only shows once the strokes are laid out is told at the sheet, or at the list of them.
-    says = rf"^error: scene\.toml:(8:8: aurora\.0\.shapes\.0\.sheets\.0\.svg_file .*drawing\.svg.*({words})|7:\d+: aurora\.0\.shapes\.0\.sheets.*allowed|7:\d+: aurora\.0\.shapes\.0\.sheets.*crosses itself)"
+    says = rf"^error: scene\.toml:(8:12: aurora\.0\.shapes\.0\.sheets\.0\.svg_file .*drawing\.svg.*({words})|7:\d+: aurora\.0\.shapes\.0\.sheets.*allowed|7:\d+: aurora\.0\.shapes\.0\.sheets.*crosses itself)"
     return Case("svg", name, ["check", "scene.toml"], code, says, {"scene.toml": SCENE, "drawing.svg": content}, **more)
 
 
@@ -85,6 +85,6 @@ def cases() -> list[Case]:
         _drawing("1,000,000 declarations without brackets", parts(("<!a>", MEGA), (_svg(LINE), 1)), (0, 3), signaled=True, large=True),
         _drawing("15 MB of text", parts((head, 1), ("a" * 1000, 15_000), (LINE + tail, 1)), 0, signaled=True, large=True),
         _drawing("an id of a megabyte", _svg(f'<path id="{"a" * MEGA}" d="L"/>'), words="path"),
-        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:10: aurora\.0\.shapes\.0\.sheets\.0\.svg_path_id .*no stroke of the id `gone`",
+        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:15: aurora\.0\.shapes\.0\.sheets\.0\.svg_path_id .*no stroke of the id `gone`",
              {"scene.toml": SCENE + 'svg_path_id = "gone"\n', "drawing.svg": _svg(LINE)}),
     ]

@@ -24,7 +24,7 @@ def _names() -> list[Case]:
         _out("an unknown extension", "a.tiff", 2, r"^error: a\.tiff: `\.tiff` is not supported"),
         _out("an extension of a megabyte's tenth", "a." + "b" * 100_000, 2, r"^error: "),
         _out("two numbers", "a.##.##.png", 2, r"^error: a\.##\.##\.png: more than one placeholder"),
-        _out("a numbered film", "a.####.gif", 2, r"^error: a\.####\.gif: a \.gif file holds all frames"),
+        _out("a numbered film", "a.####.gif", 2, r"^error: a\.####\.gif: a \.gif file contains all frames"),
         _out("printf with a string", "a.%s.png", 2, r"^error: a\.%s\.png: `%`"),
         _out("printf with 99 digits", "a.%099d.png", 2, r"^error: a\.%099d\.png: `%`"),
         _out("printf with a number to write to", "a.%n.png", 2, r"^error: a\.%n\.png: `%`"),

@@ -93,7 +93,7 @@ def _assets() -> list[Case]:
         ("mesh", "mesh.gltf", r"scene\.toml:8:8: obstacle\.0\.file.*: ", {"scene.toml": meshes.SCENE.format("mesh.gltf")}),
         ("mesh", "mesh.glb", r"scene\.toml:8:8: obstacle\.0\.file.*: ", {"scene.toml": meshes.SCENE.format("mesh.glb")}),
         ("buffer", "a.bin", r"scene\.toml:8:8: obstacle\.0\.file.*: ", {"scene.toml": meshes.SCENE.format("mesh.gltf"), "mesh.gltf": gltf.changed(buffers_0_uri="a.bin")}),
-        ("drawing", "drawing.svg", r"scene\.toml:8:8: aurora\.0\.shapes\.0\.sheets\.0\.svg_file .*", {"scene.toml": drawings.SCENE}),
+        ("drawing", "drawing.svg", r"scene\.toml:8:12: aurora\.0\.shapes\.0\.sheets\.0\.svg_file .*", {"scene.toml": drawings.SCENE}),
     ]
     made = []
     for what, file, place, files in wanted:
@@ -127,7 +127,7 @@ def _confined() -> list[Case]:
         confined("a sequence of links", "l.#.png", {"inside/l.0.png": link("here.png"), "inside/l.1.png": link("../outside.png")}),
         confined("a folder of a like name", "../inside2/a.png", {"inside2/a.png": flat}),
         Case("root", "a buffer outside", ["check", "--asset-root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:8: obstacle\.0\.file", mesh),
-        Case("root", "a drawing outside", ["check", "--asset-root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:8: aurora\.0\.shapes\.0\.sheets\.0\.svg_file ",
+        Case("root", "a drawing outside", ["check", "--asset-root", "inside", "inside/scene.toml"], 3, r"^error: inside/scene\.toml:8:12: aurora\.0\.shapes\.0\.sheets\.0\.svg_file ",
              {"inside/scene.toml": drawings.SCENE.replace("drawing.svg", "../drawing.svg"), "drawing.svg": '<svg><path d="M0 0L1 1"/></svg>'}),
         Case("root", "rendered", ["render", "--asset-root", "inside", "inside/scene.toml", "-o", "out/a.png", "--frames", "0"], 3, r"^error: inside/scene\.toml:6:9: plate\.image: ",
              {"inside/scene.toml": plates.SCENE.format("../outside.png"), "outside.png": flat}),
