@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Fails when a fast way is not as many times faster than its naive twin as .ci/ratios.txt asks.
+"""Fails when a fast way is not as many times faster than its naive implementation as .ci/ratios.txt asks.
 
 Reads what criterion measured in the same run, so that the speed of the machine does not matter.
 Usage: ratios.py CRITERION_DIR RATIOS_FILE

@@ -59,7 +59,7 @@ fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
 }
 
 /// All equations with trigonometric functions and curves evaluated at every pixel.
-#[allow(clippy::disallowed_methods, reason = "the naive twin calls the standard library")]
+#[allow(clippy::disallowed_methods, reason = "the naive implementation calls the standard library")]
 fn naive_pixel(parameters: &FlameSheetParameters, x: f64, y: f64, scroll: f64) -> [f64; 3] {
     let shape = &parameters.shape;
     let rise = equations::rise(y as f32, shape.initial_speed as f32);
@@ -81,7 +81,7 @@ fn naive_pixel(parameters: &FlameSheetParameters, x: f64, y: f64, scroll: f64) -
 }
 
 /// Eq. (20), literally.
-#[allow(clippy::disallowed_methods, reason = "the naive twin calls the standard library")]
+#[allow(clippy::disallowed_methods, reason = "the naive implementation calls the standard library")]
 fn naive_texture(p: f64, q: f64) -> f64 {
     let (mut sum, mut total, mut weight, mut fx, mut fy) = (0.0, 0.0, 1.0, 16.0, 26.0);
     for _ in 0..OCTAVES {

@@ -35,7 +35,7 @@
 //! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::displacement` |
 //!
 //! # Data flow
-//! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins with terminal velocities.
+//! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins. Terminal velocities follow each frame from the scene's air.
 //! 2. For a frame, `shutter_cameras` holds the cameras when the shutter opens, at its middle and when it closes, and `drops::shutter_state` the state of
 //!    the rain: a `lattice` of cells for each diameter, displaced by the wind, with `gust`s on top.
 //! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.

@@ -24,7 +24,7 @@ const MAX_MEASURED: usize = 16;
 ///
 /// Measured in a thumbnail of the middle frame, and where that shows no change in those of the first and last frame. Phenomena that are
 /// simulated in steps are left out. With more than [`MAX_MEASURED`] phenomena nothing is measured.
-pub(crate) fn faint(compiled: &CompiledScene, plan: &Plan) -> Vec<(String, Remark)> {
+pub(crate) fn faint_phenomenon_remarks(compiled: &CompiledScene, plan: &Plan) -> Vec<(String, Remark)> {
     if !plan.scene.has_plate() {
         return Vec::new();
     }

@@ -16,7 +16,7 @@ use bansho_base::{
 use crate::{
     compiled::{ActiveRun, CompiledScene},
     context::ShotContext,
-    faint::faint,
+    faint::faint_phenomenon_remarks,
     plan::Plan,
     planning::exposure::assumed_of_plate,
     shot::stepping::scene_publication,
@@ -80,5 +80,5 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
         (PLATE_LAYER.to_owned(), Remark::new(message))
     });
     let of_phenomena = (0..runs.len()).filter_map(remark);
-    plate.into_iter().chain(of_phenomena).chain(faint(compiled, plan)).collect()
+    plate.into_iter().chain(of_phenomena).chain(faint_phenomenon_remarks(compiled, plan)).collect()
 }

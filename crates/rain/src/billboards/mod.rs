@@ -103,8 +103,8 @@ impl<'a> Billboards<'a> {
     /// Streaks whose radiance is below `culling_radiance` (cd/m^2) everywhere are drawn without the light of lamps and
     /// fires.
     pub(super) fn new(projection: StreakProjection<'a>, culling_radiance: f32) -> Self {
-        let exposure = projection.exposure;
-        Self { projection, textures: DropTextures::new(exposure.key, &exposure.classes), culling_radiance }
+        let shutter_state = projection.shutter_state;
+        Self { projection, textures: DropTextures::new(shutter_state.key, &shutter_state.classes), culling_radiance }
     }
 
     /// The streaks of all cells that may be visible within a sphere.
@@ -153,21 +153,21 @@ impl<'a> Billboards<'a> {
 
     /// Corner of a quad relative to the camera, and its edge vectors, m.
     fn quad_edges(&self, quad: &UprightQuad) -> [[f32; 3]; 3] {
-        let eye = self.projection.exposure.cameras.middle().position;
+        let eye = self.projection.shutter_state.cameras.middle().position;
         let [corner, right, up] = [quad.point(0.0, 0.0), quad.point(1.0, 0.0), quad.point(0.0, 1.0)];
         [corner - eye, right - corner, up - corner].map(|vector| vector.as_vec3().to_array())
     }
 
     fn billboard(&self, class: &DropClassState, cell: Cell) -> Billboard<'_> {
-        let exposure = self.projection.exposure;
+        let shutter_state = self.projection.shutter_state;
         let contents = class.lattice.contents(cell);
-        let [across, up, choice, mirrored] = exposure.key.uniforms(contents, 0, class.purpose(OFFSET));
-        let [x, z, threshold, _] = exposure.key.uniforms(contents, 0, class.purpose(POSITION));
+        let [across, up, choice, mirrored] = shutter_state.key.uniforms(contents, 0, class.purpose(OFFSET));
+        let [x, z, threshold, _] = shutter_state.key.uniforms(contents, 0, class.purpose(POSITION));
         // At a random position within the cell, so that billboards do not line up.
-        let (middle, velocity) = exposure.drop_state(class, cell, DVec3::new(x.into(), 0.5, z.into()));
+        let (middle, velocity) = shutter_state.drop_state(class, cell, DVec3::new(x.into(), 0.5, z.into()));
         let height = class.lattice.height();
         let base = middle - DVec3::Y * (0.5 * height);
-        let right = right_facing(exposure.cameras.middle(), base);
+        let right = right_facing(shutter_state.cameras.middle(), base);
         Billboard {
             quad: UprightQuad::new(base, right, DVec2::new(CELL_SIZE, height), 0.0),
             velocity,

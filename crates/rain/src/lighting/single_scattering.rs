@@ -38,13 +38,13 @@ const MIN_LAMP_DISTANCE: f64 = 0.02;
 /// Extinction coefficient as a function of the distance from the camera.
 #[derive(Clone, Copy)]
 struct ExtinctionProfile<'a> {
-    exposure: &'a ShutterState,
+    shutter_state: &'a ShutterState,
     extinction: RainExtinction,
 }
 
 impl ExtinctionProfile<'_> {
     fn at(&self, distance: f64) -> f64 {
-        self.extinction.all - self.extinction.streaks * f64::from(self.exposure.streak_weight(distance as f32))
+        self.extinction.all - self.extinction.streaks * f64::from(self.shutter_state.streak_weight(distance as f32))
     }
 }
 
@@ -155,7 +155,7 @@ impl<'a> SingleScattering<'a> {
     /// The medium up to the distance `end` (m) in front of a plate, and up to `farthest` (m) without a plate; `None` where
     /// there is no rain.
     pub(crate) fn new(
-        exposure: &ShutterState,
+        shutter_state: &ShutterState,
         lighting: &DropLighting,
         sky: Arc<SkyLighting>,
         view: &'a View,
@@ -166,7 +166,7 @@ impl<'a> SingleScattering<'a> {
         if end <= 0.0 || extinction.all <= 0.0 {
             return None;
         }
-        let profile = ExtinctionProfile { exposure, extinction };
+        let profile = ExtinctionProfile { shutter_state, extinction };
         let mut distances = geometric_sequence(FIRST_DISTANCE.min(end), end, DISTANCE_RATIO);
         distances.insert(0, 0.0);
         let last = distances.len() - 1;
@@ -179,7 +179,7 @@ impl<'a> SingleScattering<'a> {
             let depth = f64::from(depths[depths.len() - 1]);
             depths.push((depth + (pair[1] - pair[0]) * 0.5 * (profile.at(pair[0]) + profile.at(pair[1]))) as f32);
         }
-        let eye = exposure.cameras.middle().position;
+        let eye = shutter_state.cameras.middle().position;
         let integrator =
             InScatterIntegrator { lighting, extinction: profile, eye, distances: &distances, depths: &depths, end };
         let tiles = &sky.fine.tiles;
@@ -201,7 +201,7 @@ impl<'a> SingleScattering<'a> {
             in_scattering,
             halos,
             end,
-            ground: exposure.ground,
+            ground: shutter_state.ground,
         })
     }
 
@@ -495,7 +495,7 @@ impl InScatterIntegrator<'_> {
     fn sample(&self, light: &Light, direction: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
         let point = self.eye + direction * at;
         let extinction = self.extinction.at(at);
-        if extinction <= 0.0 || point.y < self.extinction.exposure.ground {
+        if extinction <= 0.0 || point.y < self.extinction.shutter_state.ground {
             return [0.0; 3];
         }
         let radiance = self.lighting.radiance(light, point, direction);

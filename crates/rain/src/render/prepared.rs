@@ -57,6 +57,7 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
 
 /// Writes the AOVs of one pixel of a streak; `depth` in m.
 fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
+    debug_assert!(aovs.is_empty() || aovs.len() == AOVS.len(), "a plane for each AOV, or none");
     let [opacities, depths, diameters] = aovs else { return };
     if opacity > 0.0 {
         opacities.add(index, 1.0, opacity);
@@ -82,26 +83,26 @@ pub(crate) struct PreparedRain<'a> {
 
 impl<'a> PreparedRain<'a> {
     pub(crate) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
-        let exposure = ShutterState::new(rain, view, surroundings);
+        let shutter_state = ShutterState::new(rain, view, surroundings);
         let extinction = rain.extinction(view.shutter.middle());
         let lights = &surroundings.others.lights;
         let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinction.all };
         let sky_lighting = rain.skies.for_view(&rain.optics.phase_function, view, surroundings.sky);
-        let prepared_lights = lighting.prepare_lights(exposure.cameras.middle().position);
-        let frame = Frame {
+        let prepared_lights = lighting.prepare_lights(shutter_state.cameras.middle().position);
+        let frame = FrameInputs {
             rain,
-            exposure: &exposure,
+            shutter_state: &shutter_state,
             lighting: &lighting,
             prepared_lights: &prepared_lights,
             sky: &sky_lighting.coarse,
             view,
         };
-        let bounds = exposure.around_camera(1.1 * exposure.distance);
+        let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
         let mut billboards = 0;
         let mut chunks = match rain.parameters.method {
             Method::Drops => frame.projection(DropSelection::All).drop_chunks(&[bounds]),
             Method::Billboards => {
-                let region = PerDropRegion::new(&exposure, lights);
+                let region = PerDropRegion::new(&shutter_state, lights);
                 let mut chunks = frame.projection(DropSelection::PerDrop(&region)).drop_chunks(region.spheres());
                 let projection = frame.projection(DropSelection::Billboard(&region));
                 let billboard_chunks = Billboards::new(projection, frame.culling_radiance()).chunks(bounds);
@@ -114,28 +115,28 @@ impl<'a> PreparedRain<'a> {
         let end = if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 };
         let farthest = rain.reach(surroundings);
         let single_scattering =
-            SingleScattering::new(&exposure, &lighting, sky_lighting.clone(), view, extinction, end, farthest);
+            SingleScattering::new(&shutter_state, &lighting, sky_lighting.clone(), view, extinction, end, farthest);
         let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
         Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), single_scattering, metadata }
     }
 }
 
 /// The inputs of a frame.
-struct Frame<'a> {
+struct FrameInputs<'a> {
     rain: &'a Rain,
-    exposure: &'a ShutterState,
+    shutter_state: &'a ShutterState,
     lighting: &'a DropLighting<'a>,
     prepared_lights: &'a [PreparedLight],
     sky: &'a SkyOnDrops,
     view: &'a View,
 }
 
-impl<'a> Frame<'a> {
+impl<'a> FrameInputs<'a> {
     /// The projection of the selected drops.
     fn projection(&self, selection: DropSelection<'a>) -> StreakProjection<'a> {
         StreakProjection {
             level: Level::new(),
-            exposure: self.exposure,
+            shutter_state: self.shutter_state,
             lighting: self.lighting,
             lights: self.prepared_lights,
             sky: self.bright_sky(),

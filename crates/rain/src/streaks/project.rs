@@ -39,7 +39,7 @@ pub(crate) const FADE_IN: f64 = 0.02;
 #[derive(Clone, Copy)]
 pub(crate) struct StreakProjection<'a> {
     pub(crate) level: Level,
-    pub(crate) exposure: &'a ShutterState,
+    pub(crate) shutter_state: &'a ShutterState,
     pub(crate) lighting: &'a DropLighting<'a>,
     /// The same lights, prepared for SIMD.
     pub(crate) lights: &'a [PreparedLight],
@@ -109,13 +109,13 @@ impl StreakProjection<'_> {
         half_width: f64,
         add: impl Fn(&DropClassState, Cell, &mut StreakChunkBuilder) + Sync,
     ) -> Vec<StreakChunk> {
-        let classes = self.exposure.classes.par_iter().filter(|class| class.fraction > 0.0);
+        let classes = self.shutter_state.classes.par_iter().filter(|class| class.fraction > 0.0);
         let lists: Vec<Vec<_>> = classes
             .map(|class| self.cells(class, within, half_width).into_iter().map(|visible| (visible, class)).collect())
             .collect();
         let mut cells = lists.concat();
         cells.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance));
-        let size = self.exposure.cameras.size();
+        let size = self.shutter_state.cameras.size();
         let fill = |cells: &[(VisibleCell, &DropClassState)]| {
             let mut builder = StreakChunkBuilder::new(size);
             for (visible, class) in cells {
@@ -130,7 +130,7 @@ impl StreakProjection<'_> {
     /// The cells of a class, without duplicates.
     fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<VisibleCell> {
         let mut cells: Vec<_> =
-            within.iter().flat_map(|sphere| self.exposure.visible_cells(class, *sphere, half_width)).collect();
+            within.iter().flat_map(|sphere| self.shutter_state.visible_cells(class, *sphere, half_width)).collect();
         cells.sort_by_key(|visible| visible.cell);
         cells.dedup_by_key(|visible| visible.cell);
         cells
@@ -139,11 +139,11 @@ impl StreakProjection<'_> {
     /// Adds the streaks of a cell, drop by drop.
     #[inline(always)]
     fn add_cell(&self, class: &DropClassState, cell: Cell, builder: &mut StreakChunkBuilder) {
-        let key = self.exposure.key;
+        let key = self.shutter_state.key;
         let contents = class.lattice.contents(cell);
         let words = key.words(contents, 0, class.purpose(COUNT));
         let count = random::poisson(class.max_density * class.lattice.volume(), [words[0], words[1]]) as usize;
-        let state = self.exposure.cell_state(class, cell);
+        let state = self.shutter_state.cell_state(class, cell);
         let rising = ((1.0 + FADE_IN) * class.fraction) as f32;
         for first in (0..count).step_by(LANES) {
             let [x, y, z, threshold] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
@@ -161,10 +161,10 @@ impl StreakProjection<'_> {
     /// Adds the streaks of visible drops. Those with a peak opacity below `min_peak` are not lit by lamps and fires.
     #[inline(always)]
     pub(crate) fn add_drops(&self, drops: &DropBatch, min_peak: f32, builder: &mut StreakChunkBuilder) {
-        let exposure = self.exposure;
+        let shutter_state = self.shutter_state;
         let [xs, ys, zs] = &drops.positions;
         let weights = self.selection.weights(&drops.positions);
-        let half = 0.5 * exposure.cameras.exposure_time as f32;
+        let half = 0.5 * shutter_state.cameras.exposure_time as f32;
         let mut paths = DropPaths {
             from: drops.positions,
             to: drops.positions,
@@ -173,7 +173,8 @@ impl StreakProjection<'_> {
         };
         for i in 0..LANES {
             let distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
-            paths.gain[i] = drops.presence[i] * exposure.streak_weight(distance) * weights[i] * exposure.gain as f32;
+            paths.gain[i] =
+                drops.presence[i] * shutter_state.streak_weight(distance) * weights[i] * shutter_state.gain as f32;
         }
         for axis in 0..3 {
             for i in 0..LANES {
@@ -182,13 +183,13 @@ impl StreakProjection<'_> {
                 paths.to[axis][i] += travel;
             }
         }
-        let eye = exposure.cameras.middle().position;
-        paths.clip_at_ground((exposure.ground - eye.y) as f32);
-        let mut streaks = paths.streaks(&exposure.cameras);
-        if exposure.has_occluders() {
+        let eye = shutter_state.cameras.middle().position;
+        paths.clip_at_ground((shutter_state.ground - eye.y) as f32);
+        let mut streaks = paths.streaks(&shutter_state.cameras);
+        if shutter_state.has_occluders() {
             for i in 0..LANES {
                 let [position, velocity] = [&drops.positions, &drops.velocities].map(|vectors| vector(vectors, i));
-                if streaks.visible[i] != 0 && exposure.is_sheltered(eye + position, velocity) {
+                if streaks.visible[i] != 0 && shutter_state.is_sheltered(eye + position, velocity) {
                     streaks.visible[i] = 0;
                 }
             }
@@ -259,17 +260,17 @@ struct SphereF32 {
 }
 
 impl PerDropRegion {
-    pub(crate) fn new(exposure: &ShutterState, lights: &[Light]) -> Self {
-        let eye = exposure.cameras.middle().position;
+    pub(crate) fn new(shutter_state: &ShutterState, lights: &[Light]) -> Self {
+        let eye = shutter_state.cameras.middle().position;
         let lamp = |light: &Light| match light.emitter {
             Emitter::Directional { .. } => None,
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(position),
         };
         let radius = LAMP_RADIUS + FADE_WIDTH;
-        let near = |position: &DVec3| (*position - eye).length() < 1.1 * exposure.distance + radius;
+        let near = |position: &DVec3| (*position - eye).length() < 1.1 * shutter_state.distance + radius;
         let lamps = lights.iter().filter_map(lamp).filter(near).map(|center| Sphere { center, radius });
         let spheres: Vec<Sphere> =
-            [exposure.around_camera(CAMERA_RADIUS + FADE_WIDTH)].into_iter().chain(lamps).collect();
+            [shutter_state.around_camera(CAMERA_RADIUS + FADE_WIDTH)].into_iter().chain(lamps).collect();
         let from_camera = |sphere: &Sphere| SphereF32 {
             center: (sphere.center - eye).as_vec3().to_array(),
             radius: sphere.radius as f32,

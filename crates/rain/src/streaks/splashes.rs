@@ -78,9 +78,9 @@ struct Period {
 impl Splashes<'_> {
     /// The streaks of all droplets that may be visible.
     pub(crate) fn chunks(&self) -> Vec<StreakChunk> {
-        let (exposure, reach) = (self.projection.exposure, self.parameters.distance);
-        let eye = exposure.cameras.middle().position;
-        let eye_height = (eye.y - exposure.ground).abs();
+        let (shutter_state, reach) = (self.projection.shutter_state, self.parameters.distance);
+        let eye = shutter_state.cameras.middle().position;
+        let eye_height = (eye.y - shutter_state.ground).abs();
         if self.parameters.fraction <= 0.0 || eye_height >= reach {
             return Vec::new();
         }
@@ -89,11 +89,11 @@ impl Splashes<'_> {
         };
         let squares: Vec<[i64; 2]> = range(eye.x).flat_map(|x| range(eye.z).map(move |z| [x, z])).collect();
         let middle = |[x, z]: [i64; 2]| {
-            DVec3::new((x as f64 + 0.5) * SQUARE_SIZE, exposure.ground, (z as f64 + 0.5) * SQUARE_SIZE)
+            DVec3::new((x as f64 + 0.5) * SQUARE_SIZE, shutter_state.ground, (z as f64 + 0.5) * SQUARE_SIZE)
         };
         let is_visible = |square: &&[i64; 2]| {
             (middle(**square) - eye).length() < reach
-                && exposure.cameras.may_be_visible(
+                && shutter_state.cameras.may_be_visible(
                     middle(**square),
                     DVec3::new(0.5 * SQUARE_SIZE, 0.0, 0.5 * SQUARE_SIZE),
                     0.3,
@@ -101,7 +101,7 @@ impl Splashes<'_> {
         };
         let squares: Vec<&[i64; 2]> = squares.iter().filter(is_visible).collect();
         let chunk = |squares: &[&[i64; 2]]| {
-            let mut builder = StreakChunkBuilder::new(exposure.cameras.size());
+            let mut builder = StreakChunkBuilder::new(shutter_state.cameras.size());
             squares.iter().for_each(|square| self.square(**square, middle(**square), &mut builder));
             builder.build()
         };
@@ -118,9 +118,9 @@ impl Splashes<'_> {
     /// Adds the droplets above one ground square.
     fn square(&self, [x, z]: [i64; 2], middle: DVec3, builder: &mut StreakChunkBuilder) {
         let Period { index: period, phase, length } = self.period();
-        let key = self.projection.exposure.key;
+        let key = self.projection.shutter_state.key;
         let id = (x as u64 & 0xffff_ffff) << 32 | z as u64 & 0xffff_ffff;
-        let distance = (middle - self.projection.exposure.cameras.middle().position).length();
+        let distance = (middle - self.projection.shutter_state.cameras.middle().position).length();
         let thinning = (distance / FULL_DENSITY_DISTANCE).max(1.0);
         let probability = self.parameters.fraction / (thinning * thinning);
         let fade = 1.0 - math::smoothstep(0.7, 1.0, distance / self.parameters.distance);
@@ -129,7 +129,9 @@ impl Splashes<'_> {
                 .loop_s
                 .map_or(period - back, |seconds| (period - back).rem_euclid((seconds / length).round() as i64));
             let step = step as u32;
-            for class in self.projection.exposure.classes.iter().filter(|class| class.diameter_mm >= MIN_DIAMETER_MM) {
+            for class in
+                self.projection.shutter_state.classes.iter().filter(|class| class.diameter_mm >= MIN_DIAMETER_MM)
+            {
                 let words = key.words(id, step, class.purpose(COUNT));
                 let mean = class.max_density * class.speed * SQUARE_SIZE * SQUARE_SIZE * length;
                 for number in 0..random::poisson(mean, [words[0], words[1]]) {
@@ -140,7 +142,7 @@ impl Splashes<'_> {
                     }
                     let age = (phase - uniforms[2] + back as f64) * length;
                     let position = middle + DVec3::new(uniforms[0] - 0.5, 0.0, uniforms[1] - 0.5) * SQUARE_SIZE;
-                    let strength = fade * thinning * self.projection.exposure.gain;
+                    let strength = fade * thinning * self.projection.shutter_state.gain;
                     let step = step.wrapping_mul(1 << 16).wrapping_add((class.index as u32) << 12 | number as u32);
                     self.add(
                         class,
@@ -153,29 +155,30 @@ impl Splashes<'_> {
     }
 
     fn add(&self, class: &DropClassState, impact: &Impact, builder: &mut StreakChunkBuilder) {
-        let StreakProjection { exposure, level, .. } = self.projection;
+        let StreakProjection { shutter_state, level, .. } = self.projection;
         let fall = DVec3::Y * -class.speed;
-        if !(0.0..SPLASH_PERIOD).contains(&impact.age) || exposure.is_sheltered(impact.position, fall) {
+        if !(0.0..SPLASH_PERIOD).contains(&impact.age) || shutter_state.is_sheltered(impact.position, fall) {
             return;
         }
         let mut paths =
             DropPaths { from: [ZERO_LANES; 3], to: [ZERO_LANES; 3], diameter_mm: ZERO_LANES, gain: ZERO_LANES };
         for droplet in 0..RING_DROPLETS + HIGH_DROPLETS {
-            let words = exposure.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
+            let words = shutter_state.key.words(impact.id, impact.step, Purpose(DROPLET.0 ^ (droplet as u32) << 24));
             self.droplet(impact, droplet, words.map(|word| f64::from(uniform(word))), &mut paths);
         }
         // One position for all droplets of a splash: the light hardly varies within it.
-        let position = (impact.position + DVec3::Y * 0.01 - exposure.cameras.middle().position).as_vec3().to_array();
+        let position =
+            (impact.position + DVec3::Y * 0.01 - shutter_state.cameras.middle().position).as_vec3().to_array();
         let positions = position.map(|coordinate| [coordinate; LANES]);
         dispatch!(level, _simd => {
-            let streaks = paths.streaks(&exposure.cameras);
+            let streaks = paths.streaks(&shutter_state.cameras);
             self.projection.add_streaks(&streaks, &positions, &paths.diameter_mm, 0.0, builder);
         });
     }
 
     /// Sets the path of one droplet, if it is in the air during the exposure: a ballistic trajectory.
     fn droplet(&self, impact: &Impact, index: usize, random: [f64; 4], paths: &mut DropPaths) {
-        let cameras = &self.projection.exposure.cameras;
+        let cameras = &self.projection.shutter_state.cameras;
         let high = index >= RING_DROPLETS;
         let turns = if high { random[0] } else { (index as f64 + 0.6 * random[0]) / RING_DROPLETS as f64 };
         let elevation = if high { 1.2 + 0.3 * random[1] } else { 0.85 + 0.3 * random[1] };

@@ -52,7 +52,7 @@ fn along_a_beam_light_falls_with_the_square_of_the_distance() {
 }
 
 #[test]
-fn twice_the_fire_is_twice_the_light_of_streaks_and_veil() {
+fn twice_the_fire_is_twice_the_light_of_streaks_and_airlight() {
     for method in METHODS {
         let parameters = || RainParameters { method, ..RainParameters::default() };
         let [once, twice] = [300.0, 600.0].map(|power| lit_by(parameters(), vec![lamp([0.5, 1.0, -3.0], power)], None));
@@ -85,7 +85,7 @@ fn culling_changes_no_pixel_by_a_255th() {
 }
 
 #[test]
-fn the_thickest_veil_around_lamps_stays_finite() {
+fn the_densest_airlight_around_lamps_stays_finite() {
     let light = lamp([0.2, 1.0, -3.0], 1e6);
     let thick = RainParameters {
         rate_mm_per_h: 300.0.into(),
@@ -104,8 +104,8 @@ fn the_thickest_veil_around_lamps_stays_finite() {
 }
 
 #[test]
-fn the_veil_is_single_scattering_along_each_line_of_sight() {
-    // All drops veil: none is drawn as a streak.
+fn the_airlight_is_single_scattering_along_each_line_of_sight() {
+    // All drops belong to the medium: none is drawn as a streak.
     let parameters =
         RainParameters { diameters_mm: vec![8.0], airlight_distance: 30.0, ..streaks(Method::Drops, 20.0) };
     let light = lamp([1.0, 3.0, -9.0], 5000.0);

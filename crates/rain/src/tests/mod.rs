@@ -234,7 +234,7 @@ fn the_plate_hides_all_rain_behind_it() {
         };
         let sum = |strip: &Strip| strip.radiance[1].iter().sum::<f32>();
         let (wall, near, far) = (draw(0.01), draw(2.5), draw(1e6));
-        // A centimeter of veil is before it.
+        // A centimeter of airlight is in front of it.
         assert!(sum(&wall) < 0.02 * sum(&near) && sum(&near) > 0.0 && sum(&far) > 1.3 * sum(&near));
         assert!(near.depth.iter().all(|depth| *depth < 2.5 || depth.is_infinite()));
     }

@@ -56,7 +56,7 @@ impl FinishedFiles {
     }
 
     /// The recorded files that were removed or changed, in order.
-    pub(crate) fn lost(&self) -> Vec<PathBuf> {
+    pub(crate) fn removed_or_changed(&self) -> Vec<PathBuf> {
         let mut lost: Vec<PathBuf> = self.lock().keys().cloned().collect();
         lost.retain(|path| !self.is_present(path));
         lost.sort_unstable();
@@ -78,14 +78,14 @@ mod tests {
             finished.record(at(name));
         }
         finished.record(at("never"));
-        assert_eq!(finished.lost(), [at("never")]);
+        assert_eq!(finished.removed_or_changed(), [at("never")]);
         fs::remove_file(at("removed")).unwrap();
         fs::write(at("cut"), "BANSH").unwrap();
         fs::write(at("spoiled"), "--------").unwrap();
         // Another program that runs the same job replaces the file by its own.
         fs::write(at("new"), "BANSHOSS").unwrap();
         fs::rename(at("new"), at("again")).unwrap();
-        assert_eq!(finished.lost(), ["cut", "never", "removed", "spoiled"].map(at));
+        assert_eq!(finished.removed_or_changed(), ["cut", "never", "removed", "spoiled"].map(at));
         assert!(finished.is_unchanged(&at("kept")) && !finished.is_unchanged(&at("again")));
     }
 }

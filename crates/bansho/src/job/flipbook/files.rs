@@ -129,7 +129,7 @@ impl Files {
         }
         let text = format!("{:#}\n", self.description(plan, sheet, numbers, scale));
         self.write_file(self.path(".json"), text.as_bytes(), &finished)?;
-        match finished.lost() {
+        match finished.removed_or_changed() {
             files if files.is_empty() => Ok(FlipbookSummary { files: self.paths() }),
             files => Err(JobError::FilesLost { files }),
         }

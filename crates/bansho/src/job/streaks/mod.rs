@@ -190,7 +190,7 @@ impl PreparedStreaks {
             format!("{:#}\n", index::describe(&self.streaks, &self.cube, &self.writer, &distributions, &entries));
         self.writer.write_file(&index, text.as_bytes())?;
         finished.record(index.clone());
-        match finished.lost() {
+        match finished.removed_or_changed() {
             files if files.is_empty() => Ok(index),
             files => Err(JobError::FilesLost { files }),
         }

@@ -5,7 +5,8 @@
 
 use std::f64::consts::PI;
 
-/// The integral of poly6, eq. (2), along a ray at distance `b` from the center, 1/m^2: `9/(2 pi d^2) (1 - b^2/d^2)^(7/2)`.
+/// The integral of poly6, eq. (2), along a ray at distance `b` from the center, 1/m^2: `9/(2 pi d^2) (1 - b^2/d^2)^(7/2)`. The exact form, to
+/// which tests compare; pictures use `Profile::LINE`.
 pub fn line_integral(b: f64, d: f64) -> f64 {
     let s = (1.0 - b * b / (d * d)).max(0.0);
     LINE_PEAK / (d * d) * s * s * s * s.sqrt()
