@@ -85,9 +85,9 @@ fn log([low, high]: [f64; 2], count: usize) -> Ticks {
         let factors = if every == 1 { 2..10 } else { 1..2 };
         factors.map(move |factor| f64::from(factor) * math::pow(10.0, f64::from(decade)))
     });
-    let labelled = (first..=last).filter(|decade| (decade - first) % every == 0);
+    let labeled = (first..=last).filter(|decade| (decade - first) % every == 0);
     Ticks {
-        major: labelled.map(|decade| (math::pow(10.0, f64::from(decade)), power_of_ten(decade))).collect(),
+        major: labeled.map(|decade| (math::pow(10.0, f64::from(decade)), power_of_ten(decade))).collect(),
         factor: String::new(),
         minor: minor.filter(|value| (low..=high).contains(value)).collect(),
     }
