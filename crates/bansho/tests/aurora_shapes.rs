@@ -279,11 +279,11 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy_factor = [[0, 1], [0.5, 1], [1, 20]] }]\n",
-            "test.toml:5:75: aurora.0.shapes.0.sheets.1.energy_factor.2 (shape 1, sheet 2, energy_factor 3): at 1 of its length sheet 2 has electrons of 200000 eV",
+            "test.toml:5:75: aurora.0.shapes.0.sheets.1.energy_factor.2 (shape 1, sheet 2, energy_factor 3): sheet 2 has electrons of 200000 eV at the fraction 1 of its length",
         ),
         (
             "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy_factor = [[0.5, 0.1]] }]\n",
-            "at 0.5 of its length sheet 1 has electrons of 50 eV, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
+            "sheet 1 has electrons of 50 eV at the fraction 0.5 of its length, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
         ),
     ] {
         let shown = fault(text);
