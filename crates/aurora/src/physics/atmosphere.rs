@@ -10,7 +10,7 @@ const TABLE_TEXT: &str = include_str!("data/nrlmsise00.csv");
 /// Altitude of the lowest level, km.
 pub const LOWEST_KM: f64 = 80.0;
 /// Altitude of the highest level, km.
-pub const HIGHEST_KM: f64 = 800.0;
+pub(crate) const HIGHEST_KM: f64 = 800.0;
 /// Levels of every altitude table: one per km, both ends included.
 pub const LEVELS: usize = 721;
 /// Distance between two levels, m.
@@ -46,7 +46,7 @@ impl AirLevel {
 
     /// Number density of N2, O2 and O together, m^-3.
     #[must_use]
-    pub const fn number_density(&self) -> f64 {
+    pub(crate) const fn number_density(&self) -> f64 {
         self.n2 + self.o2 + self.o
     }
 
@@ -104,7 +104,7 @@ pub fn level_altitude_km(level: usize) -> f64 {
 
 /// The level below an altitude and the interpolation fraction toward the next; clamped to 80-800 km.
 #[must_use]
-pub fn locate_level(altitude_km: f64) -> (usize, f64) {
+pub(crate) fn locate_level(altitude_km: f64) -> (usize, f64) {
     let coordinate = (altitude_km - LOWEST_KM).clamp(0.0, (LEVELS - 1) as f64);
     let level = (coordinate as usize).min(LEVELS - 2);
     (level, coordinate - level as f64)

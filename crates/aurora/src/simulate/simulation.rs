@@ -285,7 +285,7 @@ impl AuroraSimulation {
 
     /// Scattered particles per cell of the in-between shape, N(i, j) (thesis, figure 2.10).
     #[must_use]
-    pub fn scatter_counts(&self) -> &Grid2 {
+    pub(crate) fn scatter_counts(&self) -> &Grid2 {
         &self.target.field.counts
     }
 
@@ -298,7 +298,7 @@ impl AuroraSimulation {
 
     /// Particles per cell (thesis, figure 2.14).
     #[must_use]
-    pub fn particle_counts(&self) -> Grid2 {
+    pub(crate) fn particle_counts(&self) -> Grid2 {
         let particles = self.particles();
         self.targets.fields.sum_by_cell((0..particles.len()).map(|index| (particles.position(index), 1.0)))
     }

@@ -13,6 +13,6 @@ pub fn counted(count: usize, one: &str) -> String {
 
 /// An allowed range of counts: `exactly 2 items` or `1 to 8 items`.
 #[must_use]
-pub fn count_range(min: usize, max: usize, one: &str) -> String {
+pub(crate) fn count_range(min: usize, max: usize, one: &str) -> String {
     if min == max { format!("exactly {}", counted(min, one)) } else { format!("{min} to {}", counted(max, one)) }
 }

@@ -8,7 +8,7 @@
 use super::MulAdd;
 
 /// 3 * 2^22: adding it to a number of magnitude below 2^22 rounds that number to an integer, which is then in the low bits of the sum.
-pub const ROUNDING_MAGIC: f32 = 12_582_912.0;
+pub(crate) const ROUNDING_MAGIC: f32 = 12_582_912.0;
 const SIGN_BIT: u32 = 0x8000_0000;
 
 /// `x` rounded to the nearest integer, ties to even; for magnitudes below 2^22.

@@ -69,7 +69,7 @@ pub struct PhenomenonKind {
 }
 
 /// Keys that every phenomenon has besides its own.
-pub const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
+pub(crate) const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
 
 /// Makes a [`PhenomenonKind`] from a parameter table and a constructor.
 pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {

@@ -7,7 +7,7 @@ pub const SIDE: u64 = 16384;
 /// Largest number of pixels: half of the largest square, 2 GiB as floats.
 pub const PIXELS: u64 = SIDE * SIDE / 2;
 /// Default memory limit of a scene's inputs, bytes.
-pub const MEMORY_BYTES: u64 = 2 << 30;
+pub(crate) const MEMORY_BYTES: u64 = 2 << 30;
 /// Largest text file (a drawing, or another file that a scene names), bytes.
 pub const TEXT_BYTES: u64 = 64 << 20;
 /// Largest compression ratio of DEFLATE: 258 bytes in two bits, with a margin for headers.

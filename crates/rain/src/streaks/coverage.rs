@@ -55,13 +55,13 @@ impl Streak {
     }
 
     /// Fraction of the blocked area at distances from the axis below `b`: a cumulative distribution.
-    pub fn area_fraction_across(&self, b: f64) -> f64 {
+    pub(crate) fn area_fraction_across(&self, b: f64) -> f64 {
         let u = (b / self.radius).clamp(-1.0, 1.0);
         0.5 + (math::asin(u) + u * math::sqrt(1.0 - u * u)) / PI
     }
 
     /// Fraction of the blocked area before `s` along the path: a cumulative distribution.
-    pub fn area_fraction_along(&self, s: f64) -> f64 {
+    pub(crate) fn area_fraction_along(&self, s: f64) -> f64 {
         // The disc at any one time has the fraction `area_fraction_across(s - s_drop)` before s; this is its mean over
         // the path.
         let fraction = self.radius / self.length
@@ -70,7 +70,7 @@ impl Streak {
     }
 
     /// Integral of [`opacity`](Self::opacity) over the width from the streak's edge to `b`, at `s`; m.
-    pub fn opacity_integral_to(&self, b: f64, s: f64) -> f64 {
+    pub(crate) fn opacity_integral_to(&self, b: f64, s: f64) -> f64 {
         (self.clamped_until(b, s) + self.clamped_until(b, self.length - s)) / self.length
     }
 

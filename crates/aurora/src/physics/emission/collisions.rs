@@ -28,7 +28,7 @@ impl Emission {
     ///
     /// If the node is not in the energy grid.
     #[must_use]
-    pub fn ion_pairs_per_collision(&self, node: usize) -> f64 {
+    pub(crate) fn ion_pairs_per_collision(&self, node: usize) -> f64 {
         let pairs = column_ion_pairs(self.deposition().monoenergetic_profile(node));
         pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
     }

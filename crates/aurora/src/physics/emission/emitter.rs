@@ -72,7 +72,7 @@ impl Emitter {
     /// Absolute ACEScg color per kilorayleigh of the counted photons, all lines and bands included; luminance in
     /// cd/m^2. The color is outside the AP1 gamut: components may be negative and are kept until the view transform.
     #[must_use]
-    pub fn color_per_kilorayleigh(self) -> [f64; 3] {
+    pub(crate) fn color_per_kilorayleigh(self) -> [f64; 3] {
         static COLORS: LazyLock<PerEmitter<[f64; 3]>> = LazyLock::new(|| EMITTERS.map(color));
         COLORS[self.index()]
     }
@@ -89,7 +89,7 @@ impl Emitter {
 impl Line {
     /// Absolute ACEScg color per kilorayleigh of this line alone.
     #[must_use]
-    pub fn color_per_kilorayleigh(&self) -> [f64; 3] {
+    pub(crate) fn color_per_kilorayleigh(&self) -> [f64; 3] {
         ACESCG_FROM_XYZ.apply(absolute_xyz(self.wavelength_nm))
     }
 }

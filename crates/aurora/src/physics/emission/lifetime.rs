@@ -15,7 +15,7 @@ const PROMPT: f64 = 1e-3;
 
 /// Coefficient of diffusion of O through the air, m^2/s (Colegrove et al. 1966: 9.69e16 T^0.774 / n cm^2/s for O in N2).
 #[must_use]
-pub fn diffusion_coefficient(air: &AirLevel) -> f64 {
+pub(crate) fn diffusion_coefficient(air: &AirLevel) -> f64 {
     9.69e18 * math::pow(air.temperature, 0.774) / air.number_density()
 }
 

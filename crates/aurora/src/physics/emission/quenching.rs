@@ -67,7 +67,7 @@ const STATES: PerEmitter<ExcitedState> = [
 
 /// Radiative lifetime, s.
 #[must_use]
-pub fn natural_lifetime(emitter: Emitter) -> f64 {
+pub(crate) fn natural_lifetime(emitter: Emitter) -> f64 {
     STATES[emitter.index()].lifetime
 }
 

@@ -7,13 +7,13 @@ use super::{Emitter, PerEmitter};
 use crate::physics::atmosphere::level_altitude_km;
 
 /// Number of altitudes for which the afterglow stores red light.
-pub const RED_ALTITUDES: usize = 3;
+pub(crate) const RED_ALTITUDES: usize = 3;
 /// The altitudes, km: the best three round values for electrons of 1 to 10 keV.
 const RED_ALTITUDES_KM: [f64; RED_ALTITUDES] = [150.0, 220.0, 300.0];
 
 /// Linear weights of the light at an altitude; their sum is 1.
 #[must_use]
-pub fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
+pub(crate) fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
     let mut weights = [0.0; RED_ALTITUDES];
     let above = RED_ALTITUDES_KM.partition_point(|altitude| *altitude <= altitude_km).clamp(1, RED_ALTITUDES - 1);
     let [low, high] = [RED_ALTITUDES_KM[above - 1], RED_ALTITUDES_KM[above]];
@@ -24,7 +24,7 @@ pub fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
 
 /// Red light of each level, split by altitude in place of the emitters; the last component is 0.
 #[must_use]
-pub fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
+pub(crate) fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let divided = |(level, light): (usize, &PerEmitter<f64>)| {
         let [low, middle, high] =
             red_altitude_weights(level_altitude_km(level)).map(|weight| weight * light[Emitter::OxygenRed.index()]);

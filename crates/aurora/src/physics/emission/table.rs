@@ -52,7 +52,7 @@ impl Emission {
 
     /// The table for the thesis's hard-sphere tracks and its rules of emission.
     #[must_use]
-    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+    pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
         Self::from_photons(air, Deposition::from_hard_spheres(air, spectrum), photons)
     }
@@ -135,7 +135,7 @@ impl Emission {
 
     /// Mean lifetime of the red light of each of its [altitudes](super::red_line_altitudes), s, weighted by emission.
     #[must_use]
-    pub fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_ALTITUDES] {
+    pub(crate) fn red_lifetimes(&self, energy_ev: f64) -> [f64; RED_ALTITUDES] {
         let (node, mixing) = energy_grid::locate(energy_ev);
         let (low, high) = (self.red_lifetimes[node], self.red_lifetimes[node + 1]);
         std::array::from_fn(|altitude| lerp(low[altitude], high[altitude], mixing))

@@ -18,7 +18,7 @@ const COLLISION: Purpose = Purpose::named("aurora hard-sphere collision");
 
 /// Radius of the spheres, m, that stops 10 keV electrons near 105 km; the thesis gives none. No radius fits all
 /// energies: with this one 1 keV electrons stop at 129 km instead of 158 km.
-pub const DEFAULT_RADIUS_M: f64 = 3.2e-11;
+pub(crate) const DEFAULT_RADIUS_M: f64 = 3.2e-11;
 
 /// An atmosphere of hard spheres.
 #[derive(Clone, Debug)]
@@ -101,7 +101,7 @@ impl HardSphereAtmosphere {
 impl Deposition {
     /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
     #[must_use]
-    pub fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
+    pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
         Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
     }
 }

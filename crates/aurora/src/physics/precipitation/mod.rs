@@ -30,8 +30,8 @@ bansho_base::choice! {
 }
 
 /// Mean energy loss per ion pair, eV (Rees 1989; Fang et al. 2010).
-pub const ION_PAIR_EV: f64 = 35.0;
+pub(crate) const ION_PAIR_EV: f64 = 35.0;
 /// Energy loss per collision, eV (thesis, 2.4.1).
-pub const COLLISION_EV: f64 = 100.0;
+pub(crate) const COLLISION_EV: f64 = 100.0;
 /// 1 mW in eV s^-1.
 const EV_PER_S_PER_MW: f64 = 1e-3 / 1.602_176_634e-19;

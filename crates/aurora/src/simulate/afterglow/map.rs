@@ -108,7 +108,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
 
     /// Width of a cell, km.
     #[must_use]
-    pub fn cell_km(&self) -> f64 {
+    pub(crate) fn cell_km(&self) -> f64 {
         self.cell_km
     }
 

@@ -128,11 +128,6 @@ impl Curve {
         (0..count).map(|index| self.eval(crate::math::lerp(low, high, index as f64 / last)) as f32).collect()
     }
 
-    /// Whether it is monotonically increasing (not strictly).
-    pub fn is_increasing(&self) -> bool {
-        self.points.is_sorted_by(|a, b| a[1] <= b[1])
-    }
-
     /// Smallest and largest value.
     pub fn range(&self) -> [f64; 2] {
         self.points
@@ -332,8 +327,7 @@ mod tests {
     #[test]
     fn range_and_rising_follow_the_points() {
         let humped = curve(&[[0.0, 1.0], [1.0, 5.0], [2.0, 5.0], [3.0, -2.0]], Interpolation::Monotone);
-        assert_eq!((humped.range(), humped.is_increasing()), ([-2.0, 5.0], false));
-        assert!(curve(&[[0.0, 1.0], [1.0, 1.0], [2.0, 4.0]], Interpolation::Step).is_increasing());
+        assert_eq!(humped.range(), [-2.0, 5.0]);
         assert_eq!(Curve::constant(3.0).unwrap().range(), [3.0, 3.0]);
     }
 
