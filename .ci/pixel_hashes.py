@@ -123,7 +123,7 @@ def main():
     parser.add_argument("--scenes", type=pathlib.Path, default=pathlib.Path(__file__).parent.parent / "scenes")
     options = parser.parse_args()
     program, scenes = options.program.resolve(), options.scenes.resolve()
-    jobs = [(program, scene, kind) for scene in sorted(scenes.glob("*.toml")) for kind in KINDS]
+    jobs = [(program, scene, kind) for scene in sorted([*scenes.glob("*.toml"), *scenes.glob("papers/*/*.toml")]) for kind in KINDS]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         lines = [line for found in pool.map(lambda job: hashes_of(*job), jobs) for line in found]
     lines += others(program, scenes)

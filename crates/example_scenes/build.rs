@@ -1,7 +1,7 @@
-//! Embeds the scenes of `scenes/` and the files that they name.
+//! Embeds the scenes of `scenes/` and of its folders `papers/NAME/`, and the files that they name.
 
 use std::{
-    collections::BTreeSet,
+    collections::BTreeMap,
     env,
     error::Error,
     fmt::Write,
@@ -22,33 +22,53 @@ fn folder() -> Result<PathBuf, Box<dyn Error>> {
     Ok(if own.is_dir() { own } else { own.with_file_name("../../scenes") })
 }
 
+/// The entries of a folder, sorted.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, std::io::Error> {
+    let mut paths = fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, std::io::Error>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// The scenes of the folder itself, then those of each paper.
 fn scene_files(folder: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {
-    let mut files = fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, std::io::Error>>()?;
+    let mut files = entries(folder)?;
+    for paper in entries(&folder.join("papers"))?.iter().filter(|path| path.is_dir()) {
+        println!("cargo::rerun-if-changed={}", paper.display());
+        files.extend(entries(paper)?);
+    }
     files.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
-    files.sort();
     Ok(files)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = folder()?;
     println!("cargo::rerun-if-changed={}", folder.display());
-    let mut assets = BTreeSet::new();
-    let mut scenes = String::new();
+    // By the path that scenes name, which is relative to the scene.
+    let mut assets: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut scenes: BTreeMap<String, String> = BTreeMap::new();
     for path in scene_files(&folder)? {
         println!("cargo::rerun-if-changed={}", path.display());
         let text = fs::read_to_string(&path)?;
         let named: Vec<String> = text.lines().filter_map(asset).map(str::to_owned).collect();
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        writeln!(
-            scenes,
-            "    ExampleScene {{ name: {name:?}, text: include_str!({path:?}), asset_paths: &{named:?} }},"
-        )?;
-        assets.extend(named);
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let code =
+            format!("    ExampleScene {{ name: {name:?}, text: include_str!({path:?}), asset_paths: &{named:?} }},\n");
+        if scenes.insert(name, code).is_some() {
+            return Err(format!("{}: another scene has this name", path.display()).into());
+        }
+        for relative in named {
+            let file = path.with_file_name(&relative);
+            let other = assets.entry(relative).or_insert_with(|| file.clone());
+            if *other != file && fs::read(&*other)? != fs::read(&file)? {
+                return Err(format!("{} differs from {}", file.display(), other.display()).into());
+            }
+        }
     }
-    let mut code = format!("/// Every example scene, by name.\npub const SCENES: &[ExampleScene] = &[\n{scenes}];\n\n");
-    code.push_str("const ASSETS: &[(&str, &[u8])] = &[\n");
-    for path in &assets {
-        writeln!(code, "    ({path:?}, include_bytes!({:?})),", folder.join(path))?;
+    let mut code = String::from("/// Every example scene, by name.\npub const SCENES: &[ExampleScene] = &[\n");
+    code.extend(scenes.into_values());
+    code.push_str("];\n\nconst ASSETS: &[(&str, &[u8])] = &[\n");
+    for (relative, file) in &assets {
+        writeln!(code, "    ({relative:?}, include_bytes!({file:?})),")?;
     }
     code.push_str("];\n");
     fs::write(Path::new(&env::var("OUT_DIR")?).join("scenes.rs"), code)?;

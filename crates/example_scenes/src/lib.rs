@@ -41,7 +41,7 @@ pub fn find(name: &str) -> Option<&'static ExampleScene> {
     SCENES.iter().find(|scene| scene.name == name)
 }
 
-/// The contents of a file that a scene names, by its path relative to the scenes.
+/// The contents of a file that a scene names, by its path relative to the scene. Two scenes that name the same path name equal files.
 pub fn asset(path: &str) -> Option<&'static [u8]> {
     ASSETS.iter().find(|(own, _)| *own == path).map(|(_, bytes)| *bytes)
 }

@@ -46,7 +46,8 @@ fn text(kind: &PhenomenonKind, all: bool) -> String {
 }
 
 fn list() -> String {
-    SCENES.iter().map(|scene| format!("{:18} {}\n", scene.name, scene.summary())).collect()
+    let width = SCENES.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
+    SCENES.iter().map(|scene| format!("{:width$} {}\n", scene.name, scene.summary())).collect()
 }
 
 fn find(name: &str) -> Result<&'static ExampleScene, UsageError> {
