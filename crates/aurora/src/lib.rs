@@ -70,7 +70,7 @@ pub mod simulate;
 
 pub use model::Aurora;
 pub use parameters::{
-    AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, ParticleParameters,
-    PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape,
+    AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, NeighborSearch, ParticleParameters,
+    PowerDistribution, PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape, Stage,
 };
 pub use render::{Blur, BlurParameters, RenderingParameters, Sampling, TrackModel};

@@ -11,21 +11,18 @@ use bansho_base::{
 
 use super::{
     AuroraParameters,
-    parameters::check_energies,
+    parameters::{check_color_matching, check_energies},
     render::Sampling,
     shapes::{Sequence, ShapeError, ShapeErrorKind},
-    simulate::AuroraSimulation,
+    simulate::{AuroraSimulation, check_neighbors},
 };
 use crate::{
-    physics::{
-        emission::Emission,
-        precipitation::{energy_grid::HIGHEST_EV, lateral_spread::lateral_spread_km},
-    },
+    physics::{emission::Emission, precipitation::energy_grid::HIGHEST_EV},
     render::{
         bin::sources::{EmissionInputs, nearest_node},
         integrate::emission_profile::EmissionProfiles,
         project::field_lines::FieldLines,
-        shade::attenuation::EmitterColors,
+        shade::attenuation::{AttenuationByDistance, EmitterColors},
         single_collisions::collision_pass::CollisionRenderer,
     },
 };
@@ -46,6 +43,7 @@ pub struct Aurora {
     pub(super) seed: u64,
     pub(super) parameters: AuroraParameters,
     pub(super) sequence: Arc<Sequence>,
+    emission: Arc<Emission>,
     /// Created when the run is first stepped or drawn: a scene may have hundreds of auroras, and checking it constructs them all.
     pub(super) run_state: OnceLock<RunState>,
     /// Initial state of every run: created by the first run that needs it, shared by all.
@@ -109,13 +107,17 @@ impl Aurora {
         let sequence = Sequence::new(&parameters.shapes, &parameters.morphing, parameters.extent_km, assets, loop_s)?;
         let crossfade_s = loop_s.map_or(Ok(0.0), |loop_s| close_loop(&mut parameters, loop_s))?;
         check_energies(&parameters)?;
+        check_color_matching(&parameters)?;
+        let lengths = sequence.arrivals().iter().map(|time| sequence.at(*time).length());
+        check_neighbors(&parameters, lengths.fold(f64::INFINITY, f64::min))?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
-        let emission = parameters.rendering.energy_deposition.shared_emission(parameters.spectrum);
+        let emission = parameters.rendering.emission(parameters.spectrum);
         Ok(Self {
             name: name.to_owned(),
             seed,
-            max_column_luminance: max_column_luminance(&parameters, emission, &factors),
+            max_column_luminance: max_column_luminance(&parameters, &emission, &factors),
+            emission,
             run_state: OnceLock::new(),
             initial_state: Arc::default(),
             parameters,
@@ -130,21 +132,29 @@ impl Aurora {
     }
 
     pub(super) fn new_run_state(&self) -> RunState {
-        let simulation = AuroraSimulation::new(self.parameters.clone(), self.sequence.clone(), &self.name, self.seed);
+        let (sequence, emission) = (self.sequence.clone(), self.emission.clone());
+        let simulation =
+            AuroraSimulation::with_emission(self.parameters.clone(), sequence, emission, &self.name, self.seed);
         let (parameters, emission) = (simulation.parameters(), simulation.emission());
         let by_collisions = parameters.rendering.sampling == Sampling::SingleCollisions;
         let max_factor = self.sequence.factors().fold(1.0, |max: f64, [_, energy]| max.max(energy));
         let max_energy_ev = (max_factor * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
         let highest_node = nearest_node(max_energy_ev) + SPECTRUM_NODES;
         let key = Key::new(self.seed, &self.name);
-        let collisions = || CollisionRenderer::new(emission, &parameters.rendering, highest_node, key);
+        let attenuation = AttenuationByDistance::new(&parameters.rendering, parameters.dip_deg);
+        let collisions = || CollisionRenderer::new(emission, &parameters.rendering, &attenuation, highest_node, key);
         RunState {
             collisions: by_collisions.then(|| Arc::new(collisions())),
-            profiles: Arc::new(EmissionProfiles::new(emission)),
-            red_profiles: Arc::new(EmissionProfiles::red_by_altitude(emission)),
-            emitter_colors: Arc::new(EmitterColors::new(&parameters.rendering.extinction)),
+            profiles: Arc::new(EmissionProfiles::new(emission, &attenuation)),
+            red_profiles: Arc::new(EmissionProfiles::red_by_altitude(emission, &attenuation)),
+            emitter_colors: Arc::new(EmitterColors::new(&parameters.rendering, emission.lines())),
             simulation,
         }
+    }
+
+    /// Its shapes in time.
+    pub(crate) fn sequence(&self) -> &Sequence {
+        &self.sequence
     }
 
     /// Its particles, field and afterglow.
@@ -188,16 +198,15 @@ impl Aurora {
         let energy_ev = parameters.energy_ev.at(t);
         EmissionInputs {
             particles: simulation.particles(),
-            afterglow: simulation.afterglow(),
+            afterglow: parameters.afterglow.then(|| simulation.afterglow()),
             emission: simulation.emission(),
             parameters: &parameters.rendering,
             spacing_km: simulation.spacing_km(),
             energy_ev,
-            lateral_spread_km: lateral_spread_km(
-                parameters.rendering.energy_deposition,
-                parameters.rendering.collision_deflection,
-                energy_ev,
-            ),
+            lateral_spread_km: simulation
+                .emission()
+                .lateral_spread_km(parameters.rendering.collision_deflection, energy_ev),
+            attenuation: AttenuationByDistance::new(&parameters.rendering, parameters.dip_deg),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Parameters of an aurora. Symbols and equation numbers are those of the thesis.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     host::once::get_or_compute,
@@ -10,10 +10,10 @@ use bansho_base::{
 use super::shapes::{MorphingParameters, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters};
 use crate::physics::{
     atmosphere::atmosphere,
-    emission::Emission,
+    emission::{ColorMatching, Emission},
     extinction::Extinction,
     precipitation::{
-        Spectrum, TrackModel,
+        HardSphereParameters, Spectrum, TrackModel,
         energy_grid::{HIGHEST_EV, LOWEST_EV},
         spectrum::ARC,
     },
@@ -110,6 +110,8 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// Births and deaths of particles when the shape changes (2.3.4, table 3.3).
     pub struct RelocationParameters {
+        /// Whether particles are created and removed. If `false`, all particles of the first shape remain (thesis, figure 2.14, left).
+        enabled: bool = true;
         /// A cell is near the shape if its scatter count is at least this fraction of the mean over all cells, and its potential is below
         /// `potential_threshold`.
         scatter_count_threshold: f64 = 0.10, limits(Range::new(0.0, 100.0));
@@ -130,6 +132,28 @@ bansho_base::parameters! {
     }
 }
 
+bansho_base::choice! {
+    /// Which particles repel each other.
+    pub enum NeighborSearch {
+        /// All within the support radius of the kernels.
+        SupportRadius = "support_radius",
+        /// All in the 3 x 3 cells, each h wide, around the cell of a particle, as in 2.5.1 of the thesis. A cubic spline reaches 2h, so parts of
+        /// its support are missed.
+        ThreeByThreeCells = "three_by_three_cells",
+    }
+}
+
+bansho_base::choice! {
+    /// How the energy flux of the sheets is distributed to the particles.
+    pub enum PowerDistribution {
+        /// Each interval of a sheet has its drawn power, whatever the number of particles there, and `rays` are drawn on it.
+        BySheetLength = "by_sheet_length",
+        /// Every particle has the same power, as in the thesis, so that a sheet is bright where particles cluster. The total is that of the sheets when
+        /// there are `count` particles.
+        Equal = "equal",
+    }
+}
+
 bansho_base::parameters! {
     /// Number and motion of the particles (2.3).
     pub struct ParticleParameters {
@@ -143,8 +167,16 @@ bansho_base::parameters! {
         repulsion: f64 = 1.0, limits(Range::new(0.0, 20.0));
         /// Kernels of the repulsion.
         kernel: RepulsionKernel = RepulsionKernel::CubicSpline;
-        /// Mean number of neighbors of a particle, which determines the support radius h.
-        neighbor_count: f64 = 35.0, limits(Range::new(6.0, 200.0));
+        /// Mean number of neighbors of a particle, which determines the support radius of both kernels.
+        neighbor_count: f64 = 35.0, limits(Range::new(6.0, 10_000.0));
+        /// Smoothing length h of the kernels in cells of the field, instead of `neighbor_count`: poly6 and spiky end at h, the cubic spline at 2h, eqs.
+        /// (2.12) to (2.18). In the thesis h is one cell (2.5.1), which is some 900 neighbors; then the cubic spline lets particles cluster into rays
+        /// 0.9 h apart.
+        smoothing_length_cells: Auto<f64> = Auto::Auto, limits(Range::new(0.05, 4.0));
+        /// Which particles repel each other.
+        neighbor_search: NeighborSearch = NeighborSearch::SupportRadius;
+        /// How the energy flux is distributed to the particles.
+        power_distribution: PowerDistribution = PowerDistribution::BySheetLength;
         /// Decay rate of the velocity; the thesis has no friction.
         friction_per_s: f64 = 6.0, limits(Range::new(0.0, 30.0)), unit("1/s");
         /// Limits the sum of kinetic and potential energy, so that particles do not accelerate without bound.
@@ -204,6 +236,27 @@ bansho_base::parameters! {
     }
 }
 
+bansho_base::choice! {
+    /// What is drawn: the light, or a stage of its computation as a map of the drawn square in front of everything. Maps show the square seen along the
+    /// field, east to the right and north up, as wide as the picture is high; `exposure_ev100 = 9.7` shows their white as white.
+    pub enum Stage {
+        /// The aurora.
+        Light = "light",
+        /// Control points and segments of the in-between shape (thesis, figures 2.9, 2.15, 3.4 to 3.8).
+        Shape = "shape",
+        /// Particles scattered about the in-between shape, N(i, j) (figure 2.10).
+        ScatterCount = "scatter_count",
+        /// Noise in the potential (figure 2.11).
+        PotentialNoise = "potential_noise",
+        /// Potential with its noise, and the electric field as arrows (figures 2.12, 3.14).
+        Potential = "potential",
+        /// Cells that are near the shape by potential and scatter count (red), and by their potential alone (yellow).
+        NearCells = "near_cells",
+        /// Particles per cell (figure 2.14).
+        ParticleCount = "particle_count",
+    }
+}
+
 bansho_base::parameters! {
     /// An aurora (Sekiguchi): shapes drawn in the plane at 100 km altitude, particles that follow them, and the light of the air that they strike.
     pub struct AuroraParameters {
@@ -226,6 +279,8 @@ bansho_base::parameters! {
         /// Seconds of the aurora per second of the picture; the afterglow fades faster by this factor. At 1 the green light of a sheet that crosses
         /// the sky in seconds stays behind, and its front is purple. Most films of auroras are time lapses, in which the front is green.
         time_lapse: f64 = 1.0, limits(Range::new(0.01, 1e4));
+        /// Whether excited atoms emit over their lifetime, 0.75 s for green and up to 134 s for red light. If `false` they emit at once, as in the thesis.
+        afterglow: bool = true;
         /// Simulated time before the shot.
         preroll_s: f64 = 1.5, limits(Range::new(0.0, 60.0)), unit("s");
         /// The shapes in chronological order; two waving curtains if the list is empty.
@@ -244,6 +299,8 @@ bansho_base::parameters! {
         pulsation: PulsationParameters = PulsationParameters::default();
         /// Rendering of the light.
         rendering: RenderingParameters = RenderingParameters::default();
+        /// What is drawn: the light, or a map of a stage of its computation.
+        stage: Stage = Stage::Light;
     }
 }
 
@@ -280,16 +337,31 @@ impl TrackModel {
     pub fn emission(self, spectrum: Spectrum) -> Emission {
         match self {
             Self::Fang2010 => Emission::new(atmosphere(), spectrum),
-            Self::HardSphereAtmosphere => Emission::from_hard_spheres(atmosphere(), spectrum),
+            Self::HardSphereAtmosphere => {
+                Emission::from_hard_spheres(atmosphere(), spectrum, &HardSphereParameters::default())
+            }
         }
     }
 
     /// The table for a spectrum that a scene can select, computed once per process.
-    pub(crate) fn shared_emission(self, shape: SpectrumShape) -> &'static Emission {
-        static TABLES: [OnceLock<Emission>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
+    fn shared_emission(self, shape: SpectrumShape) -> Arc<Emission> {
+        static TABLES: [OnceLock<Arc<Emission>>; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()] =
             [const { OnceLock::new() }; TrackModel::CHOICES.len() * SpectrumShape::CHOICES.len()];
         let index = self as usize * SpectrumShape::CHOICES.len() + shape as usize;
-        get_or_compute(&TABLES[index], || self.emission(shape.spectrum()))
+        get_or_compute(&TABLES[index], || Arc::new(self.emission(shape.spectrum()))).clone()
+    }
+}
+
+impl RenderingParameters {
+    /// The emission table for a spectrum.
+    pub(crate) fn emission(&self, shape: SpectrumShape) -> Arc<Emission> {
+        let has_own_radii = self.energy_deposition == TrackModel::HardSphereAtmosphere
+            && self.hard_spheres != HardSphereParameters::default();
+        if has_own_radii {
+            Arc::new(Emission::from_hard_spheres(atmosphere(), shape.spectrum(), &self.hard_spheres))
+        } else {
+            self.energy_deposition.shared_emission(shape)
+        }
     }
 }
 
@@ -328,6 +400,10 @@ bansho_base::parameters! {
         sampling: Sampling = Sampling::MeanProfile;
         /// Model of the energy loss of the electrons: the measured atmosphere, or the thesis's hard spheres.
         energy_deposition: TrackModel = TrackModel::Fang2010;
+        /// The thesis's hard spheres.
+        hard_spheres: HardSphereParameters = HardSphereParameters::default();
+        /// Color matching functions by which spectral lines become color. Table 2.1 has the five lines of `energy_deposition = "hard_sphere"` only.
+        color_matching: ColorMatching = ColorMatching::Cie1931;
         /// Where light is blurred: on the sky in km, or in the picture in pixels.
         blur_space: Blur = Blur::World;
         /// Radii of the blur in the picture.
@@ -339,7 +415,24 @@ bansho_base::parameters! {
         collision_deflection: f64 = 0.002, limits(Range::new(0.0, MAX_COLLISION_DEFLECTION));
         /// The lower atmosphere, which attenuates light near the horizon.
         extinction: Extinction = Extinction::default();
+        /// Attenuation coefficient d of (2.27): light from a distance of z km is attenuated by exp(-(d z)^2), besides `extinction`. The thesis does not
+        /// state its value. AOVs in kilorayleigh include it.
+        attenuation_per_km: f64 = 0.0, limits(Range::new(0.0, 0.1)), unit("1/km");
     }
+}
+
+/// Checks that the color table has the lines of the emission.
+///
+/// # Errors
+///
+/// Table 2.1 with other lines than its five.
+pub(crate) fn check_color_matching(parameters: &AuroraParameters) -> Result<(), ShapeError> {
+    let RenderingParameters { color_matching, energy_deposition, .. } = &parameters.rendering;
+    if *color_matching == ColorMatching::Table21 && *energy_deposition != TrackModel::HardSphereAtmosphere {
+        let key = "rendering.color_matching".to_owned();
+        return Err(ShapeError { key, kind: ShapeErrorKind::LinesOutsideTable21 });
+    }
+    Ok(())
 }
 
 /// Relative rounding error that is accepted.

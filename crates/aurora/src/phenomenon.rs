@@ -16,7 +16,7 @@ use bansho_base::{
 };
 
 use super::{
-    AuroraParameters,
+    AuroraParameters, Stage,
     model::{Aurora, OBLIQUE_LUMINANCE_FACTOR},
     render::aovs::AOVS,
     shapes::ShapeErrorKind,
@@ -26,6 +26,7 @@ use crate::{
     render::{
         prepared::{DEPTHS, PreparedAurora},
         shutter,
+        stages::{self, PreparedStage, WHITE_LUMINANCE},
     },
     simulate::point_cloud::point_cloud,
 };
@@ -70,7 +71,11 @@ impl Phenomenon for Aurora {
     }
 
     fn luminance(&self) -> f64 {
-        OBLIQUE_LUMINANCE_FACTOR * self.max_column_luminance
+        if self.parameters.stage == Stage::Light {
+            OBLIQUE_LUMINANCE_FACTOR * self.max_column_luminance
+        } else {
+            WHITE_LUMINANCE
+        }
     }
 
     fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
@@ -91,11 +96,14 @@ impl Phenomenon for Aurora {
 
 impl Run for Aurora {
     fn publish(&self, _shutter: Shutter) -> Publication {
+        if self.parameters.stage != Stage::Light {
+            return Publication::default();
+        }
         Publication { lights: self.directional_light().into_iter().collect(), ..Publication::default() }
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        vec![DEPTHS]
+        vec![if self.parameters.stage == Stage::Light { DEPTHS } else { stages::DEPTHS }]
     }
 
     fn prepare<'a>(
@@ -104,7 +112,10 @@ impl Run for Aurora {
         _surroundings: &'a Surroundings<'a>,
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        Ok(Box::new(PreparedAurora::new(self, view, observer)?))
+        match self.parameters.stage {
+            Stage::Light => Ok(Box::new(PreparedAurora::new(self, view, observer)?)),
+            stage => Ok(Box::new(PreparedStage::new(self, stage, view))),
+        }
     }
 
     fn export(&self, t: f64) -> Option<PointCloud> {

@@ -3,7 +3,7 @@
 use bansho_base::phenomenon::strip::{AovDescriptor, AovRule};
 
 use super::maps::MAPS;
-use crate::physics::emission::{Emitter, LINES, Line};
+use crate::physics::emission::{Emitter, LINES, Line, LineSet};
 
 /// Wavelengths of the lines that the AOVs measure, nm.
 pub(crate) const MEASURED: [f64; 6] = [557.7, 630.0, 636.4, 427.8, 391.4, 670.5];
@@ -15,10 +15,15 @@ pub(crate) fn measured_lines() -> impl Iterator<Item = &'static Line> {
     MEASURED.iter().filter_map(|nm| LINES.iter().find(|line| (line.wavelength_nm - nm).abs() < 0.05))
 }
 
-/// Emitter of each of the [`BRIGHTNESSES`], and its photons per counted photon of the emitter.
-pub(crate) fn brightnesses() -> impl Iterator<Item = (Emitter, f64)> {
-    let lines = measured_lines().map(|line| (line.emitter, line.photons));
-    lines.chain([(Emitter::Nitrogen, 1.0)])
+/// Emitter of each of the [`BRIGHTNESSES`], and its photons per counted photon of the emitter: 0 for lines that are not emitted.
+pub(crate) fn brightnesses(lines: LineSet) -> impl Iterator<Item = (Emitter, f64)> {
+    let photons = move |line: &Line| if lines.has(line) { line.photons } else { 0.0 };
+    let measured = measured_lines().map(move |line| (line.emitter, photons(line)));
+    let first_positive = match lines {
+        LineSet::Observed => 1.0,
+        LineSet::Thesis => lines.lines(Emitter::Nitrogen).iter().map(|(_, photons)| photons).sum(),
+    };
+    measured.chain([(Emitter::Nitrogen, first_positive)])
 }
 
 const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {

@@ -4,7 +4,7 @@
 //! aurora is drawn on a chart of the sky in longitude and colatitude about that point (`chart`). Precipitation is
 //! binned by longitude and distance (`bin`); the emission profile of every field line is integrated along its
 //! meridian (`integrate`), or single collisions are rasterized (`single_collisions`). Extinction and color are applied to the chart (`shade`), and the pixels of any lens
-//! sample it (`prepared`). The cost is linear in pixels and particles and independent of the shapes.
+//! sample it (`prepared`). `stages` draws maps of the simulation instead. The cost is linear in pixels and particles and independent of the shapes.
 
 pub(crate) mod aovs;
 pub(crate) mod bin;
@@ -16,6 +16,7 @@ pub(crate) mod project;
 pub(crate) mod shade;
 pub(crate) mod shutter;
 pub(crate) mod single_collisions;
+pub(crate) mod stages;
 #[cfg(test)]
 mod tests;
 

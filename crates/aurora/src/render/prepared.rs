@@ -101,7 +101,7 @@ impl<'a> PreparedAurora<'a> {
             field,
             displayed,
             measured,
-            brightnesses: brightnesses().collect(),
+            brightnesses: brightnesses(aurora.simulation().emission().lines()).collect(),
             maps: OnceLock::new(),
         })
     }

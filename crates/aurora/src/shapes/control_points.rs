@@ -85,7 +85,12 @@ pub(crate) fn track_control_points(
         let mut transition = Transition::new(parameters, index, &tracked.shapes[index - 1], &mut tracked.tracks)?;
         let expected = if in_order { tracked.shapes[index - 1].len() } else { transition.chains.len() };
         if drawn[index].len() != expected {
-            let kind = ShapeErrorKind::Unmatched { found: drawn[index].len(), expected };
+            let found = drawn[index].len();
+            let kind = if in_order {
+                ShapeErrorKind::UnmatchedInOrder { found, expected }
+            } else {
+                ShapeErrorKind::Unmatched { found, expected }
+            };
             return Err(ShapeError { key: format!("shapes.{index}.sheets"), kind });
         }
         if in_order && !parameters.link.is_empty() {

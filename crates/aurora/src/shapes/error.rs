@@ -92,6 +92,19 @@ pub enum ShapeErrorKind {
         /// Number of sheets after the splits and merges of the previous shape.
         expected: usize,
     },
+    /// The wrong number of sheets in drawing order.
+    #[error(
+        "has {}, but with `correspondence = \"drawing_order\"` each of the {} of the previous shape is drawn again as one stroke: one that splits with \
+         its gap as a segment, those that merge each by itself; allowed: {expected}, or `correspondence = \"automatic\"`, where splits and merges \
+         change the number",
+        counted(*.found, "sheet"), counted(*.expected, "sheet")
+    )]
+    UnmatchedInOrder {
+        /// Number of sheets drawn.
+        found: usize,
+        /// Number of sheets of the previous shape.
+        expected: usize,
+    },
     /// Too many sheets.
     #[error("has {}; allowed: up to {max}", counted(*.found, "sheet"))]
     TooManySheets {
@@ -225,6 +238,24 @@ pub enum ShapeErrorKind {
         /// The energy, eV.
         energy_ev: f64,
     },
+    /// More pairs of neighboring particles than memory and time allow.
+    #[error(
+        "each of {count} particles would have about {neighbors:.0} neighbors; allowed: about {max:.0} for so many particles (a smaller value, or a \
+         smaller `count`)"
+    )]
+    TooManyNeighbors {
+        /// Number of particles.
+        count: i64,
+        /// Estimated mean number of neighbors.
+        neighbors: f64,
+        /// Maximum number of neighbors.
+        max: f64,
+    },
+    /// The thesis's color table with more lines than it has.
+    #[error(
+        "table 2.1 has the five lines of the thesis only; allowed: `\"cie_1931\"`, or `energy_deposition = \"hard_sphere\"`, which emits these five"
+    )]
+    LinesOutsideTable21,
     /// A loop whose length is not a positive number.
     #[error("a loop of {seconds} s; allowed: more than 0")]
     LoopLength {

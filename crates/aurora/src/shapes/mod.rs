@@ -25,8 +25,8 @@ pub use geometry::{
 };
 pub use interpolation::gap::{Bridge, SheetEnd};
 pub use parameters::{
-    Correspondence, FRAME_S, LinkParameters, MergeParameters, MorphingParameters, ShapeParameters, SheetParameters,
-    Spacing, SplitParameters,
+    Correspondence, FRAME_S, GapLight, LinkParameters, MergeParameters, MorphingParameters, ShapeParameters,
+    SheetParameters, Spacing, SplitParameters,
 };
 pub(crate) use sequence::ControlPointIds;
 pub use sequence::Sequence;

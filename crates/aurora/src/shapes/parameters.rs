@@ -146,6 +146,16 @@ bansho_base::parameters! {
     }
 }
 
+bansho_base::choice! {
+    /// Light at gaps between sheets that split or merge.
+    pub enum GapLight {
+        /// The flux fades toward a gap, and light bridges a narrow one, so that sheets come apart and together without hard ends.
+        Faded = "faded",
+        /// Sheets keep their flux up to the ends, as in the thesis: the gap is as wide as the control points are apart.
+        Full = "full",
+    }
+}
+
 bansho_base::parameters! {
     /// Transition from one shape to the next.
     pub struct MorphingParameters {
@@ -156,6 +166,8 @@ bansho_base::parameters! {
         control_points: Auto<i64> = Auto::Auto, limits(Range::new(4.0, 512.0));
         /// Spacing of the control points along a drawn stroke.
         control_point_spacing: Spacing = Spacing::ArcLength;
+        /// Light at gaps that a split opens or a merge closes.
+        gap_light: GapLight = GapLight::Faded;
         /// Frames of 1/30 s from one in-between shape to the next; 5 to 10 in the thesis.
         update_interval_frames: f64 = 6.0, limits(Range::new(1.0, 60.0));
     }

@@ -7,7 +7,7 @@ use bansho_base::{
 use rayon::prelude::*;
 
 use super::{
-    Correspondence, FRAME_S, MorphingParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,
+    Correspondence, FRAME_S, GapLight, MorphingParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,
     parameters::TRANSITION_S,
 };
 use crate::shapes::{
@@ -34,6 +34,7 @@ pub struct Sequence {
     tracked: TrackedControlPoints,
     timing: ShapeTiming,
     half_km: f64,
+    gap_light: GapLight,
     /// The first shape whose transition has crossing sheets.
     crossing: Option<usize>,
     loop_s: Option<f64>,
@@ -98,8 +99,14 @@ impl Sequence {
             let mut tracked = track_control_points(shapes, &drawn, morphing, extent_km, evenness)?;
             let closed = loop_s.is_some() && tracked.is_closed;
             find_velocities(&mut tracked.tracks, &timing, closed);
-            let sequence =
-                Self { tracked, timing: timing.clone(), half_km: extent_km / 2.0, crossing: None, loop_s: None };
+            let sequence = Self {
+                tracked,
+                timing: timing.clone(),
+                half_km: extent_km / 2.0,
+                gap_light: morphing.gap_light,
+                crossing: None,
+                loop_s: None,
+            };
             Ok((sequence.crossings(), sequence))
         };
         let mut best = sequence(EVENNESS[0])?;
@@ -137,7 +144,8 @@ impl Sequence {
         };
         let between = |track: usize| self.tracked.tracks[track].between(index, fraction, &self.timing);
         let mut shape = self.shape(&self.tracked.strands[index], between);
-        for gap in &self.tracked.gaps[index] {
+        let faded: &[Gap] = if self.gap_light == GapLight::Faded { &self.tracked.gaps[index] } else { &[] };
+        for gap in faded {
             let (state, _) = self.gap(gap, index, fraction);
             for SheetEnd { sheet, is_end } in gap.ends.iter().filter_map(|end| self.end(*end, index)) {
                 gap::fade_toward_gap(&mut shape.sheets[sheet], is_end, state.ends);
@@ -159,6 +167,9 @@ impl Sequence {
     /// Bridges over narrow gaps between the sheets of [`Self::at`].
     pub fn bridges(&self, t: f64) -> Vec<Bridge> {
         let SequencePosition::Between(index, fraction) = self.position_at(t) else { return Vec::new() };
+        if self.gap_light == GapLight::Full {
+            return Vec::new();
+        }
         let bridge = |gap: &Gap| {
             let (state, knots) = self.gap(gap, index, fraction);
             let ends = [self.end(gap.ends[0], index)?, self.end(gap.ends[1], index)?];

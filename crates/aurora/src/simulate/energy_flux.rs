@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::AuroraParticles;
 use crate::{
-    AuroraParameters,
+    AuroraParameters, PowerDistribution,
     physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV},
     simulate::sheets::{
         nodes::{NodeLayout, NodeValues},
@@ -94,6 +94,10 @@ impl EnergyFlux {
         rays: &RayTable,
         time: f64,
     ) {
+        if self.parameters.particles.power_distribution == PowerDistribution::Equal {
+            self.distribute_equally(particles, refined, time);
+            return;
+        }
         let lengths = refined.sheet_lengths();
         let [coarse, fine] = self.layouts(&lengths);
         let weight_chunk = |chunk| self.weight_chunk(chunk, refined, &fine, rays, time);
@@ -111,6 +115,28 @@ impl EnergyFlux {
         let totals: Vec<[f64; 2]> =
             chunks(particles).into_par_iter().with_max_len(1).map(|chunk| chunk.assign_powers(&factors)).collect();
         balance(particles, &totals);
+    }
+
+    /// Assigns every particle the same power and energy, as in the thesis: the total power of the sheets over the number of particles that a
+    /// scene asks for, whatever number there is.
+    fn distribute_equally(&self, particles: &mut AuroraParticles, refined: &RefinedShape, time: f64) {
+        let width = 2.0 * self.parameters.half_thickness_km();
+        let area: f64 = refined.pieces(|_| 1.0).map(|piece| piece.flux * piece.length_km * width).sum();
+        let power = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * area / self.parameters.particles.count as f64;
+        let energy = self.parameters.energy_ev.at(time);
+        chunks(particles).into_par_iter().with_max_len(1).for_each(|chunk| {
+            for index in 0..chunk.fades.len() {
+                let projection = chunk.project(refined, index);
+                let energy_factor = projection.map_or(1.0, |projection| projection.energy);
+                chunk.energies[index] = (energy * energy_factor).clamp(LOWEST_EV, HIGHEST_EV) as f32;
+                chunk.full_powers[index] = power as f32;
+                chunk.powers[index] = chunk.fades[index] * chunk.full_powers[index];
+                if let Some(projection) = projection {
+                    chunk.arc_fractions[index] = projection.fraction as f32;
+                    chunk.sheets[index] = projection.sheet;
+                }
+            }
+        });
     }
 
     /// Computes weights of a chunk; they are stored as negative powers until normalized.

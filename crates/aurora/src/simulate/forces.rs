@@ -1,12 +1,19 @@
 //! Forces and time integration (thesis, 2.3.1 to 2.3.3).
 
-use bansho_base::math::{self, MulAdd};
+use bansho_base::{
+    math::{self, MulAdd},
+    parameters::Auto,
+};
 use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, compute_densities};
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::AuroraParticles;
-use crate::{AuroraParameters, RepulsionKernel, shapes::FRAME_S, simulate::field::sheet_field::ElectricField};
+use super::{AuroraParticles, neighbor_cells::NeighborCells};
+use crate::{
+    AuroraParameters, NeighborSearch, RepulsionKernel,
+    shapes::{FRAME_S, ShapeError, ShapeErrorKind},
+    simulate::field::sheet_field::ElectricField,
+};
 
 /// Gas constant k at a repulsion of 1, cells^2 per frame^2.
 const STIFFNESS: f64 = 0.1;
@@ -16,18 +23,80 @@ const TASK: usize = 4096;
 const SUPPORT_RELAXATION: f64 = 0.1;
 /// Minimum and maximum support radius, cells.
 const SUPPORT_CELLS: [f64; 2] = [0.02, 2.0];
+/// Number of neighbors up to which that maximum holds; it grows with more.
+const USUAL_NEIGHBORS: f64 = 200.0;
 /// Minimum mass of a particle that is fading in.
 const MIN_MASS: f32 = 0.05;
+
+/// How the support radius of the kernels is found.
+#[derive(Clone, Copy, Debug)]
+enum Support {
+    /// That with a number of neighbors, within bounds in km.
+    Neighbors { count: f64, bounds_km: [f64; 2] },
+    /// Fixed, km.
+    Fixed(f64),
+}
+
+impl Support {
+    fn new(parameters: &AuroraParameters) -> Self {
+        let (particles, cell) = (&parameters.particles, parameters.cell_km());
+        match particles.smoothing_length_cells {
+            Auto::Set(cells) => Self::Fixed(kernel_reach(particles.kernel) * cells * cell),
+            Auto::Auto => {
+                let count = particles.neighbor_count;
+                let more = (count / USUAL_NEIGHBORS).sqrt().max(1.0);
+                let [min, max] = SUPPORT_CELLS.map(|cells| cells * cell);
+                Self::Neighbors { count, bounds_km: [min, max * more] }
+            }
+        }
+    }
+}
+
+/// Maximum number of pairs of neighbors. Lists of candidates take half a byte for each of them.
+const MAX_PAIRS: f64 = 1.5e9;
+
+/// Checks the number of neighbors of the particles of a sheet of that length in km, the shortest of a sequence.
+///
+/// # Errors
+///
+/// More pairs than [`MAX_PAIRS`].
+pub(crate) fn check_neighbors(parameters: &AuroraParameters, length_km: f64) -> Result<(), ShapeError> {
+    let count = parameters.particles.count;
+    let (key, neighbors) = match Support::new(parameters) {
+        Support::Neighbors { count, .. } => ("neighbor_count", count),
+        Support::Fixed(support_km) => {
+            let width = 2.0 * parameters.half_thickness_km();
+            let density = count as f64 / (length_km.max(width) * width);
+            let area = (std::f64::consts::PI * support_km * support_km).min(2.0 * support_km * width);
+            ("smoothing_length_cells", (density * area).min(count as f64))
+        }
+    };
+    let max = MAX_PAIRS / count as f64;
+    if neighbors <= max {
+        return Ok(());
+    }
+    let kind = ShapeErrorKind::TooManyNeighbors { count, neighbors, max };
+    Err(ShapeError { key: format!("particles.{key}"), kind })
+}
+
+/// Support radius of a kernel in smoothing lengths h, eqs. (2.12) to (2.18).
+fn kernel_reach(kernel: RepulsionKernel) -> f64 {
+    match kernel {
+        RepulsionKernel::CubicSpline => 2.0,
+        RepulsionKernel::Poly6Spiky => 1.0,
+    }
+}
 
 /// SPH repulsion with reusable buffers.
 #[derive(Clone, Debug)]
 pub(super) struct Repulsion {
     cells: Cells<2>,
+    /// 3 x 3 cells of the thesis, if the scene selects them.
+    neighbor_cells: Option<NeighborCells>,
     force: PressureForce,
     density_kernel: KernelShape,
     stiffness: f32,
-    neighbors: f64,
-    bounds_km: [f64; 2],
+    support: Support,
     masses: Vec<f32>,
     densities: Vec<f32>,
     pressures: Vec<f32>,
@@ -45,11 +114,12 @@ impl Repulsion {
         let cell = parameters.cell_km();
         Self {
             cells: Cells::new(cell as f32),
+            neighbor_cells: (particles.neighbor_search == NeighborSearch::ThreeByThreeCells)
+                .then(|| NeighborCells::new(kernel_reach(particles.kernel))),
             force: PressureForce::new(force_kernel),
             density_kernel,
             stiffness: (particles.repulsion * STIFFNESS * cell * cell / (FRAME_S * FRAME_S)) as f32,
-            neighbors: particles.neighbor_count,
-            bounds_km: SUPPORT_CELLS.map(|cells| cells * cell),
+            support: Support::new(parameters),
             masses: Vec::new(),
             densities: Vec::new(),
             pressures: Vec::new(),
@@ -57,10 +127,22 @@ impl Repulsion {
         }
     }
 
-    /// Support radius h with the required number of neighbors at a density, km.
+    /// Support radius at a density, km.
     pub(super) fn support_km(&self, density_per_km2: f64) -> f64 {
-        let [min, max] = self.bounds_km;
-        (self.neighbors / (std::f64::consts::PI * density_per_km2.max(f64::MIN_POSITIVE))).sqrt().clamp(min, max)
+        match self.support {
+            Support::Fixed(support_km) => support_km,
+            Support::Neighbors { count, bounds_km: [min, max] } => {
+                (count / (std::f64::consts::PI * density_per_km2.max(f64::MIN_POSITIVE))).sqrt().clamp(min, max)
+            }
+        }
+    }
+
+    /// Mean distance between neighboring particles, km, the side of a square with one particle, by the support radius or by the rest density per km^2.
+    pub(super) fn spacing_km(&self, support_km: f64, rest_density: f64) -> f64 {
+        match self.support {
+            Support::Fixed(_) => 1.0 / rest_density.max(f64::MIN_POSITIVE).sqrt(),
+            Support::Neighbors { count, .. } => (std::f64::consts::PI / count).sqrt() * support_km,
+        }
     }
 
     /// Sorts the particles and computes the repulsion, eqs. (2.11) to (2.18); `rest_density` per km^2 is delta_0.
@@ -75,7 +157,12 @@ impl Repulsion {
         particles.sort(&mut self.cells);
         let level = Level::new();
         dispatch!(level, _simd => particle_masses(&particles.fades, &mut self.masses));
-        compute_densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
+        if let Some(cells) = &mut self.neighbor_cells {
+            cells.assign(&particles.positions, &self.masses, support_km as f32);
+            cells.compute_densities(self.density_kernel, &mut self.densities);
+        } else {
+            compute_densities(&self.cells, self.density_kernel, &self.masses, &mut self.densities);
+        }
         // A particle has its full mass in its own density: one that is fading in would otherwise have nearly no density
         // and be accelerated too much.
         let self_density = self.density_kernel.at_center::<2>(self.cells.support_radius());
@@ -84,8 +171,12 @@ impl Repulsion {
         dispatch!(level, _simd => add_missing_self_density(densities, masses, self_density));
         pressures.clear();
         pressures.extend(densities.iter().map(|density| state.pressure(*stiffness, *density)));
-        let (cells, masses) = (&self.cells, &self.masses);
-        self.force.compute_accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
+        if let Some(cells) = &mut self.neighbor_cells {
+            cells.compute_accelerations(self.force.kernel, &self.densities, &self.pressures, &mut self.accelerations);
+        } else {
+            let (cells, masses) = (&self.cells, &self.masses);
+            self.force.compute_accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
+        }
         let count = self.densities.len().max(1) as f64;
         let mean = self.densities.iter().map(|density| f64::from(*density)).sum::<f64>() / count;
         support_km + SUPPORT_RELAXATION * (self.support_km(mean) - support_km)

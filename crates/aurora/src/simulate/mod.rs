@@ -1,13 +1,14 @@
 //! Simulation of the particles and of the field that moves them (thesis, 2.2.3 and 2.3).
 //!
 //! [`AuroraSimulation`] advances them: the [`field`] attracts them to the in-between shape, `forces` has the repulsion
-//! and integration, `relocation` creates and removes particles when the shape is updated, `energy_flux` assigns their
+//! and integration (`neighbor_cells` the neighbor search of the thesis), `relocation` creates and removes particles when the shape is updated, `energy_flux` assigns their
 //! power, [`afterglow`] keeps the delayed light.
 
 pub mod afterglow;
 mod energy_flux;
 pub mod field;
 mod forces;
+mod neighbor_cells;
 mod particles;
 pub(crate) mod point_cloud;
 mod relocation;
@@ -17,5 +18,6 @@ mod state;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use forces::check_neighbors;
 pub use particles::AuroraParticles;
 pub use simulation::AuroraSimulation;

@@ -41,7 +41,6 @@ struct Birth {
 pub(super) struct Relocation {
     parameters: RelocationParameters,
     count: f64,
-    half_thickness: f64,
     key: Key,
 }
 
@@ -54,12 +53,7 @@ struct CellOccupants {
 
 impl Relocation {
     pub(super) fn new(parameters: &AuroraParameters, key: Key) -> Self {
-        Self {
-            parameters: parameters.particles.relocation.clone(),
-            count: parameters.particles.count as f64,
-            half_thickness: parameters.half_thickness_km(),
-            key,
-        }
+        Self { parameters: parameters.particles.relocation.clone(), count: parameters.particles.count as f64, key }
     }
 
     /// Marks stray and surplus particles for removal and adds missing ones, by the shape, scattered particles and field
@@ -89,7 +83,7 @@ impl Relocation {
             self.remove_surplus(particles, &mut intervals, update_index);
             births
         } else {
-            self.births_by_cell(particles, &occupants, field, refined, &near, *next_id, update_index)
+            self.births_by_cell(particles, &occupants, field, &near, *next_id, update_index)
         };
         for Birth { position, velocity } in births {
             particles.push(*next_id, position, velocity, 0.0);
@@ -144,7 +138,6 @@ impl Relocation {
         particles: &AuroraParticles,
         occupants: &CellOccupants,
         field: &ElectricField,
-        refined: &RefinedShape,
         near: &[bool],
         first_id: u64,
         update_index: u32,
@@ -164,7 +157,7 @@ impl Relocation {
                 let id = first_id + births.len() as u64;
                 let [u, v, ..] = self.key.words(id, update_index, BIRTH).map(|word| f64::from(uniform(word)));
                 let position = origin + (corner + DVec2::new(u, v)) * field.counts.spacing();
-                births.push(Birth { position: refined.clamp_distance(position, self.half_thickness), velocity });
+                births.push(Birth { position, velocity });
             }
         }
         births
@@ -243,13 +236,22 @@ const MAX_PARTICLE_FACTOR: f64 = 4.0;
 
 /// Near cells: scatter count and potential compared with their means over all cells.
 pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
-    let (counts, potential) = (field.counts.values(), field.potential.values());
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let (min_count, max_potential) =
-        (table.scatter_count_threshold * mean(counts), table.potential_threshold * mean(potential));
+    let counts = field.counts.values();
+    let min_count = table.scatter_count_threshold * mean(counts);
     // An empty shape has no near cells, whatever the thresholds.
-    let near = |(count, potential): (&f64, &f64)| *count > 0.0 && *count >= min_count && *potential <= max_potential;
-    counts.iter().zip(potential).map(near).collect()
+    let near = |(count, is_low): (&f64, bool)| *count > 0.0 && *count >= min_count && is_low;
+    counts.iter().zip(cells_of_low_potential(field, table)).map(near).collect()
+}
+
+/// Cells whose potential is low enough to be near the shape.
+pub(super) fn cells_of_low_potential(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
+    let potential = field.potential.values();
+    let max_potential = table.potential_threshold * mean(potential);
+    potential.iter().map(|potential| *potential <= max_potential).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// The cell that a particle is in.

@@ -13,7 +13,7 @@ use super::{
     energy_flux::EnergyFlux,
     field::Grid2,
     forces::{Integrator, Repulsion},
-    relocation::{Relocation, near_cells},
+    relocation::{Relocation, cells_of_low_potential, near_cells},
     state::SimulationState,
 };
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
     simulate::{
         field::{
             sheet_charge::{ScatteredParticle, scatter},
-            sheet_field::{ElectricField, FieldBuilder},
+            sheet_field::{ElectricField, FieldBuilder, full_cell_count},
         },
         sheets::{
             arc_length::ArcLengthMap,
@@ -38,7 +38,7 @@ const REACH: f64 = 3.0;
 /// An aurora's particles, afterglow and field, stepped by frames of 1/30 s.
 #[derive(Clone, Debug)]
 pub struct AuroraSimulation {
-    emission: Emission,
+    emission: Arc<Emission>,
     decay: AfterglowDecay,
     targets: TargetBuilder,
     relocation: Relocation,
@@ -124,7 +124,18 @@ impl AuroraSimulation {
     /// The aurora `name` at the start of its preroll: particles at rest, uniformly distributed about the first shape.
     #[must_use]
     pub fn new(parameters: AuroraParameters, sequence: impl Into<Arc<Sequence>>, name: &str, seed: u64) -> Self {
-        let sequence = sequence.into();
+        let emission = parameters.rendering.emission(parameters.spectrum);
+        Self::with_emission(parameters, sequence.into(), emission, name, seed)
+    }
+
+    /// [`Self::new`] with the emission table of its rendering and spectrum.
+    pub(crate) fn with_emission(
+        parameters: AuroraParameters,
+        sequence: Arc<Sequence>,
+        emission: Arc<Emission>,
+        name: &str,
+        seed: u64,
+    ) -> Self {
         let key = Key::new(seed, name);
         let time = -parameters.preroll_s;
         let arc_map = ArcLengthMap::from_lengths(&sequence.at(time), &sequence.control_point_ids(time));
@@ -151,12 +162,13 @@ impl AuroraSimulation {
         state.support_km = repulsion.support_km(target.rest_density);
         let rays = energy_flux.ray_table(&target.refined, time);
         energy_flux.distribute_power(&mut state.particles, &target.refined, &rays, time);
-        state.afterglow.fill_steady_state(&state.particles);
+        if targets.parameters.afterglow {
+            state.afterglow.fill_steady_state(&state.particles);
+        }
         let parameters = &targets.parameters;
-        let emission = parameters.rendering.energy_deposition.shared_emission(parameters.spectrum);
         Self {
-            decay: AfterglowDecay::new(emission, Self::STEP_S * parameters.time_lapse),
-            emission: emission.clone(),
+            decay: AfterglowDecay::new(&emission, Self::STEP_S * parameters.time_lapse),
+            emission,
             relocation: Relocation::new(parameters, key),
             integrator: Integrator::new(parameters),
             repulsion,
@@ -171,14 +183,16 @@ impl AuroraSimulation {
     /// at the time of the next update, so that particles arrive in time.
     fn update_target(&mut self, frames: u64) {
         let (state, target) = (&mut self.state, &self.target);
-        self.relocation.relocate(
-            &mut state.particles,
-            &target.field,
-            &target.refined,
-            &target.scattered,
-            state.target_updates,
-            &mut state.next_id,
-        );
+        if self.targets.parameters.particles.relocation.enabled {
+            self.relocation.relocate(
+                &mut state.particles,
+                &target.field,
+                &target.refined,
+                &target.scattered,
+                state.target_updates,
+                &mut state.next_id,
+            );
+        }
         state.target_updates += 1;
         state.target_time = (state.steps + frames) as f64 * Self::STEP_S - self.targets.parameters.preroll_s;
         state.target_arc_map = self.targets.transfer_arc_map(&state.arc_map, state.target_time);
@@ -214,7 +228,9 @@ impl AuroraSimulation {
         state.steps += 1;
         state.arc_map = arc_map;
         energy_flux.distribute_power(&mut state.particles, &refined, &rays, time);
-        state.afterglow.step(&state.particles, decay);
+        if targets.parameters.afterglow {
+            state.afterglow.step(&state.particles, decay);
+        }
     }
 
     /// Serializes the state.
@@ -267,7 +283,7 @@ impl AuroraSimulation {
 
     /// Mean distance between neighboring particles, km: the side of a square with one particle.
     pub(crate) fn spacing_km(&self) -> f64 {
-        (std::f64::consts::PI / self.targets.parameters.particles.neighbor_count).sqrt() * self.state.support_km
+        self.repulsion.spacing_km(self.state.support_km, self.target.rest_density)
     }
 
     /// Afterglow of the green and the red line.
@@ -287,6 +303,23 @@ impl AuroraSimulation {
     #[must_use]
     pub(crate) fn scatter_counts(&self) -> &Grid2 {
         &self.target.field.counts
+    }
+
+    /// Typical number of scattered particles in a cell that is entirely within a sheet.
+    pub(crate) fn full_cell_count(&self) -> f64 {
+        full_cell_count(&self.target.field.counts)
+    }
+
+    /// Electric field with the noise at a position, km/s^2 (thesis, figure 2.12).
+    pub(crate) fn electric_field(&self, position: DVec2) -> DVec2 {
+        let [east, south] = self.target.field.sample(position.x as f32, position.y as f32).field;
+        DVec2::new(f64::from(east), f64::from(south))
+    }
+
+    /// Cells that are near the shape by their potential alone, and by potential and scatter count (thesis, 2.3.4).
+    pub(crate) fn near_cells(&self) -> [Vec<bool>; 2] {
+        let table = &self.targets.parameters.particles.relocation;
+        [cells_of_low_potential(&self.target.field, table), near_cells(&self.target.field, table)]
     }
 
     /// Noise in the potential at a position, km^2/s^2 (thesis, figure 2.11).

@@ -17,8 +17,6 @@ use crate::physics::{
 /// k_b, J/K, and the atomic mass unit, kg.
 const BOLTZMANN: f64 = 1.380_649e-23;
 const ATOMIC_MASS: f64 = 1.660_539e-27;
-/// Radius of the quenching molecules in (2.25), m: half the distance of an N2-N2 collision.
-const MOLECULAR_RADIUS: f64 = 1.85e-10;
 
 impl Emission {
     /// Column brightness per collision of a track, in kR of ion pairs per mW m^-2. Multiplied by
@@ -40,30 +38,32 @@ pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
     math::sqrt(8.0 * BOLTZMANN * temperature / (std::f64::consts::PI * mass_u * ATOMIC_MASS))
 }
 
-/// Probability that a collision de-excites a state within its mean lifetime (2.25). It suppresses green light below 190
-/// km, which is not observed: few collisions with a molecule quench O(1S).
+/// Probability that a contact with a sphere of `radius` in m de-excites a state within its mean lifetime (2.25).
+///
+/// With the radius of the electrons' collisions, 3.2e-11 m, a tenth of the green light is left at 110 km and nearly all above 150 km. With that of a
+/// molecule, 1.85e-10 m, none is left below 190 km, which is not observed: few contacts with a molecule quench O(1S).
 #[must_use]
-pub fn hard_sphere_quenching(emitter: Emitter, air: &AirLevel) -> f64 {
+pub fn hard_sphere_quenching(emitter: Emitter, air: &AirLevel, radius: f64) -> f64 {
     let mass_u = match emitter {
         Emitter::OxygenGreen | Emitter::OxygenRed => 15.999,
         Emitter::NitrogenIon | Emitter::Nitrogen => 28.014,
     };
-    let cross_section = std::f64::consts::PI * MOLECULAR_RADIUS * MOLECULAR_RADIUS;
+    let cross_section = std::f64::consts::PI * radius * radius;
     let rate = std::f64::consts::SQRT_2 * air.number_density() * cross_section * thermal_speed(air.temperature, mass_u);
     -math::exp_m1(-rate * natural_lifetime(emitter))
 }
 
 /// Photons of each emitter per ion pair by the rules of the thesis (2.4.2): the target is chosen by number density and
-/// emits one line by production rate, unless it is quenched (2.25). O2 emits nothing. This is the expected value over
+/// emits one line by production rate, unless it is quenched (2.25) by spheres of `radius` in m. O2 emits nothing. This is the expected value over
 /// all random choices.
 #[must_use]
-pub fn mean_hard_sphere_photons(air: &AirLevel) -> PerEmitter<f64> {
+pub fn mean_hard_sphere_photons(air: &AirLevel, radius: f64) -> PerEmitter<f64> {
     EMITTERS.map(|emitter| {
         let struck = match emitter {
             Emitter::OxygenGreen | Emitter::OxygenRed => air.o,
             Emitter::NitrogenIon | Emitter::Nitrogen => air.n2,
         };
-        let radiated = 1.0 - hard_sphere_quenching(emitter, air);
+        let radiated = 1.0 - hard_sphere_quenching(emitter, air, radius);
         struck / air.number_density() * DIRECT_PHOTONS[emitter.index()] * radiated
     })
 }
@@ -126,14 +126,22 @@ mod tests {
     }
 
     #[test]
-    fn hard_spheres_kill_green_low_down() {
-        let quenched = |altitude_km| hard_sphere_quenching(Emitter::OxygenGreen, &atmosphere().at(altitude_km));
-        assert!(quenched(110.0) > 0.999 && quenched(150.0) > 0.9 && quenched(250.0) < 0.5);
-        assert!(hard_sphere_quenching(Emitter::NitrogenIon, &atmosphere().at(110.0)) < 1e-3);
+    fn green_survives_the_radius_of_the_collisions_and_not_that_of_a_molecule() {
+        let left = |altitude_km, radius| {
+            1.0 - hard_sphere_quenching(Emitter::OxygenGreen, &atmosphere().at(altitude_km), radius)
+        };
+        for (altitude_km, of_collisions, of_molecules) in
+            [(115.0, 0.16, 0.0), (120.0, 0.35, 0.0), (130.0, 0.64, 0.0), (150.0, 0.87, 0.01)]
+        {
+            let found = [3.2e-11, 1.85e-10].map(|radius| left(altitude_km, radius));
+            assert!((found[0] - of_collisions).abs() < 0.006, "{altitude_km}: {found:?}");
+            assert!((found[1] - of_molecules).abs() < 0.006, "{altitude_km}: {found:?}");
+        }
+        assert!(hard_sphere_quenching(Emitter::NitrogenIon, &atmosphere().at(110.0), 1.85e-10) < 1e-3);
     }
 
     /// What shines after a collision, drawn by the rules of the thesis.
-    fn drawn(air: &AirLevel, uniforms: [f64; 3]) -> Option<Emitter> {
+    fn drawn(air: &AirLevel, radius: f64, uniforms: [f64; 3]) -> Option<Emitter> {
         use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
         let species_draw = uniforms[0] * air.number_density();
         let struck = match species_draw {
@@ -143,7 +151,7 @@ mod tests {
         };
         let rates = struck.map(|emitter| DIRECT_PHOTONS[emitter.index()]);
         let emitter = struck[usize::from(uniforms[1] * (rates[0] + rates[1]) >= rates[0])];
-        (uniforms[2] >= hard_sphere_quenching(emitter, air)).then_some(emitter)
+        (uniforms[2] >= hard_sphere_quenching(emitter, air, radius)).then_some(emitter)
     }
 
     #[test]
@@ -155,11 +163,11 @@ mod tests {
         let (mut sum, draws) = ([0.0; 4], 100_000_u64);
         for draw in 0..draws {
             let [a, b, c, _] = Key::new(1, "rules").uniforms(draw, 0, Purpose::named("draw")).map(f64::from);
-            if let Some(emitter) = drawn(&air, [a, b, c]) {
+            if let Some(emitter) = drawn(&air, 1.85e-10, [a, b, c]) {
                 sum[emitter.index()] += photons[emitter.index()] / draws as f64;
             }
         }
-        let mean = mean_hard_sphere_photons(&air);
+        let mean = mean_hard_sphere_photons(&air, 1.85e-10);
         // Hardly any red is left, and 1,700 photons of the violet: 2.4 %.
         for i in [0, 2, 3] {
             assert!((sum[i] / mean[i] - 1.0).abs() < 0.08, "{i}: {sum:?} {mean:?}");

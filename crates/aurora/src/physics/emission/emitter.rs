@@ -5,6 +5,8 @@ use std::sync::LazyLock;
 
 use bansho_base::color::{ACESCG_FROM_XYZ, LUMINOUS_EFFICACY_LM_PER_W, line_xyz};
 
+use super::table_2_1;
+
 use super::PHOTONS_PER_KILORAYLEIGH;
 
 /// Bands of the N2 first positive system in the visible (Vallance Jones 1974, table 4.12): a header, then upper and lower vibrational
@@ -62,6 +64,63 @@ pub const LINES: [Line; 7] = [
     line("N2 670.5 nm", 670.48, Emitter::Nitrogen, 0.021_44),
 ];
 
+bansho_base::choice! {
+    /// Color matching functions by which spectral lines become color, eqs. (2.29) and (2.30).
+    pub enum ColorMatching {
+        /// CIE 1931 standard observer, 2 degrees, straight to the working space.
+        Cie1931 = "cie_1931",
+        /// The thesis's table 2.1, which has its five lines only, and its matrix (2.30) to sRGB.
+        Table21 = "table_2_1",
+    }
+}
+
+/// The lines that a model of the emission knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineSet {
+    /// All visible lines and bands of each state: [`LINES`], and the whole first positive system.
+    Observed,
+    /// The five lines of the thesis (2.4.2): 557.7 and 630.0 nm of O; 391.4, 427.8 and 670.5 nm of N2.
+    Thesis,
+}
+
+impl LineSet {
+    /// Wavelength, nm, and photons of each line or band of an emitter, per counted photon.
+    #[must_use]
+    pub fn lines(self, emitter: Emitter) -> Vec<(f64, f64)> {
+        if self == Self::Observed && emitter == Emitter::Nitrogen {
+            return first_positive_bands();
+        }
+        let lines = LINES.iter().filter(|line| line.emitter == emitter && self.has(line));
+        lines.map(|line| (line.wavelength_nm, line.photons)).collect()
+    }
+
+    /// Whether it has a line.
+    #[must_use]
+    pub fn has(self, line: &Line) -> bool {
+        self == Self::Observed || table_2_1::XYZ.iter().any(|(nm, _)| (nm - line.wavelength_nm).abs() < 0.05)
+    }
+
+    /// Absolute ACEScg color per kilorayleigh of the counted photons of an emitter; luminance in cd/m^2.
+    #[must_use]
+    pub(crate) fn color_per_kilorayleigh(self, emitter: Emitter) -> [f64; 3] {
+        static COLORS: LazyLock<[PerEmitter<[f64; 3]>; 2]> = LazyLock::new(|| {
+            [LineSet::Observed, LineSet::Thesis].map(|set| EMITTERS.map(|emitter| color(set, emitter)))
+        });
+        COLORS[self as usize][emitter.index()]
+    }
+}
+
+impl ColorMatching {
+    /// Absolute ACEScg color per kilorayleigh of a line, luminance in cd/m^2.
+    #[must_use]
+    pub(crate) fn line_color(self, wavelength_nm: f64) -> [f64; 3] {
+        match self {
+            Self::Cie1931 => ACESCG_FROM_XYZ.apply(absolute_xyz(wavelength_nm)),
+            Self::Table21 => table_2_1::acescg(wavelength_nm, watts_per_kilorayleigh(wavelength_nm)),
+        }
+    }
+}
+
 impl Emitter {
     /// Its index in [`EMITTERS`].
     #[must_use]
@@ -73,40 +132,28 @@ impl Emitter {
     /// cd/m^2. The color is outside the AP1 gamut: components may be negative and are kept until the view transform.
     #[must_use]
     pub(crate) fn color_per_kilorayleigh(self) -> [f64; 3] {
-        static COLORS: LazyLock<PerEmitter<[f64; 3]>> = LazyLock::new(|| EMITTERS.map(color));
-        COLORS[self.index()]
-    }
-
-    /// Wavelength and photons of each line or band, per counted photon.
-    fn spectrum(self) -> Vec<(f64, f64)> {
-        if self == Self::Nitrogen {
-            return first_positive_bands();
-        }
-        LINES.iter().filter(|line| line.emitter == self).map(|line| (line.wavelength_nm, line.photons)).collect()
+        LineSet::Observed.color_per_kilorayleigh(self)
     }
 }
 
-impl Line {
-    /// Absolute ACEScg color per kilorayleigh of this line alone.
-    #[must_use]
-    pub(crate) fn color_per_kilorayleigh(&self) -> [f64; 3] {
-        ACESCG_FROM_XYZ.apply(absolute_xyz(self.wavelength_nm))
-    }
-}
-
-fn color(emitter: Emitter) -> [f64; 3] {
-    let sum = emitter.spectrum().into_iter().fold([0.0; 3], |sum: [f64; 3], (wavelength_nm, photons)| {
+fn color(set: LineSet, emitter: Emitter) -> [f64; 3] {
+    let sum = set.lines(emitter).into_iter().fold([0.0; 3], |sum: [f64; 3], (wavelength_nm, photons)| {
         let xyz = absolute_xyz(wavelength_nm);
         std::array::from_fn(|i| sum[i] + photons * xyz[i])
     });
     ACESCG_FROM_XYZ.apply(sum)
 }
 
-/// XYZ per kilorayleigh at a wavelength, Y in cd/m^2: 10^13 photons m^-2 s^-1 over the full sphere (Hunten et al.
-/// 1956), (2.29).
-fn absolute_xyz(wavelength_nm: f64) -> [f64; 3] {
+/// Radiance of a kilorayleigh at a wavelength, W m^-2 sr^-1: 10^13 photons m^-2 s^-1 over the full sphere (Hunten et al.
+/// 1956).
+fn watts_per_kilorayleigh(wavelength_nm: f64) -> f64 {
     let photon = PLANCK_TIMES_LIGHT_SPEED / (wavelength_nm * 1e-9);
-    let radiance = PHOTONS_PER_KILORAYLEIGH / (4.0 * std::f64::consts::PI) * photon;
+    PHOTONS_PER_KILORAYLEIGH / (4.0 * std::f64::consts::PI) * photon
+}
+
+/// XYZ per kilorayleigh at a wavelength, Y in cd/m^2, (2.29).
+fn absolute_xyz(wavelength_nm: f64) -> [f64; 3] {
+    let radiance = watts_per_kilorayleigh(wavelength_nm);
     line_xyz(wavelength_nm).map(|value| LUMINOUS_EFFICACY_LM_PER_W * radiance * value)
 }
 
@@ -146,7 +193,7 @@ mod tests {
             let number = |column: usize| fields[column].parse::<f64>().unwrap();
             if fields[2] == "CIE1931_2deg" && !fields[0].contains("composite") {
                 let line = LINES.iter().find(|line| (line.wavelength_nm - number(1)).abs() < 0.02).unwrap();
-                let found = luminance_of(line.color_per_kilorayleigh());
+                let found = luminance_of(ColorMatching::Cie1931.line_color(line.wavelength_nm));
                 assert!((found / number(19) - 1.0).abs() < 0.01, "{row}: {found}");
                 compared += 1;
             }

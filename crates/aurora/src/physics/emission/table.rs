@@ -5,7 +5,7 @@ use bansho_base::math::lerp;
 use super::{
     PHOTONS_PER_KILORAYLEIGH,
     collisions::mean_hard_sphere_photons,
-    emitter::{EMITTERS, Emitter, PerEmitter},
+    emitter::{EMITTERS, Emitter, LineSet, PerEmitter},
     excitation::photons_per_ion_pair,
     lifetime::LifetimeAndDiffusion,
     red_line_altitudes::{RED_ALTITUDES, mean_lifetimes},
@@ -13,9 +13,10 @@ use super::{
 use crate::physics::{
     atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, covers, locate_level},
     precipitation::{
-        Deposition, Spectrum,
+        Deposition, HardSphereParameters, Spectrum,
         deposition::AltitudeProfile,
         energy_grid::{self, NODES, node_energy_ev},
+        lateral_spread::SpreadByEnergy,
     },
 };
 
@@ -23,6 +24,9 @@ use crate::physics::{
 #[derive(Clone, Debug)]
 pub struct Emission {
     deposition: Deposition,
+    lines: LineSet,
+    /// Spread of tracks about their field line; computed on first use.
+    spread: SpreadByEnergy,
     /// Counted photons of each emitter per ion pair, by level.
     photons: Vec<PerEmitter<f64>>,
     columns: Vec<ColumnEmission>,
@@ -47,17 +51,26 @@ impl Emission {
     #[must_use]
     pub fn new(air: &Atmosphere, spectrum: Spectrum) -> Self {
         let photons = air.levels().iter().map(photons_per_ion_pair).collect();
-        Self::from_photons(air, Deposition::new(air, spectrum), photons)
+        let spread = SpreadByEnergy::of_fang_2010();
+        Self::from_photons(air, Deposition::new(air, spectrum), LineSet::Observed, spread, photons)
     }
 
     /// The table for the thesis's hard-sphere tracks and its rules of emission.
     #[must_use]
-    pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
-        let photons = air.levels().iter().map(mean_hard_sphere_photons).collect();
-        Self::from_photons(air, Deposition::from_hard_spheres(air, spectrum), photons)
+    pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum, spheres: &HardSphereParameters) -> Self {
+        let (radius, quenching_radius) = (spheres.collision_radius(), spheres.quenching_radius());
+        let photons = air.levels().iter().map(|air| mean_hard_sphere_photons(air, quenching_radius)).collect();
+        let deposition = Deposition::from_hard_spheres(air, spectrum, radius);
+        Self::from_photons(air, deposition, LineSet::Thesis, SpreadByEnergy::of_hard_spheres(radius), photons)
     }
 
-    fn from_photons(air: &Atmosphere, deposition: Deposition, photons: Vec<PerEmitter<f64>>) -> Self {
+    fn from_photons(
+        air: &Atmosphere,
+        deposition: Deposition,
+        lines: LineSet,
+        spread: SpreadByEnergy,
+        photons: Vec<PerEmitter<f64>>,
+    ) -> Self {
         let persistence: Vec<_> =
             air.levels().iter().map(|air| EMITTERS.map(|emitter| LifetimeAndDiffusion::new(emitter, air))).collect();
         let columns = (0..NODES)
@@ -70,7 +83,20 @@ impl Emission {
             mean_lifetimes(light.zip(persistence.iter().map(|persistence| persistence[red].lifetime)))
         };
         let red_lifetimes = (0..NODES).map(red_lifetimes).collect();
-        Self { deposition, photons, columns, red_lifetimes }
+        Self { deposition, lines, spread, photons, columns, red_lifetimes }
+    }
+
+    /// The lines of each emitter.
+    #[must_use]
+    pub(crate) const fn lines(&self) -> LineSet {
+        self.lines
+    }
+
+    /// RMS distance of the collisions of electrons of an energy from their field line, per direction, km, where each
+    /// collision deflects by an RMS tangent of `deflection`.
+    #[must_use]
+    pub(crate) fn lateral_spread_km(&self, deflection: f64, energy_ev: f64) -> f64 {
+        if deflection <= 0.0 { 0.0 } else { deflection * self.spread.at(energy_ev) }
     }
 
     /// The underlying ionization table.
@@ -144,17 +170,17 @@ impl Emission {
     /// ACEScg color of the column, luminance in cd/m^2 per mW m^-2.
     #[must_use]
     pub fn column_color(&self, energy_ev: f64) -> [f64; 3] {
-        color_of(self.column(energy_ev).kilorayleigh)
+        self.color_of(self.column(energy_ev).kilorayleigh)
     }
-}
 
-/// Absolute ACEScg color of kilorayleighs by emitter, luminance in cd/m^2.
-#[must_use]
-pub fn color_of(kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
-    EMITTERS.into_iter().zip(kilorayleigh).fold([0.0; 3], |sum: [f64; 3], (emitter, kilorayleigh)| {
-        let color = emitter.color_per_kilorayleigh();
-        std::array::from_fn(|i| sum[i] + kilorayleigh * color[i])
-    })
+    /// Absolute ACEScg color of kilorayleighs by emitter, luminance in cd/m^2.
+    #[must_use]
+    pub fn color_of(&self, kilorayleigh: PerEmitter<f64>) -> [f64; 3] {
+        EMITTERS.into_iter().zip(kilorayleigh).fold([0.0; 3], |sum: [f64; 3], (emitter, kilorayleigh)| {
+            let color = self.lines.color_per_kilorayleigh(emitter);
+            std::array::from_fn(|i| sum[i] + kilorayleigh * color[i])
+        })
+    }
 }
 
 fn column(
@@ -186,6 +212,8 @@ fn column(
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::parameters::Auto;
+
     use super::*;
     use crate::physics::{
         atmosphere::{atmosphere, level_altitude_km},
@@ -227,15 +255,21 @@ mod tests {
 
     #[test]
     fn hard_spheres_shine_where_nature_does_not() {
-        let (measured, spheres) = (Emission::new(atmosphere(), ARC), Emission::from_hard_spheres(atmosphere(), ARC));
+        let of_radius = |quenching_radius_pm| {
+            let radii = HardSphereParameters { quenching_radius_pm, ..HardSphereParameters::default() };
+            Emission::from_hard_spheres(atmosphere(), ARC, &radii)
+        };
+        let (measured, spheres) = (Emission::new(atmosphere(), ARC), of_radius(Auto::Auto));
         let peak_km = |table: &Emission, energy_ev: f64, emitter: Emitter| {
             let profile = table.profile(energy_ev);
             let light = |level: &usize| profile[*level][emitter.index()];
             level_altitude_km((0..LEVELS).max_by(|a, b| light(a).total_cmp(&light(b))).unwrap_or(0))
         };
-        // (2.25) leaves no green light below 190 km; electrons of 1 keV come far too low, as violet light shows.
-        let green = [&measured, &spheres].map(|table| peak_km(table, 5000.0, Emitter::OxygenGreen));
-        assert!(green[0] < 115.0 && green[1] > 180.0, "{green:?}");
+        // (2.25) with the one radius of the thesis moves green light up by some km; with that of a molecule it leaves none below 190 km. Electrons of
+        // 1 keV come far too low, as violet light shows.
+        let molecules = of_radius(Auto::Set(185.0));
+        let green = [&measured, &spheres, &molecules].map(|table| peak_km(table, 5000.0, Emitter::OxygenGreen));
+        assert!(green[0] < 115.0 && (110.0..125.0).contains(&green[1]) && green[2] > 180.0, "{green:?}");
         let violet = [&measured, &spheres].map(|table| peak_km(table, 1000.0, Emitter::NitrogenIon));
         assert!(violet[0] > 148.0 && violet[1] < 140.0, "{violet:?}");
         let column = spheres.column(5000.0);
@@ -244,8 +278,8 @@ mod tests {
 
     /// Red and blue beside green, linear on a screen, of the light from one altitude.
     fn beside_green(energy_ev: f64, altitude_km: f64) -> [f64; 2] {
-        let emission = Emission::new(atmosphere(), ARC).at(energy_ev, altitude_km);
-        let [r, g, b] = bansho_base::color::SRGB_FROM_ACESCG.apply(color_of(emission));
+        let table = Emission::new(atmosphere(), ARC);
+        let [r, g, b] = bansho_base::color::SRGB_FROM_ACESCG.apply(table.color_of(table.at(energy_ev, altitude_km)));
         [r / g, b / g]
     }
 

@@ -3,6 +3,7 @@
 use bansho_base::{
     math,
     math::random::{Key, Purpose, normal_pair, uniform_f64},
+    parameters::{Auto, Range},
 };
 
 use super::{
@@ -19,6 +20,39 @@ const COLLISION: Purpose = Purpose::named("aurora hard-sphere collision");
 /// Radius of the spheres, m, that stops 10 keV electrons near 105 km; the thesis gives none. No radius fits all
 /// energies: with this one 1 keV electrons stop at 129 km instead of 158 km.
 pub(crate) const DEFAULT_RADIUS_M: f64 = 3.2e-11;
+
+/// Radii from a hundredth of the default to ten times that of a molecule, pm.
+const RADII_PM: Range = Range::new(0.3, 2000.0);
+/// m.
+const PICOMETER: f64 = 1e-12;
+
+bansho_base::parameters! {
+    /// The hard spheres of the thesis (2.4), for `energy_deposition = "hard_sphere"`. The thesis has one radius r and does not state it.
+    pub struct HardSphereParameters {
+        /// Radius r of (2.22). At 32 pm electrons of 10 keV stop near 105 km, at 100 pm near 130 km.
+        collision_radius_pm: f64 = DEFAULT_RADIUS_M / PICOMETER, limits(RADII_PM), unit("pm");
+        /// Radius r of (2.25), by which excited atoms are quenched; `"auto"` is the radius of the collisions, as in the thesis. With collisions at 32 pm
+        /// and the radius of a molecule here, 185 pm, no green light is left below 190 km.
+        quenching_radius_pm: Auto<f64> = Auto::Auto, limits(RADII_PM), unit("pm");
+    }
+}
+
+impl HardSphereParameters {
+    /// Radius of the spheres that electrons collide with, m.
+    #[must_use]
+    pub fn collision_radius(&self) -> f64 {
+        self.collision_radius_pm * PICOMETER
+    }
+
+    /// Radius of the spheres that quench, m.
+    #[must_use]
+    pub fn quenching_radius(&self) -> f64 {
+        match self.quenching_radius_pm {
+            Auto::Auto => self.collision_radius(),
+            Auto::Set(radius) => radius * PICOMETER,
+        }
+    }
+}
 
 /// An atmosphere of hard spheres.
 #[derive(Clone, Debug)]
@@ -99,10 +133,10 @@ impl HardSphereAtmosphere {
 }
 
 impl Deposition {
-    /// The table of the thesis's hard-sphere tracks, radius [`DEFAULT_RADIUS_M`].
+    /// The table of the thesis's hard-sphere tracks, for spheres of `radius` in m.
     #[must_use]
-    pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum) -> Self {
-        Self::from_profiles(HardSphereAtmosphere::new(air, DEFAULT_RADIUS_M, 0.0).profiles(air), spectrum)
+    pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum, radius: f64) -> Self {
+        Self::from_profiles(HardSphereAtmosphere::new(air, radius, 0.0).profiles(air), spectrum)
     }
 }
 

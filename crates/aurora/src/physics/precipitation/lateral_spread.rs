@@ -1,15 +1,15 @@
 //! Lateral spread of an electron's collisions about its field line.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use bansho_base::{host::once::get_or_compute, math, math::random::Key};
 use rayon::prelude::*;
 
 use super::{
-    Deposition, TrackModel,
+    Deposition,
     electron_track::{Collision, TrackSampler, collision_count},
     energy_grid::{self, NODES, node_energy_ev},
-    hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
+    hard_sphere::HardSphereAtmosphere,
     spectrum::ARC,
 };
 use crate::physics::atmosphere::atmosphere;
@@ -22,52 +22,69 @@ const MIN_TRACKS: u32 = 96;
 const STRIDE: usize = 4;
 const _: () = assert!((NODES - 1).is_multiple_of(STRIDE));
 
-/// Spread of Fang and of hard-sphere tracks, for straight tracks: deflections change their altitudes only to second
-/// order.
-static FANG: OnceLock<SpreadByEnergy> = OnceLock::new();
-static HARD_SPHERE: OnceLock<SpreadByEnergy> = OnceLock::new();
-
-fn by_energy(model: TrackModel) -> &'static SpreadByEnergy {
-    match model {
-        TrackModel::Fang2010 => get_or_compute(&FANG, || {
-            // Tracks are monoenergetic, so the spectrum does not matter.
-            let tracks = TrackSampler::new(&Deposition::new(atmosphere(), ARC), 0.0);
-            SpreadByEnergy::new(|node, key, particle| altitudes_km(tracks.sample_track(node, key, particle)))
-        }),
-        TrackModel::HardSphereAtmosphere => get_or_compute(&HARD_SPHERE, || {
-            let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0);
-            SpreadByEnergy::new(|node, key, particle| altitudes_km(spheres.track(node_energy_ev(node), key, particle)))
-        }),
-    }
+/// RMS distance of the collisions of an electron from its field line, for straight tracks: deflections change their altitudes only to
+/// second order. Computed on first use.
+#[derive(Clone, Debug)]
+pub(crate) struct SpreadByEnergy {
+    tracks: Tracks,
+    /// For a deflection of 1, km, at every [`STRIDE`]th node; it is proportional to the deflection. Shared by copies.
+    by_node: Arc<OnceLock<Vec<f64>>>,
 }
 
-/// RMS distance of the collisions of electrons of an energy from their field line, per direction, km, where each
-/// collision deflects by an RMS tangent of `deflection`.
-pub(crate) fn lateral_spread_km(model: TrackModel, deflection: f64, energy_ev: f64) -> f64 {
-    if deflection <= 0.0 { 0.0 } else { deflection * by_energy(model).at(energy_ev) }
+/// Which tracks are sampled.
+#[derive(Clone, Copy, Debug)]
+enum Tracks {
+    Fang2010,
+    /// Radius, m.
+    HardSpheres(f64),
 }
-
-/// RMS distance for a deflection of 1, km, at every [`STRIDE`]th node; it is proportional to the deflection.
-struct SpreadByEnergy(Vec<f64>);
 
 impl SpreadByEnergy {
-    /// From the altitudes, in km, of the collisions of a track of a node, sampled with a key and a particle number.
-    fn new(track_altitudes_km: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Self {
-        let key = Key::new(0, "aurora wander");
-        let of_node = |node: usize| {
-            let tracks = u64::from(COLLISIONS_PER_ENERGY.div_ceil(collision_count(node)).max(MIN_TRACKS));
-            let sum = (0..tracks).map(|particle| variance_km2(&track_altitudes_km(node, key, particle))).sum::<f64>();
-            math::sqrt(sum / tracks as f64)
-        };
-        Self((0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect())
+    pub(crate) fn of_fang_2010() -> Self {
+        // Tracks are monoenergetic, so the spectrum does not matter.
+        static BY_NODE: LazyLock<Arc<OnceLock<Vec<f64>>>> = LazyLock::new(Arc::default);
+        Self { tracks: Tracks::Fang2010, by_node: BY_NODE.clone() }
     }
 
-    fn at(&self, energy_ev: f64) -> f64 {
+    /// For spheres of `radius` in m.
+    pub(crate) fn of_hard_spheres(radius: f64) -> Self {
+        Self { tracks: Tracks::HardSpheres(radius), by_node: Arc::default() }
+    }
+
+    /// For a deflection of 1, km.
+    pub(crate) fn at(&self, energy_ev: f64) -> f64 {
+        let by_node = get_or_compute(&self.by_node, || self.tracks.spread_by_node());
         let (node, fraction) = energy_grid::locate(energy_ev);
         let coordinate = (node as f64 + fraction) / STRIDE as f64;
-        let below = (coordinate as usize).min(self.0.len() - 2);
-        math::lerp(self.0[below], self.0[below + 1], coordinate - below as f64)
+        let below = (coordinate as usize).min(by_node.len() - 2);
+        math::lerp(by_node[below], by_node[below + 1], coordinate - below as f64)
     }
+}
+
+impl Tracks {
+    fn spread_by_node(self) -> Vec<f64> {
+        match self {
+            Self::Fang2010 => {
+                let tracks = TrackSampler::new(&Deposition::new(atmosphere(), ARC), 0.0);
+                spread_by_node(|node, key, particle| altitudes_km(tracks.sample_track(node, key, particle)))
+            }
+            Self::HardSpheres(radius) => {
+                let spheres = HardSphereAtmosphere::new(atmosphere(), radius, 0.0);
+                spread_by_node(|node, key, particle| altitudes_km(spheres.track(node_energy_ev(node), key, particle)))
+            }
+        }
+    }
+}
+
+/// From the altitudes, in km, of the collisions of a track of a node, sampled with a key and a particle number.
+fn spread_by_node(track_altitudes_km: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Vec<f64> {
+    let key = Key::new(0, "aurora wander");
+    let of_node = |node: usize| {
+        let tracks = u64::from(COLLISIONS_PER_ENERGY.div_ceil(collision_count(node)).max(MIN_TRACKS));
+        let sum = (0..tracks).map(|particle| variance_km2(&track_altitudes_km(node, key, particle))).sum::<f64>();
+        math::sqrt(sum / tracks as f64)
+    };
+    (0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect()
 }
 
 fn altitudes_km(track: impl Iterator<Item = Collision>) -> Vec<f64> {
@@ -89,7 +106,7 @@ fn variance_km2(altitudes_km: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::precipitation::energy_grid::locate;
+    use crate::physics::precipitation::{TrackModel, energy_grid::locate, hard_sphere::DEFAULT_RADIUS_M};
 
     #[test]
     fn steps_of_equal_length_wander_as_a_random_walk() {
@@ -126,7 +143,7 @@ mod tests {
                         }
                     }
                 }
-                let ratio = lateral_spread_km(model, 0.05, node_energy_ev(node)) / math::sqrt(sum / count);
+                let ratio = emission.lateral_spread_km(0.05, node_energy_ev(node)) / math::sqrt(sum / count);
                 assert!((0.75..1.35).contains(&ratio), "{model:?} {energy_ev}: {ratio}");
             }
         }

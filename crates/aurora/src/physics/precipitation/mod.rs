@@ -16,7 +16,7 @@ pub mod spectrum;
 
 pub use deposition::Deposition;
 pub use electron_track::{Collision, TrackLibrary, TrackSampler};
-pub use hard_sphere::HardSphereAtmosphere;
+pub use hard_sphere::{HardSphereAtmosphere, HardSphereParameters};
 pub use spectrum::Spectrum;
 
 bansho_base::choice! {
@@ -24,7 +24,7 @@ bansho_base::choice! {
     pub enum TrackModel {
         /// The measured atmosphere: altitudes after Fang et al. (2010), colors and brightness as observed.
         Fang2010 = "fang_2010",
-        /// Hard spheres, as in the thesis (2.4): one radius for all energies, and green light only above 190 km.
+        /// Hard spheres, as in the thesis (2.4): one radius for all energies, five lines, and quenching at every contact.
         HardSphereAtmosphere = "hard_sphere",
     }
 }

@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn the_mean_is_the_profile_and_falls_go_down() {
-        let deposition = Deposition::from_hard_spheres(atmosphere(), ARC);
+        let deposition = Deposition::from_hard_spheres(atmosphere(), ARC, DEFAULT_RADIUS_M);
         let (spheres, heights) =
             (HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0), TrackSampler::new(&deposition, 0.0));
         // The last energy is so great that some of its collisions lie below all levels.

@@ -16,6 +16,7 @@ use crate::{
     render::{
         Blur, RenderingParameters, Sampling,
         project::field_lines::{FieldLines, FootPoint},
+        shade::attenuation::AttenuationByDistance,
     },
     simulate::{
         AuroraParticles,
@@ -60,12 +61,15 @@ pub(crate) struct SourceBuilder<'a> {
     pub(crate) weight: f32,
     /// Index of the instant: a particle has other random tracks at each.
     pub(crate) instant: u32,
+    /// Attenuation by the distance of the field line.
+    pub(crate) attenuation: AttenuationByDistance,
 }
 
 impl SourceBuilder<'_> {
     #[inline(always)]
     fn build(&self, foot: FootPoint, powers_w: [f32; 3], node: f32, key: u32) -> FieldLineSource {
-        let scale = self.weight * PER_UNIT * foot.vertical_cosine;
+        let attenuation = self.attenuation.of_field_line(foot.across);
+        let scale = self.weight * PER_UNIT * foot.vertical_cosine * attenuation;
         let [green, red, prompt] = powers_w;
         let power = [green * scale, red * scale, prompt * scale];
         FieldLineSource { across: foot.across, reach: self.reach, energy_node: node, power, random_key: key }
@@ -115,12 +119,12 @@ impl SourceBuilder<'_> {
         }
     }
 
-    /// Particles extrapolated by `offset_s` seconds, with the green light of each.
-    fn particles(&self, particles: &AuroraParticles, green_w: &[f32], offset_s: f32) -> Vec<FieldLineSource> {
+    /// Particles extrapolated by `offset_s` seconds, with the green and the red light of each.
+    fn particles(&self, particles: &AuroraParticles, lasting: LastingLight, offset_s: f32) -> Vec<FieldLineSource> {
         let level = Level::new();
         let mut sources = vec![FieldLineSource::default(); particles.len()];
         sources.par_chunks_mut(TASK).enumerate().for_each(|(task, sources)| {
-            dispatch!(level, _simd => self.fill_from_particles(sources, particles, green_w, task * TASK, offset_s));
+            dispatch!(level, _simd => self.fill_from_particles(sources, particles, lasting, task * TASK, offset_s));
         });
         sources
     }
@@ -130,7 +134,7 @@ impl SourceBuilder<'_> {
         &self,
         sources: &mut [FieldLineSource],
         particles: &AuroraParticles,
-        green_w: &[f32],
+        lasting: LastingLight,
         first: usize,
         offset_s: f32,
     ) {
@@ -154,7 +158,8 @@ impl SourceBuilder<'_> {
             }
             for (i, source) in sources.iter_mut().enumerate() {
                 let foot = FootPoint { across: [feet[0][i], feet[1][i]], vertical_cosine: feet[2][i] };
-                let powers = [green_w[first + i], 0.0, particles.powers_w[first + i]];
+                let power = particles.powers_w[first + i];
+                let powers = [lasting.green_w[first + i], lasting.red_fraction * power, power];
                 let key = self.random_key(particles.ids[first + i] as u32);
                 *source = self.build(foot, powers, nodes[i], key);
             }
@@ -162,12 +167,40 @@ impl SourceBuilder<'_> {
     }
 }
 
+/// The light of particles in the lines that outlast their excitation.
+#[derive(Clone, Copy)]
+struct LastingLight<'a> {
+    /// Power of the green light of each particle, W.
+    green_w: &'a [f32],
+    /// Fraction of a particle's power with which it emits red light: 0 if cells do.
+    red_fraction: f32,
+}
+
 impl Sources {
     /// Sources while the shutter is open.
     pub(crate) fn new(inputs: &EmissionInputs, field: &FieldLines, times: &SampleTimes) -> Self {
+        match inputs.afterglow {
+            Some(afterglow) => Self::with_afterglow(inputs, afterglow, field, times),
+            None => Self::without_afterglow(inputs, field, times),
+        }
+    }
+
+    /// All light is emitted where and when electrons strike, as in the thesis.
+    fn without_afterglow(inputs: &EmissionInputs, field: &FieldLines, times: &SampleTimes) -> Self {
+        let spread = math::hypot(inputs.spread_km(), times.smear_km);
+        let (reach, weight) = (spread as f32 * REACH, 1.0 / times.offsets_s.len().max(1) as f32);
+        let lasting = LastingLight { green_w: &inputs.particles.powers_w, red_fraction: 1.0 };
+        let mut sharp = Vec::new();
+        for (offset_s, instant) in times.offsets_s.iter().zip(times.first_index..) {
+            let builder = SourceBuilder { field, reach, weight, instant, attenuation: inputs.attenuation };
+            sharp.extend(builder.particles(inputs.particles, lasting, *offset_s as f32));
+        }
+        Self { sharp, soft: Vec::new(), spread_km: [spread; 2] }
+    }
+
+    fn with_afterglow(inputs: &EmissionInputs, afterglow: &Afterglow, field: &FieldLines, times: &SampleTimes) -> Self {
         let by_collisions = inputs.parameters.sampling == Sampling::SingleCollisions;
         let min_power = if by_collisions { MIN_RELATIVE_POWER_WITH_COLLISIONS } else { MIN_RELATIVE_POWER };
-        let afterglow = inputs.afterglow;
         let column = inputs.emission.column(inputs.energy_ev);
         let spread = math::hypot(inputs.spread_km(), times.smear_km);
         let with = |emitter: Emitter, cell_km: f64| {
@@ -187,12 +220,19 @@ impl Sources {
         };
         let green_spread = of_block(cell_spreads[0], afterglow.green.cell_km(), blocks[0]);
         let red_spread = of_block(cell_spreads[1], afterglow.red.cell_km(), blocks[1]);
-        let builder =
-            |spread: f64, weight, instant| SourceBuilder { field, reach: spread as f32 * REACH, weight, instant };
+        let attenuation = inputs.attenuation;
+        let builder = |spread: f64, weight, instant| SourceBuilder {
+            field,
+            reach: spread as f32 * REACH,
+            weight,
+            instant,
+            attenuation,
+        };
+        let lasting = LastingLight { green_w: &green_w, red_fraction: 0.0 };
         let mut sharp = builder(green_spread, 1.0, times.first_index).cells(&green, GREEN);
         let weight = 1.0 / times.offsets_s.len().max(1) as f32;
         for (offset_s, instant) in times.offsets_s.iter().zip(times.first_index..) {
-            sharp.extend(builder(spread, weight, instant).particles(inputs.particles, &green_w, *offset_s as f32));
+            sharp.extend(builder(spread, weight, instant).particles(inputs.particles, lasting, *offset_s as f32));
         }
         let soft = builder(red_spread, 1.0, times.first_index).cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
@@ -229,8 +269,8 @@ pub(crate) struct SampleTimes {
 /// Inputs from which sources are created.
 pub(crate) struct EmissionInputs<'a> {
     pub(crate) particles: &'a AuroraParticles,
-    /// The green and the red map.
-    pub(crate) afterglow: &'a Afterglow,
+    /// The green and the red map, unless all light is prompt.
+    pub(crate) afterglow: Option<&'a Afterglow>,
     pub(crate) emission: &'a Emission,
     pub(crate) parameters: &'a RenderingParameters,
     /// Mean distance between neighboring particles, km.
@@ -239,6 +279,8 @@ pub(crate) struct EmissionInputs<'a> {
     pub(crate) energy_ev: f64,
     /// Spread of collisions about their field line, km.
     pub(crate) lateral_spread_km: f64,
+    /// Attenuation by distance.
+    pub(crate) attenuation: AttenuationByDistance,
 }
 
 impl EmissionInputs<'_> {

@@ -4,13 +4,16 @@ use std::sync::OnceLock;
 
 use bansho_base::math;
 
-use crate::physics::{
-    atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
-    emission::{
-        EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
-        red_line_altitudes::{RED_ALTITUDES, red_by_altitude},
+use crate::{
+    physics::{
+        atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
+        emission::{
+            EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
+            red_line_altitudes::{RED_ALTITUDES, red_by_altitude},
+        },
+        precipitation::energy_grid::NODES,
     },
-    precipitation::energy_grid::NODES,
+    render::shade::attenuation::AttenuationByDistance,
 };
 
 /// Tables per node of the energy grid: the nearest is within 0.5 % of the energy, and the red column, which varies
@@ -41,6 +44,8 @@ const fn starts() -> [usize; MIP_LEVELS + 1] {
 #[derive(Clone, Debug)]
 pub(crate) struct EmissionProfiles {
     emission: Emission,
+    /// Attenuation (2.27) of the light of each level.
+    attenuation: Vec<f64>,
     /// Whether the components are red light by altitude instead of emitters.
     red_by_altitude: bool,
     tables: Vec<OnceLock<MipTables>>,
@@ -67,14 +72,15 @@ pub(super) struct EmissionProfile<'a> {
 
 impl EmissionProfiles {
     /// The tables for a spectrum.
-    pub(crate) fn new(emission: &Emission) -> Self {
+    pub(crate) fn new(emission: &Emission, attenuation: &AttenuationByDistance) -> Self {
         let tables = vec![OnceLock::new(); (NODES - 1) * TABLES_PER_NODE + 1];
-        Self { emission: emission.clone(), red_by_altitude: false, tables }
+        let attenuation = (0..LEVELS).map(|level| attenuation.of_level(level)).collect();
+        Self { emission: emission.clone(), attenuation, red_by_altitude: false, tables }
     }
 
     /// Tables of red light by altitude instead of emitters.
-    pub(crate) fn red_by_altitude(emission: &Emission) -> Self {
-        Self { red_by_altitude: true, ..Self::new(emission) }
+    pub(crate) fn red_by_altitude(emission: &Emission, attenuation: &AttenuationByDistance) -> Self {
+        Self { red_by_altitude: true, ..Self::new(emission, attenuation) }
     }
 
     /// The profile of an energy, given as fractional node index; `red` includes the red line's altitude range.
@@ -89,7 +95,10 @@ impl EmissionProfiles {
     #[inline(never)]
     fn table(&self, table_index: usize) -> &MipTables {
         self.tables[table_index].get_or_init(|| {
-            let profile = self.emission.profile(table_energy_ev(table_index));
+            let mut profile = self.emission.profile(table_energy_ev(table_index));
+            for (light, attenuation) in profile.iter_mut().zip(&self.attenuation) {
+                *light = light.map(|photons| photons * attenuation);
+            }
             if self.red_by_altitude {
                 MipTables::from_red_altitudes(&red_by_altitude(&profile))
             } else {
@@ -190,7 +199,7 @@ mod tests {
     #[test]
     fn every_table_of_an_energy_holds_the_same_column() {
         let table = table::Emission::new(atmosphere(), ARC);
-        let profiles = EmissionProfiles::new(&table);
+        let profiles = EmissionProfiles::new(&table, &AttenuationByDistance::default());
         for node in [20.0, 48.0, 60.25] {
             let profile = profiles.at(node, true);
             let energy = table_energy_ev((node * TABLES_PER_NODE as f32) as usize);
@@ -208,7 +217,8 @@ mod tests {
 
     #[test]
     fn hard_electrons_stop_lower() {
-        let profiles = EmissionProfiles::new(&table::Emission::new(atmosphere(), ARC));
+        let profiles =
+            EmissionProfiles::new(&table::Emission::new(atmosphere(), ARC), &AttenuationByDistance::default());
         assert!(profiles.at(64.0, false).top_km < profiles.at(32.0, false).top_km);
         assert!(profiles.at(48.0, true).top_km > 300.0);
     }

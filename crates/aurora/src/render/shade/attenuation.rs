@@ -1,4 +1,4 @@
-//! From kilorayleighs to color, with the extinction of the lower atmosphere.
+//! From kilorayleighs to color, with the extinction of the lower atmosphere, or the thesis's attenuation by distance.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,9 +8,13 @@ use bansho_base::math::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use crate::physics::{
-    emission::{EMITTERS, Emitter, LINES, PerEmitter},
-    extinction::Extinction,
+use crate::{
+    physics::{
+        atmosphere::level_altitude_km,
+        emission::{ColorMatching, EMITTERS, Emitter, LineSet, PerEmitter},
+        extinction::Extinction,
+    },
+    render::RenderingParameters,
 };
 
 /// Steps from the horizon to the zenith, uniform in the square root of the sine of the elevation: extinction varies
@@ -27,13 +31,15 @@ pub(crate) struct EmitterColors {
 }
 
 impl EmitterColors {
-    /// Precomputes the table for an extinction.
-    pub(crate) fn new(air: &Extinction) -> Self {
+    /// Precomputes the table for the extinction and the color matching functions of a rendering, and the lines of its emission.
+    pub(crate) fn new(rendering: &RenderingParameters, lines: LineSet) -> Self {
+        let RenderingParameters { extinction: air, color_matching, .. } = rendering;
         let colors = (0..=STEPS).map(|step| {
             let root = step as f64 / STEPS as f64;
             let elevation = math::asin(root * root).min(FRAC_PI_2);
             EMITTERS.map(|emitter| {
-                let [red, green, blue] = attenuated_color(emitter, air, elevation).map(|value| value as f32);
+                let [red, green, blue] =
+                    attenuated_color(emitter, lines, *color_matching, air, elevation).map(|value| value as f32);
                 [red, green, blue, if emitter == Emitter::Nitrogen { 0.0 } else { 1.0 }]
             })
         });
@@ -60,17 +66,66 @@ impl EmitterColors {
 }
 
 /// Attenuated color of a kilorayleigh of an emitter, all lines included.
-fn attenuated_color(emitter: Emitter, air: &Extinction, elevation: f64) -> [f64; 3] {
-    if emitter == Emitter::Nitrogen {
+fn attenuated_color(
+    emitter: Emitter,
+    lines: LineSet,
+    color_matching: ColorMatching,
+    air: &Extinction,
+    elevation: f64,
+) -> [f64; 3] {
+    if emitter == Emitter::Nitrogen && lines == LineSet::Observed {
         let transmittance = air.transmittance(BANDS_NM, elevation);
         return emitter.color_per_kilorayleigh().map(|value| value * transmittance);
     }
-    let lines = LINES.iter().filter(|line| line.emitter == emitter);
-    let sum = lines.fold(DVec3::ZERO, |sum, line| {
-        sum + DVec3::from(line.color_per_kilorayleigh())
-            * (line.photons * air.transmittance(line.wavelength_nm, elevation))
+    let sum = lines.lines(emitter).into_iter().fold(DVec3::ZERO, |sum, (wavelength_nm, photons)| {
+        let color = DVec3::from(color_matching.line_color(wavelength_nm));
+        sum + color * (photons * air.transmittance(wavelength_nm, elevation))
     });
     sum.to_array()
+}
+
+/// The thesis's attenuation by distance, exp(-(d z)^2) (2.27), with z the distance from the observer.
+///
+/// z^2 is the sum of the squared distances along the field and across it, so that the attenuation is the product of a factor of the altitude and one
+/// of the field line. The field is taken as straight over a flat Earth; the thesis looks along no horizon. The default is no attenuation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct AttenuationByDistance {
+    /// d, 1/km.
+    per_km: f64,
+    /// Sine of the dip: altitude over distance along the field.
+    dip_sine: f64,
+}
+
+/// Minimum dip, degrees, as for field lines.
+const MIN_DIP_DEG: f64 = 30.0;
+
+impl AttenuationByDistance {
+    /// For a rendering, and a dip of the magnetic field.
+    pub(crate) fn new(rendering: &RenderingParameters, dip_deg: f64) -> Self {
+        let dip_sine = math::sin(dip_deg.abs().max(MIN_DIP_DEG).to_radians());
+        Self { per_km: rendering.attenuation_per_km, dip_sine }
+    }
+
+    /// Factor of the light of a level of the atmosphere.
+    pub(crate) fn of_level(&self, level: usize) -> f64 {
+        self.of_distance(level_altitude_km(level) / self.dip_sine)
+    }
+
+    /// Factor of the light of a field line at these distances from the observer's, km.
+    #[inline(always)]
+    pub(crate) fn of_field_line(&self, [x, y]: [f32; 2]) -> f32 {
+        // Checked here, too: the square root would cost where there is no attenuation.
+        if self.per_km == 0.0 { 1.0 } else { self.of_distance(math::hypot(f64::from(x), f64::from(y))) as f32 }
+    }
+
+    /// Factor of the light of a distance along or across the field, km.
+    fn of_distance(&self, distance_km: f64) -> f64 {
+        if self.per_km == 0.0 {
+            return 1.0;
+        }
+        let depth = self.per_km * distance_km;
+        math::exp(-depth * depth)
+    }
 }
 
 #[cfg(test)]
@@ -82,7 +137,8 @@ mod tests {
     #[test]
     fn without_air_every_emitter_has_its_own_color() {
         let none = Extinction { rayleigh: 0.0, aerosol: 0.0, ozone: 0.0, ..Extinction::default() };
-        let emitter_colors = EmitterColors::new(&none);
+        let rendering = RenderingParameters { extinction: none, ..RenderingParameters::default() };
+        let emitter_colors = EmitterColors::new(&rendering, LineSet::Observed);
         for emitter in EMITTERS {
             let mut light = [0.0; 4];
             light[emitter.index()] = 2.0;
@@ -96,7 +152,7 @@ mod tests {
 
     #[test]
     fn blue_fades_before_red_toward_the_horizon() {
-        let emitter_colors = EmitterColors::new(&Extinction::default());
+        let emitter_colors = EmitterColors::new(&RenderingParameters::default(), LineSet::Observed);
         let transmittance = |emitter: Emitter| {
             let mut light = [0.0; 4];
             light[emitter.index()] = 1.0;

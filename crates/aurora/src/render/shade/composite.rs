@@ -153,8 +153,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        physics::extinction::Extinction,
-        render::project::{chart::Coverage, pixel_batch::PixelBatch},
+        physics::emission::LineSet,
+        render::{
+            RenderingParameters,
+            project::{chart::Coverage, pixel_batch::PixelBatch},
+        },
     };
 
     /// Light that changes slowly over the sky, on a chart.
@@ -180,7 +183,7 @@ mod tests {
         };
         let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [320, 240], 0);
         let field = FieldLines::new(77.0, 3.0, DVec3::ZERO);
-        let emitter_colors = EmitterColors::new(&Extinction::default());
+        let emitter_colors = EmitterColors::new(&RenderingParameters::default(), LineSet::Observed);
         let coverage = Coverage::of_view(&view, &field);
         let pixel = coverage.pixel;
         let [sharp, soft] = [(1.0, 2.0, 9.0), (8.0, 2.0, 4.0)]

@@ -28,8 +28,7 @@ use crate::{
             Deposition,
             electron_track::{Collision, TrackLibrary, TrackSampler},
             energy_grid::{NODES, node_energy_ev},
-            hard_sphere::{DEFAULT_RADIUS_M, HardSphereAtmosphere},
-            lateral_spread::lateral_spread_km,
+            hard_sphere::HardSphereAtmosphere,
             quantile_matched::QuantileMatchedTracks,
         },
     },
@@ -42,6 +41,7 @@ use crate::{
             chart::{BLOCK_COLUMNS, Chart, ChartProjection},
             field_lines::FieldLines,
         },
+        shade::attenuation::AttenuationByDistance,
     },
 };
 
@@ -76,7 +76,13 @@ pub(crate) struct CollisionRenderer {
 
 impl CollisionRenderer {
     /// The tables for all energies up to that of the node `highest`.
-    pub(crate) fn new(emission: &Emission, rendering: &RenderingParameters, highest: usize, key: Key) -> Self {
+    pub(crate) fn new(
+        emission: &Emission,
+        rendering: &RenderingParameters,
+        attenuation: &AttenuationByDistance,
+        highest: usize,
+        key: Key,
+    ) -> Self {
         let deviation = |index: usize| {
             // The sum of three uniforms approximates that density; scaled to its variance, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
@@ -84,22 +90,25 @@ impl CollisionRenderer {
         };
         let deviations = |batch: usize| std::array::from_fn(|lane| deviation(batch * SPLAT_LANES + lane));
         let highest = highest.min(NODES - 1);
-        let levels = emission.photons_per_ion_pair().iter().copied();
-        let photons = levels.chain([[0.0; 4]]);
+        let levels = emission.photons_per_ion_pair().iter().enumerate();
+        let attenuated =
+            |(level, photons): (usize, &PerEmitter<f64>)| photons.map(|photons| photons * attenuation.of_level(level));
+        let photons = levels.map(attenuated).chain([[0.0; 4]]);
         let (deposition, deflection) = (emission.deposition(), rendering.collision_deflection);
         let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
         let tracks = match rendering.energy_deposition {
             TrackModel::Fang2010 => fang_tracks(&TrackSampler::new(deposition, deflection), highest, key),
             TrackModel::HardSphereAtmosphere => {
-                let tracks = hard_sphere_tracks(deposition, deflection, highest, key);
+                let radius = rendering.hard_spheres.collision_radius();
+                let spheres = HardSphereAtmosphere::new(atmosphere(), radius, deflection);
+                let tracks = hard_sphere_tracks(&spheres, deposition, highest, key);
                 pairs.iter_mut().zip(&tracks).for_each(|(pairs, tracks)| *pairs *= tracks.energy_weight);
                 TrackTable::new(highest + 1, |node, variant| {
                     tracks[node].track(variant).iter().map(with_light).collect()
                 })
             }
         };
-        let support_km =
-            |node| REACH * lateral_spread_km(rendering.energy_deposition, deflection, node_energy_ev(node)) as f32;
+        let support_km = |node| REACH * emission.lateral_spread_km(deflection, node_energy_ev(node)) as f32;
         Self {
             key,
             tracks,
@@ -166,14 +175,13 @@ fn fang_tracks(tracks: &TrackSampler, highest: usize, key: Key) -> TrackTable {
 
 /// Hard-sphere tracks for each node up to the highest.
 fn hard_sphere_tracks(
+    spheres: &HardSphereAtmosphere,
     deposition: &Deposition,
-    deflection: f64,
     highest: usize,
     key: Key,
 ) -> Vec<QuantileMatchedTracks> {
-    let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, deflection);
     let sampler = TrackSampler::new(deposition, 0.0);
-    (0..=highest).into_par_iter().map(|node| QuantileMatchedTracks::new(&spheres, &sampler, node, key)).collect()
+    (0..=highest).into_par_iter().map(|node| QuantileMatchedTracks::new(spheres, &sampler, node, key)).collect()
 }
 
 /// A collision and its photon row, its level.

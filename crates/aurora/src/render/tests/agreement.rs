@@ -1,7 +1,7 @@
 //! The mean of pictures of single collisions is the picture of the mean profile, for each emitter.
 
 use super::*;
-use crate::{parameters::MAX_COLLISION_DEFLECTION, physics::precipitation::lateral_spread::lateral_spread_km};
+use crate::parameters::MAX_COLLISION_DEFLECTION;
 
 /// Sum of absolute differences over the sum, for each emitter but the red line, which is not drawn by collisions.
 fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
@@ -22,8 +22,11 @@ fn beside_profile(
     cells: &[AfterglowCell<1>],
     spread_km: f64,
 ) -> ([f64; 3], ColumnBuffer) {
-    let (profiles, view, field) =
-        (EmissionProfiles::new(emission), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
+    let (profiles, view, field) = (
+        EmissionProfiles::new(emission, &AttenuationByDistance::default()),
+        view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]),
+        field(77.0),
+    );
     let sources = sources(cells, PROMPT_AND_GREEN, spread_km, &field);
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
@@ -51,9 +54,14 @@ fn arc_beside_profile(
         fall.emission(ARC),
         RenderingParameters { energy_deposition: fall, collision_deflection, ..RenderingParameters::default() },
     );
-    let collisions =
-        CollisionRenderer::new(&emission, &drawing, nearest_node(6.0 * ENERGY_EV), Key::new(seed, "aurora"));
-    let spread_km = math::hypot(OWN_SPREAD_KM, lateral_spread_km(fall, collision_deflection, ENERGY_EV));
+    let collisions = CollisionRenderer::new(
+        &emission,
+        &drawing,
+        &AttenuationByDistance::default(),
+        nearest_node(6.0 * ENERGY_EV),
+        Key::new(seed, "aurora"),
+    );
+    let spread_km = math::hypot(OWN_SPREAD_KM, emission.lateral_spread_km(collision_deflection, ENERGY_EV));
     beside_profile(&emission, &collisions, &arc(particles), spread_km)
 }
 
@@ -129,9 +137,10 @@ fn middle_row(picture: &ColumnBuffer, emitter: Emitter) -> usize {
 fn the_fall_of_the_thesis_lies_elsewhere() {
     let [measured, thesis] =
         [TrackModel::Fang2010, TrackModel::HardSphereAtmosphere].map(|fall| arc_beside_profile(fall, 0.0, 5, 1000).1);
-    // Rows of 5 mrad: green light only above 190 km, the rest hardly elsewhere at this energy.
+    // Rows of 5 mrad: quenching at every contact by spheres of the collisions' radius moves the middle of the green light up by some 19 rows; violet light
+    // is hardly elsewhere at this energy.
     let [green, violet] = [Emitter::OxygenGreen, Emitter::NitrogenIon]
         .map(|emitter| [&measured, &thesis].map(|picture| middle_row(picture, emitter)));
-    assert!(green[1] + 20 < green[0], "{green:?}");
+    assert!(green[1] + 15 < green[0], "{green:?}");
     assert!(violet[0].abs_diff(violet[1]) < 25, "{violet:?}");
 }

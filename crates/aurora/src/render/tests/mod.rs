@@ -24,7 +24,7 @@ use crate::{
     Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
         atmosphere::atmosphere,
-        emission::{EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
+        emission::{EMITTERS, Emission, Emitter, LineSet, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
         precipitation::spectrum::ARC,
     },
     render::{
@@ -39,6 +39,7 @@ use crate::{
             field_lines::{EARTH_RADIUS_KM, FieldLines},
             pixel_batch::PixelBatch,
         },
+        shade::attenuation::AttenuationByDistance,
         single_collisions::{
             blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS, collision_pass::CollisionRenderer,
         },
@@ -81,7 +82,14 @@ fn sources(
     spread_km: f64,
     field: &FieldLines,
 ) -> Vec<FieldLineSource> {
-    SourceBuilder { field, reach: spread_km as f32 * REACH, weight: 1.0, instant: 0 }.cells(cells, [shares])
+    SourceBuilder {
+        field,
+        reach: spread_km as f32 * REACH,
+        weight: 1.0,
+        instant: 0,
+        attenuation: AttenuationByDistance::default(),
+    }
+    .cells(cells, [shares])
 }
 
 /// Minimum standard deviation of sources, km.
@@ -135,7 +143,7 @@ fn colatitude_and_longitude(field: &FieldLines, direction: DVec3) -> [f32; 2] {
 #[test]
 fn an_even_sheet_overhead_shows_its_column() {
     let (emission, view) = (emission(), view(Lens::Fisheye, [0.0, 1.0, 0.0], [64, 64]));
-    let profiles = EmissionProfiles::new(&emission);
+    let profiles = EmissionProfiles::new(&emission, &AttenuationByDistance::default());
     for (shares, emitters) in [(GREEN, 0..1), (RED, 1..2), (PROMPT, 2..4)] {
         for dip_deg in [90.0, 77.0, -60.0] {
             let field = field(dip_deg);
@@ -160,7 +168,7 @@ fn an_even_sheet_overhead_shows_its_column() {
 
 #[test]
 fn a_ray_is_seen_where_every_lens_puts_it() {
-    let profiles = EmissionProfiles::new(&emission());
+    let profiles = EmissionProfiles::new(&emission(), &AttenuationByDistance::default());
     let field = field(77.0);
     let cell =
         AfterglowCell { cell_index: 0, position_km: [40.0, -90.0], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
@@ -222,8 +230,11 @@ fn every_measured_line_is_there_and_named_by_its_wavelength() {
     let measured: Vec<_> =
         aurora.info().aovs.iter().map(|aov| aov.name).filter(|name| name.starts_with("kilo")).collect();
     assert_eq!(names.collect::<Vec<_>>(), measured);
-    assert_eq!(measured.len(), brightnesses().count());
-    let [green, red, fainter_red, _, _, band, all_bands] = brightnesses().collect::<Vec<_>>()[..] else { panic!() };
+    assert_eq!(measured.len(), brightnesses(LineSet::Observed).count());
+    let [green, red, fainter_red, _, _, band, all_bands] = brightnesses(LineSet::Observed).collect::<Vec<_>>()[..]
+    else {
+        panic!()
+    };
     assert_eq!((green, red, fainter_red.0), ((Emitter::OxygenGreen, 1.0), (Emitter::OxygenRed, 1.0), red.0));
     assert!((fainter_red.1 * 2.997 - 1.0).abs() < 1e-12, "{fainter_red:?}");
     assert_eq!((all_bands, band.0), ((Emitter::Nitrogen, 1.0), Emitter::Nitrogen));
@@ -252,8 +263,11 @@ fn auto_exposure_knows_the_flux_and_energy_of_sheets() {
 /// Standard deviation in pixels, from left to right, of the violet light of a lone field line to the north where it is
 /// 110 km high, blurred in the picture.
 fn blurred_width(north_km: f32, radii: &BlurParameters) -> f64 {
-    let (profiles, view, field) =
-        (EmissionProfiles::new(&emission()), view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]), field(77.0));
+    let (profiles, view, field) = (
+        EmissionProfiles::new(&emission(), &AttenuationByDistance::default()),
+        view(Lens::Perspective, [0.0, 40.0, -60.0], [320, 240]),
+        field(77.0),
+    );
     let cell =
         AfterglowCell { cell_index: 0, position_km: [0.0, -north_km], powers_w: [1e6], energy_ev: ENERGY_EV as f32 };
     let sources = sources(&[cell], PROMPT, 0.01, &field);
@@ -340,8 +354,11 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
 
 #[test]
 fn few_particles_are_as_smooth_and_as_bright_as_many() {
-    let (profiles, view, field) =
-        (EmissionProfiles::new(&emission()), view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]), field(77.0));
+    let (profiles, view, field) = (
+        EmissionProfiles::new(&emission(), &AttenuationByDistance::default()),
+        view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]),
+        field(77.0),
+    );
     let picture = |count: usize| {
         let mut cells = arc(count);
         cells.iter_mut().for_each(|cell| cell.powers_w[0] *= 16_000.0 / count as f32);
@@ -402,7 +419,7 @@ fn thin_light(emission: &Emission, emitter: usize, [colatitude, longitude]: [f64
 #[test]
 fn a_thin_sheet_is_as_bright_about_the_magnetic_zenith_as_its_light_comes_to() {
     let (emission, field, view) = (emission(), field(90.0), view(Lens::Perspective, [0.0, 1.0, 1e-3], [320, 320]));
-    let profiles = EmissionProfiles::new(&emission);
+    let profiles = EmissionProfiles::new(&emission, &AttenuationByDistance::default());
     for (shares, emitter) in [(GREEN, 0), (PROMPT, 2)] {
         let sources = sources(&thin_sheet(), shares, THIN_SPREAD_KM, &field);
         // Rows of a pixel of an ordinary picture.

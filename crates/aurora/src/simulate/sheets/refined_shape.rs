@@ -1,7 +1,7 @@
 //! The refined in-between shape: a smooth curve through the control points, with folds that travel along it.
 
 use bansho_base::{
-    math::{self, DVec2, lerp, random::Key},
+    math::{DVec2, lerp, random::Key},
     noise::{Coordinate, Fractal, Noise},
 };
 
@@ -214,19 +214,6 @@ impl RefinedShape {
     /// Indices of sheet and segment nearest to `point`; `None` beyond the reach.
     pub(crate) fn nearest_segment(&self, point: DVec2) -> Option<[usize; 2]> {
         self.near.nearest(point).map(|(segment, _)| self.starts[segment].map(|number| number as usize))
-    }
-
-    /// `point`, moved toward the shape if it is farther than `max_distance` km from it; unchanged beyond the reach.
-    pub(crate) fn clamp_distance(&self, point: DVec2, max_distance: f64) -> DVec2 {
-        let Some(nearest) =
-            self.near.nearest_point(point).filter(|nearest| nearest.distance_squared > max_distance * max_distance)
-        else {
-            return point;
-        };
-        let [sheet, index] = self.starts[nearest.segment].map(|number| number as usize);
-        let points = &self.shape.sheets[sheet].points;
-        let on_sheet = points[index].lerp(points[index + 1], nearest.fraction);
-        on_sheet + (point - on_sheet) * (max_distance / math::sqrt(nearest.distance_squared))
     }
 
     /// The point of a sheet nearest to `point`; `None` beyond the reach.

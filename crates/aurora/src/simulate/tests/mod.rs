@@ -2,6 +2,7 @@
 
 mod arrivals;
 mod contract;
+mod literal;
 mod rules;
 mod shapes;
 

@@ -1,0 +1,183 @@
+//! The thesis to the letter: rays by kernel, relocation by table 3.3, gaps by frame.
+
+use bansho_base::{math, math::random::Key};
+
+use super::*;
+use crate::{
+    FieldCharge, FieldSolver, NeighborSearch, PowerDistribution, RayParameters, RelocationParameters, RepulsionKernel,
+    simulate::field::{gauss_seidel_sweep, sheet_charge::scatter, sheet_field::FieldBuilder},
+};
+
+/// A straight sheet of so many cells of the grid, by the rules of the thesis, with 600 particles per cell of its length.
+fn literal(cells: f64, kernel: RepulsionKernel) -> AuroraParameters {
+    let extent_km = 640.0;
+    let half = 0.5 * cells * extent_km / 64.0;
+    AuroraParameters {
+        extent_km,
+        preroll_s: 0.0,
+        afterglow: false,
+        shapes: vec![shape(vec![line([-half, 5.0], [half, 5.0])])],
+        field: FieldParameters {
+            cells: 64,
+            solver: FieldSolver::GaussSeidel,
+            charge: FieldCharge::Uniform,
+            sweeps: 20,
+            tolerance: 0.0,
+            screening_length_km: Auto::Set(20_000.0),
+            ..FieldParameters::default()
+        },
+        particles: ParticleParameters {
+            count: (600.0 * cells) as i64,
+            kernel,
+            smoothing_length_cells: Auto::Set(1.0),
+            friction_per_s: 0.0,
+            fade_s: 0.0,
+            power_distribution: PowerDistribution::Equal,
+            relocation: RelocationParameters { scale_counts: false, ..RelocationParameters::default() },
+            ..ParticleParameters::default()
+        },
+        rays: RayParameters { contrast: 0.0, energy_variation: 0.0, ..RayParameters::default() },
+        folds: FoldParameters { amplitude_km: 0.0, ..FoldParameters::default() },
+        ..AuroraParameters::default()
+    }
+}
+
+/// Bins of the line density per cell.
+const BINS: usize = 16;
+
+/// `values` after a Gaussian with a standard deviation in bins.
+fn blurred(values: &[f64], sigma: f64) -> Vec<f64> {
+    let weight = |distance: f64| math::exp(-0.5 * (distance / sigma) * (distance / sigma));
+    let at = |i: usize| {
+        let (mut sum, mut whole) = (0.0, 0.0);
+        for (j, value) in values.iter().enumerate() {
+            let weight = weight(i as f64 - j as f64);
+            (sum, whole) = (sum + weight * value, whole + weight);
+        }
+        sum / whole
+    };
+    (0..values.len()).map(at).collect()
+}
+
+/// Contrast of the density along the middle of a still sheet: the standard deviation over the mean after a Gaussian of one cell is taken off, of the
+/// density blurred by a quarter of a cell.
+fn ray_contrast(simulation: &AuroraSimulation, cells: f64) -> f64 {
+    let cell = simulation.parameters().cell_km();
+    let mut counts = vec![0.0; (cells * BINS as f64) as usize];
+    for index in 0..simulation.particles().len() {
+        let along = simulation.particles().position(index).x / cell + 0.5 * cells;
+        if let Some(count) = counts.get_mut((along * BINS as f64).floor() as usize).filter(|_| along >= 0.0) {
+            *count += 1.0;
+        }
+    }
+    let fine = blurred(&counts, 0.25 * BINS as f64);
+    let coarse = blurred(&counts, BINS as f64);
+    // Four cells at each end belong to the ends.
+    let inner = 4 * BINS..counts.len() - 4 * BINS;
+    let mean = inner.clone().map(|bin| counts[bin]).sum::<f64>() / inner.len() as f64;
+    let variance = inner.clone().map(|bin| (fine[bin] - coarse[bin]) * (fine[bin] - coarse[bin])).sum::<f64>();
+    math::sqrt(variance / inner.len() as f64) / mean
+}
+
+/// The mean contrast of some seeds by kernel and neighbor search.
+fn mean_contrast(kernel: RepulsionKernel, neighbor_search: NeighborSearch, seeds: u64) -> f64 {
+    const CELLS: f64 = 18.0;
+    let of_seed = |seed: u64| {
+        let mut parameters = literal(CELLS, kernel);
+        parameters.particles.neighbor_search = neighbor_search;
+        let sequence = sequence(&parameters);
+        let mut simulation = AuroraSimulation::new(parameters, sequence, "aurora", seed);
+        (0..FRAMES).for_each(|_| simulation.step());
+        ray_contrast(&simulation, CELLS)
+    };
+    (0..seeds).map(of_seed).sum::<f64>() / seeds as f64
+}
+
+/// Frames from shape to shape in the thesis.
+const FRAMES: usize = 140;
+
+/// The thesis's own result (2.3.2, figure 2.13). h is one cell, and the spline reaches two.
+#[test]
+fn the_spline_makes_rays_where_poly6_and_spiky_do_not() {
+    let poly6_spiky = mean_contrast(RepulsionKernel::Poly6Spiky, NeighborSearch::SupportRadius, 5);
+    let spline = mean_contrast(RepulsionKernel::CubicSpline, NeighborSearch::SupportRadius, 5);
+    let spline_in_cells = mean_contrast(RepulsionKernel::CubicSpline, NeighborSearch::ThreeByThreeCells, 2);
+    assert!(spline > 2.0 * poly6_spiky, "{spline} {poly6_spiky}");
+    assert!(spline_in_cells > 2.0 * poly6_spiky, "{spline_in_cells} {poly6_spiky}");
+}
+
+#[test]
+fn gauss_seidel_of_the_literal_scenes_leaves_little_of_the_charge() {
+    let key = Key::new(1, "literal");
+    let mut parameters = literal(64.0, RepulsionKernel::CubicSpline);
+    parameters.field.cells = 256;
+    let simulation = simulation(parameters.clone());
+    let refined = simulation.refined_shape();
+    let half_thickness = parameters.half_thickness_km();
+    let scattered = scatter(&refined, half_thickness, parameters.particles.count as usize, key, 0);
+    let residual = |sweeps: i64| {
+        let mut parameters = parameters.clone();
+        parameters.field.sweeps = sweeps;
+        let builder = FieldBuilder::new(&parameters, key);
+        let field = builder.build(&refined, &scattered, 0.0);
+        let source = builder.charge_density(&refined, &scattered, &field.counts);
+        let lowest = field.potential.values().iter().copied().fold(0.0, f64::min);
+        // The change by (2.6) itself, which the thesis compares with a threshold.
+        gauss_seidel_sweep(&mut field.potential.clone(), &source, builder.screening) / -lowest
+    };
+    let [few, literal] = [20, 60].map(residual);
+    assert!(literal < 0.01 && few > literal, "{few} {literal}");
+}
+
+/// Table 3.3 on a still sheet: every near cell with fewer than 50 particles gets what it lacks, at most 10.
+#[test]
+fn births_are_those_that_table_3_3_predicts() {
+    let mut parameters = literal(24.0, RepulsionKernel::CubicSpline);
+    // Nothing moves, so that the numbers of the first update are those of the scattered particles.
+    (parameters.particles.lorentz_weight, parameters.particles.repulsion_weight) = (0.0, 0.0);
+    parameters.particles.count = 2400;
+    let mut simulation = simulation(parameters);
+    let [_, near] = simulation.near_cells();
+    let counts = simulation.particle_counts();
+    let births = |(near, count): (&bool, &f64)| if *near { (50.0 - count).clamp(0.0, 10.0) } else { 0.0 };
+    let predicted: f64 = near.iter().zip(counts.values()).map(births).sum();
+    let before = simulation.particles().len();
+    simulation.step();
+    let found = simulation.particles().len() - before;
+    assert_eq!(found as f64, predicted);
+}
+
+/// Figure 2.14: without relocation no particle appears or disappears.
+#[test]
+fn without_relocation_all_particles_of_the_first_shape_remain() {
+    let mut parameters = literal(24.0, RepulsionKernel::CubicSpline);
+    parameters.shapes = vec![
+        ShapeParameters { hold_s: 0.0, ..shape(vec![line([-120.0, 5.0], [120.0, 5.0])]) },
+        ShapeParameters { transition_s: Some(1.0), ..shape(vec![line([-120.0, 90.0], [120.0, -80.0])]) },
+    ];
+    parameters.particles.count = 2400;
+    let [fixed, relocated] = [false, true].map(|enabled| {
+        parameters.particles.relocation.enabled = enabled;
+        let mut simulation = simulation(parameters.clone());
+        let before = simulation.particles().ids.len();
+        (0..40).for_each(|_| simulation.step());
+        let mut ids = simulation.particles().ids.clone();
+        ids.sort_unstable();
+        ids == (0..before as u64).collect::<Vec<_>>()
+    });
+    assert!(fixed && !relocated);
+}
+
+/// Every particle has the same power, so that light follows the particles.
+#[test]
+fn particles_of_equal_power_have_the_power_of_the_sheets_together() {
+    let mut parameters = literal(24.0, RepulsionKernel::CubicSpline);
+    parameters.flux_mw_per_m2 = 10.0.into();
+    let simulation = simulation(parameters);
+    let particles = simulation.particles();
+    let [least, most] =
+        [f32::min, f32::max].map(|pick| particles.powers_w.iter().copied().fold(particles.powers_w[0], pick));
+    assert_eq!(least, most);
+    // 10 mW/m^2 on 240 km times the thickness of two cells, 20 km.
+    assert!((particles.power_w() / (10.0 * 1e3 * 240.0 * 20.0) - 1.0).abs() < 0.01, "{}", particles.power_w());
+}

@@ -1,0 +1,230 @@
+//! The literal scenes of the thesis (`scenes/papers/sekiguchi`): their shapes, gaps, maps and errors.
+
+#[path = "support/planned.rs"]
+mod planned;
+
+use std::{fs, path::Path, sync::Arc};
+
+use bansho::KINDS;
+use bansho_aurora::{
+    AuroraParameters,
+    shapes::{FRAME_S, Sequence, Sheet},
+};
+use bansho_base::{
+    color::srgb_from_acescg,
+    host::{assets::MemoryAssets, observer::Unobserved},
+    parameters::{Parameters, Reader},
+};
+use bansho_render::PlanOptions;
+use bansho_scene::Scene;
+use planned::Planned;
+
+/// The text of a literal scene.
+fn text(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/papers/sekiguchi").join(name);
+    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn sequence(text: &str) -> Sequence {
+    let scene = Scene::parse("test.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
+    let aurora = AuroraParameters::read_table(&scene.instances[0].parameters.canonical(), &mut Reader::new(), &[]);
+    Sequence::new(&aurora.shapes, &aurora.morphing, aurora.extent_km, &MemoryAssets::default(), None).unwrap()
+}
+
+fn scene(number: usize) -> Sequence {
+    sequence(&text(&format!("sekiguchi_paper_{number}.toml")))
+}
+
+#[test]
+fn the_literal_scenes_have_the_sheets_and_frames_of_the_thesis_and_do_not_cross() {
+    let sheets = |number: usize| {
+        let sequence = scene(number);
+        assert_eq!(sequence.crossing(), None, "scene {number}");
+        let frames = (sequence.duration() / FRAME_S).round() as usize;
+        let sheets = sequence.arrivals().iter().map(|&time| sequence.at(time).sheets.len()).collect::<Vec<_>>();
+        (frames, sheets)
+    };
+    assert_eq!(sheets(1), (280, vec![1, 1, 1]));
+    assert_eq!(sheets(2), (280, vec![1, 1, 2]));
+    assert_eq!(sheets(3), (280, vec![3, 3, 2]));
+    assert_eq!(sheets(4), (560, vec![1, 1, 1, 3, 2]));
+    assert_eq!(sheets(5), (420, vec![6, 6, 6, 6]));
+}
+
+/// Distance between the end of one sheet and the start of another, km, and the smallest flux factor of both.
+fn gap([first, second]: [&Sheet; 2]) -> [f64; 2] {
+    let ends = [first.points[first.points.len() - 1], second.points[0]];
+    let flux = first.flux.iter().chain(&second.flux).copied().fold(f64::INFINITY, f64::min);
+    [ends[0].distance(ends[1]), flux]
+}
+
+/// Figures 2.4 to 2.7: both ends of the split segment leave its middle; the gap is as wide as they are apart, and no light bridges it.
+#[test]
+fn a_split_opens_from_nothing_frame_by_frame() {
+    let sequence = scene(2);
+    let widths: Vec<f64> = (141..=279)
+        .map(|frame| {
+            let time = f64::from(frame) * FRAME_S;
+            assert!(sequence.bridges(time).is_empty(), "frame {frame}");
+            let shape = sequence.at(time);
+            let [width, flux] = gap([&shape.sheets[0], &shape.sheets[1]]);
+            assert_eq!((shape.sheets.len(), flux), (2, 1.0), "frame {frame}");
+            width
+        })
+        .collect();
+    assert!(widths.windows(2).all(|pair| pair[1] > pair[0]), "{widths:?}");
+    // Frames 141, 175, 210, 245 and 279, km: the ends are 112 km apart at last.
+    let found = [0, 34, 69, 104, 138].map(|index| widths[index].round());
+    assert_eq!(found, SPLIT_WIDTHS_KM, "{found:?}");
+    // Bansho's own scene bridges the same gap at first.
+    let own = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sekiguchi_2.toml")).unwrap();
+    assert!(!self::sequence(&own).bridges(150.0 * FRAME_S).is_empty());
+}
+
+/// Widths of the gap of scene 2 at these frames, km.
+const SPLIT_WIDTHS_KM: [f64; 5] = [0.0, 18.0, 56.0, 95.0, 112.0];
+
+#[test]
+fn a_merge_closes_at_its_last_frame_and_not_before() {
+    let sequence = scene(3);
+    let widths = [141, 210, 270, 279].map(|frame| {
+        let time = f64::from(frame) * FRAME_S;
+        assert!(sequence.bridges(time).is_empty());
+        let shape = sequence.at(time);
+        gap([&shape.sheets[1], &shape.sheets[2]])[0]
+    });
+    assert!(widths.windows(2).all(|pair| pair[1] < pair[0]) && widths[2] > 1.0, "{widths:?}");
+    let merged = sequence.at(sequence.duration());
+    assert_eq!(merged.sheets.len(), 2);
+}
+
+/// A scene with few particles and fast transitions, drawn at a size: linear sRGB of each pixel, 1 is the white of the maps.
+fn drawn(text: &str, size: usize, frame: i64) -> Vec<[f32; 3]> {
+    let text =
+        text.replace("count = 120_000", "count = 20_000").replace("transition_frames = 140", "transition_frames = 5");
+    let scene = Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"));
+    let options = PlanOptions { size: Some([size; 2]), ..PlanOptions::default() };
+    let mut shot = Planned::new(scene, &options, Arc::new(MemoryAssets::default())).open();
+    shot.advance(frame, &Unobserved).unwrap();
+    shot.draw(&Unobserved).unwrap();
+    let frame = shot.read().unwrap();
+    frame.beauty.pixels().iter().map(|[red, green, blue, _]| srgb_from_acescg([*red, *green, *blue])).collect()
+}
+
+fn is_red(pixel: &[f32; 3]) -> bool {
+    pixel[0] > 0.4 && pixel[1] < 0.1 && pixel[2] < 0.1
+}
+
+fn is_blue(pixel: &[f32; 3]) -> bool {
+    pixel[2] > 0.4 && pixel[0] < 0.1 && pixel[1] < 0.1
+}
+
+fn is_yellow(pixel: &[f32; 3]) -> bool {
+    pixel[0] > 0.3 && pixel[1] > 0.3 && pixel[2] < 0.1
+}
+
+/// Fraction of the pixels.
+fn fraction(pixels: &[[f32; 3]], is_counted: impl Fn(&[f32; 3]) -> bool) -> f64 {
+    pixels.iter().filter(|pixel| is_counted(pixel)).count() as f64 / pixels.len() as f64
+}
+
+/// Figure 2.10: as many cells have particles as the band of L_thr about the shape covers.
+#[test]
+fn scattered_particles_cover_the_band_about_the_shape() {
+    let pixels = drawn(&text("sekiguchi_figure_2_10.toml"), 256, 0);
+    let covered = 1.0 - fraction(&pixels, is_blue);
+    let sequence = sequence(&text("sekiguchi_figure_2_10.toml"));
+    // The band is two cells wide; it touches three cells and more across, of which those with few particles look blue.
+    let length = sequence.at(0.0).length() / (600.0 / 256.0);
+    let across = covered * 256.0 * 256.0 / length;
+    assert!((2.0..3.3).contains(&across), "{across}");
+}
+
+/// Figures 2.9 and 2.15: as many black points as control points, on segments of the length of the shape.
+#[test]
+fn the_shape_is_drawn_with_its_control_points() {
+    let pixels = drawn(&text("sekiguchi_figure_2_9.toml"), 512, 0);
+    assert!(pixels[0].iter().all(|value| (*value - 1.0).abs() < 0.01), "white: {:?}", pixels[0]);
+    let black = fraction(&pixels, |pixel| pixel.iter().all(|value| *value < 0.05)) * 512.0 * 512.0;
+    // Without their soft edge of a pixel.
+    let radius = 0.5 * 2.6 * 512.0 / 300.0 - 0.5;
+    let expected = 32.0 * std::f64::consts::PI * radius * radius;
+    assert!((black / expected - 1.0).abs() < 0.25, "{black} for {expected}");
+}
+
+/// Figure 2.12: the potential is lowest, blue, on the shape and highest, red, far from it. Figure 2.11: noise has all colors.
+#[test]
+fn the_potential_is_low_on_the_shape_and_the_noise_is_everywhere() {
+    let potential = drawn(&text("sekiguchi_figure_2_12.toml"), 256, 0);
+    let low = fraction(&potential, is_blue);
+    assert!((0.005..0.1).contains(&low) && fraction(&potential, is_red) > 0.5, "{low}");
+    let noise = drawn(&text("sekiguchi_figure_2_11.toml"), 256, 0);
+    let [low, high] = [fraction(&noise, is_blue), fraction(&noise, is_red)];
+    assert!((0.005..0.2).contains(&low) && (0.005..0.2).contains(&high), "{low} {high}");
+}
+
+/// Figure 3.14 and section 3.3: within the fold the potential is low enough to be near, but no particles were scattered there.
+#[test]
+fn the_potential_alone_takes_the_inside_of_the_fold_for_the_sheet() {
+    let scene = text("sekiguchi_figure_3_14.toml").replace("stage = \"potential\"", "stage = \"near_cells\"");
+    let pixels = drawn(&scene, 256, 20);
+    // (95, -213) km, in the black circle: 800 km are 256 pixels.
+    let at = |east: f64, south: f64| {
+        let pixel = |km: f64| ((km / 800.0 + 0.5) * 256.0) as usize;
+        pixels[pixel(south) * 256 + pixel(east)]
+    };
+    assert!(is_yellow(&at(95.0, -213.0)), "{:?}", at(95.0, -213.0));
+    assert!(is_red(&at(105.0, -156.0)), "{:?}", at(105.0, -156.0));
+    assert!(is_blue(&at(0.0, 200.0)), "{:?}", at(0.0, 200.0));
+    let near = fraction(&pixels, is_red);
+    assert!((0.01..0.05).contains(&near) && fraction(&pixels, is_yellow) > 3.0 * near, "{near}");
+}
+
+/// Figure 2.14: without relocation particles leave cells of the shape empty and gather in others.
+#[test]
+fn relocation_keeps_the_particles_on_the_shape() {
+    let occupied = |name: &str| {
+        let pixels = drawn(&text(name), 256, 30);
+        1.0 - fraction(&pixels, is_blue)
+    };
+    let [without, with] = ["sekiguchi_figure_2_14_left.toml", "sekiguchi_figure_2_14_right.toml"].map(occupied);
+    assert!(with > 0.0 && (with / without - 1.0).abs() > 0.1, "{without} {with}");
+}
+
+#[test]
+fn faults_of_the_literal_way_say_what_would_work() {
+    let fault = |text: &str| match bansho::compile_scene("test.toml", text, Arc::new(MemoryAssets::default())) {
+        Ok(_) => panic!("accepted: {text}"),
+        Err(error) => error.to_string(),
+    };
+    let aurora = |text: &str| fault(&format!("bansho = 2\n[[aurora]]\n{text}"));
+    for (text, expected) in [
+        (
+            "rendering.hard_spheres.collision_radius_pm = 0.0\n",
+            "test.toml:3:46: aurora.0.rendering.hard_spheres.collision_radius_pm: 0 is out of range; allowed: 0.3 to 2000 pm",
+        ),
+        (
+            "rendering.hard_spheres.quenching_radius_pm = 1e12\n",
+            "aurora.0.rendering.hard_spheres.quenching_radius_pm: 1000000000000 is out of range; allowed: 0.3 to 2000 pm",
+        ),
+        (
+            "rendering.color_matching = \"table_2_1\"\n",
+            "table 2.1 has the five lines of the thesis only; allowed: `\"cie_1931\"`",
+        ),
+        (
+            "morphing.correspondence = \"drawing_order\"\n[[aurora.shapes]]\n[[aurora.shapes]]\nsplit = [{}]\nsheets = [{}, { position_km = [0, 90] }]\n",
+            "test.toml:7:10: aurora.0.shapes.1.sheets (shape 2): has 2 sheets, but with `correspondence = \"drawing_order\"` each of the 1 sheet",
+        ),
+        (
+            "particles = { count = 1_000_000, smoothing_length_cells = 4.0 }\n",
+            "aurora.0.particles.smoothing_length_cells: each of 1000000 particles would have about",
+        ),
+        (
+            "particles = { count = 1_000_000, neighbor_count = 5000 }\n",
+            "aurora.0.particles.neighbor_count: each of 1000000 particles would have about 5000 neighbors; allowed: about 1500",
+        ),
+    ] {
+        let shown = aurora(text);
+        assert!(shown.contains(expected), "{text}\nexpected: {expected}\nshown: {shown}");
+    }
+}
