@@ -50,13 +50,15 @@ mod model;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;
+mod soot_field;
 mod tables;
 mod texture;
 pub use model::FlameSheet;
 pub use parameters::{
     ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, Stage, TextureKind, TextureParameters,
+    SheetMethod, SmokeParameters, Stage, TextureKind, TextureParameters,
 };
+pub use soot_field::SootFieldParameters;
 pub use texture::{PaperTexture, paper_texture};
 
 pub use crate::sparks::SparkParameters;

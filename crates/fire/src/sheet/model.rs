@@ -11,7 +11,8 @@ use bansho_base::{
 
 use super::{
     animate::{clock::Clock, warp::FlameWaves},
-    parameters::{Facing, FlameSheetParameters, Instance, TextureKind},
+    parameters::{Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
+    soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
     texture::{FractalLayers, PaperLayer, TextureSource},
 };
@@ -45,6 +46,7 @@ impl FlameSheet {
         let clock = Clock::new(parameters.speed.clone(), loop_s);
         ShapeTables::check(&parameters.shape)?;
         ColorRamp::check(&parameters.texture)?;
+        soot_field::check(&parameters)?;
         let flames = flames(&parameters, name, seed, &clock);
         Ok(Self { name: name.to_owned(), parameters, clock, tables: OnceLock::new(), flames })
     }
@@ -56,9 +58,11 @@ impl FlameSheet {
 
     pub(super) fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
+        let has_soot_field = self.parameters.method == SheetMethod::SootField;
         let compute = || Tables {
             shape: Box::new(ShapeTables::new(shape, texture, color)),
             ramp: Box::new(ColorRamp::new(texture, color, *stage)),
+            soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
         };
         get_or_compute(&self.tables, compute)
     }
@@ -72,6 +76,11 @@ impl FlameSheet {
     pub(crate) fn ramp(&self) -> &ColorRamp {
         &self.tables().ramp
     }
+
+    /// Tables of the soot field; `None` for other methods.
+    pub(crate) fn soot_field(&self) -> Option<&SootFieldTables> {
+        self.tables().soot_field.as_deref()
+    }
 }
 
 /// Tables that depend on the parameters alone.
@@ -79,6 +88,8 @@ impl FlameSheet {
 pub(super) struct Tables {
     pub(super) shape: Box<ShapeTables>,
     pub(super) ramp: Box<ColorRamp>,
+    /// Only for that method.
+    pub(super) soot_field: Option<Box<SootFieldTables>>,
 }
 
 /// One instance of a flame: its placement, fluctuations and texture.

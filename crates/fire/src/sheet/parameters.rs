@@ -5,6 +5,7 @@ use bansho_base::{
     parameters::{Auto, CurveLimits, Length, Range, animated::Animated},
 };
 
+use super::soot_field::SootFieldParameters;
 use crate::sparks::SparkParameters;
 
 const FRACTION: Range = Range::new(0.0, 1.0);
@@ -48,6 +49,16 @@ bansho_base::choice! {
         Sharpened = "sharpened",
         /// After coloring, before the mapping to the shape of the flame (picture 4).
         Colored = "colored",
+    }
+}
+
+bansho_base::choice! {
+    /// How flame and smoke are computed.
+    pub enum SheetMethod {
+        /// A scrolling texture, thresholded, colored and mapped, eqs. (1) to (20); `smoke` adds a second sheet.
+        Texture = "texture",
+        /// One field of soot temperature and density that a fractal field stirs, with the parameters `soot_field`: hot soot is flame, cool soot smoke (picture 9).
+        SootField = "soot_field",
     }
 }
 
@@ -209,6 +220,8 @@ bansho_base::parameters! {
         variation: i64 = 0, limits(Range::new(0.0, 1e6));
         /// Response to the wind: 0 for none, 1 for gas that drifts with the wind.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 10.0));
+        /// How flame and smoke are computed. `"soot_field"` does not use `texture`, and of `shape` only `initial_speed`, sway and flicker.
+        method: SheetMethod = SheetMethod::Texture;
         /// Outline and motion.
         shape: ShapeParameters = ShapeParameters::default();
         /// Texture, threshold and sharpening.
@@ -219,6 +232,8 @@ bansho_base::parameters! {
         sparks: SparkParameters = SparkParameters::default();
         /// Smoke.
         smoke: SmokeParameters = SmokeParameters::default();
+        /// Flame and smoke as one field, for `method = "soot_field"`.
+        soot_field: SootFieldParameters = SootFieldParameters::default();
         /// Light on other objects.
         light: LightParameters = LightParameters::default();
         /// Instances of the flame; an empty list is one instance at `position`.

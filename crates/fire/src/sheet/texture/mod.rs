@@ -11,7 +11,7 @@ use bansho_base::math::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 use fractal::FRACTAL;
-pub(crate) use fractal::FractalLayers;
+pub(crate) use fractal::{FractalLayers, fractal_noise};
 pub(crate) use paper::PaperLayer;
 pub use paper::{PaperTexture, paper_texture};
 
@@ -145,7 +145,7 @@ pub(crate) struct TextureLayer {
 impl TextureLayer {
     /// Looks up the layer at sixteen points.
     #[inline(always)]
-    fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
+    pub(crate) fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         let slant = w.fma(w.broadcast(self.columns_per_w), w.broadcast(self.first_column));
         let column = u.fma(u.broadcast(self.columns_per_u), slant);
         table.sample(column, w.fma(w.broadcast(self.rows_per_w), w.broadcast(self.first_row)))
