@@ -79,7 +79,7 @@ pub enum ParameterErrorKind {
         sum: f64,
     },
     /// A value that does not go together with that of another parameter.
-    #[error("must be `{allowed}` where {other}")]
+    #[error("must be {allowed} where {other}")]
     NotWith {
         /// The value that is allowed.
         allowed: &'static str,

@@ -14,7 +14,7 @@ use super::{
     parameters::{Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
-    texture::{FractalLayers, PaperLayer, TextureSource},
+    texture::{FractalLayers, PaperLayer, PaperSum, TextureSource},
 };
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
@@ -145,13 +145,16 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
+    let exact = (texture.kind == TextureKind::OhshimaItahashiExact)
+        .then(|| PaperSum::new(texture.octaves as u32, clock));
     let placements =
         if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
     let flame = |(index, placement): (usize, Instance)| {
         let key = instance_key(seed, name, parameters.variation, index);
-        let texture_source = match &paper {
-            Some(layer) => TextureSource::Paper(layer.clone()),
-            None => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
+        let texture_source = match (&paper, exact) {
+            (Some(layer), _) => TextureSource::Paper(layer.clone()),
+            (_, Some(sum)) => TextureSource::Exact(sum),
+            _ => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
         };
         FlameInstance { placement, key, waves: FlameWaves::new(&parameters.shape, key, clock), texture_source }
     };

@@ -23,6 +23,8 @@ bansho_base::choice! {
         Fractal = "fractal",
         /// The paper's sum of cosines, eq. (20), halved so that it lies in [0, 1]; repeats every 0.483 sheet heights.
         OhshimaItahashi = "ohshima_itahashi",
+        /// The same sum, evaluated at every pixel instead of looked up in a filtered table, as in the paper: slower, and not antialiased.
+        OhshimaItahashiExact = "ohshima_itahashi_exact",
     }
 }
 

@@ -45,7 +45,7 @@ impl SootFieldTables {
 /// A stage of the texture is to be shown, but a soot field has no texture.
 pub(super) fn check(parameters: &FlameSheetParameters) -> Result<(), ParameterError> {
     if parameters.method == SheetMethod::SootField && parameters.stage != Stage::Flame {
-        let kind = ParameterErrorKind::NotWith { allowed: "\"flame\"", other: "`method = \"soot_field\"`" };
+        let kind = ParameterErrorKind::NotWith { allowed: "`\"flame\"`", other: "`method` is `\"soot_field\"`" };
         return Err(ParameterError { key: "stage", kind });
     }
     Ok(())

@@ -31,7 +31,8 @@ bansho_base::parameters! {
         eddy_size: f64 = 0.3, limits(Range::new(0.02, 5.0));
         /// Number of octaves of the fractal field.
         octaves: i64 = 5, limits(Range::new(1.0, 5.0));
-        /// Amplitude of each octave relative to that of the previous one, which is twice as large; for the spectrum of turbulence 2^(-5/6) = 0.56.
+        /// Amplitude of each octave relative to that of the previous one, whose eddies are twice as large; at 0.5 displacements are proportional to the size
+        /// of the eddies.
         gain: f64 = 0.58, limits(FRACTION);
         /// Single-scattering albedo of the soot: fraction of the attenuated light that it scatters instead of absorbing it.
         albedo: f64 = 0.25, limits(FRACTION);

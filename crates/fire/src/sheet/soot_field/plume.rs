@@ -152,6 +152,8 @@ fn tabulate_light(plume: &SootFieldParameters, color: &ColorParameters) -> Box<[
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::SimdBase;
+
     use super::*;
 
     fn plume() -> SootFieldParameters {
