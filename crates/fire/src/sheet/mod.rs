@@ -55,8 +55,8 @@ mod tables;
 mod texture;
 pub use model::FlameSheet;
 pub use parameters::{
-    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SheetMethod, SmokeParameters, Stage, TextureKind, TextureParameters,
+    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters, SheetMethod,
+    SmokeParameters, Stage, TextureKind, TextureParameters,
 };
 pub use soot_field::SootFieldParameters;
 pub use texture::{PaperTexture, paper_texture};

@@ -10,7 +10,10 @@ use bansho_base::{
 };
 
 use super::{
-    animate::{clock::Clock, warp::FlameWaves},
+    animate::{
+        clock::Clock,
+        warp::{FlameWaves, WarpState, WindLean},
+    },
     parameters::{Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
@@ -54,6 +57,16 @@ impl FlameSheet {
     /// Its parameters.
     pub fn parameters(&self) -> &FlameSheetParameters {
         &self.parameters
+    }
+
+    /// E(w, t) of eq. (15), left and right, at time `t` in s of the first instance, over the height w.
+    pub fn edges(&self, t: f64) -> impl Fn(f64) -> [f64; 2] + use<> {
+        let no_wind = WindLean { across: 0.0, toward: 0.0 };
+        let warp = self.flames.first().map(|flame| {
+            let time = self.flame_time(flame, t);
+            WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, no_wind)
+        });
+        move |w| warp.as_ref().map_or([0.0; 2], |warp| warp.edges.at(w as f32).map(f64::from))
     }
 
     pub(super) fn tables(&self) -> &Tables {
@@ -145,8 +158,8 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
-    let exact = (texture.kind == TextureKind::OhshimaItahashiExact)
-        .then(|| PaperSum::new(texture.octaves as u32, clock));
+    let exact =
+        (texture.kind == TextureKind::OhshimaItahashiExact).then(|| PaperSum::new(texture.octaves as u32, clock));
     let placements =
         if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
     let flame = |(index, placement): (usize, Instance)| {

@@ -99,7 +99,13 @@ fn write_aov_batch<S: Simd>(
         let weight = color::luminance([0, 1, 2].map(|k| shade.light[k][lane])) * sample.luminance;
         if weight > 0.0 && context.content == SheetContent::Flame {
             strip.aovs[TEMPERATURE].add(index, sheet.ramp().temperature.at(shade.t1[lane])[0], weight);
-            let motion = sheet.motion(context.flame, context.view, &sample.quad, &sample.state.warp, [f64::from(batch.x[lane]), f64::from(batch.y[lane])]);
+            let motion = sheet.motion(
+                context.flame,
+                context.view,
+                &sample.quad,
+                &sample.state.warp,
+                [f64::from(batch.x[lane]), f64::from(batch.y[lane])],
+            );
             for (plane, value) in MOTION.into_iter().zip(motion) {
                 strip.aovs[plane].add(index, value, weight);
             }

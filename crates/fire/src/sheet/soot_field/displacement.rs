@@ -38,7 +38,8 @@ impl DisplacementTables {
     /// Both components low-pass filtered for a sheet `height_pixels` tall.
     pub(super) fn filtered(&self, layers: &FractalLayers, height_pixels: f64) -> Self {
         let level = math::log2(layers.texels_up() / height_pixels.max(1.0)) as f32;
-        let filter = |table: &Arc<TextureTable>| if level > 0.0 { Arc::new(table.filtered(level)) } else { table.clone() };
+        let filter =
+            |table: &Arc<TextureTable>| if level > 0.0 { Arc::new(table.filtered(level)) } else { table.clone() };
         Self { components: [filter(&self.components[0]), filter(&self.components[1])] }
     }
 
@@ -52,7 +53,8 @@ impl DisplacementTables {
 fn normalize(texels: &mut [f32]) {
     let count = texels.len() as f64;
     let mean = texels.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
-    let square = texels.iter().map(|value| (f64::from(*value) - mean) * (f64::from(*value) - mean)).sum::<f64>() / count;
+    let square =
+        texels.iter().map(|value| (f64::from(*value) - mean) * (f64::from(*value) - mean)).sum::<f64>() / count;
     let scale = 1.0 / math::sqrt(2.0 * square.max(f64::MIN_POSITIVE));
     texels.iter_mut().for_each(|value| *value = ((f64::from(*value) - mean) * scale) as f32);
 }
@@ -119,7 +121,12 @@ mod tests {
                 count += 2.0;
             }
         }
-        assert!((sum / count).abs() < 0.12 && (square / count - 1.0_f32).abs() < 0.15, "{} {}", sum / count, square / count);
+        assert!(
+            (sum / count).abs() < 0.12 && (square / count - 1.0_f32).abs() < 0.15,
+            "{} {}",
+            sum / count,
+            square / count
+        );
         assert!((2.0 * product / count).abs() < 0.12, "components are independent: {}", 2.0 * product / count);
     }
 
@@ -129,6 +136,11 @@ mod tests {
         let field = field();
         let (before, moved, fixed) = (row(&field, 5.0, 0.40), row(&field, 5.01, 0.41), row(&field, 5.01, 0.40));
         let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>();
-        assert!(apart(&before, &moved) < 0.5 * apart(&before, &fixed), "{} {}", apart(&before, &moved), apart(&before, &fixed));
+        assert!(
+            apart(&before, &moved) < 0.5 * apart(&before, &fixed),
+            "{} {}",
+            apart(&before, &moved),
+            apart(&before, &fixed)
+        );
     }
 }

@@ -8,11 +8,7 @@ use bansho_base::{
 };
 use fearless_simd::Simd;
 
-use super::{
-    SootFieldTables,
-    shade::shade_soot,
-    time_samples::SootSample,
-};
+use super::{SootFieldTables, shade::shade_soot, time_samples::SootSample};
 use crate::sheet::{
     model::{FlameInstance, FlameSheet},
     render::{

@@ -117,8 +117,7 @@ impl PlumeTables {
         let at = table_index(height * height.broadcast((1.0 / MAX_HEIGHT) as f32));
         let ([inverse_half_width, relative_depth], [excess, _]) = (self.axis.fetch(&at), self.axis_excess.fetch(&at));
         let across = distance * inverse_half_width;
-        let [depth_profile, excess_profile] =
-            self.section.sample(across * across.broadcast((1.0 / MAX_ACROSS) as f32));
+        let [depth_profile, excess_profile] = self.section.sample(across * across.broadcast((1.0 / MAX_ACROSS) as f32));
         Soot { relative_depth: relative_depth * depth_profile, excess: excess * excess_profile }
     }
 

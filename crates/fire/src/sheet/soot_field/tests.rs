@@ -147,7 +147,10 @@ fn strips_crops_and_lenses_draw_the_same_finite_field() {
     let field = sheet(
         FlameSheetParameters {
             method: SheetMethod::SootField,
-            instances: vec![Instance::default(), Instance { position: [0.4, 0.0, -0.6], scale: 0.7, ..Instance::default() }],
+            instances: vec![
+                Instance::default(),
+                Instance { position: [0.4, 0.0, -0.6], scale: 0.7, ..Instance::default() },
+            ],
             time_samples: Auto::Set(2),
             ..FlameSheetParameters::default()
         },
@@ -192,8 +195,11 @@ fn a_seamless_loop_of_the_field_ends_where_it_began() {
 
 #[test]
 fn a_stage_of_the_texture_is_refused() {
-    let parameters =
-        FlameSheetParameters { method: SheetMethod::SootField, stage: Stage::Colored, ..FlameSheetParameters::default() };
+    let parameters = FlameSheetParameters {
+        method: SheetMethod::SootField,
+        stage: Stage::Colored,
+        ..FlameSheetParameters::default()
+    };
     let fault = FlameSheet::new(parameters, "test", 1, None).unwrap_err();
     assert_eq!(fault.to_string(), "stage: must be `\"flame\"` where `method` is `\"soot_field\"`");
 }

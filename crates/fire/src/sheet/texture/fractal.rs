@@ -165,8 +165,13 @@ impl FractalLayers {
     /// `key` determines their offsets.
     pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
         let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
-        let coarse =
-            LayerMapping { widths: COARSE[0], slant: 0.061_8, heights: COARSE[1], rate: 1.0, start: [start[0], start[1]] };
+        let coarse = LayerMapping {
+            widths: COARSE[0],
+            slant: 0.061_8,
+            heights: COARSE[1],
+            rate: 1.0,
+            start: [start[0], start[1]],
+        };
         let fine =
             LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
         let fit = |mapping: LayerMapping| {

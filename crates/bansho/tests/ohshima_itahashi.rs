@@ -1,0 +1,237 @@
+//! The pictures of Ohshima and Itahashi: scenes of `scenes/papers/ohshima_itahashi` compared with the paper's formulas, evaluated here in double precision,
+//! and judged by measurements.
+//!
+//! The formulas are written down from the paper, and share nothing with the library but the curves that a scene states: V, H, C, R, G, B, A, D and F are free.
+#![cfg(feature = "files")]
+#![allow(clippy::disallowed_methods, reason = "an independent evaluation calls the standard library")]
+
+use std::{f64::consts::PI, path::PathBuf, sync::Arc};
+
+use bansho::{
+    CompiledScene, Plan, PlanOptions, Shot, Unobserved,
+    base::{
+        color::{srgb_from_acescg, white_luminance},
+        frame::Frame,
+        math::curve::{Curve, Interpolation},
+    },
+    media::assets::FileAssets,
+};
+
+/// Pixels on each side, as in the paper.
+const SIZE: usize = 256;
+/// A frame, at 30 per second.
+const FRAME: i64 = 47;
+/// One step of an 8-bit display.
+const STEP: f64 = 1.0 / 255.0;
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../scenes/papers/ohshima_itahashi")
+}
+
+fn scene_text(picture: u32) -> String {
+    std::fs::read_to_string(folder().join(format!("ohshima_picture_{picture}.toml"))).unwrap()
+}
+
+/// Frames of a scene, scene-linear.
+fn render(text: &str, size: [usize; 2], frames: &[i64]) -> Vec<Frame> {
+    let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
+    let compiled = CompiledScene::build(Arc::new(scene), Arc::new(FileAssets::new(folder())), None);
+    let compiled = Arc::new(compiled.unwrap_or_else(|errors| panic!("{errors}")));
+    let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();
+    let mut shot = Shot::open(compiled, Arc::new(plan));
+    frames.iter().map(|number| bansho::draw(&mut shot, *number, &Unobserved).unwrap()).collect()
+}
+
+/// Linear sRGB of a frame's pixels.
+fn linear(frame: &Frame) -> Vec<[f64; 3]> {
+    let pixels = frame.beauty.pixels().iter();
+    pixels.map(|[red, green, blue, _]| srgb_from_acescg([*red, *green, *blue]).map(f64::from)).collect()
+}
+
+fn decode(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+fn encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The numbers and functions that the paper leaves free, as a scene states them.
+struct Choices {
+    text: String,
+    octaves: u32,
+    contrast: f64,
+    /// Distance that the texture has scrolled at the middle of the exposure.
+    scroll: f64,
+}
+
+impl Choices {
+    fn of(text: &str) -> Self {
+        let mut choices = Self { text: text.to_owned(), octaves: 0, contrast: 1.0, scroll: 0.0 };
+        choices.octaves = choices.number("octaves").unwrap() as u32;
+        choices.contrast = choices.number("contrast").unwrap_or(1.0);
+        // The shutter is open for the first half of a frame.
+        choices.scroll = choices.number("speed").unwrap() * (FRAME as f64 + 0.25) / 30.0;
+        choices
+    }
+
+    /// What the scene assigns to a key.
+    fn value(&self, key: &str) -> Option<&str> {
+        let assigned = self.text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "))?;
+        Some(assigned.split('#').next().unwrap_or(assigned).trim())
+    }
+
+    fn number(&self, key: &str) -> Option<f64> {
+        self.value(key)?.parse().ok()
+    }
+
+    fn curve(&self, key: &str) -> Curve {
+        let text = self.value(key).unwrap_or_else(|| panic!("no {key}"));
+        let numbers: Vec<f64> = text.split(['[', ']', ',', ' ']).filter_map(|word| word.parse().ok()).collect();
+        Curve::new(numbers.chunks_exact(2).map(|point| [point[0], point[1]]).collect(), Interpolation::Monotone).unwrap()
+    }
+
+    /// Color over T2, eq. (7), as the encoded values that the paper's display is given.
+    fn color(&self) -> impl Fn(f64) -> [f64; 3] + use<> {
+        let curves = ["red", "green", "blue"].map(|key| self.curve(key));
+        move |t2| [0, 1, 2].map(|k| curves[k].eval(t2))
+    }
+}
+
+/// Eq. (20), halved so that its values are those of (2).
+fn texture_20(x: f64, y: f64, octaves: u32) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for i in 0..octaves as i32 {
+        let (fx, fy, c) = (16.0 * 2f64.powi(i), 26.0 * 2f64.powi(i), 0.707f64.powi(i));
+        let px = PI / 2.0 * (fy * y / 2.0).sin();
+        let py = PI / 2.0 * (fx * x / 2.0).sin();
+        sum += c * c * ((fx * x + px).cos() * (fy * y + py).cos() + 1.0);
+        weights += c * c;
+    }
+    sum / weights / 2.0
+}
+
+/// The stages T0, T1 and T2 at (u, w): eqs. (1) to (6).
+fn stages(choices: &Choices) -> impl Fn(f64, f64) -> [f64; 3] + '_ {
+    let [v, h, c] = ["threshold", "threshold_across", "sharpen"].map(|key| choices.curve(key));
+    move |u, w| {
+        let (p, q) = (u, w - choices.scroll);
+        let t0 = 1.0 - choices.contrast * (1.0 - texture_20(p, q, choices.octaves));
+        let l = 1.0 - (1.0 - v.eval(w)) * (1.0 - h.eval((2.0 * u - 1.0).abs()));
+        let t1 = if t0 > l { t0 - l } else { 0.0 };
+        [t0, t1, c.eval(t1)]
+    }
+}
+
+/// The mapping from (x, y) to (u, w), eqs. (9) to (18), where P is 1 everywhere; `None` outside the flame.
+fn mapping(choices: &Choices) -> impl Fn(f64, f64) -> Option<[f64; 2]> + use<> {
+    let [a, d, slowing] = ["core_width", "fringe_width", "slowing"].map(|key| choices.curve(key));
+    let [k, h] = ["initial_speed", "edge_speed"].map(|key| choices.number(key).unwrap());
+    move |x, y| {
+        let w_p = (1.0 - k) * y.sqrt() + k * y;
+        let distance = 2.0 * (x - 0.5).abs();
+        let (core, fringe) = (a.eval(w_p), d.eval(w_p));
+        let speed = if distance <= core {
+            1.0
+        } else if distance <= core + fringe {
+            h + (1.0 - h) * (1.0 - slowing.eval((distance - core) / fringe))
+        } else {
+            h
+        };
+        let w = w_p / speed;
+        let (right, offset) = (x >= 0.5, if x >= 0.5 { 2.0 * x - 1.0 } else { 1.0 - 2.0 * x });
+        let edge = a.eval(w) + d.eval(w);
+        (w <= 1.0 && offset < edge).then(|| {
+            let across = offset / edge;
+            [if right { (1.0 + across) / 2.0 } else { (1.0 - across) / 2.0 }, w]
+        })
+    }
+}
+
+/// (x, y) of the unit square at the center of a pixel, for a camera 5 m before the middle of a sheet 1 m high.
+fn unit_square(choices: &Choices, pixel: usize) -> [f64; 2] {
+    let half = 5.0 * (choices.number("vertical_fov_deg").unwrap().to_radians() / 2.0).tan();
+    let at = |index: usize| half * (2.0 * (index as f64 + 0.5) / SIZE as f64 - 1.0);
+    let [right, down] = [pixel % SIZE, pixel / SIZE].map(at);
+    [right / choices.number("width").unwrap() + 0.5, 0.5 - down]
+}
+
+/// Factor of the brightest color's luminance, 1000 cd/m^2, to display white.
+fn exposure(choices: &Choices) -> f64 {
+    choices.number("luminance").unwrap() / white_luminance(choices.number("exposure_ev100").unwrap_or(9.7))
+}
+
+/// Encoded color of a rendered pixel as the paper's display is given it: the library scales colors so that the brightest has luminance 1.
+fn encoded(choices: &Choices) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
+    let color = choices.color();
+    let luminance = |[r, g, b]: [f64; 3]| 0.212_639 * r + 0.715_169 * g + 0.072_192 * b;
+    let brightest = (0..=256).map(|i| luminance(color(f64::from(i) / 256.0).map(decode))).fold(0.0, f64::max);
+    let scale = exposure(choices) / brightest;
+    move |pixel| pixel.map(|value| encode((value / scale).max(0.0)))
+}
+
+#[test]
+fn the_stages_are_the_papers_formulas_within_one_step_of_255() {
+    for (picture, stage) in [(1, 0), (2, 1), (3, 2)] {
+        let choices = Choices::of(&scene_text(picture));
+        let (formulas, scale) = (stages(&choices), exposure(&choices));
+        let frame = &render(&choices.text, [SIZE; 2], &[FRAME])[0];
+        let (mut worst, mut lit) = (0.0_f64, 0);
+        for (index, pixel) in linear(frame).into_iter().enumerate() {
+            let [u, w] = unit_square(&choices, index);
+            let wanted = formulas(u, w)[stage];
+            worst = pixel.iter().fold(worst, |worst, value| worst.max((value / scale - wanted).abs()));
+            lit += usize::from(wanted > 0.1);
+        }
+        assert!(worst < STEP && lit > SIZE * SIZE / 4, "picture {picture}: {:.3} steps apart, {lit} lit", worst / STEP);
+        println!("picture {picture}: at most {:.3} steps of 255", worst / STEP);
+    }
+}
+
+#[test]
+fn the_colored_stage_is_equation_7_within_one_step_of_255() {
+    let choices = Choices::of(&scene_text(4));
+    let (formulas, color, encoded) = (stages(&choices), choices.color(), encoded(&choices));
+    let frame = &render(&choices.text, [SIZE; 2], &[FRAME])[0];
+    let mut worst = 0.0_f64;
+    for (index, pixel) in linear(frame).into_iter().enumerate() {
+        let [u, w] = unit_square(&choices, index);
+        let wanted = color(formulas(u, w)[2]);
+        worst = encoded(pixel).iter().zip(wanted).fold(worst, |worst, (value, wanted)| worst.max((value - wanted).abs()));
+    }
+    assert!(worst < STEP, "{:.3} steps", worst / STEP);
+    println!("picture 4: at most {:.3} steps of 255", worst / STEP);
+}
+
+#[test]
+fn the_finished_flame_is_mapped_by_equations_9_to_18() {
+    // P is random; without its flutter it is 1, and the edge (15) is A + D.
+    for picture in [5, 6, 7, 8] {
+        let choices = Choices::of(&scene_text(picture));
+        let flutter = format!("flutter = {}", choices.value("flutter").unwrap());
+        let text = choices.text.replace(&flutter, "flutter = 0.0").replace("height = 1.0\n", "height = 1.0\ntime_samples = 1\n");
+        let (formulas, color, encoded) = (stages(&choices), choices.color(), encoded(&choices));
+        let map = mapping(&choices);
+        let frame = &render(&text, [SIZE; 2], &[FRAME])[0];
+        let (mut apart, mut outside) = (Vec::new(), 0);
+        for (index, pixel) in linear(frame).into_iter().enumerate() {
+            let [x, y] = unit_square(&choices, index);
+            // A pixel that the outline crosses is antialiased, which the paper leaves open.
+            let margin = 1.5 / SIZE as f64;
+            let around = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+                .map(|[dx, dy]| (y + dy * margin > 0.0).then(|| map(x + 1.3 * dx * margin, y + dy * margin)).flatten());
+            if around.iter().all(Option::is_none) {
+                outside += usize::from((y < 0.0 || map(x, y).is_none()) && pixel != [0.0; 3]);
+            } else if let (Some([u, w]), true) = (map(x, y.max(0.0)), around.iter().all(Option::is_some)) {
+                let wanted = color(formulas(u, w)[2]);
+                let difference = encoded(pixel).iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                apart.push(difference / STEP);
+            }
+        }
+        apart.sort_by(f64::total_cmp);
+        let (within, count) = (apart.iter().filter(|steps| **steps < 1.0).count(), apart.len());
+        let share = within as f64 / count as f64;
+        println!("picture {picture}: {count} pixels, {share:.4} within a step, worst {:.2}, {outside} outside", apart[count - 1]);
+        assert!(count > 5000 && share > 0.99 && outside == 0, "picture {picture}: {share}, worst {}", apart[count - 1]);
+    }
+}
