@@ -103,7 +103,7 @@ impl Choices {
 fn texture_20(x: f64, y: f64, octaves: u32) -> f64 {
     let (mut sum, mut weights) = (0.0, 0.0);
     for i in 0..octaves as i32 {
-        let (fx, fy, c) = (16.0 * 2f64.powi(i), 26.0 * 2f64.powi(i), 0.707f64.powi(i));
+        let (fx, fy, c) = (16.0 * 2.0_f64.powi(i), 26.0 * 2.0_f64.powi(i), 0.707_f64.powi(i));
         let px = PI / 2.0 * (fy * y / 2.0).sin();
         let py = PI / 2.0 * (fx * x / 2.0).sin();
         sum += c * c * ((fx * x + px).cos() * (fy * y + py).cos() + 1.0);
@@ -185,7 +185,6 @@ fn the_stages_are_the_papers_formulas_within_one_step_of_255() {
             lit += usize::from(wanted > 0.1);
         }
         assert!(worst < STEP && lit > SIZE * SIZE / 4, "picture {picture}: {:.3} steps apart, {lit} lit", worst / STEP);
-        println!("picture {picture}: at most {:.3} steps of 255", worst / STEP);
     }
 }
 
@@ -202,7 +201,6 @@ fn the_colored_stage_is_equation_7_within_one_step_of_255() {
             encoded(pixel).iter().zip(wanted).fold(worst, |worst, (value, wanted)| worst.max((value - wanted).abs()));
     }
     assert!(worst < STEP, "{:.3} steps", worst / STEP);
-    println!("picture 4: at most {:.3} steps of 255", worst / STEP);
 }
 
 #[test]
@@ -236,10 +234,6 @@ fn the_finished_flame_is_mapped_by_equations_9_to_18() {
         apart.sort_by(f64::total_cmp);
         let (within, count) = (apart.iter().filter(|steps| **steps < 1.0).count(), apart.len());
         let share = within as f64 / count as f64;
-        println!(
-            "picture {picture}: {count} pixels, {share:.4} within a step, worst {:.2}, {outside} outside",
-            apart[count - 1]
-        );
         assert!(count > 5000 && share > 0.99 && outside == 0, "picture {picture}: {share}, worst {}", apart[count - 1]);
     }
 }
@@ -359,7 +353,6 @@ fn edge_redness(pixels: &[[f64; 3]], mask: &[bool]) -> f64 {
 fn the_four_flames_are_judged_to_be_flames_and_to_differ() {
     let judgments: Vec<Judgment> = [5, 6, 7, 8].map(|picture| Judgment::of(&scene_text(picture))).into();
     for (picture, flame) in (5..).zip(&judgments) {
-        println!("picture {picture}: {flame:.2?}");
         assert!(flame.body > 0.9, "picture {picture}: the body is closed at the base: {flame:?}");
         assert!(flame.edge_redness < 0.7, "picture {picture}: red edges, yellow core: {flame:?}");
         assert!(flame.base_width < 0.75, "picture {picture}: the base is not cut off: {flame:?}");
@@ -388,6 +381,5 @@ fn a_flame_that_is_cut_off_pale_and_full_of_holes_is_judged_so() {
         text = text.replace(&line, &format!("{key} = {value}"));
     }
     let flame = Judgment::of(&text);
-    println!("{flame:.2?}");
     assert!(flame.base_width > 0.75 && flame.body < 0.9 && flame.pale > 0.5, "{flame:?}");
 }

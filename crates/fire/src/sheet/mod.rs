@@ -42,7 +42,8 @@
 //!    lens; `tables::shape_tables` maps those to flame coordinates.
 //! 6. `render::shade` turns them into light and opacity; `render::smoke` prepares the second sheet, the smoke above the flame.
 //! 7. `render::draw` evaluates bands of rows and composites them into strips; `render::aovs` writes AOVs.
-//! 8. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
+//! 8. Where the scene selects it, `soot_field` replaces 4 to 7: flame and smoke as one plume of soot that a fractal field displaces.
+//! 9. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
 
 pub(crate) mod animate;
 pub mod equations;

@@ -15,7 +15,7 @@ use fearless_simd::Simd;
 use super::SootFieldParameters;
 use crate::sheet::{
     parameters::ColorParameters,
-    tables::curve_pair::{CurvePair, table_index},
+    tables::curve_pair::{CurvePair, lookup_index, table_index},
 };
 
 /// Height up to which the plume is tabulated, sheet heights: displacements may reach above the sheet.
@@ -107,7 +107,7 @@ impl PlumeTables {
     /// Fraction of the displacement at `height`.
     #[inline(always)]
     pub(super) fn growth<S: Simd>(&self, height: Lanes<S>) -> Lanes<S> {
-        let [growth, _] = self.growth.sample(height);
+        let [growth, _] = self.growth.lookup(&lookup_index(height));
         growth
     }
 
