@@ -57,9 +57,8 @@ mod texture;
 pub use model::FlameSheet;
 pub use parameters::{
     ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters, SheetMethod,
-    SmokeParameters, Stage, TextureKind, TextureParameters,
+    SmokeParameters, SootFieldParameters, Stage, TextureKind, TextureParameters,
 };
-pub use soot_field::SootFieldParameters;
 pub use texture::{PaperTexture, paper_texture};
 
 pub use crate::sparks::SparkParameters;

@@ -16,13 +16,13 @@ use super::{
     aovs::{AovContext, write_aov_rows},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
+    soot_field::{SootContext, SootSample, draw_soot_rows},
     time_samples::pixels_per_meter,
 };
 use crate::{
     sheet::{
         model::{FlameInstance, FlameSheet},
         parameters::{SheetMethod, Stage},
-        soot_field::{SootContext, SootSample, draw_soot_rows},
     },
     sparks::{SparkEmitter, Streak},
 };

@@ -11,10 +11,9 @@ use bansho_base::math::{
 };
 use fearless_simd::Simd;
 
-use super::SootFieldParameters;
 use crate::sheet::{
     animate::clock::Clock,
-    parameters::FlameSheetParameters,
+    parameters::{FlameSheetParameters, SootFieldParameters},
     texture::{FractalLayers, TextureLayer, TextureTable, fractal_noise},
 };
 
@@ -25,7 +24,7 @@ pub(crate) struct DisplacementTables {
 }
 
 impl DisplacementTables {
-    pub(super) fn new(field: &SootFieldParameters) -> Self {
+    pub(crate) fn new(field: &SootFieldParameters) -> Self {
         let key = Key::new(1988, "soot field");
         let component = |name| {
             let mut texels = fractal_noise(field.octaves as usize, field.gain as f32, key, Purpose::named(name));
@@ -36,7 +35,7 @@ impl DisplacementTables {
     }
 
     /// Both components low-pass filtered for a sheet `height_pixels` tall.
-    pub(super) fn filtered(&self, layers: &FractalLayers, height_pixels: f64) -> Self {
+    pub(crate) fn filtered(&self, layers: &FractalLayers, height_pixels: f64) -> Self {
         let level = math::log2(layers.texels_up() / height_pixels.max(1.0)) as f32;
         let filter =
             |table: &Arc<TextureTable>| if level > 0.0 { Arc::new(table.filtered(level)) } else { table.clone() };
@@ -44,7 +43,7 @@ impl DisplacementTables {
     }
 
     /// The field after `scroll` sheet heights.
-    pub(super) fn at(&self, layers: &FractalLayers, scroll: f64) -> Displacement {
+    pub(crate) fn at(&self, layers: &FractalLayers, scroll: f64) -> Displacement {
         Displacement { components: self.components.clone(), layers: layers.layers(scroll) }
     }
 }
@@ -60,7 +59,7 @@ fn normalize(texels: &mut [f32]) {
 }
 
 /// Layers of the field of one flame, which move with the flame's speed.
-pub(super) fn layers(sheet: &FlameSheetParameters, key: Key, clock: &Clock) -> FractalLayers {
+pub(crate) fn layers(sheet: &FlameSheetParameters, key: Key, clock: &Clock) -> FractalLayers {
     /// Length of an eddy relative to its width: rising gas stretches it.
     const ELONGATION: f64 = 1.6;
     let [across, up] = FractalLayers::COARSE_CELLS;
@@ -79,7 +78,7 @@ pub(crate) struct Displacement {
 impl Displacement {
     /// Displacement across and up at sixteen points, with a root mean square of 1.
     #[inline(always)]
-    pub(super) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> [Lanes<S>; 2] {
+    pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> [Lanes<S>; 2] {
         let [coarse, fine] = &self.layers;
         let component = |table: &TextureTable| coarse.sample(table, u, w) + fine.sample(table, u, w);
         [component(&self.components[0]), component(&self.components[1])]

@@ -8,29 +8,20 @@
 //! - W. R. Morton, G. Taylor and J. S. Turner, "Turbulent gravitational convection from maintained and instantaneous sources" (1956): linear spread.
 //! - B. J. McCaffrey, "Purely buoyant diffusion flames: some experimental results" (1979): temperature over height.
 
-mod displacement;
-mod draw;
-mod parameters;
-mod plume;
-mod shade;
-#[cfg(test)]
-mod tests;
-mod time_samples;
+pub(crate) mod displacement;
+pub(crate) mod plume;
 
 use bansho_base::parameters::{ParameterError, ParameterErrorKind};
 use displacement::DisplacementTables;
-pub(crate) use draw::{SootContext, draw_soot_rows};
-pub use parameters::SootFieldParameters;
 use plume::PlumeTables;
-pub(crate) use time_samples::SootSample;
 
-use super::parameters::{ColorParameters, FlameSheetParameters, SheetMethod, Stage};
+use super::parameters::{ColorParameters, FlameSheetParameters, SheetMethod, SootFieldParameters, Stage};
 
 /// Tables of a soot field, which do not change with time.
 #[derive(Clone, Debug)]
 pub(crate) struct SootFieldTables {
-    plume: PlumeTables,
-    displacement: DisplacementTables,
+    pub(crate) plume: PlumeTables,
+    pub(crate) displacement: DisplacementTables,
 }
 
 impl SootFieldTables {

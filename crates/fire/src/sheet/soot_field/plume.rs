@@ -12,9 +12,8 @@ use bansho_base::{
 };
 use fearless_simd::Simd;
 
-use super::SootFieldParameters;
 use crate::sheet::{
-    parameters::ColorParameters,
+    parameters::{ColorParameters, SootFieldParameters},
     tables::curve_pair::{CurvePair, lookup_index, table_index},
 };
 
@@ -28,32 +27,32 @@ const FORMATION_HEIGHT: f64 = 0.05;
 const ENTRIES: usize = 4096;
 
 /// Half width at `height`, sheet widths: a buoyant plume entrains air in proportion to its speed and widens linearly (Morton, Taylor and Turner 1956).
-pub(super) fn half_width(plume: &SootFieldParameters, height: f64) -> f64 {
+pub(crate) fn half_width(plume: &SootFieldParameters, height: f64) -> f64 {
     plume.spread * height.max(0.0) + plume.base_half_width
 }
 
 /// Optical depth through the axis at `height`.
-pub(super) fn axis_optical_depth(plume: &SootFieldParameters, height: f64) -> f64 {
+pub(crate) fn axis_optical_depth(plume: &SootFieldParameters, height: f64) -> f64 {
     let formed = smoothstep(height / FORMATION_HEIGHT);
     plume.optical_depth * formed * math::pow(plume.base_half_width / half_width(plume, height), plume.dilution)
 }
 
 /// Excess temperature on the axis at `height` relative to that at the base: 1 in the flame, and proportional to height^(-5/3) in the plume above it
 /// (McCaffrey 1979), with a smooth transition.
-pub(super) fn axis_excess(plume: &SootFieldParameters, height: f64) -> f64 {
+pub(crate) fn axis_excess(plume: &SootFieldParameters, height: f64) -> f64 {
     const EXPONENT: f64 = 5.0 / 3.0;
     let relative = height.max(0.0) / plume.flame_height;
     math::pow(1.0 + relative * relative * relative, -EXPONENT / 3.0)
 }
 
 /// Profile of the optical depth at the distance `across` from the axis, in half widths: a Gaussian, lowered to 0 at [`MAX_ACROSS`].
-pub(super) fn profile(across: f64) -> f64 {
+pub(crate) fn profile(across: f64) -> f64 {
     let end = math::exp(-MAX_ACROSS * MAX_ACROSS);
     ((math::exp(-across * across) - end) / (1.0 - end)).max(0.0)
 }
 
 /// Profile of the excess temperature.
-pub(super) fn excess_profile(plume: &SootFieldParameters, across: f64) -> f64 {
+pub(crate) fn excess_profile(plume: &SootFieldParameters, across: f64) -> f64 {
     math::exp(-plume.edge_cooling * across * across)
 }
 
@@ -64,11 +63,11 @@ fn smoothstep(x: f64) -> f64 {
 
 /// Soot at sixteen points.
 #[derive(Clone, Copy)]
-pub(super) struct Soot<S: Simd> {
+pub(crate) struct Soot<S: Simd> {
     /// Optical depth relative to that through the axis at the base.
-    pub(super) relative_depth: Lanes<S>,
+    pub(crate) relative_depth: Lanes<S>,
     /// Excess temperature relative to that on the axis at the base.
-    pub(super) excess: Lanes<S>,
+    pub(crate) excess: Lanes<S>,
 }
 
 /// The closed forms as tables.
@@ -89,7 +88,7 @@ pub(crate) struct PlumeTables {
 }
 
 impl PlumeTables {
-    pub(super) fn new(plume: &SootFieldParameters, color: &ColorParameters) -> Self {
+    pub(crate) fn new(plume: &SootFieldParameters, color: &ColorParameters) -> Self {
         let depth = plume.optical_depth.max(f64::MIN_POSITIVE);
         let axis = |height: f64| [1.0 / half_width(plume, height), axis_optical_depth(plume, height) / depth];
         Self {
@@ -106,14 +105,14 @@ impl PlumeTables {
 
     /// Fraction of the displacement at `height`.
     #[inline(always)]
-    pub(super) fn growth<S: Simd>(&self, height: Lanes<S>) -> Lanes<S> {
+    pub(crate) fn growth<S: Simd>(&self, height: Lanes<S>) -> Lanes<S> {
         let [growth, _] = self.growth.lookup(&lookup_index(height));
         growth
     }
 
     /// The soot at a distance from the axis, sheet widths, and a height, sheet heights.
     #[inline(always)]
-    pub(super) fn soot<S: Simd>(&self, distance: Lanes<S>, height: Lanes<S>) -> Soot<S> {
+    pub(crate) fn soot<S: Simd>(&self, distance: Lanes<S>, height: Lanes<S>) -> Soot<S> {
         let at = table_index(height * height.broadcast((1.0 / MAX_HEIGHT) as f32));
         let ([inverse_half_width, relative_depth], [excess, _]) = (self.axis.fetch(&at), self.axis_excess.fetch(&at));
         let across = distance * inverse_half_width;
@@ -123,14 +122,14 @@ impl PlumeTables {
 
     /// 1 - exp(-tau).
     #[inline(always)]
-    pub(super) fn opacity<S: Simd>(&self, relative_depth: Lanes<S>) -> Lanes<S> {
+    pub(crate) fn opacity<S: Simd>(&self, relative_depth: Lanes<S>) -> Lanes<S> {
         let [opacity, _] = self.opacity.sample(relative_depth);
         opacity
     }
 
     /// Black-body radiance, of luminance up to 1, and temperature.
     #[inline(always)]
-    pub(super) fn light<S: Simd>(&self, excess: Lanes<S>) -> [Lanes<S>; 4] {
+    pub(crate) fn light<S: Simd>(&self, excess: Lanes<S>) -> [Lanes<S>; 4] {
         let scaled = excess.simd_clamp01() * excess.broadcast((ENTRIES - 1) as f32);
         gather(excess.simd, &self.light, round_to_u32(scaled))
     }

@@ -3,7 +3,6 @@
 use bansho_base::math::simd::{LANES, Lanes, Real, any_positive, linspace};
 use fearless_simd::Simd;
 
-use super::{displacement::Displacement, plume::PlumeTables};
 use crate::sheet::{
     animate::warp::WarpState,
     equations,
@@ -14,6 +13,7 @@ use crate::sheet::{
             smoke::{LIGHT_SAMPLES, scattered_at},
         },
     },
+    soot_field::{displacement::Displacement, plume::PlumeTables},
 };
 
 /// Distance from the side of the sheet over which the soot thins out, sheet widths.

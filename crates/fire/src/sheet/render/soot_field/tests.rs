@@ -14,9 +14,9 @@ use bansho_base::{
     },
 };
 
-use super::{plume, *};
 use crate::sheet::{
-    FlameSheet, Instance, ShapeParameters,
+    FlameSheet, FlameSheetParameters, Instance, ShapeParameters, SheetMethod, SootFieldParameters, Stage,
+    soot_field::plume,
     tests::{SIZE, draw, sheet, view, with_wind},
 };
 

@@ -8,7 +8,7 @@ use bansho_base::{
 };
 use fearless_simd::Simd;
 
-use super::{SootFieldTables, shade::shade_soot, time_samples::SootSample};
+use super::{shade::shade_soot, time_samples::SootSample};
 use crate::sheet::{
     model::{FlameInstance, FlameSheet},
     render::{
@@ -17,6 +17,7 @@ use crate::sheet::{
         projection::SheetCoordinates,
         shade::ShadedBatch,
     },
+    soot_field::SootFieldTables,
 };
 
 /// One soot field with the inputs of drawing.

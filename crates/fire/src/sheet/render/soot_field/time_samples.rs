@@ -11,11 +11,7 @@ use bansho_base::{
 };
 use fearless_simd::{Level, Simd, prelude::*};
 
-use super::{
-    displacement::{Displacement, layers},
-    plume::PlumeTables,
-    shade::{SootState, shade_soot},
-};
+use super::shade::{SootState, shade_soot};
 use crate::sheet::{
     animate::warp::WarpState,
     model::{FlameInstance, FlameSheet},
@@ -25,6 +21,10 @@ use crate::sheet::{
         shade::smoke::LIGHT_SAMPLES,
         smoke::Scattering,
         time_samples::pixels_per_meter,
+    },
+    soot_field::{
+        displacement::{Displacement, layers},
+        plume::PlumeTables,
     },
 };
 
