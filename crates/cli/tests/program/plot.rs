@@ -159,7 +159,7 @@ fn transfer_curves_are_those_of_the_scene() {
 
 #[test]
 fn the_shape_of_a_flame_is_that_of_the_scene() {
-    let shape = "shape = { initial_speed = 0.0, edge_speed = 0.2, core_width = 0.4, fringe_width = [[0, 0], [0.5, 0.5]], flutter = 0.5 }";
+    let shape = "shape = { initial_speed = 0.0, edge_speed = 0.2, core_width = [[0, 0.4]], fringe_width = [[0, 0], [0.5, 0.5]], flutter = 0.5 }";
     let folder = Folder::with_scene(&format!("bansho = 2\n[[flame_sheet]]\n{shape}\n"));
     let run = folder.succeed(&["plot", "flame-shape", "scene.toml", "--height", "0.5", "-o", "-"]);
     let table = Csv::parse(&run.stdout);
