@@ -383,3 +383,44 @@ fn a_flame_that_is_cut_off_pale_and_full_of_holes_is_judged_so() {
     let flame = Judgment::of(&text);
     assert!(flame.base_width > 0.75 && flame.body < 0.9 && flame.pale > 0.5, "{flame:?}");
 }
+
+/// A scene of the paper's future work.
+fn future_work(name: &str) -> String {
+    std::fs::read_to_string(folder().join(format!("ohshima_{name}.toml"))).unwrap()
+}
+
+#[test]
+fn sparks_and_smoke_are_shown_together_with_the_flame() {
+    let text = future_work("sparks_and_smoke");
+    let [all, no_sparks, no_smoke] = ["", "rate = 40.0", "optical_depth = 2.0"].map(|removed| {
+        let none = format!("{} = 0.0", removed.split(' ').next().unwrap());
+        render(&if removed.is_empty() { text.clone() } else { text.replacen(removed, &none, 1) }, [256, 384], &[75])
+            .remove(0)
+    });
+    // Above the flame, in the upper half of the picture, smoke covers the background and sparks add light.
+    let upper = 256 * 192;
+    let sparks = (0..upper).filter(|i| all.beauty.pixels()[*i][0] > no_sparks.beauty.pixels()[*i][0] + 0.05).count();
+    let cover = |frame: &Frame| frame.beauty.pixels()[..upper].iter().map(|pixel| f64::from(pixel[3])).sum::<f64>();
+    let (smoky, clear) = (cover(&all) / upper as f64, cover(&no_smoke) / upper as f64);
+    assert!((20..2000).contains(&sparks), "{sparks} pixels of sparks");
+    assert!(smoky > 0.15 && clear < 0.02, "{smoky} {clear}");
+    let lit = |frame: &Frame| frame.beauty.pixels()[upper..].iter().filter(|pixel| pixel[0] > 0.3).count();
+    assert!(lit(&all) > 4000, "the flame stays: {}", lit(&all));
+}
+
+#[test]
+fn flames_stand_in_a_3d_scene() {
+    let text = future_work("in_3d");
+    let frames = render(&text, [256, 144], &[0, 239]);
+    for frame in &frames {
+        let depth = frame.depth.as_ref().unwrap();
+        let lit = |i: &usize| frame.beauty.pixels()[*i][0] > 0.5 && depth[*i].is_finite();
+        let depths: Vec<f32> = (0..depth.len()).filter(lit).map(|i| depth[i]).collect();
+        let (near, far) = depths.iter().fold((f32::INFINITY, 0.0_f32), |(a, b), d| (a.min(*d), b.max(*d)));
+        assert!((4.6..5.0).contains(&near) && (6.6..7.1).contains(&far), "{near} m to {far} m");
+    }
+    // The ground is lit by the flames: without them the picture is dark.
+    let light = |frame: &Frame| frame.beauty.pixels().iter().map(|p| f64::from(p[1])).filter(|g| *g < 0.2).sum::<f64>();
+    let dark = render(&text.replacen("luminance = 1000.0", "luminance = 0.0", 1), [256, 144], &[0]);
+    assert!(light(&frames[0]) > 50.0 && light(&dark[0]) < 1.0, "{} {}", light(&frames[0]), light(&dark[0]));
+}
