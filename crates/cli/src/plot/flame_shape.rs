@@ -1,8 +1,10 @@
 //! Shape of a flame sheet: thresholds, widths, speed and edges, eqs. (4), (9), (11) and (15) of Ohshima & Itahashi.
 
 use bansho::{
+    BuildErrors, Scene,
+    base::parameters::{BuildError, ParameterError},
     fire::sheet::{FlameSheet, FlameSheetParameters, equations},
-    job::SceneFile,
+    job::{JobError, SceneFile},
 };
 
 use super::{
@@ -34,7 +36,8 @@ const COLUMNS: [&str; 10] = [
 pub(crate) fn figure(file: &SceneFile, name: Option<&str>, time: f64, height: f64) -> anyhow::Result<Figure> {
     let scene = file.parse()?;
     let (name, parameters) = flame_sheet(file, &scene, name)?;
-    let sheet = FlameSheet::new(parameters.clone(), &name, scene.seed, None)?;
+    let sheet = FlameSheet::new(parameters.clone(), &name, scene.seed, None);
+    let sheet = sheet.map_err(|error| located(file, &scene, &name, error))?;
     let edges = sheet.edges(time);
     let mut table = Table::new(COLUMNS);
     for index in 0..=SAMPLES {
@@ -43,6 +46,14 @@ pub(crate) fn figure(file: &SceneFile, name: Option<&str>, time: f64, height: f6
     }
     let title = format!("Shape of the flame sheet \"{name}\" (Ohshima & Itahashi)");
     Ok(Figure { title, panels: panels(&table, time, height), table })
+}
+
+/// An error of the flame sheet `name` with its line in the file.
+fn located(file: &SceneFile, scene: &Scene, name: &str, error: ParameterError) -> JobError {
+    let sheets = scene.instances.iter().filter(|instance| instance.kind.key == "flame_sheet");
+    let index = sheets.take_while(|sheet| sheet.name != name).count();
+    let errors = BuildErrors(vec![(format!("flame_sheet.{index}"), BuildError::new(error.key, error.kind))]);
+    JobError::Scene(Box::new(errors.located(&file.name, &file.text)))
 }
 
 /// All columns but the edges.

@@ -177,6 +177,10 @@ fn the_shape_of_a_flame_is_that_of_the_scene() {
     }
     let run = folder.run(&["plot", "flame-shape", "scene.toml", "--height", "2"]);
     assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+    let wide = Folder::with_scene("bansho = 2\n[[flame_sheet]]\nshape = { core_width = [[0, 0.9]] }\n");
+    let run = wide.run(&["plot", "flame-shape", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("scene.toml:3:9: flame_sheet.0.shape.fringe_width"), "{}", run.stderr);
 }
 
 #[test]
