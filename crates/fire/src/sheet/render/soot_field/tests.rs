@@ -128,6 +128,35 @@ fn gas_rises_and_is_hottest_where_it_is_brightest() {
 }
 
 #[test]
+fn the_pattern_of_the_smoke_rises_at_the_speed_of_its_motion() {
+    // The pattern 0.12 s later is that of now, shifted up by four times the motion to the next frame, which is 0.03 s later.
+    let field = sheet(still_fire(SootFieldParameters::default()), None);
+    let [now, later] = [2.0, 2.12].map(|t| draw(&field, &view(Lens::Perspective, t), SIZE[1], None));
+    let rows = 20..60;
+    let correlation = |shift: usize| {
+        let pairs = || {
+            let pixels =
+                rows.clone().flat_map(|y| (0..SIZE[0]).map(move |x| [y * SIZE[0] + x, (y - shift) * SIZE[0] + x]));
+            pixels.map(|[from, to]| [now[TRANSMITTANCE][from], later[TRANSMITTANCE][to]])
+        };
+        let count = pairs().count() as f32;
+        let mean = pairs().fold([0.0; 2], |sum, pair| [sum[0] + pair[0] / count, sum[1] + pair[1] / count]);
+        let products = pairs().map(|[a, b]| [a - mean[0], b - mean[1]]).map(|[a, b]| [a * b, a * a, b * b]);
+        let [ab, aa, bb] = products.fold([0.0; 3], |sum, product| [0, 1, 2].map(|k| sum[k] + product[k]));
+        ab / (aa * bb).sqrt()
+    };
+    let best = (0..16).max_by(|a, b| correlation(*a).total_cmp(&correlation(*b))).unwrap();
+    let moving: Vec<f32> = rows
+        .clone()
+        .flat_map(|y| now[MOTION_UP][y * SIZE[0]..(y + 1) * SIZE[0]].iter().copied())
+        .filter(|motion| *motion < 0.0)
+        .collect();
+    let expected = -4.0 * moving.iter().sum::<f32>() / moving.len() as f32;
+    assert!((best as f32 - expected).abs() < 1.5 && best > 2, "{best} pixels, not {expected}");
+    assert!(correlation(best) > 0.88 && correlation(0) < 0.82, "{} {}", correlation(best), correlation(0));
+}
+
+#[test]
 fn the_published_light_is_what_is_drawn() {
     let still = sheet(still_fire(SootFieldParameters { albedo: 0.0, ..SootFieldParameters::default() }), None);
     let view = view(Lens::Perspective, 2.0);
