@@ -61,6 +61,7 @@ fn of_flame_sheets_with_sparks_and_smoke() {
     let sheet = "[[flame_sheet]]\nsparks = { rate = 60 }\nsmoke = { optical_depth = 0.6 }\n";
     assert_parts_agree(&format!("bansho = 2\n{sheet}"), 9);
     assert_parts_agree(&format!("bansho = 2\n{sheet}texture = {{ kind = \"ohshima_itahashi\" }}\n"), 9);
+    assert_parts_agree(&format!("bansho = 2\n{sheet}method = \"soot_field\"\n"), 9);
 }
 
 #[test]

@@ -78,6 +78,14 @@ pub enum ParameterErrorKind {
         /// Their sum there.
         sum: f64,
     },
+    /// A value that does not go together with that of another parameter.
+    #[error("must be {allowed} where {other}")]
+    NotWith {
+        /// The value that is allowed.
+        allowed: &'static str,
+        /// The other parameter and its value.
+        other: &'static str,
+    },
     /// A list that must ascend does not.
     #[error("must ascend, but {next} follows {value}")]
     NotAscending {

@@ -57,6 +57,8 @@ pub(crate) enum PlotCommand {
     Parameters(ParametersArgs),
     /// Sharpening and color curves of a flame sheet in a scene (Ohshima & Itahashi, eqs. (6) and (7)).
     TransferCurves(TransferCurvesArgs),
+    /// Thresholds, widths, speeds and edges of a flame sheet in a scene (Ohshima & Itahashi, figures 2, 6 and 7).
+    FlameShape(FlameShapeArgs),
     /// The numbers of the JSON files that `bansho render --metadata` wrote, over the frames.
     Metadata(MetadataArgs),
 }
@@ -189,6 +191,24 @@ pub(crate) struct TransferCurvesArgs {
     pub(crate) output: PlotOutputArgs,
 }
 
+/// `bansho plot flame-shape`
+#[derive(Args, Debug)]
+pub(crate) struct FlameShapeArgs {
+    /// The scene file; `-` reads it from standard input.
+    pub(crate) scene: PathBuf,
+    /// Name of the flame sheet. [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Time at which the edges are plotted.
+    #[arg(long, value_name = "SECONDS", default_value = "1", allow_hyphen_values = true, value_parser = parse_flame_time)]
+    pub(crate) time: f64,
+    /// Height w of the horizontal section whose speed is plotted.
+    #[arg(long, value_name = "W", default_value = "0.5", allow_hyphen_values = true, value_parser = parse_flame_height)]
+    pub(crate) height: f64,
+    #[command(flatten)]
+    pub(crate) output: PlotOutputArgs,
+}
+
 /// `bansho plot metadata`
 #[derive(Args, Debug)]
 pub(crate) struct MetadataArgs {
@@ -231,6 +251,14 @@ fn list(
 
 fn parse_kelvin(text: &str) -> Result<f64, RangeError> {
     number(text, f64::from(LOWEST_K), f64::from(HIGHEST_K), "K")
+}
+
+fn parse_flame_time(text: &str) -> Result<f64, RangeError> {
+    number(text, -1e6, 1e6, "s")
+}
+
+fn parse_flame_height(text: &str) -> Result<f64, RangeError> {
+    number(text, 0.0, 1.0, "sheet heights")
 }
 
 fn parse_step(text: &str) -> Result<f64, RangeError> {

@@ -20,7 +20,10 @@ use bansho::{
 use crate::{
     args::{Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
-    plot::{PlotError, aurora, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves},
+    plot::{
+        PlotError, aurora, black_body, csv, draw, figure::Figure, flame_shape, metadata, parameters, rain,
+        transfer_curves,
+    },
 };
 
 /// Plots what is asked for.
@@ -57,6 +60,10 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
         PlotCommand::TransferCurves(args) => {
             let figure = transfer_curves::figure(&read(&args.scene)?, args.name.as_deref())?;
             finish("transfer-curves", &figure, &args.output, std::slice::from_ref(&args.scene))
+        }
+        PlotCommand::FlameShape(args) => {
+            let figure = flame_shape::figure(&read(&args.scene)?, args.name.as_deref(), args.time, args.height)?;
+            finish("flame-shape", &figure, &args.output, std::slice::from_ref(&args.scene))
         }
         PlotCommand::Metadata(args) => finish("metadata", &metadata::figure(&args.files)?, &args.output, &args.files),
     }

@@ -1,6 +1,6 @@
 //! `bansho plot`: figures of what the models compute.
 //!
-//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`] and [`metadata`] make one
+//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and [`metadata`] make one
 //! from the library's own functions. [`draw`] lays a figure out on a [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
@@ -9,6 +9,7 @@ mod canvas;
 pub(crate) mod csv;
 pub(crate) mod draw;
 pub(crate) mod figure;
+pub(crate) mod flame_shape;
 mod font;
 pub(crate) mod metadata;
 pub(crate) mod parameters;

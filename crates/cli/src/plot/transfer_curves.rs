@@ -22,7 +22,7 @@ use super::{
 const CURVE_SAMPLES: usize = 256;
 
 /// The flame sheet of that name, or the first.
-fn flame_sheet(
+pub(super) fn flame_sheet(
     file: &SceneFile,
     scene: &Scene,
     name: Option<&str>,

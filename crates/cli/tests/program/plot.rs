@@ -158,6 +158,32 @@ fn transfer_curves_are_those_of_the_scene() {
 }
 
 #[test]
+fn the_shape_of_a_flame_is_that_of_the_scene() {
+    let shape = "shape = { initial_speed = 0.0, edge_speed = 0.2, core_width = [[0, 0.4]], fringe_width = [[0, 0], [0.5, 0.5]], flutter = 0.5 }";
+    let folder = Folder::with_scene(&format!("bansho = 2\n[[flame_sheet]]\n{shape}\n"));
+    let run = folder.succeed(&["plot", "flame-shape", "scene.toml", "--height", "0.5", "-o", "-"]);
+    let table = Csv::parse(&run.stdout);
+    assert_eq!(
+        &table.columns[..6],
+        ["argument", "threshold", "threshold_across", "rise", "core_width", "core_and_fringe_width"]
+    );
+    // By hand: w = sqrt(y), A + D = 0.9, K from 1 in the core to h at x' = 0.9, and edges from A + D / 2 to A + D.
+    let middle = table.row(0.25);
+    assert!((middle[3] - 0.5).abs() < 1e-6 && (table.row(0.5)[5] - 0.9).abs() < 1e-6);
+    assert!((middle[7] - 1.0).abs() < 1e-6 && (table.row(1.0)[7] - 0.2).abs() < 1e-6);
+    for column in [8, 9] {
+        let edge = table.row(0.75)[column];
+        assert!((0.65 - 1e-3..=0.9 + 1e-3).contains(&edge), "{edge}");
+    }
+    let run = folder.run(&["plot", "flame-shape", "scene.toml", "--height", "2"]);
+    assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+    let wide = Folder::with_scene("bansho = 2\n[[flame_sheet]]\nshape = { core_width = [[0, 0.9]] }\n");
+    let run = wide.run(&["plot", "flame-shape", "scene.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("scene.toml:3:9: flame_sheet.0.shape.fringe_width"), "{}", run.stderr);
+}
+
+#[test]
 fn metadata_are_plotted_over_the_frames() {
     let folder = Folder::new();
     for frame in 0..3 {

@@ -83,6 +83,29 @@ mod tests {
     }
 
     #[test]
+    fn table_1_a_small_k_starts_slowly_and_accelerates_much() {
+        // Gas rises by dw/dt = s = 1, so that its speed is dy/dt = 1 / (dw/dy). By hand, for k = 0: y = t^2, so 2 t; for k = 1: y = t, so 1.
+        let height = |k: f32, w: f64| {
+            let (mut low, mut high) = (0.0_f64, 1.0_f64);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if f64::from(rise(middle as f32, k)) < w { low = middle } else { high = middle }
+            }
+            0.5 * (low + high)
+        };
+        let speed = |k, w| (height(k, w + 0.02) - height(k, w - 0.02)) / 0.04;
+        assert!((speed(0.0, 0.5) - 1.0).abs() < 1e-3 && (speed(1.0, 0.5) - 1.0).abs() < 1e-3);
+        let starts = [0.0, 0.25, 0.5, 0.75, 1.0].map(|k| speed(k, 0.05));
+        let accelerations = [0.0, 0.25, 0.5, 0.75, 1.0].map(|k| (speed(k, 0.95) - speed(k, 0.05)) / 0.9);
+        assert!(starts.windows(2).all(|pair| pair[0] + 0.005 < pair[1]), "{starts:?}");
+        assert!(accelerations.windows(2).all(|pair| pair[0] > pair[1] + 0.005), "{accelerations:?}");
+        assert!(
+            (starts[0] - 0.1).abs() < 1e-3 && (accelerations[0] - 2.0).abs() < 1e-2,
+            "{starts:?} {accelerations:?}"
+        );
+    }
+
+    #[test]
     fn axis_distance_10_is_0_on_the_axis_and_1_at_both_edges() {
         assert_eq!([0.0, 0.25, 0.5, 0.875, 1.0].map(axis_distance), [1.0, 0.5, 0.0, 0.75, 1.0]);
     }

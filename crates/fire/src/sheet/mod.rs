@@ -42,7 +42,8 @@
 //!    lens; `tables::shape_tables` maps those to flame coordinates.
 //! 6. `render::shade` turns them into light and opacity; `render::smoke` prepares the second sheet, the smoke above the flame.
 //! 7. `render::draw` evaluates bands of rows and composites them into strips; `render::aovs` writes AOVs.
-//! 8. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
+//! 8. Where the scene selects it, `soot_field` replaces 4 to 7: flame and smoke as one plume of soot that a fractal field displaces.
+//! 9. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
 
 pub(crate) mod animate;
 pub mod equations;
@@ -50,12 +51,13 @@ mod model;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;
+mod soot_field;
 mod tables;
 mod texture;
 pub use model::FlameSheet;
 pub use parameters::{
-    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters,
-    SmokeParameters, Stage, TextureKind, TextureParameters,
+    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters, SheetMethod,
+    SmokeParameters, SootFieldParameters, Stage, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 

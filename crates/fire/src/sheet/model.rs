@@ -10,10 +10,14 @@ use bansho_base::{
 };
 
 use super::{
-    animate::{clock::Clock, warp::FlameWaves},
-    parameters::{Facing, FlameSheetParameters, Instance, TextureKind},
+    animate::{
+        clock::Clock,
+        warp::{FlameWaves, WarpState, WindLean},
+    },
+    parameters::{Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
+    soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
-    texture::{FractalLayers, PaperLayer, TextureSource},
+    texture::{FractalLayers, PaperLayer, PaperSum, TextureSource},
 };
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
@@ -45,6 +49,7 @@ impl FlameSheet {
         let clock = Clock::new(parameters.speed.clone(), loop_s);
         ShapeTables::check(&parameters.shape)?;
         ColorRamp::check(&parameters.texture)?;
+        soot_field::check(&parameters)?;
         let flames = flames(&parameters, name, seed, &clock);
         Ok(Self { name: name.to_owned(), parameters, clock, tables: OnceLock::new(), flames })
     }
@@ -54,11 +59,23 @@ impl FlameSheet {
         &self.parameters
     }
 
+    /// E(w, t) of eq. (15), left and right, at time `t` in s of the first instance, over the height w.
+    pub fn edges(&self, t: f64) -> impl Fn(f64) -> [f64; 2] + use<> {
+        let no_wind = WindLean { across: 0.0, toward: 0.0 };
+        let warp = self.flames.first().map(|flame| {
+            let time = self.flame_time(flame, t);
+            WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, no_wind)
+        });
+        move |w| warp.as_ref().map_or([0.0; 2], |warp| warp.edges.at(w as f32).map(f64::from))
+    }
+
     pub(super) fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
+        let has_soot_field = self.parameters.method == SheetMethod::SootField;
         let compute = || Tables {
             shape: Box::new(ShapeTables::new(shape, texture, color)),
             ramp: Box::new(ColorRamp::new(texture, color, *stage)),
+            soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
         };
         get_or_compute(&self.tables, compute)
     }
@@ -72,6 +89,11 @@ impl FlameSheet {
     pub(crate) fn ramp(&self) -> &ColorRamp {
         &self.tables().ramp
     }
+
+    /// Tables of the soot field; `None` for other methods.
+    pub(crate) fn soot_field(&self) -> Option<&SootFieldTables> {
+        self.tables().soot_field.as_deref()
+    }
 }
 
 /// Tables that depend on the parameters alone.
@@ -79,6 +101,8 @@ impl FlameSheet {
 pub(super) struct Tables {
     pub(super) shape: Box<ShapeTables>,
     pub(super) ramp: Box<ColorRamp>,
+    /// Only for that method.
+    pub(super) soot_field: Option<Box<SootFieldTables>>,
 }
 
 /// One instance of a flame: its placement, fluctuations and texture.
@@ -134,13 +158,16 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
     let texture = &parameters.texture;
     let paper = (texture.kind == TextureKind::OhshimaItahashi)
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
+    let exact =
+        (texture.kind == TextureKind::OhshimaItahashiExact).then(|| PaperSum::new(texture.octaves as u32, clock));
     let placements =
         if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
     let flame = |(index, placement): (usize, Instance)| {
         let key = instance_key(seed, name, parameters.variation, index);
-        let texture_source = match &paper {
-            Some(layer) => TextureSource::Paper(layer.clone()),
-            None => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
+        let texture_source = match (&paper, exact) {
+            (Some(layer), _) => TextureSource::Paper(layer.clone()),
+            (_, Some(sum)) => TextureSource::Exact(sum),
+            _ => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
         };
         FlameInstance { placement, key, waves: FlameWaves::new(&parameters.shape, key, clock), texture_source }
     };

@@ -22,6 +22,8 @@ bansho_base::choice! {
         Fractal = "fractal",
         /// The paper's sum of cosines, eq. (20), halved so that it lies in [0, 1]; repeats every 0.483 sheet heights.
         OhshimaItahashi = "ohshima_itahashi",
+        /// The same sum, evaluated at every pixel instead of looked up in a filtered table, as in the paper: slower, and not antialiased.
+        OhshimaItahashiExact = "ohshima_itahashi_exact",
     }
 }
 
@@ -48,6 +50,16 @@ bansho_base::choice! {
         Sharpened = "sharpened",
         /// After coloring, before the mapping to the shape of the flame (picture 4).
         Colored = "colored",
+    }
+}
+
+bansho_base::choice! {
+    /// How flame and smoke are computed.
+    pub enum SheetMethod {
+        /// A scrolling texture, thresholded, colored and mapped, eqs. (1) to (20); `smoke` adds a second sheet.
+        Texture = "texture",
+        /// One field of soot temperature and density that a fractal field stirs, with the parameters `soot_field`: hot soot is flame, cool soot smoke (picture 9).
+        SootField = "soot_field",
     }
 }
 
@@ -165,6 +177,43 @@ bansho_base::parameters! {
 }
 
 bansho_base::parameters! {
+    /// Flame and smoke as one plume of soot, whose temperature and density a fractal field stirs (section 5 and picture 9 of the paper); for
+    /// `method = "soot_field"`. The soot glows at up to `color.core_temperature_k`.
+    pub struct SootFieldParameters {
+        /// Optical depth of the soot through the axis at the base of the plume.
+        optical_depth: f64 = 2.5, limits(Range::new(0.0, 100.0));
+        /// Half width of the plume at its base, in sheet widths: where its density is 1/e of that on the axis.
+        base_half_width: f64 = 0.09, limits(Range::new(0.005, 0.5));
+        /// Growth of the half width with height, in sheet widths per sheet height.
+        spread: f64 = 0.2, limits(FRACTION);
+        /// Exponent of the dilution: the optical depth on the axis falls as the half width to the power of minus this.
+        dilution: f64 = 0.3, limits(Range::new(0.0, 2.0));
+        /// Height up to which the soot burns and stays hot, in sheet heights. Above it the excess temperature falls as in a buoyant plume, as the height to
+        /// the power -5/3.
+        flame_height: f64 = 0.28, limits(Range::new(0.01, 2.0));
+        /// How much faster than the density the excess temperature falls toward the edge; at 1 equally fast, at 0 not at all.
+        edge_cooling: f64 = 0.7, limits(Range::new(0.0, 4.0));
+        /// Temperature of the surrounding air, to which the soot cools.
+        ambient_temperature_k: f64 = 290.0, limits(Range::new(100.0, 600.0)), unit("K");
+        /// Displacement by the fractal field, in sheet widths (root mean square of each component); 0 for an undisturbed plume.
+        stir: f64 = 0.12, limits(FRACTION);
+        /// Height at which the displacement reaches `stir`, in sheet heights; it starts from 0 at the base.
+        stir_height: f64 = 0.25, limits(Range::new(0.01, 2.0));
+        /// Size of the largest eddies, in sheet widths.
+        eddy_size: f64 = 0.3, limits(Range::new(0.02, 5.0));
+        /// Number of octaves of the fractal field.
+        octaves: i64 = 5, limits(Range::new(1.0, 5.0));
+        /// Amplitude of each octave relative to that of the previous one, whose eddies are twice as large; at 0.5 displacements are proportional to the size
+        /// of the eddies.
+        gain: f64 = 0.58, limits(FRACTION);
+        /// Single-scattering albedo of the soot: fraction of the attenuated light that it scatters instead of absorbing it.
+        albedo: f64 = 0.25, limits(FRACTION);
+        /// Factor of the flame's own light that the smoke scatters.
+        fire_light: f64 = 1.0, limits(Range::new(0.0, 100.0));
+    }
+}
+
+bansho_base::parameters! {
     /// Light of the flame on other objects. It follows the flame's emission over time.
     pub struct LightParameters {
         /// Factor of that light; 0 for none.
@@ -209,6 +258,8 @@ bansho_base::parameters! {
         variation: i64 = 0, limits(Range::new(0.0, 1e6));
         /// Response to the wind: 0 for none, 1 for gas that drifts with the wind.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 10.0));
+        /// How flame and smoke are computed. `"soot_field"` does not use `texture`, and of `shape` only `initial_speed`, sway and flicker.
+        method: SheetMethod = SheetMethod::Texture;
         /// Outline and motion.
         shape: ShapeParameters = ShapeParameters::default();
         /// Texture, threshold and sharpening.
@@ -219,6 +270,8 @@ bansho_base::parameters! {
         sparks: SparkParameters = SparkParameters::default();
         /// Smoke.
         smoke: SmokeParameters = SmokeParameters::default();
+        /// Flame and smoke as one field, for `method = "soot_field"`.
+        soot_field: SootFieldParameters = SootFieldParameters::default();
         /// Light on other objects.
         light: LightParameters = LightParameters::default();
         /// Instances of the flame; an empty list is one instance at `position`.

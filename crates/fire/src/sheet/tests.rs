@@ -28,25 +28,25 @@ use crate::sheet::{
     },
 };
 
-const SIZE: [usize; 2] = [96, 80];
+pub(crate) const SIZE: [usize; 2] = [96, 80];
 
-fn sheet(parameters: FlameSheetParameters, loop_s: Option<f64>) -> FlameSheet {
+pub(crate) fn sheet(parameters: FlameSheetParameters, loop_s: Option<f64>) -> FlameSheet {
     FlameSheet::new(parameters, "test", 5, loop_s).unwrap()
 }
 
-fn view(lens: Lens, t: f64) -> View {
+pub(crate) fn view(lens: Lens, t: f64) -> View {
     let camera = CameraParameters { lens, position: Animated::from([0.3, 0.9, 3.0]), ..CameraParameters::default() };
     View::new(camera, Shutter { open: t, close: t + 0.02 }, t + 0.04, SIZE, 0)
 }
 
-fn with_wind<T>(velocity: [f64; 3], use_it: impl FnOnce(&Surroundings) -> T) -> T {
+pub(crate) fn with_wind<T>(velocity: [f64; 3], use_it: impl FnOnce(&Surroundings) -> T) -> T {
     let parameters = WindParameters { velocity: Animated::from(velocity), ..WindParameters::default() };
     let wind = Wind::new(parameters, 3, None);
     use_it(&Surroundings::from_wind(&wind))
 }
 
 /// All planes of a picture drawn in strips of `height` rows, with AOVs.
-fn draw(sheet: &FlameSheet, view: &View, height: usize, plate: Option<f32>) -> Vec<Vec<f32>> {
+pub(crate) fn draw(sheet: &FlameSheet, view: &View, height: usize, plate: Option<f32>) -> Vec<Vec<f32>> {
     with_wind([0.8, 0.0, 0.3], |surroundings| {
         let prepared = sheet.prepare(view, surroundings, &Unobserved).unwrap();
         let plate_row = vec![plate.unwrap_or(0.0); SIZE[0]];

@@ -1,6 +1,7 @@
 //! AOVs of a flame: temperature, optical depth and motion.
 
 use bansho_base::{
+    camera::upright_quad::UprightQuad,
     color,
     image::Rect,
     math::{self, DVec3, simd::LANES},
@@ -10,8 +11,10 @@ use fearless_simd::Simd;
 
 use super::shade::{SheetContent, TimeSample, shade_sample};
 use crate::sheet::{
+    animate::warp::WarpState,
     equations,
     model::{FlameInstance, FlameSheet},
+    parameters::SheetMethod,
 };
 
 /// AOVs of a flame sheet, in the order of a strip's planes.
@@ -43,9 +46,9 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
 ];
 
 /// Indices of the planes among a strip's AOVs.
-const TEMPERATURE: usize = 0;
-const OPTICAL_DEPTH: usize = 1;
-const MOTION: [usize; 2] = [2, 3];
+pub(crate) const TEMPERATURE: usize = 0;
+pub(crate) const OPTICAL_DEPTH: usize = 1;
+pub(crate) const MOTION: [usize; 2] = [2, 3];
 
 /// One flame with the inputs of its AOVs.
 pub(crate) struct AovContext<'a> {
@@ -96,26 +99,16 @@ fn write_aov_batch<S: Simd>(
         let weight = color::luminance([0, 1, 2].map(|k| shade.light[k][lane])) * sample.luminance;
         if weight > 0.0 && context.content == SheetContent::Flame {
             strip.aovs[TEMPERATURE].add(index, sheet.ramp().temperature.at(shade.t1[lane])[0], weight);
-            let motion = context.motion(sample, f64::from(batch.x[lane]), f64::from(batch.y[lane]));
+            let motion = sheet.motion(
+                context.flame,
+                context.view,
+                &sample.quad,
+                &sample.state.warp,
+                [f64::from(batch.x[lane]), f64::from(batch.y[lane])],
+            );
             for (plane, value) in MOTION.into_iter().zip(motion) {
                 strip.aovs[plane].add(index, value, weight);
             }
-        }
-    }
-}
-
-impl AovContext<'_> {
-    /// Motion of the gas at (x, y) of the sheet until the next frame, pixels to the right and down.
-    fn motion(&self, sample: &TimeSample, x: f64, y: f64) -> [f32; 2] {
-        let (now, next) = (self.view.shutter.middle(), self.view.next_middle);
-        let rise = self.sheet.gas_speed(self.flame, x, y, now) * (next - now);
-        let shift: DVec3 = self.sheet.base(self.flame, next) - self.sheet.base(self.flame, now);
-        let bend = sample.state.warp.center(y + rise) - sample.state.warp.center(y);
-        let before = self.view.camera.project(sample.quad.point(x, y));
-        let after = self.view.camera_at(next).project(sample.quad.point(x + bend, y + rise) + shift);
-        match (before, after) {
-            (Some(before), Some(after)) => (after.pixel - before.pixel).as_vec2().to_array(),
-            _ => [0.0; 2],
         }
     }
 }
@@ -125,10 +118,35 @@ impl AovContext<'_> {
 const MIN_SLOPE: f32 = 0.5;
 
 impl FlameSheet {
+    /// Motion of the gas at (x, y) of the sheet until the next frame, pixels to the right and down.
+    pub(crate) fn motion(
+        &self,
+        flame: &FlameInstance,
+        view: &View,
+        quad: &UprightQuad,
+        warp: &WarpState,
+        [x, y]: [f64; 2],
+    ) -> [f32; 2] {
+        let (now, next) = (view.shutter.middle(), view.next_middle);
+        let rise = self.gas_speed(flame, x, y, now) * (next - now);
+        let shift: DVec3 = self.base(flame, next) - self.base(flame, now);
+        let bend = warp.center(y + rise) - warp.center(y);
+        let before = view.camera.project(quad.point(x, y));
+        let after = view.camera_at(next).project(quad.point(x + bend, y + rise) + shift);
+        match (before, after) {
+            (Some(before), Some(after)) => (after.pixel - before.pixel).as_vec2().to_array(),
+            _ => [0.0; 2],
+        }
+    }
+
     /// dy/dt of the gas at (x, y), sheet heights per second: s / (dw/dy).
     fn gas_speed(&self, flame: &FlameInstance, x: f64, y: f64, t: f64) -> f64 {
         const STEP: f32 = 0.01;
-        let distance = equations::axis_distance(x as f32);
+        // A soot field rises uniformly, as the core does.
+        let distance = match self.parameters.method {
+            SheetMethod::Texture => equations::axis_distance(x as f32),
+            SheetMethod::SootField => 0.0,
+        };
         let y = (y as f32).clamp(0.02, 0.98);
         let slope = (self.shape().slowed_rise_at(distance, y + STEP) - self.shape().slowed_rise_at(distance, y - STEP))
             / (2.0 * STEP);

@@ -275,7 +275,7 @@ fn misses_flame(shape: &ShapeTables, sample: &TimeSample, columns: &Range<usize>
 }
 
 /// Mean light and opacity of sixteen pixels over the exposure, and the depth of their nearest sample.
-struct PixelSums<S: Simd> {
+pub(crate) struct PixelSums<S: Simd> {
     light: [Lanes<S>; 4],
     depth: Lanes<S>,
     covered: bool,
@@ -283,12 +283,12 @@ struct PixelSums<S: Simd> {
 
 impl<S: Simd> PixelSums<S> {
     #[inline(always)]
-    fn new(simd: S) -> Self {
+    pub(crate) fn new(simd: S) -> Self {
         Self { light: [Lanes::splat(simd, 0.0); 4], depth: Lanes::splat(simd, f32::INFINITY), covered: false }
     }
 
     #[inline(always)]
-    fn add(&mut self, shade: &ShadedBatch<S>, depth: Lanes<S>, luminance: f32, samples: usize) {
+    pub(crate) fn add(&mut self, shade: &ShadedBatch<S>, depth: Lanes<S>, luminance: f32, samples: usize) {
         for (k, weight) in [luminance, luminance, luminance, 1.0 / samples as f32].into_iter().enumerate() {
             self.light[k] = shade.light[k].fma(depth.broadcast(weight), self.light[k]);
         }
@@ -299,7 +299,7 @@ impl<S: Simd> PixelSums<S> {
 
     /// Composites the pixels behind the contents of the strip, where the plate does not hide them.
     #[inline(always)]
-    fn composite(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
+    pub(crate) fn composite(&self, column: usize, y: usize, rect: Rect, absorbs: bool, strip: &mut Strip) {
         if !self.covered {
             return;
         }

@@ -19,10 +19,11 @@ use super::{
 use crate::sheet::{
     animate::warp::{WarpState, WindLean},
     model::{FlameInstance, FlameSheet},
+    parameters::SheetMethod,
 };
 
 /// Rows of the grid, which has sixteen columns.
-const ROWS: usize = 32;
+pub(crate) const ROWS: usize = 32;
 
 /// Luminous intensity of each row of the grid, from the base up, cd (ACEScg).
 pub(crate) type RowIntensities = [[f32; 3]; ROWS];
@@ -35,6 +36,9 @@ impl FlameSheet {
         let no_wind = WindLean { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
         let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, no_wind);
+        if self.parameters.method == SheetMethod::SootField {
+            return self.soot_row_intensities(flame, warp, t);
+        }
         let texture = flame.texture_source.texture(warp.scroll);
         let state = SheetState { warp, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
         let size = self.sheet_size(flame);

@@ -7,4 +7,5 @@ pub(crate) mod prepared;
 pub(crate) mod projection;
 pub(crate) mod shade;
 pub(crate) mod smoke;
+pub(crate) mod soot_field;
 pub(crate) mod time_samples;

@@ -16,12 +16,13 @@ use super::{
     aovs::{AovContext, write_aov_rows},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     shade::{SheetContent, TimeSample},
+    soot_field::{SootContext, SootSample, draw_soot_rows},
     time_samples::pixels_per_meter,
 };
 use crate::{
     sheet::{
         model::{FlameInstance, FlameSheet},
-        parameters::Stage,
+        parameters::{SheetMethod, Stage},
     },
     sparks::{SparkEmitter, Streak},
 };
@@ -45,6 +46,8 @@ struct DrawCommand<'a> {
 enum DrawItem {
     /// A sheet of flame or smoke.
     Sheet(SheetContent, Vec<TimeSample>),
+    /// Flame and smoke as one field.
+    SootField(Vec<SootSample>),
     /// A spark.
     Spark(Streak),
 }
@@ -80,12 +83,20 @@ impl FlameSheet {
         let right = self.right(flame, &view.camera, base);
         let quad = UprightQuad::new(base, right, self.sheet_size(flame), 0.0);
         let scale = pixels_per_meter(&view.camera, &quad);
-        let texture = flame.texture_source.filtered(scale * quad.size.y);
         let count = self.time_samples(flame, view.shutter, scale);
-        let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);
         let depth = view.camera.depth(quad.point(0.5, 0.5));
-        if !samples.is_empty() {
-            commands.push(DrawCommand { flame, depth, rect, item: DrawItem::Sheet(self.content(), samples) });
+        match self.parameters.method {
+            SheetMethod::Texture => {
+                let texture = flame.texture_source.filtered(scale * quad.size.y);
+                let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);
+                if !samples.is_empty() {
+                    commands.push(DrawCommand { flame, depth, rect, item: DrawItem::Sheet(self.content(), samples) });
+                }
+            }
+            SheetMethod::SootField => {
+                let (samples, rect) = self.soot_samples(flame, view, surroundings, count);
+                commands.push(DrawCommand { flame, depth, rect, item: DrawItem::SootField(samples) });
+            }
         }
         if self.parameters.stage != Stage::Flame {
             return;
@@ -138,6 +149,10 @@ impl Prepared for PreparedSheet<'_> {
             }
             match &command.item {
                 DrawItem::Sheet(content, samples) => self.draw_sheet(command, *content, samples, rect, strip),
+                DrawItem::SootField(samples) => {
+                    let context = SootContext { sheet: self.sheet, flame: command.flame, view: self.view, samples };
+                    fearless_simd::dispatch!(self.level, simd => draw_soot_rows(simd, &context, rect, strip));
+                }
                 DrawItem::Spark(streak) => streak.draw(self.view.size, strip),
             }
         }

@@ -9,6 +9,7 @@ use bansho_base::{
 };
 
 use super::{
+    emitted_light::RowIntensities,
     projection::{PixelToSheet, bounds},
     shade::{
         SheetState, TimeSample,
@@ -73,7 +74,7 @@ impl FlameSheet {
         Some((TimeSample { pixel_to_sheet, state, quad, luminance: 1.0, smoke: Some(smoke_state) }, rect))
     }
 
-    /// Radiance scattered at each height: isotropic single scattering of the light of the flame below and of all other lights.
+    /// Light that a flame's smoke scatters at each height.
     fn smoke_light(
         &self,
         flame: &FlameInstance,
@@ -81,18 +82,48 @@ impl FlameSheet {
         t: f64,
         surroundings: &Surroundings,
     ) -> [[f32; 3]; LIGHT_SAMPLES] {
-        let smoke = &self.parameters.smoke;
-        let rows = self.row_intensities(flame, t);
+        let (smoke, size) = (&self.parameters.smoke, self.sheet_size(flame));
+        let scattering = Scattering {
+            albedo: smoke.albedo,
+            tint: smoke.color,
+            fire_light: smoke.fire_light,
+            flame_center: self.base(flame, t) + DVec3::Y * (0.3 * size.y),
+            flame_size: size,
+        };
+        scattering.radiance(&self.row_intensities(flame, t), quad, surroundings)
+    }
+}
+
+/// Isotropic single scattering of the light of the flame below and of all other lights.
+pub(crate) struct Scattering {
+    /// Single-scattering albedo.
+    pub(crate) albedo: f64,
+    /// Tint, linear sRGB.
+    pub(crate) tint: [f64; 3],
+    /// Factor of the light of the flame.
+    pub(crate) fire_light: f64,
+    /// Center of the flame, m.
+    pub(crate) flame_center: DVec3,
+    /// Width and height of the flame, m.
+    pub(crate) flame_size: DVec2,
+}
+
+impl Scattering {
+    /// Radiance that opaque smoke on `quad` scatters toward the viewer at each height.
+    pub(crate) fn radiance(
+        &self,
+        rows: &RowIntensities,
+        quad: &UprightQuad,
+        surroundings: &Surroundings,
+    ) -> [[f32; 3]; LIGHT_SAMPLES] {
         let fire: [f32; 3] = std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum());
-        let size = self.sheet_size(flame);
-        let flame_center = self.base(flame, t) + DVec3::Y * (0.3 * size.y);
         // The light of the flame is extended: within about its size the illuminance no longer increases.
-        let extent_squared = 0.16 * size.length_squared();
-        let phase_albedo = smoke.albedo / (4.0 * std::f64::consts::PI);
-        let tint = color::acescg_from_srgb(smoke.color.map(|value| value as f32));
+        let extent_squared = 0.16 * self.flame_size.length_squared();
+        let phase_albedo = self.albedo / (4.0 * std::f64::consts::PI);
+        let tint = color::acescg_from_srgb(self.tint.map(|value| value as f32));
         std::array::from_fn(|i| {
             let point = quad.point(0.5, i as f64 / (LIGHT_SAMPLES - 1) as f64);
-            let falloff = smoke.fire_light / ((point - flame_center).length_squared() + extent_squared);
+            let falloff = self.fire_light / ((point - self.flame_center).length_squared() + extent_squared);
             let mut light = fire.map(|value| value * falloff as f32);
             for other in &surroundings.others.lights {
                 let (illuminance, _) = other.illuminance(point);

@@ -19,6 +19,8 @@ use crate::sheet::animate::clock::Clock;
 
 /// Lattice cells of the first octave along columns and rows; 32 and 64 texels wide.
 const CELLS: [usize; 2] = [8, 8];
+/// Table widths across the sheet, and table heights per sheet height, of the coarse layer.
+const COARSE: [f64; 2] = [0.37, 0.243];
 /// The noise table, common to all flames, which differ by their offsets.
 pub(crate) static FRACTAL: LazyLock<Arc<TextureTable>> = LazyLock::new(|| Arc::new(TextureTable::new(&warped_noise())));
 
@@ -78,7 +80,7 @@ fn lattice_coordinates(count: usize, cells: usize) -> Vec<LatticeCoordinate> {
 }
 
 /// Sum of octaves of noise, each with twice the frequency and `gain` times the amplitude of the previous one.
-fn octaves(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
+pub(crate) fn fractal_noise(count: usize, gain: f32, key: Key, name: Purpose) -> Texels {
     let mut sum = vec![0.0_f32; ROWS * COLUMNS];
     let mut amplitude = 1.0;
     for octave in 0..count {
@@ -95,9 +97,9 @@ fn warped_noise() -> Texels {
     /// Displacement across and up at a noise value of 1, texels.
     const WARP_TEXELS: [f32; 2] = [34.0, 60.0];
     let key = Key::new(1985, "flame sheet fractal");
-    let gas = TextureTable::new(&octaves(4, 0.5, key, Purpose::named("gas")));
-    let across = octaves(2, 0.5, key, Purpose::named("stir across"));
-    let up = octaves(2, 0.5, key, Purpose::named("stir up"));
+    let gas = TextureTable::new(&fractal_noise(4, 0.5, key, Purpose::named("gas")));
+    let across = fractal_noise(2, 0.5, key, Purpose::named("stir across"));
+    let up = fractal_noise(2, 0.5, key, Purpose::named("stir up"));
     let coordinate = |i: usize| {
         let column = WARP_TEXELS[0].fma(across[i], (i % COLUMNS) as f32);
         gas.bilinear(column, WARP_TEXELS[1].fma(up[i], (i / COLUMNS) as f32))
@@ -156,12 +158,20 @@ pub(crate) struct FractalLayers {
 }
 
 impl FractalLayers {
+    /// Lattice cells of the first octave of the coarse layer, per sheet width and height, for tongues of the default size.
+    pub(crate) const COARSE_CELLS: [f64; 2] = [COARSE[0] * CELLS[0] as f64, COARSE[1] * CELLS[1] as f64];
+
     /// Layers whose tongues are `width` times as wide and `length` times as long as the default, and which rise at `speed` times the scroll speed;
     /// `key` determines their offsets.
     pub(crate) fn new([width, length]: [f64; 2], speed: f64, key: Key, clock: &Clock) -> Self {
         let start = key.uniforms(0, 0, Purpose::named("fractal layers")).map(f64::from);
-        let coarse =
-            LayerMapping { widths: 0.37, slant: 0.061_8, heights: 0.243, rate: 1.0, start: [start[0], start[1]] };
+        let coarse = LayerMapping {
+            widths: COARSE[0],
+            slant: 0.061_8,
+            heights: COARSE[1],
+            rate: 1.0,
+            start: [start[0], start[1]],
+        };
         let fine =
             LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
         let fit = |mapping: LayerMapping| {
@@ -179,6 +189,11 @@ impl FractalLayers {
 
     /// The texture after `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
     pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> Texture {
+        Texture::Mixed(table.clone(), self.layers(scroll))
+    }
+
+    /// The mappings of both layers to their table after `scroll` sheet heights.
+    pub(crate) fn layers(&self, scroll: f64) -> [TextureLayer; 2] {
         let layer = |mapping: &LayerMapping| {
             let scroll = mapping.rate * scroll;
             let column = math::reduce_phase(mapping.start[0] - mapping.slant * scroll);
@@ -192,7 +207,7 @@ impl FractalLayers {
                 first_row: rows as f32 * row,
             }
         };
-        Texture::Mixed(table.clone(), [layer(&self.mappings[0]), layer(&self.mappings[1])])
+        [layer(&self.mappings[0]), layer(&self.mappings[1])]
     }
 
     /// Texels per sheet height, of the finer layer.

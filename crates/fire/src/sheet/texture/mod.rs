@@ -11,8 +11,8 @@ use bansho_base::math::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 use fractal::FRACTAL;
-pub(crate) use fractal::FractalLayers;
-pub(crate) use paper::PaperLayer;
+pub(crate) use fractal::{FractalLayers, fractal_noise};
+pub(crate) use paper::{PaperLayer, PaperSum};
 pub use paper::{PaperTexture, paper_texture};
 
 /// Columns of a table, along u.
@@ -145,7 +145,7 @@ pub(crate) struct TextureLayer {
 impl TextureLayer {
     /// Looks up the layer at sixteen points.
     #[inline(always)]
-    fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
+    pub(crate) fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         let slant = w.fma(w.broadcast(self.columns_per_w), w.broadcast(self.first_column));
         let column = u.fma(u.broadcast(self.columns_per_u), slant);
         table.sample(column, w.fma(w.broadcast(self.rows_per_w), w.broadcast(self.first_row)))
@@ -159,14 +159,18 @@ pub(crate) enum Texture {
     Single(Arc<TextureTable>, TextureLayer),
     /// A coarse and a fine layer, each uniformly distributed over [0, 1], mixed so that the result is uniformly distributed too.
     Mixed(Arc<TextureTable>, [TextureLayer; 2]),
+    /// Eq. (20) itself, after a scroll in sheet heights.
+    Exact(PaperSum, f64),
 }
 
 impl Texture {
-    /// Texels per unit of u and of w, of the finer layer.
+    /// Texels per unit of u and of w, of the finer layer; 0 without a table.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
-        let (Self::Single(_, fine) | Self::Mixed(_, [_, fine])) = self;
-        [fine.columns_per_u.abs(), fine.rows_per_w.abs()]
+        match self {
+            Self::Single(_, fine) | Self::Mixed(_, [_, fine]) => [fine.columns_per_u.abs(), fine.rows_per_w.abs()],
+            Self::Exact(..) => [0.0; 2],
+        }
     }
 
     /// T0 at sixteen points; in [0, 1].
@@ -177,6 +181,7 @@ impl Texture {
             Self::Mixed(table, [coarse, fine]) => {
                 fractal::mix_equalized(coarse.sample(table, u, w), fine.sample(table, u, w))
             }
+            Self::Exact(sum, scroll) => sum.sample(u, w, *scroll),
         }
     }
 }
@@ -188,14 +193,17 @@ pub(crate) enum TextureSource {
     Fractal(FractalLayers),
     /// The paper's table, common to all instances.
     Paper(Arc<PaperLayer>),
+    /// The paper's sum.
+    Exact(PaperSum),
 }
 
 impl TextureSource {
-    /// Texels of the table per sheet height.
+    /// Texels of the table per sheet height; 0 without a table.
     fn texels_up(&self) -> f64 {
         match self {
             Self::Fractal(layers) => layers.texels_up(),
             Self::Paper(layer) => layer.texels_up(),
+            Self::Exact(_) => 0.0,
         }
     }
 }
@@ -206,6 +214,7 @@ impl TextureSource {
         match self {
             Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
             Self::Paper(layer) => layer.at(scroll),
+            Self::Exact(sum) => Texture::Exact(*sum, scroll),
         }
     }
 
@@ -219,6 +228,7 @@ impl TextureSource {
             Self::Fractal(layers) => FilteredTexture::Fractal(*layers, FRACTAL.clone()),
             Self::Paper(layer) if level > 0.0 => FilteredTexture::Paper(Arc::new(layer.filtered(level))),
             Self::Paper(layer) => FilteredTexture::Paper(layer.clone()),
+            Self::Exact(sum) => FilteredTexture::Exact(*sum),
         }
     }
 }
@@ -229,6 +239,8 @@ pub(crate) enum FilteredTexture {
     Fractal(FractalLayers, Arc<TextureTable>),
     /// The paper's texture.
     Paper(Arc<PaperLayer>),
+    /// The paper's sum, which is not filtered.
+    Exact(PaperSum),
 }
 
 impl FilteredTexture {
@@ -242,6 +254,7 @@ impl FilteredTexture {
         match self {
             Self::Fractal(layers, table) => layers.at(table, scroll),
             Self::Paper(layer) => layer.at(scroll),
+            Self::Exact(sum) => Texture::Exact(*sum, scroll),
         }
     }
 }

@@ -5,7 +5,11 @@ use std::{
     sync::Arc,
 };
 
-use bansho_base::math::{self, MulAdd};
+use bansho_base::math::{
+    self, MulAdd,
+    simd::{LANES, Lanes},
+};
+use fearless_simd::{Simd, prelude::*};
 
 use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
@@ -130,10 +134,7 @@ impl PaperLayer {
         let mut texels = vec![0.0; ROWS * COLUMNS];
         let level = fearless_simd::Level::new();
         fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
-        Self {
-            table: Arc::new(TextureTable::new(&texels)),
-            relative_speed: clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q,
-        }
+        Self { table: Arc::new(TextureTable::new(&texels)), relative_speed: relative_speed(clock) }
     }
 
     /// The texture after `scroll` sheet heights, eq. (1).
@@ -160,6 +161,37 @@ impl PaperLayer {
     pub(crate) fn texels_up(&self) -> f64 {
         ROWS as f64 / PERIOD_Q
     }
+}
+
+/// Eq. (20), evaluated point by point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PaperSum {
+    octaves: u32,
+    /// As that of [`PaperLayer`].
+    relative_speed: f64,
+}
+
+impl PaperSum {
+    /// The sum of `octaves` terms.
+    pub(crate) fn new(octaves: u32, clock: &Clock) -> Self {
+        Self { octaves, relative_speed: relative_speed(clock) }
+    }
+
+    /// T0 at sixteen points, eq. (2). Not inlined, so that the code is compiled once.
+    #[inline(never)]
+    pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>, scroll: f64) -> Lanes<S> {
+        let mut values = [0.0; LANES];
+        for (lane, value) in values.iter_mut().enumerate() {
+            let q = f64::from(w[lane]) - self.relative_speed * scroll;
+            *value = paper_texture(f64::from(u[lane]), q, self.octaves) as f32;
+        }
+        Lanes::from_slice(u.simd, &values)
+    }
+}
+
+/// Scroll speed relative to the parameter: 1, unless a loop requires an integer number of periods.
+fn relative_speed(clock: &Clock) -> f64 {
+    clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q
 }
 
 #[inline(always)]

@@ -23,13 +23,12 @@ pub(crate) struct SmokeState {
     pub(crate) scattered: [[f32; 3]; LIGHT_SAMPLES],
 }
 
-impl SmokeState {
-    fn scattered_at(&self, y: f32) -> [f32; 3] {
-        let scaled = y.simd_clamp01() * (LIGHT_SAMPLES - 1) as f32;
-        let below = (scaled as usize).min(LIGHT_SAMPLES - 2);
-        let fraction = scaled - below as f32;
-        std::array::from_fn(|k| math::f32::lerp(self.scattered[below][k], self.scattered[below + 1][k], fraction))
-    }
+/// Scattered light at height `y`, interpolated.
+pub(crate) fn scattered_at(scattered: &[[f32; 3]; LIGHT_SAMPLES], y: f32) -> [f32; 3] {
+    let scaled = y.simd_clamp01() * (LIGHT_SAMPLES - 1) as f32;
+    let below = (scaled as usize).min(LIGHT_SAMPLES - 2);
+    let fraction = scaled - below as f32;
+    std::array::from_fn(|k| math::f32::lerp(scattered[below][k], scattered[below + 1][k], fraction))
 }
 
 /// Light and opacity of sixteen pixels of smoke; `None` if all are empty.
@@ -64,7 +63,7 @@ pub(super) fn shade_smoke<S: Simd>(
     }
     let opacity = Lanes::from_slice(x.simd, &opacity);
     let (first, last) = (y[0], y[LANES - 1]);
-    let (low, high) = (smoke.scattered_at(first), smoke.scattered_at(last));
+    let (low, high) = (scattered_at(&smoke.scattered, first), scattered_at(&smoke.scattered, last));
     let scattered = |k: usize| linspace(x.simd, low[k], high[k]) * opacity;
     let light = [scattered(0), scattered(1), scattered(2), opacity];
     Some(ShadedBatch { t1: density, light })

@@ -1,0 +1,426 @@
+//! The pictures of Ohshima and Itahashi: scenes of `scenes/papers/ohshima_itahashi` compared with the paper's formulas, evaluated here in double precision,
+//! and judged by measurements.
+//!
+//! The formulas are written down from the paper, and share nothing with the library but the curves that a scene states: V, H, C, R, G, B, A, D and F are free.
+#![cfg(feature = "files")]
+#![allow(clippy::disallowed_methods, reason = "an independent evaluation calls the standard library")]
+
+use std::{f64::consts::PI, path::PathBuf, sync::Arc};
+
+use bansho::{
+    CompiledScene, Plan, PlanOptions, Shot, Unobserved,
+    base::{
+        color::{srgb_from_acescg, white_luminance},
+        frame::Frame,
+        math::curve::{Curve, Interpolation},
+    },
+    media::assets::FileAssets,
+};
+
+/// Pixels on each side, as in the paper.
+const SIZE: usize = 256;
+/// A frame, at 30 per second.
+const FRAME: i64 = 47;
+/// One step of an 8-bit display.
+const STEP: f64 = 1.0 / 255.0;
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../scenes/papers/ohshima_itahashi")
+}
+
+fn scene_text(picture: u32) -> String {
+    std::fs::read_to_string(folder().join(format!("ohshima_picture_{picture}.toml"))).unwrap()
+}
+
+/// Frames of a scene, scene-linear.
+fn render(text: &str, size: [usize; 2], frames: &[i64]) -> Vec<Frame> {
+    let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
+    let compiled = CompiledScene::build(Arc::new(scene), Arc::new(FileAssets::new(folder())), None);
+    let compiled = Arc::new(compiled.unwrap_or_else(|errors| panic!("{errors}")));
+    let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();
+    let mut shot = Shot::open(compiled, Arc::new(plan));
+    frames.iter().map(|number| bansho::draw(&mut shot, *number, &Unobserved).unwrap()).collect()
+}
+
+/// Linear sRGB of a frame's pixels.
+fn linear(frame: &Frame) -> Vec<[f64; 3]> {
+    let pixels = frame.beauty.pixels().iter();
+    pixels.map(|[red, green, blue, _]| srgb_from_acescg([*red, *green, *blue]).map(f64::from)).collect()
+}
+
+fn decode(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+fn encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The numbers and functions that the paper leaves free, as a scene states them.
+struct Choices {
+    text: String,
+    octaves: u32,
+    contrast: f64,
+    /// Distance that the texture has scrolled at the middle of the exposure.
+    scroll: f64,
+}
+
+impl Choices {
+    fn of(text: &str) -> Self {
+        let mut choices = Self { text: text.to_owned(), octaves: 0, contrast: 1.0, scroll: 0.0 };
+        choices.octaves = choices.number("octaves").unwrap() as u32;
+        choices.contrast = choices.number("contrast").unwrap_or(1.0);
+        // The shutter is open for the first half of a frame.
+        choices.scroll = choices.number("speed").unwrap() * (FRAME as f64 + 0.25) / 30.0;
+        choices
+    }
+
+    /// What the scene assigns to a key.
+    fn value(&self, key: &str) -> Option<&str> {
+        let assigned = self.text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "))?;
+        Some(assigned.split('#').next().unwrap_or(assigned).trim())
+    }
+
+    fn number(&self, key: &str) -> Option<f64> {
+        self.value(key)?.parse().ok()
+    }
+
+    fn curve(&self, key: &str) -> Curve {
+        let text = self.value(key).unwrap_or_else(|| panic!("no {key}"));
+        let numbers: Vec<f64> = text.split(['[', ']', ',', ' ']).filter_map(|word| word.parse().ok()).collect();
+        Curve::new(numbers.chunks_exact(2).map(|point| [point[0], point[1]]).collect(), Interpolation::Monotone)
+            .unwrap()
+    }
+
+    /// Color over T2, eq. (7), as the encoded values that the paper's display is given.
+    fn color(&self) -> impl Fn(f64) -> [f64; 3] + use<> {
+        let curves = ["red", "green", "blue"].map(|key| self.curve(key));
+        move |t2| [0, 1, 2].map(|k| curves[k].eval(t2))
+    }
+}
+
+/// Eq. (20), halved so that its values are those of (2).
+fn texture_20(x: f64, y: f64, octaves: u32) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for i in 0..octaves as i32 {
+        let (fx, fy, c) = (16.0 * 2.0_f64.powi(i), 26.0 * 2.0_f64.powi(i), 0.707_f64.powi(i));
+        let px = PI / 2.0 * (fy * y / 2.0).sin();
+        let py = PI / 2.0 * (fx * x / 2.0).sin();
+        sum += c * c * ((fx * x + px).cos() * (fy * y + py).cos() + 1.0);
+        weights += c * c;
+    }
+    sum / weights / 2.0
+}
+
+/// The stages T0, T1 and T2 at (u, w): eqs. (1) to (6).
+fn stages(choices: &Choices) -> impl Fn(f64, f64) -> [f64; 3] + '_ {
+    let [v, h, c] = ["threshold", "threshold_across", "sharpen"].map(|key| choices.curve(key));
+    move |u, w| {
+        let (p, q) = (u, w - choices.scroll);
+        let t0 = 1.0 - choices.contrast * (1.0 - texture_20(p, q, choices.octaves));
+        let l = 1.0 - (1.0 - v.eval(w)) * (1.0 - h.eval((2.0 * u - 1.0).abs()));
+        let t1 = if t0 > l { t0 - l } else { 0.0 };
+        [t0, t1, c.eval(t1)]
+    }
+}
+
+/// The mapping from (x, y) to (u, w), eqs. (9) to (18), where P is 1 everywhere; `None` outside the flame.
+fn mapping(choices: &Choices) -> impl Fn(f64, f64) -> Option<[f64; 2]> + use<> {
+    let [a, d, slowing] = ["core_width", "fringe_width", "slowing"].map(|key| choices.curve(key));
+    let [k, h] = ["initial_speed", "edge_speed"].map(|key| choices.number(key).unwrap());
+    move |x, y| {
+        let w_p = (1.0 - k) * y.sqrt() + k * y;
+        let distance = 2.0 * (x - 0.5).abs();
+        let (core, fringe) = (a.eval(w_p), d.eval(w_p));
+        let speed = if distance <= core {
+            1.0
+        } else if distance <= core + fringe {
+            h + (1.0 - h) * (1.0 - slowing.eval((distance - core) / fringe))
+        } else {
+            h
+        };
+        let w = w_p / speed;
+        let (right, offset) = (x >= 0.5, if x >= 0.5 { 2.0 * x - 1.0 } else { 1.0 - 2.0 * x });
+        let edge = a.eval(w) + d.eval(w);
+        (w <= 1.0 && offset < edge).then(|| {
+            let across = offset / edge;
+            [if right { (1.0 + across) / 2.0 } else { (1.0 - across) / 2.0 }, w]
+        })
+    }
+}
+
+/// (x, y) of the unit square at the center of a pixel, for a camera 5 m before the middle of a sheet 1 m high.
+fn unit_square(choices: &Choices, pixel: usize) -> [f64; 2] {
+    let half = 5.0 * (choices.number("vertical_fov_deg").unwrap().to_radians() / 2.0).tan();
+    let at = |index: usize| half * (2.0 * (index as f64 + 0.5) / SIZE as f64 - 1.0);
+    let [right, down] = [pixel % SIZE, pixel / SIZE].map(at);
+    [right / choices.number("width").unwrap() + 0.5, 0.5 - down]
+}
+
+/// Factor of the brightest color's luminance, 1000 cd/m^2, to display white.
+fn exposure(choices: &Choices) -> f64 {
+    choices.number("luminance").unwrap() / white_luminance(choices.number("exposure_ev100").unwrap_or(9.7))
+}
+
+/// Encoded color of a rendered pixel as the paper's display is given it: the library scales colors so that the brightest has luminance 1.
+fn encoded(choices: &Choices) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
+    let color = choices.color();
+    let luminance = |[r, g, b]: [f64; 3]| 0.212_639 * r + 0.715_169 * g + 0.072_192 * b;
+    let brightest = (0..=256).map(|i| luminance(color(f64::from(i) / 256.0).map(decode))).fold(0.0, f64::max);
+    let scale = exposure(choices) / brightest;
+    move |pixel| pixel.map(|value| encode((value / scale).max(0.0)))
+}
+
+#[test]
+fn the_stages_are_the_papers_formulas_within_one_step_of_255() {
+    for (picture, stage) in [(1, 0), (2, 1), (3, 2)] {
+        let choices = Choices::of(&scene_text(picture));
+        let (formulas, scale) = (stages(&choices), exposure(&choices));
+        let frame = &render(&choices.text, [SIZE; 2], &[FRAME])[0];
+        let (mut worst, mut lit) = (0.0_f64, 0);
+        for (index, pixel) in linear(frame).into_iter().enumerate() {
+            let [u, w] = unit_square(&choices, index);
+            let wanted = formulas(u, w)[stage];
+            worst = pixel.iter().fold(worst, |worst, value| worst.max((value / scale - wanted).abs()));
+            lit += usize::from(wanted > 0.1);
+        }
+        assert!(worst < STEP && lit > SIZE * SIZE / 4, "picture {picture}: {:.3} steps apart, {lit} lit", worst / STEP);
+    }
+}
+
+#[test]
+fn the_colored_stage_is_equation_7_within_one_step_of_255() {
+    let choices = Choices::of(&scene_text(4));
+    let (formulas, color, encoded) = (stages(&choices), choices.color(), encoded(&choices));
+    let frame = &render(&choices.text, [SIZE; 2], &[FRAME])[0];
+    let mut worst = 0.0_f64;
+    for (index, pixel) in linear(frame).into_iter().enumerate() {
+        let [u, w] = unit_square(&choices, index);
+        let wanted = color(formulas(u, w)[2]);
+        worst =
+            encoded(pixel).iter().zip(wanted).fold(worst, |worst, (value, wanted)| worst.max((value - wanted).abs()));
+    }
+    assert!(worst < STEP, "{:.3} steps", worst / STEP);
+}
+
+#[test]
+fn the_finished_flame_is_mapped_by_equations_9_to_18() {
+    // P is random; without its flutter it is 1, and the edge (15) is A + D.
+    for picture in [5, 6, 7, 8] {
+        let choices = Choices::of(&scene_text(picture));
+        let flutter = format!("flutter = {}", choices.value("flutter").unwrap());
+        let text = choices
+            .text
+            .replace(&flutter, "flutter = 0.0")
+            .replace("height = 1.0\n", "height = 1.0\ntime_samples = 1\n");
+        let (formulas, color, encoded) = (stages(&choices), choices.color(), encoded(&choices));
+        let map = mapping(&choices);
+        let frame = &render(&text, [SIZE; 2], &[FRAME])[0];
+        let (mut apart, mut outside) = (Vec::new(), 0);
+        for (index, pixel) in linear(frame).into_iter().enumerate() {
+            let [x, y] = unit_square(&choices, index);
+            // A pixel that the outline crosses is antialiased, which the paper leaves open.
+            let margin = 1.5 / SIZE as f64;
+            let around = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+                .map(|[dx, dy]| (y + dy * margin > 0.0).then(|| map(x + 1.3 * dx * margin, y + dy * margin)).flatten());
+            if around.iter().all(Option::is_none) {
+                outside += usize::from((y < 0.0 || map(x, y).is_none()) && pixel != [0.0; 3]);
+            } else if let (Some([u, w]), true) = (map(x, y.max(0.0)), around.iter().all(Option::is_some)) {
+                let wanted = color(formulas(u, w)[2]);
+                let difference = encoded(pixel).iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                apart.push(difference / STEP);
+            }
+        }
+        apart.sort_by(f64::total_cmp);
+        let (within, count) = (apart.iter().filter(|steps| **steps < 1.0).count(), apart.len());
+        let share = within as f64 / count as f64;
+        assert!(count > 5000 && share > 0.99 && outside == 0, "picture {picture}: {share}, worst {}", apart[count - 1]);
+    }
+}
+
+/// Measurements by which flames can be judged and compared, over frames of a film.
+#[derive(Debug)]
+struct Judgment {
+    /// Height at which there is flame half of the time (Zukoski's flame height), as a fraction of the picture's.
+    height: f64,
+    /// Fraction of the outline's inside that is lit, in the lower third of that height.
+    body: f64,
+    /// Mean number of pieces that are apart from each other.
+    pieces: f64,
+    /// Mean of green over red at the edge of the pieces, as encoded, relative to that inside: below 1 the edges are redder.
+    edge_redness: f64,
+    /// Width of the lowest lit row relative to the greatest width: 1 for a flame that is cut off at its base.
+    base_width: f64,
+    /// Fraction of the lit pixels that are pale: with blue at least half as bright as red, as encoded.
+    pale: f64,
+    /// Mean lit area, as a fraction of the picture.
+    area: f64,
+}
+
+/// Side of the pictures that are judged.
+const SMALL: usize = 128;
+
+impl Judgment {
+    fn of(text: &str) -> Self {
+        let numbers: Vec<i64> = (0..24).map(|i| 10 * i + 3).collect();
+        let frames: Vec<Vec<[f64; 3]>> = render(text, [SMALL; 2], &numbers).iter().map(linear).collect();
+        let lit = |pixels: &[[f64; 3]]| pixels.iter().map(|pixel| pixel[0] > 0.02).collect::<Vec<bool>>();
+        let masks: Vec<Vec<bool>> = frames.iter().map(|frame| lit(frame)).collect();
+        let mean = |of: &dyn Fn(usize) -> f64| (0..masks.len()).map(of).sum::<f64>() / masks.len() as f64;
+        let lowest = |mask: &[bool]| (0..SMALL).rev().find(|row| extent(mask, *row).is_some()).unwrap();
+        let base = masks.iter().map(|mask| lowest(mask)).max().unwrap();
+        let is_flame_in = |row: usize| mean(&|i| f64::from(u8::from(extent(&masks[i], row).is_some())));
+        let top = (0..base).find(|row| is_flame_in(*row) >= 0.5).unwrap();
+        let lower_third = base - (base - top) / 3..base - 1;
+        Self {
+            height: (base - top) as f64 / SMALL as f64,
+            body: mean(&|i| filled(&masks[i], lower_third.clone())),
+            pieces: mean(&|i| pieces(&masks[i])),
+            edge_redness: mean(&|i| edge_redness(&frames[i], &masks[i])),
+            base_width: mean(&|i| {
+                let width = |row: usize| extent(&masks[i], row).map_or(0, |[left, right]| right + 1 - left);
+                width(lowest(&masks[i])) as f64 / (0..SMALL).map(width).max().unwrap() as f64
+            }),
+            pale: mean(&|i| {
+                let lit = (0..masks[i].len()).filter(|index| masks[i][*index]);
+                let pale = |index: &usize| encode(frames[i][*index][2].max(0.0)) > 0.5 * encode(frames[i][*index][0]);
+                lit.clone().filter(pale).count() as f64 / lit.count() as f64
+            }),
+            area: mean(&|i| masks[i].iter().filter(|lit| **lit).count() as f64 / (SMALL * SMALL) as f64),
+        }
+    }
+}
+
+/// First and last lit column of a row.
+fn extent(mask: &[bool], row: usize) -> Option<[usize; 2]> {
+    let row = &mask[row * SMALL..(row + 1) * SMALL];
+    Some([row.iter().position(|lit| *lit)?, row.iter().rposition(|lit| *lit)?])
+}
+
+/// Fraction of the pixels between the first and the last lit one of each row that are lit.
+fn filled(mask: &[bool], rows: std::ops::Range<usize>) -> f64 {
+    let (mut lit, mut all) = (0, 0);
+    for row in rows {
+        if let Some([left, right]) = extent(mask, row) {
+            lit += mask[row * SMALL + left..=row * SMALL + right].iter().filter(|lit| **lit).count();
+            all += right + 1 - left;
+        }
+    }
+    f64::from(lit as u32) / f64::from(all as u32)
+}
+
+fn neighbors(index: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (index % SMALL, index / SMALL);
+    let sides = [(x > 0).then(|| index - 1), (x + 1 < SMALL).then(|| index + 1)];
+    let ends = [(y > 0).then(|| index - SMALL), (y + 1 < SMALL).then(|| index + SMALL)];
+    sides.into_iter().chain(ends).flatten()
+}
+
+/// Number of connected pieces of at least four pixels.
+fn pieces(mask: &[bool]) -> f64 {
+    let (mut seen, mut count) = (vec![false; mask.len()], 0.0);
+    for start in 0..mask.len() {
+        let (mut size, mut open) = (0, vec![start]);
+        while let Some(index) = open.pop() {
+            if mask[index] && !seen[index] {
+                seen[index] = true;
+                size += 1;
+                open.extend(neighbors(index));
+            }
+        }
+        count += f64::from(u8::from(size >= 4));
+    }
+    count
+}
+
+/// Green over red at pixels beside dark ones, relative to that of pixels at least three pixels inside.
+fn edge_redness(pixels: &[[f64; 3]], mask: &[bool]) -> f64 {
+    let erode = |mask: &[bool]| -> Vec<bool> {
+        (0..mask.len()).map(|index| mask[index] && neighbors(index).all(|next| mask[next])).collect()
+    };
+    let (once, thrice) = (erode(mask), erode(&erode(&erode(mask))));
+    let ratio = |chosen: &dyn Fn(usize) -> bool| {
+        let found: Vec<f64> = (0..mask.len())
+            .filter(|index| chosen(*index))
+            .map(|index| encode(pixels[index][1].max(0.0)) / encode(pixels[index][0]))
+            .collect();
+        found.iter().sum::<f64>() / found.len() as f64
+    };
+    ratio(&|index| mask[index] && !once[index]) / ratio(&|index| thrice[index])
+}
+
+#[test]
+fn the_four_flames_are_judged_to_be_flames_and_to_differ() {
+    let judgments: Vec<Judgment> = [5, 6, 7, 8].map(|picture| Judgment::of(&scene_text(picture))).into();
+    for (picture, flame) in (5..).zip(&judgments) {
+        assert!(flame.body > 0.9, "picture {picture}: the body is closed at the base: {flame:?}");
+        assert!(flame.edge_redness < 0.7, "picture {picture}: red edges, yellow core: {flame:?}");
+        assert!(flame.base_width < 0.75, "picture {picture}: the base is not cut off: {flame:?}");
+        assert!(flame.pale < 0.35, "picture {picture}: orange rather than cream: {flame:?}");
+        assert!((0.5..0.95).contains(&flame.height), "picture {picture}: {flame:?}");
+    }
+    let [broad, tall, ragged, calm] = judgments.as_slice() else { panic!("four pictures") };
+    assert!([broad, tall, ragged].iter().all(|flame| flame.pieces > 1.5), "tongues break off");
+    assert!(ragged.pieces > 1.3 * broad.pieces && calm.pieces < 0.7 * tall.pieces);
+    assert!(broad.area > 1.4 * tall.area && ragged.height < 0.95 * broad.height.max(tall.height));
+}
+
+#[test]
+fn a_flame_that_is_cut_off_pale_and_full_of_holes_is_judged_so() {
+    // The widths do not narrow at the base, the threshold is high there, and the sharpening is saturated.
+    let replaced = [
+        ("core_width", "[[0.0, 0.5], [1.0, 0.5]]"),
+        ("fringe_width", "[[0.0, 0.0], [1.0, 0.1]]"),
+        ("threshold", "[[0.0, 0.42], [1.0, 0.5]]"),
+        ("threshold_across", "[[0.0, 0.0], [1.0, 0.0]]"),
+        ("sharpen", "[[0.0, 0.0], [0.02, 1.0], [1.0, 1.0]]"),
+    ];
+    let mut text = scene_text(5);
+    for (key, value) in replaced {
+        let line = text.lines().find(|line| line.starts_with(&format!("{key} = "))).unwrap().to_owned();
+        text = text.replace(&line, &format!("{key} = {value}"));
+    }
+    let flame = Judgment::of(&text);
+    assert!(flame.base_width > 0.75 && flame.body < 0.9 && flame.pale > 0.5, "{flame:?}");
+}
+
+/// A scene of the paper's future work.
+fn future_work(name: &str) -> String {
+    std::fs::read_to_string(folder().join(format!("ohshima_{name}.toml"))).unwrap()
+}
+
+#[test]
+fn sparks_and_smoke_are_shown_together_with_the_flame() {
+    let text = future_work("sparks_and_smoke");
+    let [all, no_sparks, no_smoke] = ["", "rate = 40.0", "optical_depth = 2.0"].map(|removed| {
+        let none = format!("{} = 0.0", removed.split(' ').next().unwrap());
+        render(&if removed.is_empty() { text.clone() } else { text.replacen(removed, &none, 1) }, [256, 384], &[75])
+            .remove(0)
+    });
+    // Above the flame, in the upper half of the picture, smoke covers the background and sparks add light.
+    let upper = 256 * 192;
+    let sparks = (0..upper).filter(|i| all.beauty.pixels()[*i][0] > no_sparks.beauty.pixels()[*i][0] + 0.05).count();
+    let cover = |frame: &Frame| frame.beauty.pixels()[..upper].iter().map(|pixel| f64::from(pixel[3])).sum::<f64>();
+    let (smoky, clear) = (cover(&all) / upper as f64, cover(&no_smoke) / upper as f64);
+    assert!((20..2000).contains(&sparks), "{sparks} pixels of sparks");
+    assert!(smoky > 0.15 && clear < 0.02, "{smoky} {clear}");
+    let lit = |frame: &Frame| frame.beauty.pixels()[upper..].iter().filter(|pixel| pixel[0] > 0.3).count();
+    assert!(lit(&all) > 4000, "the flame stays: {}", lit(&all));
+}
+
+#[test]
+fn flames_stand_in_a_3d_scene() {
+    let text = future_work("in_3d");
+    let frames = render(&text, [256, 144], &[0, 239]);
+    for frame in &frames {
+        let depth = frame.depth.as_ref().unwrap();
+        let lit = |i: &usize| frame.beauty.pixels()[*i][0] > 0.5 && depth[*i].is_finite();
+        let depths: Vec<f32> = (0..depth.len()).filter(lit).map(|i| depth[i]).collect();
+        let (near, far) = depths.iter().fold((f32::INFINITY, 0.0_f32), |(a, b), d| (a.min(*d), b.max(*d)));
+        assert!((4.6..5.0).contains(&near) && (6.6..7.1).contains(&far), "{near} m to {far} m");
+    }
+    // The ground is lit by the flames: without them the picture is dark.
+    let light = |frame: &Frame| frame.beauty.pixels().iter().map(|p| f64::from(p[1])).filter(|g| *g < 0.2).sum::<f64>();
+    let dark = render(&text.replacen("luminance = 1000.0", "luminance = 0.0", 1), [256, 144], &[0]);
+    assert!(light(&frames[0]) > 50.0 && light(&dark[0]) < 1.0, "{} {}", light(&frames[0]), light(&dark[0]));
+}
