@@ -69,7 +69,7 @@ pub use error::{ParticleError, ParticleErrorKind};
 pub use model::FlameParticles;
 pub use parameters::{
     BurnerParameters, BurnerShape, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters,
-    NegativePressure, TemperatureLaw, WindForce,
+    GasModel, NegativePressure, TemperatureLaw, WindForce,
 };
 pub use simulate::{
     burner::heskestad,

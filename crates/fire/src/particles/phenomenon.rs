@@ -20,7 +20,7 @@ use bansho_base::{
 use super::{
     error::ParticleErrorKind,
     model::FlameParticles,
-    parameters::{FlameParticlesParameters, TemperatureLaw},
+    parameters::{FlameParticlesParameters, GasModel, TemperatureLaw},
     render::{self, PreparedGas, SpriteStyle},
 };
 use crate::particles::simulate::{
@@ -78,9 +78,9 @@ impl Phenomenon for FlameParticles {
     fn luminance(&self) -> f64 {
         /// Mean luminance of the bright parts, relative to a uniform flame with soot of the highest temperature.
         const BRIGHT_PARTS: f64 = 0.09;
-        let hottest = match self.parameters.combustion.temperature_model {
-            TemperatureLaw::Simulated => self.parameters.combustion.flame_temperature_k,
-            TemperatureLaw::Constant => self.tallest_burner().parameters.temperature_k,
+        let hottest = match (self.parameters.gas_model, self.parameters.combustion.temperature_model) {
+            (GasModel::Combustion, TemperatureLaw::Simulated) => self.parameters.combustion.flame_temperature_k,
+            (GasModel::Euler, _) | (_, TemperatureLaw::Constant) => self.tallest_burner().parameters.temperature_k,
         };
         let black_body = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
         let absorption =
