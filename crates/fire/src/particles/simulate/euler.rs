@@ -42,6 +42,7 @@ impl EulerStep<'_> {
         // Neighbors, density (3), pressure (11), its force (12) and its acceleration (8).
         solver.compute_pressure_forces(particles, self.parameters.step_s as f32);
         self.integrate(particles, solver.acceleration.each_ref().map(Vec::as_slice), solver.support_radius());
+        self.remove_outside(particles);
     }
 
     /// Step 1: adds the particles of this step, all with the same initial speed, mass and temperature.
@@ -80,29 +81,37 @@ impl EulerStep<'_> {
             temperature: burner.parameters.temperature_k as f32,
             support_radius: constants.support_radius,
             age: 0.0,
-            max_age: constants.residence_times[burner_index] as f32,
+            // The oldest are removed when there are too many, whatever their age.
+            max_age: f32::MAX,
             fuel: 1.0,
             soot: self.parameters.combustion.soot_ppm as f32 * 1e-6,
         };
         particles.push_from(burner_index as u32, 1.0, particle);
     }
 
-    /// Keeps as many particles of each burner as are to be alive at a time, those added last, of those within the domain.
+    /// Keeps as many particles of each burner as are to be alive at a time, those added last.
     fn remove_oldest(&self, particles: &mut Particles) {
-        let DerivedConstants { rates, residence_times, domain, .. } = self.constants;
-        let [min, max] = domain.map(|corner| corner.as_vec3());
+        let DerivedConstants { rates, residence_times, .. } = self.constants;
         let first_kept = |(burner, (rate, residence_time)): (usize, (&f64, &f64))| {
             let alive = (rate * residence_time).round().max(1.0) as u64;
             self.added_count(burner, self.time + self.parameters.step_s).saturating_sub(alive)
         };
         let first_kept: Vec<u64> = rates.iter().zip(residence_times).enumerate().map(first_kept).collect();
-        let Particles { id, burner, position, .. } = &*particles;
-        let is_kept = |index: usize| {
-            let position = Vec3::from(position.each_ref().map(|values| values[index]));
-            let ordinal = id[index] & ((1 << ORDINAL_BITS) - 1);
-            ordinal >= first_kept[burner[index] as usize] && position.cmpge(min).all() && position.cmple(max).all()
+        let Particles { id, burner, .. } = &*particles;
+        let is_kept = |(id, burner): (&u64, &u32)| id & ((1 << ORDINAL_BITS) - 1) >= first_kept[*burner as usize];
+        let keep: Vec<bool> = id.iter().zip(burner).map(is_kept).collect();
+        particles.retain(&keep);
+    }
+
+    /// Removes particles that have left the domain.
+    fn remove_outside(&self, particles: &mut Particles) {
+        let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
+        let [x, y, z] = particles.positions();
+        let is_inside = |index: usize| {
+            let position = Vec3::new(x[index], y[index], z[index]);
+            position.cmpge(min).all() && position.cmple(max).all()
         };
-        let keep: Vec<bool> = (0..id.len()).into_par_iter().with_min_len(PARTICLES_PER_TASK).map(is_kept).collect();
+        let keep: Vec<bool> = (0..x.len()).map(is_inside).collect();
         particles.retain(&keep);
     }
 
