@@ -130,7 +130,7 @@ fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBu
 /// Writes a texture as PNG, over none of its `inputs`.
 fn finish_texture(name: &str, texture: &Texture, output: &PlotOutputArgs, inputs: &[PathBuf]) -> anyhow::Result<()> {
     let path = output_path(name, "png", output);
-    if path.extension().unwrap_or_default().to_ascii_lowercase() != "png" {
+    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(PlotError::TextureExtension { path }.into());
     }
     let encode = if texture.is_linear { png::encode_linear_document } else { png::encode_document };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho::{
     Plan, PlanOptions, Shot, Unobserved,
-    base::frame::Frame,
+    base::{frame::Frame, math},
     job::{JobError, SceneFile},
 };
 
@@ -38,7 +38,7 @@ pub(crate) fn deflection(file: &SceneFile, number: i64, full_scale_rad: Option<f
     let frame = bansho::draw(&mut shot, number, &Unobserved).map_err(JobError::from)?;
     let [x, y] = [".deflection.X", ".deflection.Y"].map(|suffix| sum_of_channels(&frame, suffix));
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-    let largest_rad = largest(&mut x.iter().zip(&y).map(|(x, y)| x.hypot(*y)));
+    let largest_rad = largest(&mut x.iter().zip(&y).map(|(x, y)| math::hypot(*x, *y)));
     if largest_rad <= 0.0 {
         return Err(PlotError::NoDeflection { scene: file.name.clone(), frame: number }.into());
     }

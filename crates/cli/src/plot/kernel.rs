@@ -1,6 +1,7 @@
 //! The poly6 kernel and its gradient: Inagaki et al., eq. (2), figures 2 and 3.
 
 use bansho::{
+    base::math,
     fire::particles::render::{line_gradient, line_integral},
     sph::{Poly6, SmoothingKernel},
 };
@@ -25,7 +26,7 @@ fn poly6_gradient(r: f64) -> f64 {
 
 /// Where the gradient is steepest: the derivative of `r (1 - r^2)^2` is 0 at `1 / sqrt(5)`.
 fn steepest_gradient() -> f64 {
-    poly6_gradient(0.2_f64.sqrt()).abs()
+    poly6_gradient(math::sqrt(0.2)).abs()
 }
 
 /// The figure: kernel, gradient, and their line integrals, by which Bansho draws gas.
@@ -69,7 +70,7 @@ fn texel_centers(size: usize) -> impl Iterator<Item = [f64; 2]> {
 
 /// Poly6 over a square of side 2 d, scaled to 1 at the center: figure 2.
 pub(crate) fn density_texture(size: usize) -> Texture {
-    let texel = |[x, y]: [f64; 2]| [unsigned_code(poly6(x.hypot(y)) / poly6(0.0)); 3];
+    let texel = |[x, y]: [f64; 2]| [unsigned_code(poly6(math::hypot(x, y)) / poly6(0.0)); 3];
     Texture::linear_8(size, texel_centers(size).map(texel))
 }
 
@@ -77,7 +78,7 @@ pub(crate) fn density_texture(size: usize) -> Texture {
 /// through the particle nothing is deflected along z.
 pub(crate) fn deflection_texture(size: usize) -> Texture {
     let texel = |[x, y]: [f64; 2]| {
-        let r = x.hypot(y);
+        let r = math::hypot(x, y);
         let outward = -poly6_gradient(r) / (steepest_gradient() * r.max(f64::MIN_POSITIVE));
         [x * outward, y * outward, 0.0].map(signed_code)
     };

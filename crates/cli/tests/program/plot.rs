@@ -82,7 +82,11 @@ fn black_bodies_are_a_texture_with_a_texel_for_each_row() {
             // 1e-6 cd/m^2.
             let value = if row[7] < -13.8155 { 0.0 } else { (row[1 + c] / brightest).max(0.0) };
             assert!((f64::from(linear[c]) / 65_535.0 - value).abs() < 1e-5, "{row:?}: {linear:?}");
-            let encoded = if value < 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 };
+            let encoded = if value < 0.003_130_8 {
+                12.92 * value
+            } else {
+                1.055 * bansho::base::math::pow(value, 1.0 / 2.4) - 0.055
+            };
             assert!((f64::from(srgb[c]) - 255.0 * encoded).abs() < 0.6, "{row:?}: {srgb:?}");
             colored += usize::from(linear[c] == 65_535);
         }
