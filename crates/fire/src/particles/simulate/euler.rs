@@ -25,6 +25,9 @@ use crate::particles::{
     },
 };
 
+/// Age at which particles are removed, s: never, since the oldest are removed when there are too many, whatever their age.
+const NEVER_S: f32 = 1e9;
+
 /// One step of the paper's gas from `time`.
 pub(super) struct EulerStep<'a> {
     pub(super) parameters: &'a FlameParticlesParameters,
@@ -81,8 +84,7 @@ impl EulerStep<'_> {
             temperature: burner.parameters.temperature_k as f32,
             support_radius: constants.support_radius,
             age: 0.0,
-            // The oldest are removed when there are too many, whatever their age.
-            max_age: f32::MAX,
+            max_age: NEVER_S,
             fuel: 1.0,
             soot: self.parameters.combustion.soot_ppm as f32 * 1e-6,
         };

@@ -1,12 +1,19 @@
 //! The paper's algorithm, section 4.3, against the same equations summed over all pairs in double precision.
 
-use bansho_base::{math, parameters::animated::Animated};
+use bansho_base::{
+    math,
+    parameters::{Auto, animated::Animated},
+    phenomenon::{Phenomenon, surroundings::OtherPhenomena},
+    world::sky::Sky,
+};
 use bansho_sph::KernelShape;
 
 use super::*;
 use crate::particles::{
-    Particle,
-    parameters::{BurnerParameters, FluidParameters, ForceParameters, GasModel, NegativePressure, WindForce},
+    FlameParticles, Particle,
+    parameters::{
+        BurnerParameters, CombustionParameters, FluidParameters, ForceParameters, GasModel, NegativePressure, WindForce,
+    },
 };
 
 const STEP: f64 = 1.0 / 60.0;
@@ -16,8 +23,8 @@ const WIND: [f64; 3] = [0.03, 0.0, -0.01];
 fn paper() -> FlameParticlesParameters {
     let burner = BurnerParameters {
         diameter: 0.3,
-        height: bansho_base::parameters::Auto::Set(0.8),
-        speed: bansho_base::parameters::Auto::Set(1.2),
+        height: Auto::Set(0.8),
+        speed: Auto::Set(1.2),
         temperature_k: 1900.0,
         ..Default::default()
     };
@@ -179,4 +186,24 @@ fn gas_of_a_burner_that_is_turned_off_rises_out_of_the_domain() {
     let at = |time: f64| counts.iter().find(|(t, _)| *t > time).unwrap().1;
     // Nothing is added, so nothing is too many.
     assert_eq!((at(0.1), at(0.5), at(3.4)), (400, 400, 0), "{counts:?}");
+}
+
+#[test]
+fn keys_without_effect_are_remarked() {
+    let nothing = Publication::default();
+    let published = |_| &nothing;
+    let neighbors = OtherPhenomena { scene: &nothing, count: 1, published: &published, own_index: 0, sky: &Sky::DARK };
+    let remark = |parameters: FlameParticlesParameters| {
+        let flame = FlameParticles::new(parameters, "flame", 1, None, &MemoryAssets::default()).unwrap();
+        flame.remark(&neighbors).map(|remark| remark.key.unwrap())
+    };
+    assert_eq!(remark(paper()), None);
+    let turbulent = ForceParameters { turbulence: 0.5, ..paper().forces };
+    assert_eq!(remark(FlameParticlesParameters { forces: turbulent.clone(), ..paper() }).as_deref(), Some("forces"));
+    let viscous = FluidParameters { viscosity: 0.5, ..paper().fluid };
+    assert_eq!(remark(FlameParticlesParameters { fluid: viscous, ..paper() }).as_deref(), Some("fluid"));
+    let hot = CombustionParameters { flame_temperature_k: 2000.0, ..CombustionParameters::default() };
+    assert_eq!(remark(FlameParticlesParameters { combustion: hot, ..paper() }).as_deref(), Some("combustion"));
+    let burning = FlameParticlesParameters { gas_model: GasModel::Combustion, forces: turbulent, ..paper() };
+    assert_eq!(remark(burning), None);
 }
