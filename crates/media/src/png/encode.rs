@@ -215,6 +215,21 @@ mod tests {
     }
 
     #[test]
+    fn linear_documents_say_so() {
+        let picture = testing::display(9, 4, 0);
+        let kinds = |file: &[u8]| -> Vec<[u8; 4]> {
+            super::super::chunk::chunks(file).unwrap().map(|chunk| chunk.unwrap().kind).collect()
+        };
+        let [linear, srgb] =
+            [encode_linear_document, encode_document].map(|encode| encode(&picture, Path::new("a.png")));
+        let (linear, srgb) = (linear.unwrap(), srgb.unwrap());
+        let gamma = ::png::Decoder::new(std::io::Cursor::new(&linear[..])).read_info().unwrap().info().gama_chunk;
+        assert_eq!(gamma, Some(ScaledFloat::from_scaled(100_000)));
+        assert!(!kinds(&linear).contains(b"sRGB") && kinds(&srgb).contains(b"sRGB"));
+        assert_eq!(read_back(&linear).1, read_back(&srgb).1);
+    }
+
+    #[test]
     fn the_file_says_that_it_is_srgb_and_nothing_of_time_or_place() {
         let file = encode(&testing::display(9, 4, 0), &[1; 32], PngEffort::Fast, Path::new("secret/a.png")).unwrap();
         let kinds: Vec<_> = super::super::chunk::chunks(&file).unwrap().map(|chunk| chunk.unwrap().kind).collect();
