@@ -125,7 +125,7 @@ impl SceneFile {
     }
 
     /// Reads the files that the scene names from its folder, within its limits.
-    pub(crate) fn assets(&self) -> Arc<dyn Assets> {
+    pub fn assets(&self) -> Arc<dyn Assets> {
         Arc::new(FileAssets::with_limits(&self.folder, self.input_limits.clone()))
     }
 

@@ -16,7 +16,7 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use self::{
     flipbook::FlipbookArgs,
     input::InputArgs,
-    plot::{PlotArgs, PlotCommand, PlotOutputArgs},
+    plot::{ColorTexture, DeflectionArgs, KernelTexture, PlotArgs, PlotCommand, PlotOutputArgs},
     render::RenderArgs,
     simulate::SimulateArgs,
     streaks::StreaksArgs,

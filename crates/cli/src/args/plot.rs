@@ -28,6 +28,7 @@ The extension of --out says the format: .svg (the default), .png, or .csv with t
 Examples:
   bansho plot black-body                          out/plots/black-body.svg
   bansho plot black-body -o black_body.csv        a table for a shader
+  bansho plot black-body --texture srgb           a texture, one texel for each kelvin
   bansho plot drop-sizes --rates 1,10,100 -o -    numbers to standard output
   bansho plot emission --energy-ev 3000 -o 3kev.png
   bansho plot parameters torch.toml --path wind.velocity")]
@@ -41,6 +42,10 @@ pub(crate) struct PlotArgs {
 pub(crate) enum PlotCommand {
     /// Luminance and color of black bodies by temperature (Inagaki et al., figure 1); the CSV is a table for shaders.
     BlackBody(BlackBodyArgs),
+    /// The poly6 kernel, its gradient and their line integrals; the textures of Inagaki et al., figures 2 and 3.
+    Kernel(KernelArgs),
+    /// Deflection of light by the hot gas of a scene, as a picture (Inagaki et al., figure 4).
+    Deflection(DeflectionArgs),
     /// Drop size distributions of Marshall and Palmer (1948) by rain rate.
     DropSizes(DropSizesArgs),
     /// Terminal velocity of raindrops by diameter: both laws, and the measurements of Gunn and Kinzer (1949).
@@ -66,7 +71,8 @@ pub(crate) enum PlotCommand {
 /// Where the figure goes.
 #[derive(Args, Debug)]
 pub(crate) struct PlotOutputArgs {
-    /// The file: .svg, .png or .csv; `-` writes CSV to standard output. [default: out/plots/NAME.svg, by the curve's name]
+    /// The file: .svg, .png or .csv; `-` writes CSV to standard output; a picture without axes is a .png. [default: out/plots/NAME.svg or
+    /// .png, by the curve's name]
     #[arg(short, long, value_name = "PATH", help_heading = "Output")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -85,6 +91,57 @@ pub(crate) struct BlackBodyArgs {
     /// Between two rows of the table.
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true, value_parser = parse_step)]
     pub(crate) step: f64,
+    /// Write a texture instead, without axes: a .png that is one pixel high, with one pixel for each row of the table. The brightest channel of
+    /// each color is full, negative values are 0, and bodies below 1e-6 cd/m^2 are black.
+    #[arg(long, value_name = "ENCODING")]
+    pub(crate) texture: Option<ColorTexture>,
+    #[command(flatten)]
+    pub(crate) output: PlotOutputArgs,
+}
+
+/// Encoding of a texture of colors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum ColorTexture {
+    /// 8 bits, sRGB-encoded.
+    Srgb,
+    /// 16 bits, linear, with the primaries of sRGB.
+    Linear,
+}
+
+/// `bansho plot kernel`
+#[derive(Args, Debug)]
+pub(crate) struct KernelArgs {
+    /// Write a texture instead, without axes: a .png of 8 bits, linear.
+    #[arg(long, value_name = "WHAT")]
+    pub(crate) texture: Option<KernelTexture>,
+    /// Side of the texture, pixels.
+    #[arg(long, value_name = "N", default_value = "64", allow_hyphen_values = true, value_parser = parse_side)]
+    pub(crate) size: usize,
+    #[command(flatten)]
+    pub(crate) output: PlotOutputArgs,
+}
+
+/// What a texture of the kernel holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum KernelTexture {
+    /// Poly6, 0 to 255 (figure 2).
+    Density,
+    /// The direction in which hot gas deflects light, outward by the gradient of poly6: x to the right, y up and z toward the viewer as red, green
+    /// and blue; -1 is 0, none is 128, 1 is 255 (figure 3).
+    Deflection,
+}
+
+/// `bansho plot deflection`
+#[derive(Args, Debug)]
+pub(crate) struct DeflectionArgs {
+    /// The scene file; `-` reads it from standard input.
+    pub(crate) scene: PathBuf,
+    /// Number of the frame.
+    #[arg(long, value_name = "N", default_value = "0", allow_hyphen_values = true)]
+    pub(crate) frame: i64,
+    /// Angle that is shown as 0 or 255. [default: the largest of the frame]
+    #[arg(long, value_name = "RAD", allow_hyphen_values = true, value_parser = parse_angle)]
+    pub(crate) full_scale: Option<f64>,
     #[command(flatten)]
     pub(crate) output: PlotOutputArgs,
 }
@@ -263,6 +320,16 @@ fn parse_flame_height(text: &str) -> Result<f64, RangeError> {
 
 fn parse_step(text: &str) -> Result<f64, RangeError> {
     number(text, 0.01, f64::from(HIGHEST_K), "K")
+}
+
+fn parse_side(text: &str) -> Result<usize, RangeError> {
+    const SIDES: [usize; 2] = [2, 4096];
+    let side = text.trim().parse().ok().filter(|side| (SIDES[0]..=SIDES[1]).contains(side));
+    side.ok_or(RangeError::Number { min: SIDES[0] as f64, max: SIDES[1] as f64, unit: "pixels" })
+}
+
+fn parse_angle(text: &str) -> Result<f64, RangeError> {
+    number(text, 1e-9, 10.0, "rad")
 }
 
 fn parse_energy(text: &str) -> Result<f64, RangeError> {

@@ -18,11 +18,11 @@ use bansho::{
 };
 
 use crate::{
-    args::{Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
+    args::{DeflectionArgs, KernelTexture, Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
     plot::{
-        PlotError, aurora, black_body, csv, draw, figure::Figure, flame_shape, metadata, parameters, rain,
-        transfer_curves,
+        PlotError, aurora, black_body, csv, deflection, draw, figure::Figure, flame_shape, kernel, metadata, parameters,
+        rain, texture::Texture, transfer_curves,
     },
 };
 
@@ -31,8 +31,23 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
     match &args.what {
         PlotCommand::BlackBody(args) => {
             let temperatures = black_body::Temperatures { from: args.from, to: args.to, step: args.step };
-            finish("black-body", &black_body::figure(temperatures)?, &args.output, &[])
+            match args.texture {
+                None => finish("black-body", &black_body::figure(temperatures)?, &args.output, &[]),
+                Some(encoding) => {
+                    finish_texture("black-body", &black_body::texture(temperatures, encoding)?, &args.output, &[])
+                }
+            }
         }
+        PlotCommand::Kernel(args) => match args.texture {
+            None => finish("kernel", &kernel::figure(), &args.output, &[]),
+            Some(KernelTexture::Density) => {
+                finish_texture("kernel", &kernel::density_texture(args.size), &args.output, &[])
+            }
+            Some(KernelTexture::Deflection) => {
+                finish_texture("kernel", &kernel::deflection_texture(args.size), &args.output, &[])
+            }
+        },
+        PlotCommand::Deflection(args) => plot_deflection(args),
         PlotCommand::DropSizes(args) => {
             let Numbers(rates) = &args.rates;
             finish("drop-sizes", &rain::drop_sizes(rates), &args.output, &[])
@@ -77,9 +92,28 @@ fn read(path: &Path) -> Result<SceneFile, JobError> {
     }
 }
 
+/// Draws the deflection of a frame, and prints how much it is.
+fn plot_deflection(args: &DeflectionArgs) -> anyhow::Result<()> {
+    let DeflectionArgs { scene, frame, full_scale, .. } = args;
+    let drawn = deflection::deflection(&read(scene)?, *frame, *full_scale)?;
+    let inputs = std::slice::from_ref(scene);
+    finish_texture("deflection", &drawn.texture, &args.output, inputs)?;
+    Ok(print(&format!(
+        "largest deflection: {} rad, {} pixels of what is far behind; 0 and 255 are {} rad\n",
+        csv::number(drawn.largest_rad),
+        csv::number((1e3 * drawn.largest_pixels).round() * 1e-3),
+        csv::number(drawn.full_scale_rad)
+    ))?)
+}
+
+/// The path of the figure called `name`.
+fn output_path(name: &str, extension: &str, output: &PlotOutputArgs) -> PathBuf {
+    output.out.clone().unwrap_or_else(|| Path::new("out/plots").join(name).with_extension(extension))
+}
+
 /// Writes the figure called `name`, over none of its `inputs`.
 fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBuf]) -> anyhow::Result<()> {
-    let path = output.out.clone().unwrap_or_else(|| Path::new("out/plots").join(name).with_extension("svg"));
+    let path = output_path(name, "svg", output);
     if path.as_os_str() == "-" {
         return Ok(print(&csv::encode(&figure.title, &figure.table))?);
     }
@@ -94,16 +128,32 @@ fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBu
         }
         _ => return Err(PlotError::Extension { path }.into()),
     };
+    write(&path, &bytes, output, inputs)
+}
+
+/// Writes a texture as PNG, over none of its `inputs`.
+fn finish_texture(name: &str, texture: &Texture, output: &PlotOutputArgs, inputs: &[PathBuf]) -> anyhow::Result<()> {
+    let path = output_path(name, "png", output);
+    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        return Err(PlotError::TextureExtension { path }.into());
+    }
+    let encode = if texture.is_linear { png::encode_linear_document } else { png::encode_document };
+    let bytes = encode(&texture.picture, &path).map_err(JobError::from)?;
+    write(&path, &bytes, output, inputs)
+}
+
+/// Writes a file, over none of `inputs`.
+fn write(path: &Path, bytes: &[u8], output: &PlotOutputArgs, inputs: &[PathBuf]) -> anyhow::Result<()> {
     let mut files = InputFiles::default();
     inputs.iter().for_each(|input| files.insert(input));
     let policy = OverwritePolicy::new(files, output.policy.overwrite);
-    policy.check(&path).map_err(|kept| {
-        let path = path.clone();
+    policy.check(path).map_err(|kept| {
+        let path = path.to_path_buf();
         JobError::Option(match kept {
             OverwriteError::Input => OptionError::OutputIsInput { path },
             OverwriteError::NotMadeByBansho => OptionError::NotMadeByBansho { path, others: 0 },
         })
     })?;
-    atomic::write_bytes_with(&path, &bytes, &policy).map_err(JobError::from)?;
+    atomic::write_bytes_with(path, bytes, &policy).map_err(JobError::from)?;
     Ok(print(&format!("{}: written\n", printable(&path.display().to_string())))?)
 }

@@ -8,10 +8,13 @@ use bansho::{
     },
 };
 
+use crate::args::ColorTexture;
+
 use super::{
     PlotError,
     csv::rows,
     figure::{Axis, ColorStrip, Figure, PALETTE, Panel, Plot, Rgb, Series, Style, Table},
+    texture::Texture,
     ticks,
 };
 
@@ -148,6 +151,28 @@ fn strip(temperatures: Temperatures) -> Vec<Rgb> {
         if light.ln_luminance < math::ln(DARKEST) { [0; 3] } else { display_color(light.acescg) }
     };
     (0..STRIP_COLORS).map(color).collect()
+}
+
+/// The color of each temperature as a row of texels: linear sRGB without negative values, scaled such that its brightest channel is 1; black
+/// below [`DARKEST`].
+pub(crate) fn texture(temperatures: Temperatures, encoding: ColorTexture) -> Result<Texture, PlotError> {
+    let kelvins = temperatures.checked()?;
+    let width = kelvins.len();
+    let color = |kelvin: f64| {
+        let Light { srgb, ln_luminance, .. } = light(kelvin);
+        if ln_luminance < math::ln(DARKEST) { [0.0; 3] } else { full(srgb) }
+    };
+    let colors = kelvins.into_iter().map(color);
+    Ok(match encoding {
+        ColorTexture::Srgb => Texture::srgb(width, colors.map(|color| color.map(|value| code(value as f32)))),
+        ColorTexture::Linear => Texture::linear_16(width, colors),
+    })
+}
+
+/// A color scaled such that its brightest channel is 1, without its negative values.
+fn full(color: [f64; 3]) -> [f64; 3] {
+    let brightest = color.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+    color.map(|value| (value / brightest).max(0.0))
 }
 
 /// sRGB of the hue of an ACEScg color, as bright as a display shows it.

@@ -1,21 +1,25 @@
 //! `bansho plot`: figures of what the models compute.
 //!
-//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and [`metadata`] make one
-//! from the library's own functions. [`draw`] lays a figure out on a [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
+//! [`figure`] describes a figure as plain data; [`black_body`], [`kernel`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and
+//! [`metadata`] make one from the library's own functions. [`texture`] and [`deflection`] are pictures without axes. [`draw`] lays a figure out on a
+//! [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
 pub(crate) mod black_body;
 mod canvas;
 pub(crate) mod csv;
+pub(crate) mod deflection;
 pub(crate) mod draw;
 pub(crate) mod figure;
 pub(crate) mod flame_shape;
 mod font;
+pub(crate) mod kernel;
 pub(crate) mod metadata;
 pub(crate) mod parameters;
 pub(crate) mod rain;
 mod raster;
 mod svg;
+pub(crate) mod texture;
 mod ticks;
 pub(crate) mod transfer_curves;
 
@@ -46,12 +50,20 @@ pub(crate) enum PlotError {
     /// The name of the output is not that of a format.
     #[error("{}: the extension says the format; allowed: .svg, .png or .csv, or `-` for CSV on standard output", path.display())]
     Extension { path: PathBuf },
+    /// The name of a texture is not that of a PNG.
+    #[error("{}: a picture without axes is a PNG; allowed: .png", path.display())]
+    TextureExtension { path: PathBuf },
     /// A figure with more panels than a picture has room for.
     #[error("{}: a picture of {panels} panels; allowed: fewer, or .svg", path.display())]
     Panels { path: PathBuf, panels: usize },
     /// A scene without a phenomenon that has such curves.
     #[error("{scene}: has no {kind}; allowed: a scene with one")]
     NoPhenomenon { scene: String, kind: &'static str },
+    /// A scene in which no hot gas refracts light.
+    #[error(
+        "{scene}: frame {frame} has no gas that refracts light; allowed: a scene of flame_particles whose `rendering.heat_haze_gain` is above 0"
+    )]
+    NoDeflection { scene: String, frame: i64 },
     /// A scene in which no phenomenon has that name.
     #[error("--name: {scene} has no {kind} `{name}`{hint}; allowed: {allowed}")]
     NoSuchName { scene: String, kind: &'static str, name: String, hint: String, allowed: String },
@@ -67,7 +79,7 @@ impl PlotError {
     /// Whose fault it is, for exit codes.
     pub(crate) fn category(&self) -> ErrorCategory {
         match self {
-            Self::NoPhenomenon { .. } => ErrorCategory::Scene,
+            Self::NoPhenomenon { .. } | Self::NoDeflection { .. } => ErrorCategory::Scene,
             Self::NotMetadata { .. } | Self::NoNumbers { .. } => ErrorCategory::Work,
             _ => ErrorCategory::Usage,
         }

@@ -56,6 +56,109 @@ fn black_bodies_are_a_table_of_all_kelvins() {
     assert_eq!(kelvins, [1000.0, 1250.0, 1500.0, 1750.0, 2000.0]);
 }
 
+/// The texels of a texture that `bansho plot` writes, with all bits of its samples.
+fn texture(arguments: &[&str]) -> (usize, usize, Vec<[u32; 3]>) {
+    let folder = Folder::new();
+    folder.succeed(&[&["plot"], arguments, &["-o", "t.png"]].concat());
+    let png = decode_png(&fs::read(folder.path("t.png")).unwrap());
+    let sample = |bytes: &[u8]| bytes.iter().fold(0, |value, byte| value << 8 | u32::from(*byte));
+    let samples: Vec<u32> = png.bytes.chunks(usize::from(png.bits) / 8).map(sample).collect();
+    let texels = samples.chunks(3).map(|texel| [texel[0], texel[1], texel[2]]).collect();
+    assert_eq!(png.channels, 3);
+    (png.width, png.height, texels)
+}
+
+#[test]
+fn black_bodies_are_a_texture_with_a_texel_for_each_row() {
+    let range = ["black-body", "--from", "500", "--to", "10000", "--step", "100"];
+    let table = Csv::of(&range);
+    let [linear, srgb] = ["linear", "srgb"].map(|encoding| texture(&[&range[..], &["--texture", encoding]].concat()));
+    assert_eq!((linear.0, linear.1, linear.2.len()), (96, 1, table.rows.len()));
+    assert_eq!((srgb.0, srgb.1), (96, 1));
+    let mut colored = 0;
+    for ((row, linear), srgb) in table.rows.iter().zip(&linear.2).zip(&srgb.2) {
+        let brightest = row[1..4].iter().fold(0.0, |a: f64, b| a.max(*b));
+        for c in 0..3 {
+            // 1e-6 cd/m^2.
+            let value = if row[7] < -13.8155 { 0.0 } else { (row[1 + c] / brightest).max(0.0) };
+            assert!((f64::from(linear[c]) / 65_535.0 - value).abs() < 1e-5, "{row:?}: {linear:?}");
+            let encoded = if value < 0.003_130_8 {
+                12.92 * value
+            } else {
+                1.055 * bansho::base::math::pow(value, 1.0 / 2.4) - 0.055
+            };
+            assert!((f64::from(srgb[c]) - 255.0 * encoded).abs() < 0.6, "{row:?}: {srgb:?}");
+            colored += usize::from(linear[c] == 65_535);
+        }
+    }
+    // 600 K has 2e-7 cd/m^2; from 700 K on each color has one full channel.
+    assert_eq!((linear.2[1], colored), ([0; 3], 94));
+}
+
+#[test]
+fn poly6_is_normalized_and_its_textures_are_figures_2_and_3() {
+    let table = Csv::of(&["kernel"]);
+    // 315/(64 pi), and 9/(2 pi) through the center.
+    assert!(near(table.row(0.0)[1], 1.566_681, 1e-6) && near(table.row(0.0)[3], 1.432_394, 1e-6));
+    let shell = |row: &Vec<f64>| 4.0 * std::f64::consts::PI * row[0] * row[0] * row[1] / 200.0;
+    let mass: f64 = table.rows.iter().map(shell).sum();
+    assert!((mass - 1.0).abs() < 1e-4, "{mass}");
+    // W' = -6 * 315/(64 pi) * r (1 - r^2)^2 at 0.5.
+    assert!(near(table.row(0.5)[2], -2.643_774, 1e-6));
+    let (width, height, density) = texture(&["kernel", "--texture", "density", "--size", "33"]);
+    assert_eq!((width, height), (33, 33));
+    let (_, _, deflection) = texture(&["kernel", "--texture", "deflection", "--size", "33"]);
+    // Eight texels to the right and five up of the center, of 16.5 in d.
+    let (x, y) = (8.0 / 16.5, 5.0 / 16.5);
+    let s: f64 = 1.0 - x * x - y * y;
+    let at = |column: usize, row: usize| row * 33 + column;
+    assert_eq!((density[at(16, 16)], density[at(0, 16)], density[at(0, 0)]), ([255; 3], [0; 3], [0; 3]));
+    assert_eq!(density[at(24, 11)], [(255.0 * s * s * s).round() as u32; 3]);
+    // The largest gradient is 16/25 sqrt(1/5).
+    let toward = |offset: f64| (127.5 + 127.5 * offset * s * s / (0.64 * 0.2_f64.sqrt())).round() as u32;
+    assert_eq!(deflection[at(24, 11)], [toward(x), toward(y), 128]);
+    assert_eq!(deflection[at(8, 21)], [toward(-x), toward(-y), 128]);
+    assert_eq!((deflection[at(16, 16)], deflection[at(0, 0)]), ([128; 3], [128; 3]));
+}
+
+const GAS: &str = "bansho = 2
+[picture]
+size = [160, 90]
+frames = 2
+[camera]
+position = [0.0, 0.5, 3.0]
+target = [0.0, 0.5, 0.0]
+[[flame_particles]]
+particles = 500
+gas_model = \"euler\"
+";
+
+#[test]
+fn deflection_is_a_picture_that_points_outward() {
+    let folder = Folder::with_scene(GAS);
+    let run = folder.succeed(&["plot", "deflection", "scene.toml", "--frame", "1", "-o", "d.png"]);
+    let largest = run.stdout.split("largest deflection: ").nth(1).unwrap().split(' ').next().unwrap();
+    let largest: f64 = largest.parse().unwrap();
+    assert!((1e-5..1e-1).contains(&largest), "{}", run.stdout);
+    let png = decode_png(&fs::read(folder.path("d.png")).unwrap());
+    assert_eq!((png.width, png.height, png.bits), (160, 90, 8));
+    let mean = |columns: std::ops::Range<usize>| {
+        let texels = png.bytes.chunks(3).enumerate().filter(|(index, _)| columns.contains(&(index % 160)));
+        let reds: Vec<f64> = texels.map(|(_, texel)| f64::from(texel[0])).collect();
+        reds.iter().sum::<f64>() / reds.len() as f64
+    };
+    assert!(mean(0..80) < 127.5 && mean(80..160) > 128.5, "{} {}", mean(0..80), mean(80..160));
+    assert!(png.bytes.chunks(3).all(|texel| texel[2] == 128) && png.bytes[0] == 128);
+    // At ten times the full scale it is ten times as faint.
+    folder.succeed(&["plot", "deflection", "scene.toml", "--frame", "1", "--full-scale", "1", "-o", "faint.png"]);
+    let faint = decode_png(&fs::read(folder.path("faint.png")).unwrap());
+    assert!(faint.bytes.iter().all(|byte| byte.abs_diff(128) <= 13));
+    folder.write("none.toml", &format!("{GAS}rendering.heat_haze_gain = 0.0\n"));
+    let run = folder.run(&["plot", "deflection", "none.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("none.toml: frame 0 has no gas that refracts light; allowed: "), "{}", run.stderr);
+}
+
 #[test]
 fn drops_fall_as_gunn_and_kinzer_measured() {
     let table = Csv::of(&["terminal-velocity"]);
@@ -214,9 +317,16 @@ fn metadata_are_plotted_over_the_frames() {
 #[test]
 fn figures_have_axes_colors_and_the_same_bytes_every_time() {
     let folder = Folder::new();
-    for name in
-        ["black-body", "drop-sizes", "terminal-velocity", "streak-opacity", "emission", "deposition", "quenching"]
-    {
+    for name in [
+        "black-body",
+        "kernel",
+        "drop-sizes",
+        "terminal-velocity",
+        "streak-opacity",
+        "emission",
+        "deposition",
+        "quenching",
+    ] {
         for extension in ["svg", "png", "csv"] {
             let file = format!("{name}.{extension}");
             let made = || {
@@ -233,6 +343,7 @@ fn figures_have_axes_colors_and_the_same_bytes_every_time() {
     for (name, label) in [
         ("black-body", "Temperature T (K)"),
         ("black-body", "Luminance (cd/m²)"),
+        ("kernel", "Distance r/d"),
         ("drop-sizes", "Number density n(D) (m⁻³ mm⁻¹)"),
         ("terminal-velocity", "Terminal velocity v (m/s)"),
         ("streak-opacity", "Drop diameter D (mm)"),
@@ -268,6 +379,11 @@ fn what_cannot_be_plotted_is_one_clear_error() {
         (&["black-body", "--to", "1e99"], "allowed: a number from 1 to 10000 K"),
         (&["black-body", "--from", "3000", "--to", "2000"], "--from: 3000 to 2000 K is no range"),
         (&["black-body", "--step", "0.01", "--from", "nan"], "allowed: a number"),
+        (&["black-body", "--texture", "srbg"], "a similar value exists: 'srgb'"),
+        (&["black-body", "--texture", "srgb", "-o", "a.csv"], "a.csv: a picture without axes is a PNG; allowed: .png"),
+        (&["kernel", "--size", "1"], "allowed: a number from 2 to 4096 pixels"),
+        (&["kernel", "--texture", "density", "-o", "-"], "allowed: .png"),
+        (&["deflection", "no.toml", "--full-scale", "0"], "allowed: a number from 0.000000001 to 10 rad"),
         (&["drop-sizes", "--rates", "5,-1"], "each from 0.01 to 500 mm/h"),
         (&["streak-opacity", "--exposure-times", "1/0"], "each from 0.000001 to 10 s"),
         (&["emission", "--energy-ev", "10"], "allowed: a number from 100 to 100000 eV"),

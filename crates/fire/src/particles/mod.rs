@@ -31,11 +31,14 @@
 //! | (13) | Planck's law | [`bansho_base::color::planck_radiance_per_nm`] |
 //! | (14) to (16) | CIE XYZ of a spectrum | [`bansho_base::color::xyz_of_spectrum`] |
 //! | (17) | XYZ to RGB, here ACEScg | [`acescg_from_xyz`](bansho_base::color::space::acescg_from_xyz) |
-//! | section 4.3, step 1 | particles are added at the burner | `simulate::spawning::Spawner::spawn` |
-//! | section 4.3, step 5 | velocity, then position | `simulate::integrate::IntegrationStep::advance` |
+//! | section 4.2.3 | the wind as the external force | `simulate::euler::EulerStep::wind_force` |
+//! | section 4.3, step 1 | particles are added at the burner | `simulate::spawning::Spawner::spawn`, `simulate::euler::EulerStep::add_particles` |
+//! | section 4.3, step 2 | pairs nearer than d | [`bansho_sph::Cells::assign`] |
+//! | section 4.3, step 5 | velocity, then position | `simulate::integrate::IntegrationStep::advance`, `simulate::euler::EulerStep::integrate` |
+//! | section 6.2 | about 3000 particles | `simulate::euler::EulerStep::remove_oldest` |
 //! | section 5.1, figure 1 | table of color over temperature, 1 to 10,000 K | [`bansho_base::color::black_body`] |
 //! | section 5.2, figure 2 | poly6 as the sprite, opacity by density | `render::prepared::RadianceSprites::density_values` |
-//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::optical_path`, `render::deflection::HeatHaze` |
+//! | section 5.3, figures 3 to 6 | refraction of the background | `render::deflection::optical_path`, `render::deflection::profile`, `render::deflection::HeatHaze` |
 //! | figure 7 | squares colored by density | `render::paper_squares::Squares::draw` |
 //! | Heskestad 1983 | `L = 0.235 Q^(2/5) - 1.02 D`: flame height | [`heskestad`] |
 //! | Cetegen and Ahmed 1993 | `1.5 / sqrt(D)` Hz: puffing frequency | `simulate::burner::Burner::puffing_hz` |
@@ -48,6 +51,7 @@
 //!    force, `simulate::integrate` advances them (with `simulate::collision`), and `simulate::spawning` adds new ones.
 //! 3. Once per step `simulate::combustion` smooths velocity and temperature, burns fuel, forms soot and cools;
 //!    `simulate::forces` provides wind, entrainment toward the plume axis, vortex rings and turbulence.
+//!    `simulate::euler` is a step of the paper's algorithm instead (`gas_model = "euler"`).
 //! 4. `simulate::snapshot` serializes the particles; `phenomenon` is the interface to the rest of Bansho.
 //! 5. To draw a frame, `render::depth_layers` gathers statistics and defines depth layers, and `render::project` turns particles into
 //!    elliptical sprites.
@@ -69,7 +73,7 @@ pub use error::{ParticleError, ParticleErrorKind};
 pub use model::FlameParticles;
 pub use parameters::{
     BurnerParameters, BurnerShape, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters,
-    NegativePressure, TemperatureLaw, WindForce,
+    GasModel, NegativePressure, TemperatureLaw, WindForce,
 };
 pub use simulate::{
     burner::heskestad,

@@ -36,6 +36,19 @@ bansho_base::choice! {
 }
 
 bansho_base::choice! {
+    /// Model of the gas: what happens to a particle from its emission to its removal.
+    pub enum GasModel {
+        /// Gas burns, heats up, forms soot, rises and mixes with air; it is removed some time after it has burnt out.
+        Combustion = "combustion",
+        /// The paper's algorithm (section 4.3): in each step the same number of particles is added, with equal speed, temperature and mass; Euler's
+        /// equation, eq. (1), with pressure and the wind's force per volume moves them; when there are more than `particles`, the oldest are removed.
+        /// Nothing burns, cools or is buoyant. Of `fluid`, `forces` and `combustion` only `support_radius`, `rest_density`, `stiffness`,
+        /// `pressure_kernel`, `negative_pressure`, `wind_response` and `soot_ppm` apply. A burner's gas rises to its `height` at constant `speed`.
+        Euler = "euler",
+    }
+}
+
+bansho_base::choice! {
     /// Model of the temperature of a particle.
     pub enum TemperatureLaw {
         /// The gas is heated by combustion, and cools by mixing with air and by radiation.
@@ -81,7 +94,8 @@ bansho_base::parameters! {
         height: Auto<f64> = Auto::Auto, limits(LENGTH), unit("m");
         /// Exit speed of the gas; `"auto"` derives it from the size.
         speed: Auto<f64> = Auto::Auto, limits(Range::new(0.0, 100.0)), unit("m/s");
-        /// Temperature of the gas at emission.
+        /// Temperature of the gas at emission. With `gas_model = "euler"` or a constant temperature it is the temperature of the flame: 1900 K is that of
+        /// luminous soot.
         temperature_k: f64 = 1150.0, limits(KELVIN), unit("K");
         /// Gas flow as a fraction of full flow; 0 turns the burner off.
         flow: Animated<f64> = Animated::from(1.0), limits(FRACTION);
@@ -168,6 +182,8 @@ bansho_base::parameters! {
         /// Approximate number of particles alive at a time, of all burners together. The actual number is up to a fifth lower, since some gas burns out
         /// early, and varies with puffing. More than 20 million are rejected, with an error that states the memory they would take.
         particles: i64 = 12_000, limits(Range::new(1.0, 1e12));
+        /// Model of the gas: combustion, or the paper's constant particles.
+        gas_model: GasModel = GasModel::Combustion;
         /// Pressure and viscosity.
         fluid: FluidParameters = FluidParameters::default();
         /// Buoyancy, wind, entrainment, puffing, turbulence.
@@ -199,6 +215,17 @@ bansho_base::choice! {
     }
 }
 
+bansho_base::choice! {
+    /// How a particle deflects the light from behind.
+    pub enum HeatHazeModel {
+        /// By the gradient of the optical path through its gas, which follows from its temperature and the volume that it fills.
+        Refraction = "refraction",
+        /// By the gradient of poly6 itself, equally for all particles, as in the paper (figure 3): as much as gas that has just been emitted, if
+        /// `heat_haze_gain` is 1.
+        Poly6 = "poly6",
+    }
+}
+
 bansho_base::parameters! {
     /// Rendering of the gas.
     pub struct RenderingParameters {
@@ -224,6 +251,8 @@ bansho_base::parameters! {
         smoke_albedo: f64 = 0.3, limits(FRACTION);
         /// Factor of the refraction of light from behind by hot gas; 1 is physical, 0 is none.
         heat_haze_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
+        /// How a particle refracts light from behind.
+        heat_haze_model: HeatHazeModel = HeatHazeModel::Refraction;
         /// Sparks.
         sparks: SparkParameters = SparkParameters::default();
         /// Light on other objects.

@@ -20,7 +20,9 @@ use bansho_base::{
 use super::{
     error::ParticleErrorKind,
     model::FlameParticles,
-    parameters::{FlameParticlesParameters, TemperatureLaw},
+    parameters::{
+        CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters, GasModel, TemperatureLaw,
+    },
     render::{self, PreparedGas, SpriteStyle},
 };
 use crate::particles::simulate::{
@@ -78,9 +80,9 @@ impl Phenomenon for FlameParticles {
     fn luminance(&self) -> f64 {
         /// Mean luminance of the bright parts, relative to a uniform flame with soot of the highest temperature.
         const BRIGHT_PARTS: f64 = 0.09;
-        let hottest = match self.parameters.combustion.temperature_model {
-            TemperatureLaw::Simulated => self.parameters.combustion.flame_temperature_k,
-            TemperatureLaw::Constant => self.tallest_burner().parameters.temperature_k,
+        let hottest = match (self.parameters.gas_model, self.parameters.combustion.temperature_model) {
+            (GasModel::Combustion, TemperatureLaw::Simulated) => self.parameters.combustion.flame_temperature_k,
+            (GasModel::Euler, _) | (_, TemperatureLaw::Constant) => self.tallest_burner().parameters.temperature_k,
         };
         let black_body = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
         let absorption =
@@ -97,6 +99,9 @@ impl Phenomenon for FlameParticles {
         let emits_gas = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
         if !burners.iter().any(emits_gas) {
             return Some(Remark::new("none of its burners emits gas; set a `flow` above 0"));
+        }
+        if let Some(key) = table_without_effect(&self.parameters) {
+            return Some(Remark::at(key, format!("`{key}` sets something without effect; {EULER_KEYS}")));
         }
         let origin = DVec3::from(self.parameters.position);
         let is_inside_obstacle = |burner: &Burner| {
@@ -116,6 +121,27 @@ impl Phenomenon for FlameParticles {
     fn start(self: Arc<Self>) -> Box<dyn Run> {
         Box::new((*self).clone())
     }
+}
+
+/// What of the tables below has an effect on the paper's gas.
+const EULER_KEYS: &str = "with `gas_model = \"euler\"` only these have one: `support_radius`, `rest_density`, `stiffness`, \
+     `pressure_kernel` and `negative_pressure` of `fluid`, `wind_response` of `forces`, `soot_ppm` of `combustion`";
+
+/// Key of the first table of the paper's gas that sets something without effect.
+fn table_without_effect(parameters: &FlameParticlesParameters) -> Option<&'static str> {
+    let FlameParticlesParameters { gas_model, fluid, forces, combustion, .. } = parameters;
+    let FluidParameters { viscosity, conduction, max_substeps, .. } = FluidParameters::default();
+    let ForceParameters { wind_response, wind_model, .. } = *forces;
+    let tables = [
+        ("fluid", *fluid != FluidParameters { viscosity, conduction, max_substeps, ..fluid.clone() }),
+        // Its wind is the model `body_force`, which may be stated.
+        ("forces", *forces != ForceParameters { wind_response, wind_model, ..ForceParameters::default() }),
+        (
+            "combustion",
+            *combustion != CombustionParameters { soot_ppm: combustion.soot_ppm, ..CombustionParameters::default() },
+        ),
+    ];
+    tables.into_iter().find(|(_, differs)| *gas_model == GasModel::Euler && *differs).map(|(key, _)| key)
 }
 
 impl Run for FlameParticles {

@@ -36,7 +36,7 @@ pub fn encode(
     path: &Path,
 ) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;
-    compress(picture, size, Some(fingerprint), effort)
+    compress(picture, size, Some(fingerprint), effort, Transfer::Srgb)
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
@@ -45,15 +45,27 @@ pub fn encode(
 /// # Errors
 /// As [`encode`].
 pub fn encode_document(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
+    document(picture, path, Transfer::Srgb)
+}
+
+/// As [`encode_document`], of linear values: the file says so.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_linear_document(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
+    document(picture, path, Transfer::Linear)
+}
+
+fn document(picture: &DisplayImage, path: &Path, transfer: Transfer) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;
-    compress(picture, size, None, PngEffort::Small)
+    compress(picture, size, None, PngEffort::Small, transfer)
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
 /// As [`encode`], without a fingerprint: a frame of a film.
 pub(crate) fn encode_frame(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;
-    compress(picture, size, None, PngEffort::Fast)
+    compress(picture, size, None, PngEffort::Fast, Transfer::Srgb)
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
@@ -78,11 +90,19 @@ fn checked_size(picture: &DisplayImage, path: &Path) -> Result<[u32; 2], MediaEr
     Ok([width as u32, height as u32])
 }
 
+/// How codes encode light, or any other quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Transfer {
+    Srgb,
+    Linear,
+}
+
 fn compress(
     picture: &DisplayImage,
     [width, height]: [u32; 2],
     fingerprint: Option<&[u8; 32]>,
     effort: PngEffort,
+    transfer: Transfer,
 ) -> Result<Vec<u8>, EncodingError> {
     let mut file = Vec::with_capacity(picture.width * picture.height / 2 + 1024);
     let mut encoder = Encoder::new(&mut file, width, height);
@@ -91,7 +111,10 @@ fn compress(
         DisplayPixels::Eight(_) => BitDepth::Eight,
         DisplayPixels::Sixteen(_) => BitDepth::Sixteen,
     });
-    mark_srgb(&mut encoder);
+    match transfer {
+        Transfer::Srgb => mark_srgb(&mut encoder),
+        Transfer::Linear => encoder.set_source_gamma(ScaledFloat::from_scaled(100_000)),
+    }
     encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", fingerprint::VERSION))?;
     encoder.add_text_chunk(KEY_VERSION.to_owned(), fingerprint::VERSION.to_owned())?;
     if let Some(fingerprint) = fingerprint {
@@ -189,6 +212,21 @@ mod tests {
             let channels = if opaque { 3 } else { 4 };
             assert_eq!(values[channels..2 * channels], [1, 257, 65534, 40000][..channels]);
         }
+    }
+
+    #[test]
+    fn linear_documents_say_so() {
+        let picture = testing::display(9, 4, 0);
+        let kinds = |file: &[u8]| -> Vec<[u8; 4]> {
+            super::super::chunk::chunks(file).unwrap().map(|chunk| chunk.unwrap().kind).collect()
+        };
+        let [linear, srgb] =
+            [encode_linear_document, encode_document].map(|encode| encode(&picture, Path::new("a.png")));
+        let (linear, srgb) = (linear.unwrap(), srgb.unwrap());
+        let gamma = ::png::Decoder::new(std::io::Cursor::new(&linear[..])).read_info().unwrap().info().gama_chunk;
+        assert_eq!(gamma, Some(ScaledFloat::from_scaled(100_000)));
+        assert!(!kinds(&linear).contains(b"sRGB") && kinds(&srgb).contains(b"sRGB"));
+        assert_eq!(read_back(&linear).1, read_back(&srgb).1);
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod encode;
 mod measured;
 
 pub(crate) use encode::encode_frame;
-pub use encode::{PngEffort, SIDE_LIMIT, encode, encode_document};
+pub use encode::{PngEffort, SIDE_LIMIT, encode, encode_document, encode_linear_document};
 pub use measured::{MeasuredImage, Samples, encode_measured};
 
 /// Key of the text chunk that holds the fingerprint in hexadecimal digits.

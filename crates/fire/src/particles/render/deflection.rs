@@ -6,13 +6,14 @@
 use bansho_base::{
     image::{Image, Rect},
     phenomenon::strip::{Strip, View},
+    world::air::Air,
 };
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::{aovs::DEFLECTION, gas::Gas};
 use crate::particles::{
-    parameters::RenderingParameters,
+    parameters::{HeatHazeModel, RenderingParameters},
     render::{
         depth_layers::is_visible,
         project::{ProjectedParticle, SpriteKind, project_particles},
@@ -47,11 +48,29 @@ pub(crate) struct HeatHaze {
 #[inline(always)]
 pub(crate) fn optical_path(gas: &Gas, rendering: &RenderingParameters, projected: &ProjectedParticle) -> f32 {
     let refractivity_excess = refractivity_excess(gas, projected.index);
-    let length = rendering.heat_haze_gain
-        * refractivity_excess
-        * gas.volume(projected.index)
-        * f64::from(projected.ellipse.peak);
+    let volume = match rendering.heat_haze_model {
+        HeatHazeModel::Refraction => gas.volume(projected.index),
+        HeatHazeModel::Poly6 => emitted_volume(gas, projected.index),
+    };
+    let length = rendering.heat_haze_gain * refractivity_excess * volume * f64::from(projected.ellipse.peak);
     (length * f64::from(projected.scale)) as f32
+}
+
+/// Volume of a particle's gas when it was emitted, at the density of air of its temperature, m^3: the same for all particles of constant
+/// temperature, wherever they are.
+#[inline(always)]
+fn emitted_volume(gas: &Gas, index: usize) -> f64 {
+    f64::from(gas.particles.mass[index])
+        / Air::default().density_at(f64::from(gas.particles.temperature[index]).max(1.0))
+}
+
+/// Profile of the optical path of a particle, whose gradient deflects light.
+fn profile(rendering: &RenderingParameters) -> Profile {
+    match rendering.heat_haze_model {
+        HeatHazeModel::Refraction => Profile::LINE,
+        // The gradient of poly6: figure 3 of the paper.
+        HeatHazeModel::Poly6 => Profile::POLY6,
+    }
 }
 
 /// Refractivity of a particle's gas minus that of the surrounding air.
@@ -102,7 +121,7 @@ impl HeatHaze {
             return None;
         }
         let settings = SplatSettings {
-            profile: Profile::LINE,
+            profile: profile(rendering),
             min_radius_cells: MIN_RADIUS_CELLS,
             layers: 1,
             picture: view.size,

@@ -28,7 +28,7 @@ pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
 pub use splat::kernel::{line_gradient, line_integral};
 
-pub use crate::particles::parameters::{GasLightParameters, RenderingParameters, SpriteStyle};
+pub use crate::particles::parameters::{GasLightParameters, HeatHazeModel, RenderingParameters, SpriteStyle};
 
 #[cfg(test)]
 mod tests;

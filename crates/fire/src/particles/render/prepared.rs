@@ -26,7 +26,7 @@ use super::{
 use crate::{
     chemiluminescence_color,
     particles::{
-        parameters::{RenderingParameters, SpriteStyle},
+        parameters::{HeatHazeModel, RenderingParameters, SpriteStyle},
         render::{
             depth_layers::{GasStatistics, is_visible},
             paper_squares::Squares,
@@ -368,11 +368,12 @@ impl Prepared for PreparedGas<'_> {
 impl PreparedGas<'_> {
     /// The haze, computed by all threads of the pool. If AOVs are requested it is computed before strips are drawn.
     fn haze(&self) -> Option<&HeatHaze> {
+        // Line integrals of the optical path are summed with those of the visible gas.
+        let is_splatted = self.rendering.sprite == SpriteStyle::LineIntegral
+            && self.rendering.heat_haze_model == HeatHazeModel::Refraction;
         let (splatted, whole_gas) = match &self.mode {
-            DrawMode::SplattedGas(gas) if self.rendering.sprite == SpriteStyle::LineIntegral => {
-                (Some(&gas.grid), false)
-            }
-            DrawMode::OutsideWindow if self.rendering.sprite == SpriteStyle::LineIntegral => (None, false),
+            DrawMode::SplattedGas(gas) if is_splatted => (Some(&gas.grid), false),
+            DrawMode::OutsideWindow if is_splatted => (None, false),
             _ => (None, true),
         };
         get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.rendering, self.view, splatted, whole_gas)).as_ref()

@@ -18,7 +18,7 @@ use bansho_base::{
 
 use crate::particles::{
     error::ParticleErrorKind,
-    parameters::{BurnerParameters, BurnerShape, FlameParticlesParameters},
+    parameters::{BurnerParameters, BurnerShape, FlameParticlesParameters, GasModel},
 };
 
 /// Acceleration along the axis of a fire, m/s^2: half the square of the 6.8 in McCaffrey's `u = 6.8 sqrt(z)` (1979).
@@ -94,7 +94,10 @@ impl Burner {
             area_m2: size.area_m2,
             height,
             speed,
-            acceleration: AXIS_ACCELERATION * flame.forces.buoyancy,
+            acceleration: match flame.gas_model {
+                GasModel::Combustion => AXIS_ACCELERATION * flame.forces.buoyancy,
+                GasModel::Euler => 0.0,
+            },
             bounding_radius: size.bounding_radius,
             extent: match &size.mesh {
                 Some(mesh) => mesh_extent(mesh, &placement),

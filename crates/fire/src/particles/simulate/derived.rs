@@ -10,7 +10,7 @@ use bansho_base::{
 use super::burner::Burner;
 use crate::particles::{
     error::{ParticleError, ParticleErrorKind},
-    parameters::{BurnerParameters, FlameParticlesParameters},
+    parameters::{BurnerParameters, FlameParticlesParameters, GasModel},
 };
 
 /// Maximum number of particles of all flames of a scene.
@@ -37,6 +37,8 @@ pub(crate) struct DerivedConstants {
     pub(crate) burners: Vec<Burner>,
     /// Particles per second of each burner at full flow.
     pub(crate) rates: Vec<f64>,
+    /// Residence time of the gas of each burner, s.
+    pub(crate) residence_times: Vec<f64>,
     /// Puffing frequency of each burner, Hz.
     pub(crate) puffing_hz: Vec<f64>,
     /// Relative amplitude of the fuel flow's pulsation.
@@ -80,11 +82,12 @@ impl DerivedConstants {
         let density = Air::default().density_at(coolest);
         let fastest = burners.iter().map(|burner| burner.speed).fold(0.0, f64::max);
         let sound = parameters.fluid.stiffness * fastest;
-        let longest_residence = residence_times.into_iter().fold(0.0, f64::max);
+        let longest_residence = residence_times.iter().copied().fold(0.0, f64::max);
         // After the longest residence time all gas has been replaced.
         let crossfade = loop_s.map_or(0.0, |seconds| longest_residence.min(seconds));
         Ok(Self {
             rates: fluxes.into_iter().map(|flux| flux / volume).collect(),
+            residence_times,
             puffing_hz: burners.iter().map(|burner| burner.puffing_hz(parameters)).collect(),
             pulse: (FLOW_PULSATION * parameters.forces.puffing).min(0.9),
             support_radius: support_radius as f32,
@@ -106,9 +109,13 @@ impl DerivedConstants {
     }
 }
 
-/// Residence time of gas of a burner, s: rise time plus lifetime of burnt gas.
+/// Residence time of gas of a burner, s: rise time plus lifetime of burnt gas. The paper's gas is burnt nowhere.
 fn residence_time(parameters: &FlameParticlesParameters, burner: &Burner) -> f64 {
-    (burner.rise_time() + parameters.combustion.burnt_gas_lifetime_s).max(MIN_STEPS * parameters.step_s)
+    let burnt_gas_lifetime = match parameters.gas_model {
+        GasModel::Combustion => parameters.combustion.burnt_gas_lifetime_s,
+        GasModel::Euler => 0.0,
+    };
+    (burner.rise_time() + burnt_gas_lifetime).max(MIN_STEPS * parameters.step_s)
 }
 
 /// Support radius d, m, of particles that represent that volume of gas at spawning.

@@ -24,9 +24,14 @@ use crate::particles::{
 /// Maximum speed of gas, m/s.
 pub(crate) const MAX_SPEED: f32 = 150.0;
 /// Distance that gas keeps from solids, in support radii.
-const CLEARANCE: f32 = 0.2;
+pub(crate) const CLEARANCE: f32 = 0.2;
 /// Minimum density by which a force per volume is divided, kg/m^3.
 const MIN_DENSITY: f32 = 1e-6;
+
+/// Maximum acceleration by pressure, m/s^2: it moves a particle by at most d/4 in `seconds`.
+pub(crate) fn max_acceleration(radius: f32, seconds: f32) -> f32 {
+    0.25 * radius / (seconds * seconds)
+}
 
 /// One sub-step of `seconds`.
 pub(crate) struct IntegrationStep<'a> {
@@ -126,9 +131,7 @@ impl IntegrationStep<'_> {
     fn apply_forces<R: Real>(&self, burner: &BurnerForces, gas: &ForceInputs<R>, wind: &[R; 3]) -> [R; 3] {
         let Self { forces, seconds, .. } = *self;
         let splat = |value: f32| gas.density.broadcast(value);
-        // Acceleration by pressure moves a particle by at most d/4 in a sub-step.
-        let max_acceleration = 0.25 * self.radius / (seconds * seconds);
-        let mut acceleration = clamp_length(&gas.acceleration, max_acceleration);
+        let mut acceleration = clamp_length(&gas.acceleration, max_acceleration(self.radius, seconds));
         let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
         acceleration[1] = (density_ratio - splat(1.0)).fma(splat(forces.buoyancy), acceleration[1]);
         let per_volume = forces.wind == WindForce::BodyForce;

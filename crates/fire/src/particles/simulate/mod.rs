@@ -2,7 +2,7 @@
 //!
 //! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` the external forces,
 //! `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state. `particle_lanes` and `vectors` are
-//! SIMD utilities.
+//! SIMD utilities. `euler` is the paper's own algorithm, which a scene can select.
 
 use std::sync::Arc;
 
@@ -13,10 +13,11 @@ use bansho_base::{
 use rayon::prelude::*;
 
 use crate::particles::{
-    parameters::FlameParticlesParameters,
+    parameters::{FlameParticlesParameters, GasModel},
     simulate::{
         combustion::{CombustionModel, CombustionStep},
         derived::DerivedConstants,
+        euler::EulerStep,
         fluid::FluidSolver,
         forces::{
             external_forces::{ExternalForces, StepConstants},
@@ -33,6 +34,7 @@ pub(crate) mod burner;
 pub(crate) mod collision;
 pub(crate) mod combustion;
 pub(crate) mod derived;
+mod euler;
 pub(crate) mod fluid;
 pub(crate) mod forces;
 pub(crate) mod integrate;
@@ -74,10 +76,21 @@ impl Simulation {
     }
 
     /// Advances from `time` by one step.
+    pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
+        match self.parameters.gas_model {
+            GasModel::Combustion => self.step_combustion(time, surroundings),
+            GasModel::Euler => {
+                let Self { constants, parameters, key, particles, solver, .. } = self;
+                EulerStep { parameters, constants, key: *key, surroundings, time }.advance(particles, solver);
+            }
+        }
+    }
+
+    /// Advances burning gas from `time` by one step.
     ///
     /// Pressure and advection run in sub-steps. Processes that are slow compared with sound run once, at the beginning of the step:
     /// viscosity and conduction, mixing, burning and cooling, and changes of wind and plume axes.
-    pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
+    fn step_combustion(&mut self, time: f64, surroundings: &Surroundings) {
         let Self { constants, combustion, parameters, turbulence, key, particles, solver } = self;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
         let mut forces = ExternalForces::new(step, particles, surroundings, time);

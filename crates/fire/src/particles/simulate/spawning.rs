@@ -13,7 +13,7 @@ use crate::particles::simulate::{
 };
 
 /// Number of low bits of an id that count the particles of one burner; the high bits are the index of the burner.
-const ORDINAL_BITS: u32 = 40;
+pub(super) const ORDINAL_BITS: u32 = 40;
 /// Relative spread of the exit velocity.
 const SPEED_SPREAD: f32 = 0.3;
 /// Exit velocity relative to the mean at the center of the burner, and its decrease toward the rim.

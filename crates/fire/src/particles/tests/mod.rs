@@ -1,6 +1,7 @@
 //! Physics of the whole simulation.
 
 mod determinism;
+mod euler;
 mod fire;
 mod gas;
 mod random;

@@ -5,11 +5,12 @@ use bansho_base::{
     parameters::{Parameters, Reader, sample},
     world::gravity::STANDARD_GRAVITY,
 };
+use bansho_sph::KernelShape;
 use rayon::prelude::*;
 
 use super::*;
 use crate::particles::{
-    parameters::WindForce,
+    parameters::{GasModel, WindForce},
     simulate::{burner::Burner, combustion::INNER_TEMPERATURE},
 };
 
@@ -89,10 +90,15 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
     let corner = |corner: [f64; 3]| corner.map(f64::abs).into_iter().fold(0.0, f64::max);
     let blown =
         wind.velocity.bounds().map(corner).into_iter().fold(0.0, f64::max) * (1.0 + wind.gust) * motion.wind_response;
-    let blown = match motion.wind_model {
-        WindForce::Entrainment => blown,
+    let blown = match (parameters.gas_model, motion.wind_model) {
+        (GasModel::Combustion, WindForce::Entrainment) => blown,
+        // A particle by itself has the least density.
+        (GasModel::Euler, _) => {
+            let density = constants.mass * KernelShape::Poly6.at_center::<3>(constants.support_radius);
+            (2.0 * blown / f64::from(density) * room.length()).sqrt()
+        }
         // Nothing holds gas back that a force drives, m/s^2 on gas as dense as at the burner.
-        WindForce::BodyForce => {
+        (GasModel::Combustion, WindForce::BodyForce) => {
             driven_speed(simulation, parameters, blown / f64::from(constants.density), room.max_element())
         }
     };

@@ -35,6 +35,38 @@ fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
 }
 
 #[test]
+fn the_papers_haze_is_the_gradient_of_poly6_for_every_particle_alike() {
+    let view = view(camera());
+    let scale = view.camera.focal_pixels / DISTANCE;
+    let rendering = RenderingParameters {
+        sprite: SpriteStyle::Poly6,
+        heat_haze_model: HeatHazeModel::Poly6,
+        heat_haze_gain: 5.0,
+        ..RenderingParameters::default()
+    };
+    // Of a liter of air at 1500 K: 0.2354 kg/m^3, whatever the density of the gas is now.
+    let volume = 0.0002 / (1.2041 * 293.15 / 1500.0);
+    let weight = 5.0 * (refractivity(293.15) - refractivity(1500.0)) * volume * LINE_PEAK / 0.09;
+    let deflections = |density: f32| {
+        let particles = cloud([Particle { density, ..ball(0, [0.0; 3], 1500.0, 0.0) }]);
+        prepared(&particles, &rendering, &view, |prepared| {
+            let bend = prepared.deflection().unwrap();
+            (70..91).map(|x| f64::from(bend.angle.at(x - bend.rect.x, 60 - bend.rect.y)[0])).collect::<Vec<_>>()
+        })
+    };
+    let dense = deflections(0.2);
+    for (x, got) in (70..91).zip(&dense) {
+        let b = (f64::from(x) + 0.5 - 80.0) / scale;
+        let s = 1.0 - b * b / 0.09;
+        // Outward: minus the derivative of (1 - b^2/d^2)^3.
+        let expected = weight * 6.0 * b / 0.09 * s * s;
+        let peak = weight * 6.0 * 0.64 * 0.2_f64.sqrt() / 0.3;
+        assert!((got - expected).abs() < 0.05 * peak, "{x}: {got} for {expected}, at most {peak}");
+    }
+    assert_eq!(dense, deflections(0.02));
+}
+
+#[test]
 fn squares_are_redder_where_gas_is_denser() {
     let view = view(camera());
     let rendering = RenderingParameters { sprite: SpriteStyle::Squares, ..RenderingParameters::default() };
