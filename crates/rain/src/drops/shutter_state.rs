@@ -234,6 +234,9 @@ const MAX_OCCLUDER_HEIGHT: f64 = 200.0;
 
 /// Sphere tracing from `point` toward `up`: whether the ray meets the solid.
 fn ray_hits_occluder(occluder: &Occluder, point: DVec3, up: DVec3) -> bool {
+    if occluder.bounding_sphere().is_some_and(|sphere| ray_misses_sphere(sphere, point, up)) {
+        return false;
+    }
     let mut travel = 0.0;
     for _ in 0..MAX_TRACE_STEPS {
         let distance = occluder.signed_distance(point + up * travel);
@@ -246,6 +249,14 @@ fn ray_hits_occluder(occluder: &Occluder, point: DVec3, up: DVec3) -> bool {
         }
     }
     false
+}
+
+/// Whether a ray stays outside of a sphere, with a margin for what sphere tracing counts as a hit.
+fn ray_misses_sphere((center, radius): (DVec3, f64), point: DVec3, up: DVec3) -> bool {
+    const MARGIN: f64 = 2e-3;
+    let offset = center - point;
+    let nearest = offset - up * offset.dot(up).max(0.0);
+    nearest.length_squared() > (radius + MARGIN) * (radius + MARGIN)
 }
 
 #[cfg(test)]

@@ -1,0 +1,215 @@
+//! The pixels of a frame: what each shows of the obstacles, antialiased, with motion blur.
+
+use bansho_base::{
+    host::observer::{Cancelled, Observer, check},
+    image::{Image, Rect},
+    math::{DVec2, DVec3},
+    phenomenon::{
+        Prepared,
+        strip::{DepthInterval, Strip, View},
+        surroundings::Surroundings,
+    },
+};
+use rayon::prelude::*;
+
+use super::{
+    model::Solids,
+    pose::{Pose, SurfacePoint, poses},
+    shade::Shading,
+};
+
+/// Rays of a pixel that shows an edge, or motion.
+const SAMPLES: usize = 16;
+/// Cosine of the angle between the normals at the corners of a pixel up to which it shows one smooth surface.
+const SMOOTH_COS: f64 = 0.97;
+
+/// A pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pixel {
+    /// ACEScg, premultiplied, cd/m^2.
+    radiance: [f32; 3],
+    /// 0 to 1.
+    coverage: f32,
+    /// Of the nearest surface, m.
+    depth: f32,
+    /// Depth beyond which it hides everything, m; infinite if it is not fully covered.
+    opaque_depth: f32,
+}
+
+impl Pixel {
+    const EMPTY: Self =
+        Self { radiance: [0.0; 3], coverage: 0.0, depth: f32::INFINITY, opaque_depth: f32::INFINITY };
+}
+
+/// A frame of the obstacles.
+pub(super) struct PreparedSolids {
+    /// The pixels that may show one.
+    rect: Rect,
+    pixels: Vec<Pixel>,
+    opaque_depth: Image<1>,
+}
+
+/// Position of ray `index` within its pixel (Hammersley).
+fn sample_offset(index: usize) -> DVec2 {
+    let reversed = (index as u8).reverse_bits() >> (8 - SAMPLES.ilog2());
+    DVec2::new(index as f64 + 0.5, f64::from(reversed) + 0.5) / SAMPLES as f64
+}
+
+/// Depths that the obstacles fill during an exposure, overlapping ones merged.
+pub(super) fn depth_intervals(solids: &Solids, view: &View) -> Vec<DepthInterval> {
+    let mut depths: Vec<[f64; 2]> = poses(solids, view).iter().flat_map(|pose| pose.depths().collect::<Vec<_>>()).collect();
+    depths.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut intervals: Vec<DepthInterval> = Vec::new();
+    for [near, far] in depths {
+        let far = far.next_up();
+        match intervals.last_mut() {
+            Some(last) if near <= last.far => last.far = last.far.max(far),
+            _ => intervals.push(DepthInterval { near, far }),
+        }
+    }
+    intervals
+}
+
+/// The rectangle of the picture that the poses may cover.
+fn bounds(poses: &[Pose], view: &View) -> Rect {
+    let mut all = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    for pose in poses {
+        let Some([low, high]) = pose.bounds() else { return view.window };
+        all = [all[0].min(low), all[1].max(high)];
+    }
+    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
+    let [left, top] = [clamp(all[0].x.floor(), view.size[0]), clamp(all[0].y.floor(), view.size[1])];
+    let [right, bottom] = [clamp(all[1].x.ceil(), view.size[0]), clamp(all[1].y.ceil(), view.size[1])];
+    let rect =
+        Rect { x: left, y: top, width: right.saturating_sub(left), height: bottom.saturating_sub(top) };
+    rect.intersection(&view.window)
+}
+
+impl PreparedSolids {
+    /// Traces the pixels of the view's window.
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    pub(super) fn new(
+        solids: &Solids,
+        view: &View,
+        surroundings: &Surroundings,
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let poses = poses(solids, view);
+        let rect = bounds(&poses, view);
+        let tracer = Tracer { poses: &poses, shading: Shading::new(surroundings) };
+        let corners = tracer.corners(rect, observer)?;
+        let mut pixels = vec![Pixel::EMPTY; rect.width * rect.height];
+        pixels.par_chunks_mut(rect.width.max(1)).enumerate().try_for_each(|(y, row)| {
+            check(observer)?;
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let first = y * (rect.width + 1) + x;
+                let around = [first, first + 1, first + rect.width + 1, first + rect.width + 2];
+                let position = DVec2::new((rect.x + x) as f64, (rect.y + y) as f64);
+                *pixel = tracer.pixel(position, around.map(|index| &corners[index]));
+            }
+            Ok(())
+        })?;
+        let mut opaque_depth = Image::filled(view.size[0], view.size[1], [f32::INFINITY]);
+        for (y, row) in pixels.chunks(rect.width.max(1)).enumerate() {
+            let out = &mut opaque_depth.row_mut(rect.y + y)[rect.x..rect.right()];
+            out.iter_mut().zip(row).for_each(|(out, pixel)| *out = [pixel.opaque_depth]);
+        }
+        Ok(Self { rect, pixels, opaque_depth })
+    }
+}
+
+/// The surface at a corner of a pixel: index of the solid and normal, at the first and the last time.
+type Corner = [Option<(usize, DVec3)>; 2];
+
+struct Tracer<'a> {
+    poses: &'a [Pose<'a>],
+    shading: Shading<'a>,
+}
+
+impl Tracer<'_> {
+    /// The surfaces at all corners of the pixels of a rectangle, row by row.
+    fn corners(&self, rect: Rect, observer: &dyn Observer) -> Result<Vec<Corner>, Cancelled> {
+        let width = rect.width + 1;
+        let ends = [&self.poses[0], &self.poses[self.poses.len() - 1]];
+        let mut corners = vec![[None; 2]; width * (rect.height + 1)];
+        corners.par_chunks_mut(width).enumerate().try_for_each(|(y, row)| {
+            check(observer)?;
+            for (x, corner) in row.iter_mut().enumerate() {
+                let position = DVec2::new((rect.x + x) as f64, (rect.y + y) as f64);
+                let seen = |pose: &Pose| pose.seen(position).map(|surface| (surface.index, surface.normal));
+                corner[0] = seen(ends[0]);
+                corner[1] = if self.poses.len() > 1 { seen(ends[1]) } else { corner[0] };
+            }
+            Ok(())
+        })?;
+        Ok(corners)
+    }
+
+    /// A pixel from its upper left corner, and the surfaces at its corners.
+    fn pixel(&self, position: DVec2, corners: [&Corner; 4]) -> Pixel {
+        let first = corners[0][0];
+        let alike = |other: &Option<(usize, DVec3)>| match (first, other) {
+            (None, None) => true,
+            (Some((solid, normal)), Some((other, other_normal))) => {
+                solid == *other && normal.dot(*other_normal) > SMOOTH_COS
+            }
+            _ => false,
+        };
+        let middle = &self.poses[self.poses.len() / 2];
+        let center = middle.seen(position + 0.5);
+        let at_center = center.map(|surface| (surface.index, surface.normal));
+        if corners.into_iter().flatten().all(alike) && alike(&at_center) {
+            return center.map_or(Pixel::EMPTY, |surface| self.covered(&surface, middle));
+        }
+        self.supersampled(position)
+    }
+
+    /// A pixel that shows one surface.
+    fn covered(&self, surface: &SurfacePoint, pose: &Pose) -> Pixel {
+        let depth = surface.t as f32;
+        Pixel { radiance: self.shading.radiance(surface, pose), coverage: 1.0, depth, opaque_depth: depth }
+    }
+
+    /// A pixel by many rays, each at its own time.
+    fn supersampled(&self, position: DVec2) -> Pixel {
+        let mut pixel = Pixel { opaque_depth: 0.0, ..Pixel::EMPTY };
+        for index in 0..SAMPLES {
+            // The times are in another order than the columns, so that motion does not shear an edge.
+            let pose = &self.poses[(index * 7 % SAMPLES) * self.poses.len() / SAMPLES];
+            let Some(surface) = pose.seen(position + sample_offset(index)) else { continue };
+            let radiance = self.shading.radiance(&surface, pose);
+            (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * (1.0 / SAMPLES as f32));
+            pixel.coverage += 1.0 / SAMPLES as f32;
+            pixel.depth = pixel.depth.min(surface.t as f32);
+            pixel.opaque_depth = pixel.opaque_depth.max(surface.t as f32);
+        }
+        let is_covered = pixel.coverage == 1.0;
+        Pixel { opaque_depth: if is_covered { pixel.opaque_depth } else { f32::INFINITY }, ..pixel }
+    }
+}
+
+impl Prepared for PreparedSolids {
+    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+        self.rect
+    }
+
+    fn opaque_depth(&self) -> Option<&Image<1>> {
+        Some(&self.opaque_depth)
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let touched = self.rect.intersection(&strip.rect);
+        for y in touched.y..touched.bottom() {
+            for x in touched.x..touched.right() {
+                let pixel = &self.pixels[(y - self.rect.y) * self.rect.width + x - self.rect.x];
+                let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                let is_drawn = pixel.coverage > 0.0 && slice.contains(f64::from(pixel.depth));
+                if is_drawn && strip.visible(index, pixel.depth) {
+                    strip.add_behind(index, pixel.radiance, [1.0 - pixel.coverage; 3], pixel.depth);
+                }
+            }
+        }
+    }
+}
