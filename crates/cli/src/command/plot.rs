@@ -20,7 +20,7 @@ use bansho::{
 use crate::{
     args::{Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
-    plot::{PlotError, aurora, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves},
+    plot::{PlotError, aurora, beam, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves},
 };
 
 /// Plots what is asked for.
@@ -40,6 +40,11 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
         PlotCommand::StreakOpacity(args) => {
             let Numbers(times) = &args.exposure_times;
             finish("streak-opacity", &rain::streak_opacity(times, args.terminal_velocity), &args.output, &[])
+        }
+        PlotCommand::Beam(args) => {
+            let Numbers(rates) = &args.rates;
+            let cones = [args.inner_cone_deg, args.outer_cone_deg];
+            finish("beam", &beam::figure(args.intensity, cones, rates)?, &args.output, &[])
         }
         PlotCommand::Emission(args) => {
             let figure = aurora::emission(args.energy_ev, args.flux_mw_per_m2, args.spectrum);

@@ -1,9 +1,10 @@
 //! `bansho plot`: figures of what the models compute.
 //!
-//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`] and [`metadata`] make one
+//! [`figure`] describes a figure as plain data; [`black_body`], [`rain`], [`beam`], [`aurora`], [`parameters`], [`transfer_curves`] and [`metadata`] make one
 //! from the library's own functions. [`draw`] lays a figure out on a [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
+pub(crate) mod beam;
 pub(crate) mod black_body;
 mod canvas;
 pub(crate) mod csv;
@@ -34,6 +35,9 @@ pub(crate) enum PlotError {
         to: f64,
         unit: &'static str,
     },
+    /// A cone that ends before it begins to.
+    #[error("--inner-cone-deg: full intensity up to {inner} degrees cannot end at {outer}; allowed: up to --outer-cone-deg")]
+    Cones { inner: f64, outer: f64 },
     /// More rows than a table may have.
     #[error("{option}: the table would have {rows} rows; allowed: up to {most}")]
     Rows {

@@ -189,7 +189,7 @@ fn metadata_are_plotted_over_the_frames() {
 fn figures_have_axes_colors_and_the_same_bytes_every_time() {
     let folder = Folder::new();
     for name in
-        ["black-body", "drop-sizes", "terminal-velocity", "streak-opacity", "emission", "deposition", "quenching"]
+        ["black-body", "drop-sizes", "terminal-velocity", "streak-opacity", "beam", "emission", "deposition", "quenching"]
     {
         for extension in ["svg", "png", "csv"] {
             let file = format!("{name}.{extension}");
@@ -210,6 +210,8 @@ fn figures_have_axes_colors_and_the_same_bytes_every_time() {
         ("drop-sizes", "Number density n(D) (m⁻³ mm⁻¹)"),
         ("terminal-velocity", "Terminal velocity v (m/s)"),
         ("streak-opacity", "Drop diameter D (mm)"),
+        ("beam", "Illuminance E (lx)"),
+        ("beam", "Angle from the axis (°)"),
         ("emission", "Altitude (km)"),
         ("deposition", "Ionization rate q (m⁻³ s⁻¹)"),
         ("quenching", "Radiated fraction"),
@@ -244,6 +246,9 @@ fn what_cannot_be_plotted_is_one_clear_error() {
         (&["black-body", "--step", "0.01", "--from", "nan"], "allowed: a number"),
         (&["drop-sizes", "--rates", "5,-1"], "each from 0.01 to 500 mm/h"),
         (&["streak-opacity", "--exposure-times", "1/0"], "each from 0.000001 to 10 s"),
+        (&["beam", "--intensity", "-3"], "allowed: a number from 0.001 to 1000000000 cd"),
+        (&["beam", "--inner-cone-deg", "40"], "--inner-cone-deg: full intensity up to 40 degrees cannot end at 22"),
+        (&["beam", "--rates", "5,-1"], "each from 0 to 500 mm/h"),
         (&["emission", "--energy-ev", "10"], "allowed: a number from 100 to 100000 eV"),
         (&["emission", "--flux-mw-per-m2", "-5"], "allowed: a number from 0.001 to 10000 mW/m^2"),
         (&["emission", "--spectrum", "maxwelian"], "a similar value exists: 'maxwellian'"),

@@ -183,7 +183,7 @@ mod tests {
             for j in 0..2 * steps {
                 let first = vertices.len() as u32;
                 vertices.extend([vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1), vertex(i + 1, j)]);
-                indices.extend([[first, first + 2, first + 1], [first, first + 3, first + 2]]);
+                indices.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
             }
         }
         Mesh::new(vertices, indices).unwrap()
