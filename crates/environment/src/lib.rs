@@ -5,5 +5,6 @@
 
 pub mod ground;
 pub mod lamps;
+mod shadow;
 pub mod sky;
 pub mod solids;

@@ -119,6 +119,11 @@ impl TriangleBvh {
         self.split(first + half, end);
     }
 
+    /// Minimum and maximum corner of its bounding box.
+    pub(super) fn bounds(&self) -> [DVec3; 2] {
+        self.nodes.first().map_or([DVec3::ZERO; 2], |node| [node.low, node.high])
+    }
+
     /// Where a ray first meets the mesh between two distances.
     pub(super) fn intersect(&self, ray: &Ray, [from, mut to]: [f64; 2]) -> Option<Hit> {
         // No component of the direction is 0, so that slabs give no NaN.

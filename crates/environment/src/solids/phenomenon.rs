@@ -32,9 +32,10 @@ impl Phenomenon for Solids {
 }
 
 impl Run for Solids {
-    /// The solids belong to the scene, so all phenomena have them already.
-    fn publish(&self, _shutter: Shutter) -> Publication {
-        Publication::default()
+    /// The solids themselves belong to the scene, so all phenomena have them already.
+    fn publish(&self, shutter: Shutter) -> Publication {
+        let shadow_casters = self.solids.iter().map(|solid| solid.obstacle.at(shutter.middle())).collect();
+        Publication { shadow_casters, ..Publication::default() }
     }
 
     fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

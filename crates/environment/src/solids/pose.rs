@@ -47,14 +47,15 @@ pub(super) struct SurfacePoint<'a> {
     pub(super) normal: DVec3,
 }
 
-/// The poses of an exposure, evenly spaced in time: one if nothing moves in the picture.
-pub(super) fn poses<'a>(solids: &'a Solids, view: &View) -> Vec<Pose<'a>> {
+/// The poses of an exposure, evenly spaced in time: one if nothing moves in the picture. And which of the obstacles move.
+pub(super) fn poses<'a>(solids: &'a Solids, view: &View) -> (Vec<Pose<'a>>, Vec<bool>) {
     let at = |t: f64| Pose::new(solids, view, t);
     let [open, close] = [view.shutter.open, view.shutter.close].map(at);
-    if open.motion_pixels(&close) < MIN_MOTION_PIXELS {
-        return vec![at(view.shutter.middle())];
+    let moves: Vec<bool> = open.motion_pixels(&close).into_iter().map(|pixels| pixels >= MIN_MOTION_PIXELS).collect();
+    if !moves.contains(&true) {
+        return (vec![at(view.shutter.middle())], moves);
     }
-    (0..MAX_TIME_SAMPLES).map(|index| at(view.shutter.instant(index, MAX_TIME_SAMPLES))).collect()
+    ((0..MAX_TIME_SAMPLES).map(|index| at(view.shutter.instant(index, MAX_TIME_SAMPLES))).collect(), moves)
 }
 
 impl<'a> Pose<'a> {
@@ -71,19 +72,18 @@ impl<'a> Pose<'a> {
         }
     }
 
-    /// Largest motion of the obstacles in the picture from this pose to another one, pixels.
-    fn motion_pixels(&self, other: &Self) -> f64 {
+    /// Largest motion of each obstacle in the picture from this pose to another one, pixels.
+    fn motion_pixels(&self, other: &Self) -> Vec<f64> {
         let pairs = self.solids.iter().zip(&other.solids);
         let motion = |(before, after): (&PlacedSolid, &PlacedSolid)| {
-            // Two points, so that a rotation counts.
-            let ends = [DVec3::ZERO, DVec3::splat(0.58 * before.radius / before.placement.scale)].map(|local| {
-                let at = |pose: &Self, placed: &PlacedSolid| pose.camera.project(placed.placement.point_in_world(local));
-                let [before, after] = [at(self, before), at(other, after)];
-                before.zip(after).map_or(MIN_MOTION_PIXELS, |(a, b)| (a.pixel - b.pixel).length())
+            let ends = before.corners().into_iter().zip(after.corners());
+            let each = ends.map(|(before, after)| {
+                let pair = self.camera.project(before).zip(other.camera.project(after));
+                pair.map_or(MIN_MOTION_PIXELS, |(a, b)| (a.pixel - b.pixel).length())
             });
-            ends[0].max(ends[1])
+            each.fold(0.0, f64::max)
         };
-        pairs.map(motion).fold(0.0, f64::max)
+        pairs.map(motion).collect()
     }
 
     /// Nearest and farthest depth of each obstacle in front of the camera, m.
@@ -96,22 +96,22 @@ impl<'a> Pose<'a> {
         depths.filter(move |[_, far]| *far > near)
     }
 
-    /// Corners of the rectangle of the picture that the obstacles may cover, pixels; `None` if an obstacle surrounds the camera's plane.
-    pub(super) fn bounds(&self) -> Option<[DVec2; 2]> {
-        let mut all = [DVec2::INFINITY, DVec2::NEG_INFINITY];
-        for placed in &self.solids {
-            let middle = self.camera.depth(placed.center);
-            if middle < -placed.radius {
-                continue;
+    /// Corners of the rectangle of the picture that each obstacle may cover, pixels; all of it if a part of the obstacle is beside or behind the camera.
+    pub(super) fn bounds(&self) -> Vec<[DVec2; 2]> {
+        const ALL: [DVec2; 2] = [DVec2::NEG_INFINITY, DVec2::INFINITY];
+        const NONE: [DVec2; 2] = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        let bounds = |placed: &PlacedSolid| {
+            if self.camera.depth(placed.center) < -placed.radius {
+                return NONE;
             }
-            let center = self.camera.project(placed.center)?;
-            // Of a sphere off the axis, the picture is longer by the tangent of its angle; half of it is ample for a field of view of 100 degrees.
-            let off_axis = 1.0 + (center.pixel - self.camera.principal_point).length() / self.camera.focal_pixels;
-            let nearest = (middle - placed.radius).max(0.1 * placed.radius);
-            let reach = DVec2::splat(off_axis * self.camera.focal_pixels * placed.radius / nearest + 2.0);
-            all = [all[0].min(center.pixel - reach), all[1].max(center.pixel + reach)];
-        }
-        Some(all)
+            let mut bounds = NONE;
+            for corner in placed.corners() {
+                let Some(projection) = self.camera.project(corner) else { return ALL };
+                bounds = [bounds[0].min(projection.pixel - 1.0), bounds[1].max(projection.pixel + 1.0)];
+            }
+            bounds
+        };
+        self.solids.iter().map(bounds).collect()
     }
 
     /// The first surface that a ray meets between two distances.
@@ -152,6 +152,27 @@ impl<'a> Pose<'a> {
 }
 
 impl PlacedSolid<'_> {
+    /// Corners of its bounding box.
+    fn corners(&self) -> [DVec3; 8] {
+        let parameters = self.solid.obstacle.parameters();
+        let [low, high] = match (&self.solid.triangles, parameters.shape) {
+            (Some(triangles), _) => triangles.bounds(),
+            (None, shape) => {
+                let radius = parameters.radius;
+                let half = match shape {
+                    ObstacleShape::Box => 0.5 * DVec3::from(parameters.size),
+                    ObstacleShape::Cylinder => DVec3::new(radius, 0.5 * parameters.height, radius),
+                    _ => DVec3::splat(radius),
+                };
+                [-half, half]
+            }
+        };
+        std::array::from_fn(|index| {
+            let pick = |axis: usize| if index >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            self.placement.point_in_world(DVec3::new(pick(0), pick(1), pick(2)))
+        })
+    }
+
     fn intersect(&self, ray: &Ray, limits: [f64; 2]) -> Option<Hit> {
         let back = self.placement.rotation.inverse();
         let local = Ray {

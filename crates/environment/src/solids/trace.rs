@@ -57,7 +57,8 @@ fn sample_offset(index: usize) -> DVec2 {
 
 /// Depths that the obstacles fill during an exposure, overlapping ones merged.
 pub(super) fn depth_intervals(solids: &Solids, view: &View) -> Vec<DepthInterval> {
-    let mut depths: Vec<[f64; 2]> = poses(solids, view).iter().flat_map(|pose| pose.depths().collect::<Vec<_>>()).collect();
+    let (poses, _) = poses(solids, view);
+    let mut depths: Vec<[f64; 2]> = poses.iter().flat_map(|pose| pose.depths().collect::<Vec<_>>()).collect();
     depths.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut intervals: Vec<DepthInterval> = Vec::new();
     for [near, far] in depths {
@@ -70,19 +71,25 @@ pub(super) fn depth_intervals(solids: &Solids, view: &View) -> Vec<DepthInterval
     intervals
 }
 
-/// The rectangle of the picture that the poses may cover.
-fn bounds(poses: &[Pose], view: &View) -> Rect {
-    let mut all = [DVec2::INFINITY, DVec2::NEG_INFINITY];
-    for pose in poses {
-        let Some([low, high]) = pose.bounds() else { return view.window };
-        all = [all[0].min(low), all[1].max(high)];
+/// The rectangle of the picture that each obstacle may cover in any of the poses.
+fn bounds(poses: &[Pose], view: &View) -> Vec<Rect> {
+    let mut all = poses[0].bounds();
+    for pose in &poses[1..] {
+        all.iter_mut().zip(pose.bounds()).for_each(|(all, one)| *all = [all[0].min(one[0]), all[1].max(one[1])]);
     }
     let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-    let [left, top] = [clamp(all[0].x.floor(), view.size[0]), clamp(all[0].y.floor(), view.size[1])];
-    let [right, bottom] = [clamp(all[1].x.ceil(), view.size[0]), clamp(all[1].y.ceil(), view.size[1])];
-    let rect =
-        Rect { x: left, y: top, width: right.saturating_sub(left), height: bottom.saturating_sub(top) };
-    rect.intersection(&view.window)
+    let rect = |[low, high]: [DVec2; 2]| {
+        let [x, y] = [clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1])];
+        let [right, bottom] = [clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1])];
+        let rect = Rect { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) };
+        rect.intersection(&view.window)
+    };
+    all.into_iter().map(rect).collect()
+}
+
+/// Whether a pixel is in one of some rectangles.
+fn is_in_any(rects: &[Rect], x: usize, y: usize) -> bool {
+    rects.iter().any(|rect| (rect.x..rect.right()).contains(&x) && (rect.y..rect.bottom()).contains(&y))
 }
 
 impl PreparedSolids {
@@ -96,9 +103,11 @@ impl PreparedSolids {
         surroundings: &Surroundings,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
-        let poses = poses(solids, view);
-        let rect = bounds(&poses, view);
-        let tracer = Tracer { poses: &poses, shading: Shading::new(surroundings) };
+        let (poses, moves) = poses(solids, view);
+        let rects = bounds(&poses, view);
+        let rect = rects.iter().fold(Rect::default(), |all, rect| all.union(rect));
+        let moving: Vec<Rect> = rects.iter().zip(moves).filter(|(_, moves)| *moves).map(|(rect, _)| *rect).collect();
+        let tracer = Tracer { poses: &poses, shading: Shading::new(surroundings), rects: &rects, moving: &moving };
         let corners = tracer.corners(rect, observer)?;
         let mut pixels = vec![Pixel::EMPTY; rect.width * rect.height];
         pixels.par_chunks_mut(rect.width.max(1)).enumerate().try_for_each(|(y, row)| {
@@ -106,8 +115,7 @@ impl PreparedSolids {
             for (x, pixel) in row.iter_mut().enumerate() {
                 let first = y * (rect.width + 1) + x;
                 let around = [first, first + 1, first + rect.width + 1, first + rect.width + 2];
-                let position = DVec2::new((rect.x + x) as f64, (rect.y + y) as f64);
-                *pixel = tracer.pixel(position, around.map(|index| &corners[index]));
+                *pixel = tracer.pixel([rect.x + x, rect.y + y], around.map(|index| corners[index]));
             }
             Ok(())
         })?;
@@ -120,50 +128,69 @@ impl PreparedSolids {
     }
 }
 
-/// The surface at a corner of a pixel: index of the solid and normal, at the first and the last time.
-type Corner = [Option<(usize, DVec3)>; 2];
+/// The surface at a corner of a pixel: index of the solid and normal.
+type Corner = Option<(usize, DVec3)>;
 
 struct Tracer<'a> {
     poses: &'a [Pose<'a>],
     shading: Shading<'a>,
+    /// The pixels of each obstacle.
+    rects: &'a [Rect],
+    /// Those of each obstacle that moves in the picture.
+    moving: &'a [Rect],
+}
+
+/// Whether two corners show one smooth surface, or both nothing.
+fn is_smooth(a: Corner, b: Corner) -> bool {
+    match (a, b) {
+        (None, None) => true,
+        (Some((solid, normal)), Some((other, other_normal))) => solid == other && normal.dot(other_normal) > SMOOTH_COS,
+        _ => false,
+    }
 }
 
 impl Tracer<'_> {
-    /// The surfaces at all corners of the pixels of a rectangle, row by row.
+    /// The pose in the middle of the exposure.
+    fn middle(&self) -> &Pose<'_> {
+        &self.poses[self.poses.len() / 2]
+    }
+
+    /// The surfaces at all corners of the pixels of a rectangle in the middle of the exposure, row by row.
     fn corners(&self, rect: Rect, observer: &dyn Observer) -> Result<Vec<Corner>, Cancelled> {
         let width = rect.width + 1;
-        let ends = [&self.poses[0], &self.poses[self.poses.len() - 1]];
-        let mut corners = vec![[None; 2]; width * (rect.height + 1)];
+        let mut corners = vec![None; width * (rect.height + 1)];
         corners.par_chunks_mut(width).enumerate().try_for_each(|(y, row)| {
             check(observer)?;
             for (x, corner) in row.iter_mut().enumerate() {
-                let position = DVec2::new((rect.x + x) as f64, (rect.y + y) as f64);
-                let seen = |pose: &Pose| pose.seen(position).map(|surface| (surface.index, surface.normal));
-                corner[0] = seen(ends[0]);
-                corner[1] = if self.poses.len() > 1 { seen(ends[1]) } else { corner[0] };
+                let [x, y] = [rect.x + x, rect.y + y];
+                // A corner belongs to four pixels.
+                let is_near = [[x, y], [x.saturating_sub(1), y.saturating_sub(1)], [x, y.saturating_sub(1)], [x.saturating_sub(1), y]]
+                    .into_iter()
+                    .any(|[x, y]| is_in_any(self.rects, x, y));
+                if is_near {
+                    let seen = self.middle().seen(DVec2::new(x as f64, y as f64));
+                    *corner = seen.map(|surface| (surface.index, surface.normal));
+                }
             }
             Ok(())
         })?;
         Ok(corners)
     }
 
-    /// A pixel from its upper left corner, and the surfaces at its corners.
-    fn pixel(&self, position: DVec2, corners: [&Corner; 4]) -> Pixel {
-        let first = corners[0][0];
-        let alike = |other: &Option<(usize, DVec3)>| match (first, other) {
-            (None, None) => true,
-            (Some((solid, normal)), Some((other, other_normal))) => {
-                solid == *other && normal.dot(*other_normal) > SMOOTH_COS
-            }
-            _ => false,
-        };
-        let middle = &self.poses[self.poses.len() / 2];
-        let center = middle.seen(position + 0.5);
-        let at_center = center.map(|surface| (surface.index, surface.normal));
-        if corners.into_iter().flatten().all(alike) && alike(&at_center) {
-            return center.map_or(Pixel::EMPTY, |surface| self.covered(&surface, middle));
+    /// A pixel, with the surfaces at its corners.
+    fn pixel(&self, [x, y]: [usize; 2], corners: [Corner; 4]) -> Pixel {
+        if !is_in_any(self.rects, x, y) {
+            return Pixel::EMPTY;
         }
-        self.supersampled(position)
+        let position = DVec2::new(x as f64, y as f64);
+        if is_in_any(self.moving, x, y) || corners.iter().any(|corner| !is_smooth(corners[0], *corner)) {
+            return self.supersampled(position);
+        }
+        let center = self.middle().seen(position + 0.5);
+        if !is_smooth(corners[0], center.map(|surface| (surface.index, surface.normal))) {
+            return self.supersampled(position);
+        }
+        center.map_or(Pixel::EMPTY, |surface| self.covered(&surface, self.middle()))
     }
 
     /// A pixel that shows one surface.
@@ -172,15 +199,23 @@ impl Tracer<'_> {
         Pixel { radiance: self.shading.radiance(surface, pose), coverage: 1.0, depth, opaque_depth: depth }
     }
 
-    /// A pixel by many rays, each at its own time.
+    /// A pixel by many rays, each at its own time. Where they all meet one smooth surface, it is shaded once.
     fn supersampled(&self, position: DVec2) -> Pixel {
-        let mut pixel = Pixel { opaque_depth: 0.0, ..Pixel::EMPTY };
-        for index in 0..SAMPLES {
+        let sample = |index: usize| {
             // The times are in another order than the columns, so that motion does not shear an edge.
             let pose = &self.poses[(index * 7 % SAMPLES) * self.poses.len() / SAMPLES];
-            let Some(surface) = pose.seen(position + sample_offset(index)) else { continue };
-            let radiance = self.shading.radiance(&surface, pose);
-            (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * (1.0 / SAMPLES as f32));
+            pose.seen(position + sample_offset(index)).map(|surface| (surface, pose))
+        };
+        let samples: [Option<(SurfacePoint, &Pose)>; SAMPLES] = std::array::from_fn(sample);
+        let corner = |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
+        let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)));
+        let mut pixel = Pixel { opaque_depth: 0.0, ..Pixel::EMPTY };
+        for (index, (surface, pose)) in samples.iter().flatten().enumerate() {
+            if !is_one || index == 0 {
+                let weight = if is_one { 1.0 } else { 1.0 / SAMPLES as f32 };
+                let radiance = self.shading.radiance(surface, pose);
+                (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * weight);
+            }
             pixel.coverage += 1.0 / SAMPLES as f32;
             pixel.depth = pixel.depth.min(surface.t as f32);
             pixel.opaque_depth = pixel.opaque_depth.max(surface.t as f32);

@@ -6,7 +6,7 @@ use bansho_base::{
     image::Rect,
     math::{DVec2, DVec3},
     phenomenon::{
-        strip::{DepthInterval, Strip, View},
+        strip::{DepthInterval, GrayPlanes, Strip, View},
         surroundings::Light,
     },
 };
@@ -156,22 +156,26 @@ impl<'a> TexturedBillboards<'a> {
         }
         let pixel = |index: usize| {
             let [x, y] = [rect.x + index % rect.width, rect.y + index / rect.width];
-            self.view.camera.direction(DVec2::new(x as f64, y as f64) + 0.5).unwrap_or(DVec3::ZERO)
+            let direction = self.view.camera.direction(DVec2::new(x as f64, y as f64) + 0.5);
+            direction.unwrap_or(DVec3::ZERO).as_vec3().to_array()
         };
-        let directions: Vec<DVec3> = (0..strip.len()).map(pixel).collect();
+        let directions: Vec<[f32; 3]> = (0..strip.len()).map(pixel).collect();
         let mut aovs = std::mem::take(&mut strip.aovs);
-        for quad in quads {
-            let touched = quad.bounds.intersection(&rect);
-            let plane = self.plane(quad);
-            for y in touched.y..touched.bottom() {
-                for x in touched.x..touched.right() {
-                    let index = (y - rect.y) * rect.width + x - rect.x;
-                    let Some((position, depth)) = plane.hit(directions[index]) else { continue };
-                    let opacity = (quad.texture.sample(quad.level, position) * self.opacity_of_code).min(1.0);
-                    if opacity > 0.0 && strip.visible(index, depth) {
-                        let light = interpolated(&quad.radiance, position).map(|light| light * opacity);
-                        strip.add_behind(index, light, [1.0 - opacity; 3], depth);
-                        write_aovs(&mut aovs, index, opacity, depth, quad.diameter_mm);
+        // Only rain draws into its strip, and its transmittance is the same for all colors.
+        if let Some(mut planes) = strip.gray_planes_mut() {
+            for quad in quads {
+                let touched = quad.bounds.intersection(&rect);
+                let plane = self.plane(quad);
+                for y in touched.y..touched.bottom() {
+                    let first = (y - rect.y) * rect.width + touched.x - rect.x;
+                    for (index, direction) in (first..).zip(&directions[first..first + touched.width]) {
+                        let Some((position, depth)) = plane.hit(*direction) else { continue };
+                        let code = quad.texture.sample(quad.level, position);
+                        if code > 0.0 && planes.plate_depth.get(index).is_none_or(|plate| depth < *plate) {
+                            let opacity = (code * self.opacity_of_code).min(1.0);
+                            composite_under(&mut planes, index, interpolated(&quad.radiance, position), opacity, depth);
+                            write_aovs(&mut aovs, index, opacity, depth, quad.diameter_mm);
+                        }
                     }
                 }
             }
@@ -184,46 +188,62 @@ impl<'a> TexturedBillboards<'a> {
         let (right, offset) = (quad.right, quad.center - eye);
         let normal = right.cross(DVec3::Y);
         QuadPlane {
-            normal,
-            right,
-            distance: offset.dot(normal),
-            across: 0.5 - offset.dot(right) / VOXEL,
-            up: 0.5 - offset.y / VOXEL,
-            lowest: (self.ground - (quad.center.y - 0.5 * VOXEL)) / VOXEL,
-            near: self.view.camera.near,
+            normal: [normal.x as f32, normal.z as f32],
+            right: [(right.x / VOXEL) as f32, (right.z / VOXEL) as f32],
+            distance: offset.dot(normal) as f32,
+            across: (0.5 - offset.dot(right) / VOXEL) as f32,
+            up: (0.5 - offset.y / VOXEL) as f32,
+            lowest: ((self.ground - (quad.center.y - 0.5 * VOXEL)) / VOXEL).max(0.0) as f32,
+            near: self.view.camera.near as f32,
         }
     }
 }
 
-/// The plane of a billboard, relative to the camera.
+/// `L += T a l; T -= T a`.
+fn composite_under(planes: &mut GrayPlanes, index: usize, light: [f32; 3], opacity: f32, depth: f32) {
+    let blocked = planes.transmittance[index] * opacity;
+    for (plane, light) in planes.radiance.iter_mut().zip(light) {
+        plane[index] += blocked * light;
+    }
+    planes.transmittance[index] -= blocked;
+    planes.depth[index] = planes.depth[index].min(depth);
+}
+
+/// The plane of a billboard, relative to the camera. It is vertical, so directions have two components, x and z.
 struct QuadPlane {
-    normal: DVec3,
-    right: DVec3,
+    normal: [f32; 2],
+    /// Unit vector across it, over its width.
+    right: [f32; 2],
     /// Of the camera along the normal, m.
-    distance: f64,
+    distance: f32,
     /// Position of the camera's own perpendicular on the billboard, 0 to 1.
-    across: f64,
-    up: f64,
+    across: f32,
+    up: f32,
     /// Position of the ground on the billboard.
-    lowest: f64,
-    near: f64,
+    lowest: f32,
+    near: f32,
 }
 
 impl QuadPlane {
     /// Where a line of sight meets the billboard, from its lower left corner (0 to 1), and the depth there, m.
-    fn hit(&self, direction: DVec3) -> Option<([f32; 2], f32)> {
-        let t = self.distance / direction.dot(self.normal);
-        if t.is_nan() || t < self.near {
-            return None;
-        }
-        let (u, v) = (self.across + t * direction.dot(self.right) / VOXEL, self.up + t * direction.y / VOXEL);
-        let is_inside = (0.0..1.0).contains(&u) && (self.lowest.max(0.0)..1.0).contains(&v);
-        is_inside.then_some(([u as f32, v as f32], t as f32))
+    #[inline(always)]
+    fn hit(&self, [x, y, z]: [f32; 3]) -> Option<([f32; 2], f32)> {
+        let t = self.distance / (x * self.normal[0] + z * self.normal[1]);
+        let u = self.across + t * (x * self.right[0] + z * self.right[1]);
+        let v = self.up + t * y * (1.0 / VOXEL as f32);
+        // Comparisons with NaN are false.
+        let is_inside = t >= self.near && u >= 0.0 && u < 1.0 && v >= self.lowest && v < 1.0;
+        is_inside.then_some(([u, v], t))
     }
 }
 
 /// Bilinear interpolation of the colors of the corners.
+#[inline(always)]
 pub(super) fn interpolated(corners: &[[f32; 3]; 4], [u, v]: [f32; 2]) -> [f32; 3] {
     let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-    [0, 1, 2].map(|c| corners.iter().zip(weights).map(|(corner, weight)| corner[c] * weight).sum())
+    let mut color = [0.0; 3];
+    for (corner, weight) in corners.iter().zip(weights) {
+        (0..3).for_each(|c| color[c] += corner[c] * weight);
+    }
+    color
 }

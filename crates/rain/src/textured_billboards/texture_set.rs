@@ -109,20 +109,27 @@ impl Texture {
     }
 
     /// The code at a position from the lower left corner (0 to 1), bilinear within a mipmap; the texture repeats.
+    #[inline(always)]
     pub(crate) fn sample(&self, level: usize, [u, v]: [f32; 2]) -> f32 {
+        // Sides are powers of two.
         let side = self.size >> level;
-        let (x, y) = (u * side as f32 - 0.5, (1.0 - v) * side as f32 - 0.5);
-        let (column, row) = (x.floor(), y.floor());
-        let (across, down) = (x - column, y - row);
-        let wrap = |index: i32| index.rem_euclid(side as i32) as usize;
-        let [left, right] = [0, 1].map(|step| wrap(column as i32 + step));
-        let [above, below] = [0, 1].map(|step| wrap(row as i32 + step) * side);
-        let at = |index: usize| match level.checked_sub(1) {
-            None => f32::from(self.codes[index]),
-            Some(mipmap) => f32::from(self.mipmaps[mipmap][index]) * (1.0 / 256.0),
-        };
-        let upper = at(above + left) * (1.0 - across) + at(above + right) * across;
-        let lower = at(below + left) * (1.0 - across) + at(below + right) * across;
-        upper * (1.0 - down) + lower * down
+        let (x, y) = (u * side as f32 + (side as f32 - 0.5), (1.0 - v) * side as f32 + (side as f32 - 0.5));
+        let (column, row) = (x as i32 as usize, y as i32 as usize);
+        let (across, down) = (x - column as i32 as f32, y - row as i32 as f32);
+        let mask = side - 1;
+        let (left, right) = (column & mask, (column + 1) & mask);
+        let (above, below) = ((row & mask) * side, ((row + 1) & mask) * side);
+        let corners = [above + left, above + right, below + left, below + right];
+        let mut values = [0.0; 4];
+        match level.checked_sub(1) {
+            None => (0..4).for_each(|i| values[i] = f32::from(self.codes[corners[i]])),
+            Some(mipmap) => {
+                let codes = &self.mipmaps[mipmap];
+                (0..4).for_each(|i| values[i] = f32::from(codes[corners[i]]) * (1.0 / 256.0));
+            }
+        }
+        let upper = values[0] + (values[1] - values[0]) * across;
+        let lower = values[2] + (values[3] - values[2]) * across;
+        upper + (lower - upper) * down
     }
 }

@@ -1,6 +1,6 @@
-"""Writes the car of the scenes beside this folder: car_body.glb, car_glass.glb, car_trim.glb and car_metal.glb.
+"""Writes the meshes of the scenes beside this folder: a car (car_body.glb, car_glass.glb, car_trim.glb, car_metal.glb) and lamp_post.glb.
 
-The car is 4.3 m long and stands at the origin, its front toward +x, y up. Each file is one glTF mesh without materials, since the color of an
+The car is 4.3 m long and stands at the origin, its front toward +x, y up. The post is 5.4 m high; its arm reaches 1.3 m toward +z. Each file is one glTF mesh without materials, since the color of an
 obstacle is a parameter of the scene: `python3 make_car.py`.
 """
 
@@ -227,7 +227,37 @@ def metal():
     return first.joined(*others)
 
 
+def lamp_post():
+    """A tapered post with a foot, a curved arm and a flat head."""
+    steps = 20
+
+    def tube(path, radii):
+        """A tube along points in the plane of y and z."""
+        rings = []
+        for i, (y, z) in enumerate(path):
+            (y0, z0), (y1, z1) = path[max(i - 1, 0)], path[min(i + 1, len(path) - 1)]
+            length = math.hypot(y1 - y0, z1 - z0)
+            up, out = (z1 - z0) / length, (y1 - y0) / length
+            ring = []
+            for j in range(steps):
+                c, s = math.cos(2 * math.pi * j / steps), math.sin(2 * math.pi * j / steps)
+                ring.append((radii[i] * c, y - radii[i] * s * up, z + radii[i] * s * out))
+            rings.append(ring)
+        mesh = Mesh()
+        mesh.loft(rings)
+        return mesh.outward()
+
+    foot = tube([(0.0, 0.0), (0.9, 0.0), (0.95, 0.0), (1.0, 0.0)], [0.11, 0.11, 0.09, 0.062])
+    bend = [(5.0 + 0.4 * math.sin(a), 0.4 - 0.4 * math.cos(a)) for a in (math.pi / 2 * i / 8 for i in range(9))]
+    path = [(0.98, 0.0), (3.0, 0.0)] + bend + [(5.42, 1.0)]
+    radii = [0.06, 0.05] + [0.042 - 0.008 * i / 8 for i in range(9)] + [0.034]
+    head = Mesh()
+    head.box((0.0, 5.43, 1.22), (0.12, 0.05, 0.3), 0.03)
+    return foot.joined(tube(path, radii), head.outward())
+
+
 body().write("car_body.glb")
 glass().write("car_glass.glb")
 trim().write("car_trim.glb")
 metal().write("car_metal.glb")
+lamp_post().write("lamp_post.glb")
