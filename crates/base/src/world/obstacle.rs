@@ -135,7 +135,9 @@ impl Obstacle {
             (ObstacleShape::Plane, None) => {
                 Occluder::HalfSpace { point: center, normal: placement.direction_in_world(DVec3::Y) }
             }
-            (ObstacleShape::Sphere | ObstacleShape::Mesh, None) => Occluder::Sphere { center, radius: parameters.radius },
+            (ObstacleShape::Sphere | ObstacleShape::Mesh, None) => {
+                Occluder::Sphere { center, radius: parameters.radius }
+            }
         }
     }
 }

@@ -20,7 +20,9 @@ use bansho::{
 use crate::{
     args::{Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
-    plot::{PlotError, aurora, beam, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves},
+    plot::{
+        PlotError, aurora, beam, black_body, csv, draw, figure::Figure, metadata, parameters, rain, transfer_curves,
+    },
 };
 
 /// Plots what is asked for.

@@ -36,7 +36,9 @@ pub(crate) enum PlotError {
         unit: &'static str,
     },
     /// A cone that ends before it begins to.
-    #[error("--inner-cone-deg: full intensity up to {inner} degrees cannot end at {outer}; allowed: up to --outer-cone-deg")]
+    #[error(
+        "--inner-cone-deg: full intensity up to {inner} degrees cannot end at {outer}; allowed: up to --outer-cone-deg"
+    )]
     Cones { inner: f64, outer: f64 },
     /// More rows than a table may have.
     #[error("{option}: the table would have {rows} rows; allowed: up to {most}")]

@@ -188,9 +188,16 @@ fn metadata_are_plotted_over_the_frames() {
 #[test]
 fn figures_have_axes_colors_and_the_same_bytes_every_time() {
     let folder = Folder::new();
-    for name in
-        ["black-body", "drop-sizes", "terminal-velocity", "streak-opacity", "beam", "emission", "deposition", "quenching"]
-    {
+    for name in [
+        "black-body",
+        "drop-sizes",
+        "terminal-velocity",
+        "streak-opacity",
+        "beam",
+        "emission",
+        "deposition",
+        "quenching",
+    ] {
         for extension in ["svg", "png", "csv"] {
             let file = format!("{name}.{extension}");
             let made = || {

@@ -65,7 +65,10 @@ impl Triangle {
 
     fn bounds(&self) -> [DVec3; 2] {
         let corners = [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]];
-        [corners.into_iter().fold(DVec3::INFINITY, DVec3::min), corners.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max)]
+        [
+            corners.into_iter().fold(DVec3::INFINITY, DVec3::min),
+            corners.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max),
+        ]
     }
 }
 

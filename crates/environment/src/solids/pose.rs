@@ -65,11 +65,7 @@ impl<'a> Pose<'a> {
             let (center, radius) = bounds.unwrap_or((placement.position, f64::INFINITY));
             PlacedSolid { solid, placement, center, radius }
         };
-        Self {
-            camera: view.camera_at(t),
-            solids: solids.solids.iter().map(placed).collect(),
-            mirror: view.mirror,
-        }
+        Self { camera: view.camera_at(t), solids: solids.solids.iter().map(placed).collect(), mirror: view.mirror }
     }
 
     /// Largest motion of each obstacle in the picture from this pose to another one, pixels.

@@ -30,8 +30,7 @@ fn specular_brdf(material: &Material, normal: DVec3, viewer: DVec3, toward: DVec
     let across = normal.dot(half).clamp(0.0, 1.0);
     let spread = across * across * (square - 1.0) + 1.0;
     let distribution = square / (PI * spread * spread);
-    let visibility =
-        0.5 / math::lerp(2.0 * to_light * to_viewer, to_light + to_viewer, material.roughness);
+    let visibility = 0.5 / math::lerp(2.0 * to_light * to_viewer, to_light + to_viewer, material.roughness);
     fresnel(material.reflectance, viewer.dot(half)) * distribution * visibility
 }
 

@@ -80,7 +80,8 @@ fn a_surface_is_as_bright_as_lambert_says_and_dark_in_a_shadow() {
         color: [0.5; 3],
         ..ball([0.0, 0.0, -0.5], 1.0)
     };
-    let light = Light { emitter: Emitter::Point { position: DVec3::new(0.0, 3.0, 4.0), radius: 0.1 }, intensity: [100.0; 3] };
+    let light =
+        Light { emitter: Emitter::Point { position: DVec3::new(0.0, 3.0, 4.0), radius: 0.1 }, intensity: [100.0; 3] };
     let middle = SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2;
     let view_of_wall = view(0.0);
     let (strip, _) = drawn(&solids(std::slice::from_ref(&wall)), &view_of_wall, &[light]);
@@ -99,15 +100,15 @@ fn a_surface_is_as_bright_as_lambert_says_and_dark_in_a_shadow() {
 #[test]
 fn what_moves_is_blurred_over_its_way_and_covers_as_much() {
     let path = vec![(1.0, [-0.5, 0.0, 0.0]), (2.0, [0.5, 0.0, 0.0])];
-    let moving = ObstacleParameters {
-        position: Animated::keyed(path, Interpolation::Linear).unwrap(),
-        ..ball([0.0; 3], 0.3)
-    };
+    let moving =
+        ObstacleParameters { position: Animated::keyed(path, Interpolation::Linear).unwrap(), ..ball([0.0; 3], 0.3) };
     let still = coverage(&drawn(&solids(&[ball([0.0; 3], 0.3)]), &view(0.0), &[]).0);
     let blurred = coverage(&drawn(&solids(&[moving]), &view(1.0), &[]).0);
     let [sum, width] = [
         |values: &[f32]| values.iter().sum::<f32>(),
-        |values: &[f32]| (0..SIZE[0]).filter(|x| values.iter().skip(*x).step_by(SIZE[0]).any(|c| *c > 0.0)).count() as f32,
+        |values: &[f32]| {
+            (0..SIZE[0]).filter(|x| values.iter().skip(*x).step_by(SIZE[0]).any(|c| *c > 0.0)).count() as f32
+        },
     ]
     .map(|measure: fn(&[f32]) -> f32| [measure(&still), measure(&blurred)]);
     assert!((sum[1] / sum[0] - 1.0).abs() < 0.05, "{sum:?}");

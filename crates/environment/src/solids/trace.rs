@@ -37,8 +37,7 @@ struct Pixel {
 }
 
 impl Pixel {
-    const EMPTY: Self =
-        Self { radiance: [0.0; 3], coverage: 0.0, depth: f32::INFINITY, opaque_depth: f32::INFINITY };
+    const EMPTY: Self = Self { radiance: [0.0; 3], coverage: 0.0, depth: f32::INFINITY, opaque_depth: f32::INFINITY };
 }
 
 /// A frame of the obstacles.
@@ -164,9 +163,14 @@ impl Tracer<'_> {
             for (x, corner) in row.iter_mut().enumerate() {
                 let [x, y] = [rect.x + x, rect.y + y];
                 // A corner belongs to four pixels.
-                let is_near = [[x, y], [x.saturating_sub(1), y.saturating_sub(1)], [x, y.saturating_sub(1)], [x.saturating_sub(1), y]]
-                    .into_iter()
-                    .any(|[x, y]| is_in_any(self.rects, x, y));
+                let is_near = [
+                    [x, y],
+                    [x.saturating_sub(1), y.saturating_sub(1)],
+                    [x, y.saturating_sub(1)],
+                    [x.saturating_sub(1), y],
+                ]
+                .into_iter()
+                .any(|[x, y]| is_in_any(self.rects, x, y));
                 if is_near {
                     let seen = self.middle().seen(DVec2::new(x as f64, y as f64));
                     *corner = seen.map(|surface| (surface.index, surface.normal));
@@ -207,7 +211,8 @@ impl Tracer<'_> {
             pose.seen(position + sample_offset(index)).map(|surface| (surface, pose))
         };
         let samples: [Option<(SurfacePoint, &Pose)>; SAMPLES] = std::array::from_fn(sample);
-        let corner = |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
+        let corner =
+            |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
         let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)));
         let mut pixel = Pixel { opaque_depth: 0.0, ..Pixel::EMPTY };
         for (index, (surface, pose)) in samples.iter().flatten().enumerate() {

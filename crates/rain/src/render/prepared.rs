@@ -133,7 +133,15 @@ impl<'a> PreparedRain<'a> {
         let single_scattering =
             SingleScattering::new(&shutter_state, lighting, sky_lighting, view, extinction, end, farthest);
         let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
-        Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), textured, single_scattering, metadata }
+        Self {
+            view,
+            level: Level::new(),
+            chunks,
+            streaks_end: rain.streaks_end(),
+            textured,
+            single_scattering,
+            metadata,
+        }
     }
 }
 

@@ -87,9 +87,12 @@ mod tests {
         for amplitude in [0.0, 0.4, 1.0] {
             let oscillation = Oscillation::new(1.5, amplitude, [0.3, 0.8]);
             assert!(near(oscillation.mean_brightness(0.0, 100.0), 1.0, 1e-3));
-            let values: Vec<f64> = (0..4000).map(|i| oscillation.mean_brightness(f64::from(i) * 1e-5, f64::from(i) * 1e-5)).collect();
+            let values: Vec<f64> =
+                (0..4000).map(|i| oscillation.mean_brightness(f64::from(i) * 1e-5, f64::from(i) * 1e-5)).collect();
             let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().fold(1.0, pick));
-            assert!(low >= 0.0 && low <= 1.0 - 0.8 * amplitude && high >= 1.0 + 0.8 * amplitude && high <= 1.0 + amplitude);
+            assert!(
+                low >= 0.0 && low <= 1.0 - 0.8 * amplitude && high >= 1.0 + 0.8 * amplitude && high <= 1.0 + amplitude
+            );
         }
     }
 

@@ -181,7 +181,8 @@ impl StreakProjection<'_> {
         };
         for i in 0..LANES {
             let distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
-            paths.gain[i] = drops.presence[i] * shutter_state.streak_weight(distance) * weights[i] * drops.opacity_factor;
+            paths.gain[i] =
+                drops.presence[i] * shutter_state.streak_weight(distance) * weights[i] * drops.opacity_factor;
         }
         for axis in 0..3 {
             for i in 0..LANES {

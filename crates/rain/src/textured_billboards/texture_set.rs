@@ -83,7 +83,8 @@ impl Texture {
         let code = |opacity: &f32| (opacity / scale * 255.0 + 0.5) as u8;
         let codes: Vec<u8> = picture.pixels().as_flattened().iter().map(code).collect();
         let mut mipmaps = Vec::new();
-        let (mut finer, mut side) = (codes.iter().map(|code| u32::from(*code) << 8).collect::<Vec<u32>>(), picture.width());
+        let (mut finer, mut side) =
+            (codes.iter().map(|code| u32::from(*code) << 8).collect::<Vec<u32>>(), picture.width());
         while side > 1 {
             let half = side / 2;
             let mean = |index: usize| {

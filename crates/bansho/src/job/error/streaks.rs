@@ -82,10 +82,14 @@ pub enum StreaksError {
     #[error("an oscillation of {0}; allowed: 0 to 1")]
     Oscillation(f64),
     /// Oscillating drops without a light.
-    #[error("an oscillation changes the brightness of drops in a light, not their opacity, and there is none; allowed: with a light direction")]
+    #[error(
+        "an oscillation changes the brightness of drops in a light, not their opacity, and there is none; allowed: with a light direction"
+    )]
     OscillationWithoutLight,
     /// Oscillating drops of the paper's opacity.
-    #[error("the paper's streaks are lines of even brightness and do not oscillate; allowed: the opacity exposure_fraction")]
+    #[error(
+        "the paper's streaks are lines of even brightness and do not oscillate; allowed: the opacity exposure_fraction"
+    )]
     OscillationOfLines,
     /// More drops than the index can list.
     #[error(

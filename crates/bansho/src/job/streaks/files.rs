@@ -115,12 +115,7 @@ impl TextureWriter {
         }
     }
 
-    fn write_png(
-        &self,
-        file: &str,
-        opacity: &Image<1>,
-        brightness: &Image<1>,
-    ) -> Result<WrittenTexture, JobError> {
+    fn write_png(&self, file: &str, opacity: &Image<1>, brightness: &Image<1>) -> Result<WrittenTexture, JobError> {
         let scale = self.write_measured(file, 1, opacity, opacity.pixels().as_flattened())?;
         let lit = self.light.zip(self.lit_name(file)).map(|(light, name)| {
             let radiance: Vec<f32> = self.radiance(&light, brightness).into_flattened();
@@ -139,12 +134,7 @@ impl TextureWriter {
         Ok(picture.scale)
     }
 
-    fn write_exr(
-        &self,
-        file: &str,
-        opacity: &Image<1>,
-        brightness: &Image<1>,
-    ) -> Result<WrittenTexture, JobError> {
+    fn write_exr(&self, file: &str, opacity: &Image<1>, brightness: &Image<1>) -> Result<WrittenTexture, JobError> {
         let values = opacity.pixels().as_flattened();
         // Without a light, the radiance is the opacity: white streaks.
         let radiance = match &self.light {
@@ -193,8 +183,7 @@ impl TextureWriter {
 
     /// The fingerprint of everything that the pixels of a file depend on.
     fn fingerprint(&self, file: &str) -> [u8; 32] {
-        let Streaks { cube, law, diameters, seed, light, oscillation, bits, variants, .. } =
-            &self.streaks;
+        let Streaks { cube, law, diameters, seed, light, oscillation, bits, variants, .. } = &self.streaks;
         let mut hasher = blake3::Hasher::new();
         hasher.update(
             format!("bansho {VERSION} {file} {cube:?} {law:?} {diameters:?} {seed} {light:?} {bits:?} {variants}")

@@ -141,7 +141,9 @@ fn how_to_read(streaks: &Streaks, writer: &TextureWriter) -> Value {
             "a round drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on the axis, \
              `mean_opacity` across the streak; it covers (pi/4) D^2 for any exposure"
         }
-        OpacityLaw::Paper => "a line one pixel wide, of the opacity 2 D / v with D in mm and v in m/s, for any exposure",
+        OpacityLaw::Paper => {
+            "a line one pixel wide, of the opacity 2 D / v with D in mm and v in m/s, for any exposure"
+        }
     };
     let mut description = json!({
         "pixel": pixel,
