@@ -25,7 +25,7 @@ Examples:
   bansho streaks                                   24 textures in out/streaks/
   bansho streaks --rates 50 --diameters 0.5,1,2,4 --exposure-time 1/60 -o heavy
   bansho streaks --format exr --light-direction 0,0.3,-1   lit from behind
-  bansho streaks --opacity paper --bits 8 --terminal-velocity rigid_sphere   to the letter of the paper
+  bansho streaks --opacity paper --bits 8          to the letter of the paper
   bansho streaks --cube-size 0.25 --size 2048 --variants 8")]
 pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
