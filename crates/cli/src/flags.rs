@@ -97,6 +97,9 @@ fn flag_of_streaks_error(error: &StreaksError) -> Option<&'static str> {
         StreaksError::CubeSize(_) | StreaksError::TooManyDrops { .. } => "--cube-size",
         StreaksError::Variants(_) => "--variants",
         StreaksError::LightDirection => "--light-direction",
+        StreaksError::Oscillation(_) | StreaksError::OscillationWithoutLight | StreaksError::OscillationOfLines => {
+            "--oscillation"
+        }
         StreaksError::Velocity(_) => "--terminal-velocity",
         _ => return None,
     })

@@ -9,7 +9,7 @@ use bansho_base::{
     phenomenon::surroundings::Surroundings,
 };
 
-use super::parameters::RainParameters;
+use super::parameters::{Method, RainParameters};
 use crate::{
     drops::{
         lattice::{Lattice, LatticeMotion},
@@ -23,6 +23,7 @@ use crate::{
         extinction::{ExtinctionEfficiency, RainExtinction, extinction},
         sky::SkyLightingCache,
     },
+    textured_billboards::TextureSet,
 };
 
 /// Extent of the rain over ground that extends to the horizon, m.
@@ -37,6 +38,8 @@ pub struct Rain {
     pub(super) optics: &'static Optics,
     pub(super) skies: SkyLightingCache,
     pub(super) classes: Vec<DropClass>,
+    /// With `method = "textures"`: those of all rates and diameters.
+    pub(super) textures: Option<TextureSet>,
     pub(super) loop_s: Option<f64>,
 }
 
@@ -64,14 +67,20 @@ impl Rain {
     /// The rain `name` of a scene; in a seamless loop it repeats every `loop_s` seconds.
     ///
     /// # Errors
-    /// Diameters that are not ascending, or a loop whose length is not a positive number.
+    /// Diameters or rates of textures that are not ascending, or a loop whose length is not a positive number.
     pub fn new(parameters: RainParameters, name: &str, seed: u64, loop_s: Option<f64>) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
         }
-        if let Some(pair) = parameters.diameters_mm.windows(2).find(|pair| pair[1] <= pair[0]) {
-            let kind = ParameterErrorKind::NotAscending { value: pair[0], next: pair[1] };
-            return Err(ParameterError { key: "diameters_mm", kind });
+        let lists = [
+            ("diameters_mm", &parameters.diameters_mm),
+            ("texture_rates_mm_per_h", &parameters.texture_rates_mm_per_h),
+        ];
+        for (key, values) in lists {
+            if let Some(pair) = values.windows(2).find(|pair| pair[1] <= pair[0]) {
+                let kind = ParameterErrorKind::NotAscending { value: pair[0], next: pair[1] };
+                return Err(ParameterError { key, kind });
+            }
         }
         constructions::count("rain");
         let [_, max_rate] = parameters.rate_mm_per_h.bounds();
@@ -84,6 +93,7 @@ impl Rain {
             optics: &OPTICS,
             skies: SkyLightingCache::default(),
             classes,
+            textures: (parameters.method == Method::Textures).then(|| TextureSet::new(&parameters, seed)),
             loop_s,
             parameters,
         })

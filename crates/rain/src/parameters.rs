@@ -2,7 +2,7 @@
 
 use bansho_base::parameters::{Length, Range, animated::Animated};
 
-use crate::drops::terminal_velocity::VelocityLaw;
+use crate::{drops::terminal_velocity::VelocityLaw, streaks::coverage::OpacityLaw};
 
 /// The paper's six diameters, mm.
 const PAPER_DIAMETERS_MM: [f64; 6] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0];
@@ -14,6 +14,9 @@ bansho_base::choice! {
         Billboards = "billboards",
         /// Every drop individually: the reference, slower the heavier the rain.
         Drops = "drops",
+        /// To the letter of that paper: streak textures of 512 x 512 pixels in 8 bits for fixed rain rates, on billboards around the camera that are lit at
+        /// their corners. No wind, no sky light, no airlight; the textures repeat, and change abruptly with the rain rate.
+        Textures = "textures",
     }
 }
 
@@ -39,6 +42,8 @@ bansho_base::parameters! {
         /// Diameters of the drops that are drawn as streaks, ascending; each represents a bin of diameters. All other drops only contribute to the
         /// airlight.
         diameters_mm: Vec<f64> = PAPER_DIAMETERS_MM.to_vec(), limits(Length { min: 1, max: 12, item: Range::new(0.1, 8.0) }), unit("mm");
+        /// Rain rates of the textures of `method = "textures"`, ascending; the nearest to the rain rate is shown.
+        texture_rates_mm_per_h: Vec<f64> = vec![1.0, 5.0, 10.0, 20.0], limits(Length { min: 1, max: 12, item: Range::new(0.1, 300.0) }), unit("mm/h");
         /// Law of the terminal velocities.
         terminal_velocity: VelocityLaw = VelocityLaw::GunnKinzer;
         /// Distance from the camera up to which streaks are drawn; rain beyond it only contributes to the airlight.
@@ -47,8 +52,13 @@ bansho_base::parameters! {
         airlight_distance: f64 = 100.0, limits(Range::new(0.0, 5000.0)), unit("m");
         /// Height of the ground, where drops end, in a scene without `[ground]`.
         ground_height: f64 = 0.0, unit("m");
-        /// Factor of the physical opacity.
+        /// Law of the opacity of streaks.
+        opacity: OpacityLaw = OpacityLaw::ExposureFraction;
+        /// Factor of that opacity.
         opacity_gain: f64 = 1.0, limits(Range::new(0.0, 20.0));
+        /// Amplitude of the brightness of a streak in the light of lamps and fires as its drop oscillates, relative to its mean: speckle along near
+        /// streaks (Garg & Nayar 2006). 0 for drops that do not oscillate. Not with `method = "textures"`.
+        oscillation: f64 = 0.0, limits(Range::new(0.0, 1.0));
         /// Response of the drops to the wind; at 1 they drift with the air.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 2.0));
         /// Whether the light of streaks is omitted where no display would show it.

@@ -8,12 +8,13 @@ use bansho_base::{
     phenomenon::{
         Phenomenon, PhenomenonInfo, Run, Stepped, Stepping, kind::BuildContext, strip::Shutter, surroundings::Occluder,
     },
-    world::wind::Wind,
+    world::{obstacle::Obstacle, wind::Wind},
 };
 use bansho_environment::{
     ground::Ground,
     lamps::{Lamp, Lamps},
     sky::SkyBackdrop,
+    solids::Solids,
 };
 
 use crate::{
@@ -28,10 +29,10 @@ pub struct CompiledScene {
     scene: Arc<Scene>,
     assets: Arc<dyn Assets>,
     wind: Wind,
-    obstacles: Vec<(Fingerprint, Occluder)>,
+    obstacles: Vec<(Fingerprint, Obstacle)>,
     /// Every phenomenon of the scene, including disabled ones, by the fingerprint of what it was built from.
     built: BTreeMap<Fingerprint, Arc<dyn Phenomenon>>,
-    /// The enabled phenomena in the order of the scene, then its lamps, ground and sky.
+    /// The enabled phenomena in the order of the scene, then its lamps, visible obstacles, ground and sky.
     enabled: Vec<BuiltPhenomenon>,
 }
 
@@ -98,7 +99,7 @@ impl CompiledScene {
         let phenomena = fingerprints.into_iter().filter_map(|fingerprint| {
             Some(BuiltPhenomenon { fingerprint, phenomenon: built.get(&fingerprint)?.clone() })
         });
-        let enabled = phenomena.chain(backdrop(&scene, previous)).collect();
+        let enabled = phenomena.chain(backdrop(&scene, &obstacles, previous)).collect();
         let wind = Wind::new(scene.wind.clone(), scene.seed, scene.loop_s);
         Ok(Self { wind, obstacles, built, enabled, scene, assets })
     }
@@ -118,12 +119,12 @@ impl CompiledScene {
         &self.wind
     }
 
-    /// Its obstacles.
-    pub fn obstacles(&self) -> impl Iterator<Item = &Occluder> {
-        self.obstacles.iter().map(|(_, obstacle)| obstacle)
+    /// Its obstacles at time `t`.
+    pub fn obstacles(&self, t: f64) -> impl Iterator<Item = Occluder> {
+        self.obstacles.iter().map(move |(_, obstacle)| obstacle.at(t))
     }
 
-    /// Its enabled phenomena, then its lamps, ground and sky.
+    /// Its enabled phenomena, then its lamps, visible obstacles, ground and sky.
     pub fn phenomena(&self) -> impl Iterator<Item = &Arc<dyn Phenomenon>> {
         self.enabled.iter().map(|built| &built.phenomenon)
     }
@@ -205,7 +206,7 @@ fn build_obstacles(
     assets: &dyn Assets,
     previous: Option<&CompiledScene>,
     errors: &mut Vec<(String, BuildError)>,
-) -> Vec<(Fingerprint, Occluder)> {
+) -> Vec<(Fingerprint, Obstacle)> {
     let mut obstacles = Vec::new();
     for (index, obstacle) in scene.obstacles.iter().enumerate() {
         // Fingerprinting reads every file that a mesh names, whatever their total size, whereas building refuses too many bytes. So only
@@ -270,8 +271,12 @@ fn build_instance(instance: &Instance, scene: &Scene, assets: &dyn Assets) -> Re
     instance.parameters.build(&context)
 }
 
-/// The scene's visible lamps, its ground, and its visible sky unless there is a plate.
-fn backdrop(scene: &Scene, previous: Option<&CompiledScene>) -> Vec<BuiltPhenomenon> {
+/// The scene's visible lamps and obstacles, its ground, and its visible sky unless there is a plate.
+fn backdrop(
+    scene: &Scene,
+    obstacles: &[(Fingerprint, Obstacle)],
+    previous: Option<&CompiledScene>,
+) -> Vec<BuiltPhenomenon> {
     let mut backdrop = Vec::new();
     let mut add = |fingerprint: Fingerprint, build: &dyn Fn() -> Arc<dyn Phenomenon>| {
         let known = previous
@@ -284,6 +289,13 @@ fn backdrop(scene: &Scene, previous: Option<&CompiledScene>) -> Vec<BuiltPhenome
             let lights = visible.clone();
             let at = move |t| lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
             Arc::new(Lamps::new(at))
+        });
+    }
+    let solid: Vec<_> = obstacles.iter().filter(|(_, obstacle)| Solids::draws(obstacle)).cloned().collect();
+    if !solid.is_empty() {
+        let fingerprints: Vec<Fingerprint> = solid.iter().map(|(fingerprint, _)| *fingerprint).collect();
+        add(fingerprint::of_solids(&fingerprints, scene), &|| {
+            Arc::new(Solids::new(solid.iter().map(|(_, obstacle)| obstacle.clone()).collect()))
         });
     }
     if let Some(ground) = &scene.ground {

@@ -60,6 +60,14 @@ pub(crate) fn of_lamps(lights: &[LightParameters], scene: &Scene) -> Fingerprint
     *hasher.finalize().as_bytes()
 }
 
+/// A fingerprint of all that the visible obstacles are built from: theirs.
+pub(crate) fn of_solids(obstacles: &[Fingerprint], scene: &Scene) -> Fingerprint {
+    let mut hasher = seeded(scene);
+    hasher.update(b"solids");
+    obstacles.iter().for_each(|fingerprint| _ = hasher.update(fingerprint));
+    *hasher.finalize().as_bytes()
+}
+
 /// A fingerprint of all that the ground is built from.
 pub(crate) fn of_ground(ground: &GroundParameters, scene: &Scene) -> Fingerprint {
     let mut hasher = seeded(scene);

@@ -12,7 +12,7 @@ use crate::{
     tables::picture::LightKind,
     text::path::{ValuePath, nearest_span},
 };
-use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop};
+use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop, solids::Solids};
 
 /// Checks the format number. Returns whether to read the rest: an older format has other keys, each of which would be reported as a further
 /// problem.
@@ -57,7 +57,7 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
 pub const PLATE_LAYER: &str = "plate";
 
 /// Names of layers that a scene has itself, and that no phenomenon may have.
-const RESERVED_NAMES: [&str; 4] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME];
+const RESERVED_NAMES: [&str; 5] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME, Solids::NAME];
 
 /// Names of the picture's own channels and layers in programs that read EXR files. A layer `Z` or `RGBA` makes OpenEXR's Python module refuse
 /// a file; `Combined`, `Alpha` and `Depth` replace the picture's own in Blender; Nuke calls them `rgba`, `alpha` and `depth`.

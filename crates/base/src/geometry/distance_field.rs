@@ -59,6 +59,12 @@ impl DistanceField {
         across(0) * (1.0 - f.z) + across(1) * f.z + (grid_position - clamped).length() * self.spacing
     }
 
+    /// Minimum and maximum corner of the grid, which contains the mesh.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let last = DVec3::from(self.size.map(|side| (side - 1) as f64));
+        [self.origin, self.origin + last * self.spacing]
+    }
+
     /// Unit vector away from the mesh at `point`: the normalized gradient of the distance, by central differences.
     pub fn normal(&self, point: DVec3) -> DVec3 {
         let step = 0.5 * self.spacing;

@@ -126,6 +126,14 @@ impl<T: Animate> Animated<T> {
         [0, 1].map(|bound| self.map_components(|value| value, |curve| curve.range()[bound]))
     }
 
+    /// The constant, or the values of all keys.
+    pub fn values(&self) -> Vec<T> {
+        match &self.motion {
+            Motion::Constant(value) => vec![*value],
+            Motion::Keyed(_) => self.keys().into_iter().map(|(_, value)| value).collect(),
+        }
+    }
+
     /// Keys (time, value), ascending; empty for a constant.
     pub fn keys(&self) -> Vec<(f64, T)> {
         match &self.motion {

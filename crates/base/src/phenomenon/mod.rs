@@ -270,6 +270,12 @@ pub trait Prepared: Send + Sync {
         self.deflection().is_some()
     }
 
+    /// Depth of its opaque surfaces over the whole picture, m; infinite where it is not fully opaque. All other phenomena are hidden behind it
+    /// exactly, as they are behind a plate. It draws these surfaces itself.
+    fn opaque_depth(&self) -> Option<&Image<1>> {
+        None
+    }
+
     /// How it refracts the light from behind it.
     fn deflection(&self) -> Option<Deflection<'_>> {
         None

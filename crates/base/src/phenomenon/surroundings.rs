@@ -105,6 +105,8 @@ pub struct Publication {
     pub extinction: f64,
     /// Solid obstacles.
     pub occluders: Vec<Occluder>,
+    /// Those of the solids that are seen, and so cast shadows.
+    pub shadow_casters: Vec<Occluder>,
 }
 
 impl Publication {
@@ -113,6 +115,7 @@ impl Publication {
         self.lights.extend_from_slice(&other.lights);
         self.extinction += other.extinction;
         self.occluders.extend_from_slice(&other.occluders);
+        self.shadow_casters.extend_from_slice(&other.shadow_casters);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use crate::geometry::{distance_field::DistanceField, transform::Transform};
 
@@ -32,6 +32,17 @@ pub enum Occluder {
         /// Its rotation.
         rotation: DQuat,
     },
+    /// A cylinder.
+    Cylinder {
+        /// Its center, m.
+        center: DVec3,
+        /// Its radius, m.
+        radius: f64,
+        /// Half of its height, m.
+        half_height: f64,
+        /// Its rotation; without it the axis is vertical.
+        rotation: DQuat,
+    },
     /// A closed triangle mesh.
     Mesh {
         /// Distance field in the local coordinates of the mesh.
@@ -51,6 +62,11 @@ impl Occluder {
                 let beyond = (rotation.inverse() * (point - *center)).abs() - *half_extents;
                 beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0)
             }
+            Self::Cylinder { center, radius, half_height, rotation } => {
+                let local = rotation.inverse() * (point - *center);
+                let beyond = DVec2::new(DVec2::new(local.x, local.z).length() - radius, local.y.abs() - half_height);
+                beyond.max(DVec2::ZERO).length() + beyond.max_element().min(0.0)
+            }
             Self::Mesh { distance, placement } => distance.at(placement.point_in_local(point)) * placement.scale,
         }
     }
@@ -63,11 +79,46 @@ impl Occluder {
             Self::Cuboid { center, half_extents, rotation } => {
                 *rotation * cuboid_normal(rotation.inverse() * (point - *center), *half_extents)
             }
+            Self::Cylinder { center, radius, half_height, rotation } => {
+                *rotation * cylinder_normal(rotation.inverse() * (point - *center), *radius, *half_height)
+            }
             Self::Mesh { distance, placement } => {
                 placement.direction_in_world(distance.normal(placement.point_in_local(point)))
             }
         }
     }
+
+    /// A sphere that contains it: center and radius, m. `None` for a half space.
+    pub fn bounding_sphere(&self) -> Option<(DVec3, f64)> {
+        match self {
+            Self::Sphere { center, radius } => Some((*center, *radius)),
+            Self::HalfSpace { .. } => None,
+            Self::Cuboid { center, half_extents, .. } => Some((*center, half_extents.length())),
+            Self::Cylinder { center, radius, half_height, .. } => {
+                Some((*center, DVec2::new(*radius, *half_height).length()))
+            }
+            Self::Mesh { distance, placement } => {
+                let [low, high] = distance.bounds();
+                Some((placement.point_in_world(0.5 * (low + high)), 0.5 * placement.scale * (high - low).length()))
+            }
+        }
+    }
+}
+
+/// Outward normal of an upright cylinder around the origin.
+fn cylinder_normal(point: DVec3, radius: f64, half_height: f64) -> DVec3 {
+    let across = DVec3::new(point.x, 0.0, point.z);
+    let [beside, above] = [across.length() - radius, point.y.abs() - half_height];
+    let side = across.normalize_or(DVec3::X);
+    let cap = DVec3::Y * point.y.signum();
+    let outward = match (beside > 0.0, above > 0.0) {
+        (true, true) => side * beside + cap * above,
+        (true, false) => side,
+        (false, true) => cap,
+        (false, false) if beside > above => side,
+        (false, false) => cap,
+    };
+    outward.normalize_or(DVec3::Y)
 }
 
 /// Outward normal of an axis-aligned box around the origin.
@@ -99,6 +150,26 @@ mod tests {
         assert!((plank.signed_distance(DVec3::new(0.0, 3.0, 0.0)) - 1.0).abs() < 1e-12);
         assert!((plank.signed_distance(DVec3::new(0.3, 0.0, 0.0)) + 0.2).abs() < 1e-12);
         assert!((plank.normal(DVec3::new(0.3, 0.0, 0.0)) - DVec3::X).length() < 1e-12);
+    }
+
+    #[test]
+    fn a_cylinder_is_measured_beside_above_and_at_its_edge() {
+        let lying = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+        for (rotation, along) in [(DQuat::IDENTITY, DVec3::Y), (lying, DVec3::X)] {
+            let post = Occluder::Cylinder { center: DVec3::ONE, radius: 0.5, half_height: 2.0, rotation };
+            let at = |beside: f64, above: f64| DVec3::ONE + DVec3::Z * beside + along * above;
+            for (point, distance, normal) in [
+                (at(1.5, 0.0), 1.0, DVec3::Z),
+                (at(0.0, -3.0), 1.0, -along),
+                (at(0.8, 2.4), 0.5, DVec3::Z * 0.6 + along * 0.8),
+                (at(0.4, 1.0), -0.1, DVec3::Z),
+            ] {
+                assert!((post.signed_distance(point) - distance).abs() < 1e-12, "{point}");
+                assert!((post.normal(point) - normal).length() < 1e-12, "{point} {}", post.normal(point));
+            }
+            let (center, radius) = post.bounding_sphere().unwrap();
+            assert!(center == DVec3::ONE && (radius * radius - 4.25).abs() < 1e-12);
+        }
     }
 
     #[test]

@@ -52,6 +52,8 @@ pub(crate) enum PlotCommand {
     TerminalVelocity(TerminalVelocityArgs),
     /// Opacity of rain streaks by drop diameter and exposure time.
     StreakOpacity(StreakOpacityArgs),
+    /// Illuminance along the beam of a lamp in rain by distance, and across it by angle.
+    Beam(BeamArgs),
     /// Volume emission rate of the auroral lines by altitude.
     Emission(EmissionArgs),
     /// Ionization, and so the deposited energy, by altitude and energy of the electrons (Fang et al. 2010).
@@ -178,6 +180,25 @@ pub(crate) struct StreakOpacityArgs {
     /// How fast drops fall: as measured by Gunn and Kinzer, or by the paper's formula for a rigid sphere.
     #[arg(long, default_value = "gunn_kinzer", value_parser = values::velocity_parser())]
     pub(crate) terminal_velocity: VelocityLaw,
+    #[command(flatten)]
+    pub(crate) output: PlotOutputArgs,
+}
+
+/// `bansho plot beam`
+#[derive(Args, Debug)]
+pub(crate) struct BeamArgs {
+    /// Luminous intensity on the axis, cd, as `intensity` of a scene's light.
+    #[arg(long, value_name = "CD", default_value = "9000", allow_hyphen_values = true, value_parser = parse_intensity)]
+    pub(crate) intensity: f64,
+    /// Angle from the axis up to which the intensity is full, as `inner_cone_deg` of a scene.
+    #[arg(long, value_name = "DEG", default_value = "5", allow_hyphen_values = true, value_parser = parse_inner_cone)]
+    pub(crate) inner_cone_deg: f64,
+    /// Angle from the axis beyond which there is no light, as `outer_cone_deg` of a scene.
+    #[arg(long, value_name = "DEG", default_value = "22", allow_hyphen_values = true, value_parser = parse_outer_cone)]
+    pub(crate) outer_cone_deg: f64,
+    /// Rain rates R, mm/h.
+    #[arg(long, value_name = "R,...", default_value = "0,10,50,150", allow_hyphen_values = true, value_parser = parse_rates_from_0)]
+    pub(crate) rates: Numbers,
     #[command(flatten)]
     pub(crate) output: PlotOutputArgs,
 }
@@ -346,6 +367,22 @@ fn parse_energies(text: &str) -> Result<Numbers, RangeError> {
 
 fn parse_rates(text: &str) -> Result<Numbers, RangeError> {
     list(text, |text| text.parse().ok(), 0.01, 500.0, "mm/h")
+}
+
+fn parse_rates_from_0(text: &str) -> Result<Numbers, RangeError> {
+    list(text, |text| text.parse().ok(), 0.0, 500.0, "mm/h")
+}
+
+fn parse_intensity(text: &str) -> Result<f64, RangeError> {
+    number(text, 1e-3, 1e9, "cd")
+}
+
+fn parse_inner_cone(text: &str) -> Result<f64, RangeError> {
+    number(text, 0.0, 89.0, "degrees")
+}
+
+fn parse_outer_cone(text: &str) -> Result<f64, RangeError> {
+    number(text, 0.1, 90.0, "degrees")
 }
 
 fn parse_exposure_times(text: &str) -> Result<Numbers, RangeError> {

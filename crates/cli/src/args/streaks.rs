@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bansho::{
     BitDepth,
     job::{StreakFormat, Streaks},
-    rain::{billboards::texture::StreakCube, drops::terminal_velocity::VelocityLaw},
+    rain::{billboards::texture::StreakCube, drops::terminal_velocity::VelocityLaw, streaks::coverage::OpacityLaw},
 };
 
 use super::{
@@ -25,6 +25,7 @@ Examples:
   bansho streaks                                   24 textures in out/streaks/
   bansho streaks --rates 50 --diameters 0.5,1,2,4 --exposure-time 1/60 -o heavy
   bansho streaks --format exr --light-direction 0,0.3,-1   lit from behind
+  bansho streaks --opacity paper --bits 8          to the letter of the paper
   bansho streaks --cube-size 0.25 --size 2048 --variants 8")]
 pub(crate) struct StreaksArgs {
     /// Rain rates R, ascending, mm/h.
@@ -51,6 +52,9 @@ pub(crate) struct StreaksArgs {
     /// Terminal velocity of drops: as measured by Gunn and Kinzer, or by the paper's formula for a rigid sphere.
     #[arg(long, default_value = "gunn_kinzer", value_parser = values::velocity_parser())]
     terminal_velocity: VelocityLaw,
+    /// Opacity of streaks: the fraction of the exposure during which the drop covers a point, or the paper's 2 D / v for lines of even opacity.
+    #[arg(long, default_value = "exposure_fraction", value_parser = values::opacity_parser())]
+    opacity: OpacityLaw,
     /// Sample the diameter of each drop within its bin, from the drop size distribution.
     #[arg(long)]
     vary_diameter: bool,
@@ -63,6 +67,9 @@ pub(crate) struct StreaksArgs {
     /// Light the drops by a distant light; the vector toward it: right, up, toward the viewer.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = values::parse_vector)]
     light_direction: Option<[f64; 3]>,
+    /// Amplitude of the brightness of lit streaks as their drops oscillate, 0 to 1; with --light-direction.
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.0, allow_hyphen_values = true)]
+    oscillation: f64,
 
     /// Output folder. [default: out/streaks]
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
@@ -88,6 +95,7 @@ impl StreaksArgs {
             edge: self.cube_size,
             size: self.size,
             exposure: self.exposure_time,
+            opacity: self.opacity,
             spread: self.vary_diameter,
             ..StreakCube::default()
         };
@@ -99,6 +107,7 @@ impl StreaksArgs {
             variants: self.variants,
             seed: self.seed,
             light: self.light_direction,
+            oscillation: self.oscillation,
             format: self.format,
             bits: self.bits,
             out: self.out.clone(),

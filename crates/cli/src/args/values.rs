@@ -6,7 +6,7 @@ use bansho::{
     AlphaConvention, BitDepth, Rect, View,
     job::frames::{self, FrameListError},
     job::{ContactBackground, FlipbookCrop, StreakFormat},
-    rain::drops::terminal_velocity::VelocityLaw,
+    rain::{drops::terminal_velocity::VelocityLaw, streaks::coverage::OpacityLaw},
     scene::picture::LARGEST_SIDE,
 };
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -128,6 +128,11 @@ pub(super) fn parse_folder(text: &str) -> Result<PathBuf, ValueError> {
 pub(super) fn velocity_parser() -> impl TypedValueParser<Value = VelocityLaw> {
     let names = VelocityLaw::CHOICES.iter().map(|choice| choice.name);
     PossibleValuesParser::new(names).map(|name| VelocityLaw::from_name(&name).unwrap_or_default())
+}
+
+pub(super) fn opacity_parser() -> impl TypedValueParser<Value = OpacityLaw> {
+    let names = OpacityLaw::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| OpacityLaw::from_name(&name).unwrap_or_default())
 }
 
 pub(super) fn streak_format_parser() -> impl TypedValueParser<Value = StreakFormat> {

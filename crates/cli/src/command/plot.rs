@@ -21,8 +21,8 @@ use crate::{
     args::{DeflectionArgs, KernelTexture, Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
     plot::{
-        PlotError, aurora, black_body, csv, deflection, draw, figure::Figure, flame_shape, kernel, metadata, parameters,
-        rain, texture::Texture, transfer_curves,
+        PlotError, aurora, beam, black_body, csv, deflection, draw, figure::Figure, flame_shape, kernel, metadata,
+        parameters, rain, texture::Texture, transfer_curves,
     },
 };
 
@@ -58,6 +58,11 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
         PlotCommand::StreakOpacity(args) => {
             let Numbers(times) = &args.exposure_times;
             finish("streak-opacity", &rain::streak_opacity(times, args.terminal_velocity), &args.output, &[])
+        }
+        PlotCommand::Beam(args) => {
+            let Numbers(rates) = &args.rates;
+            let cones = [args.inner_cone_deg, args.outer_cone_deg];
+            finish("beam", &beam::figure(args.intensity, cones, rates)?, &args.output, &[])
         }
         PlotCommand::Emission(args) => {
             let figure = aurora::emission(args.energy_ev, args.flux_mw_per_m2, args.spectrum);

@@ -1,10 +1,11 @@
 //! `bansho plot`: figures of what the models compute.
 //!
-//! [`figure`] describes a figure as plain data; [`black_body`], [`kernel`], [`rain`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and
+//! [`figure`] describes a figure as plain data; [`black_body`], [`kernel`], [`rain`], [`beam`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and
 //! [`metadata`] make one from the library's own functions. [`texture`] and [`deflection`] are pictures without axes. [`draw`] lays a figure out on a
 //! [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
+pub(crate) mod beam;
 pub(crate) mod black_body;
 mod canvas;
 pub(crate) mod csv;
@@ -39,6 +40,11 @@ pub(crate) enum PlotError {
         to: f64,
         unit: &'static str,
     },
+    /// A cone that ends before it begins to.
+    #[error(
+        "--inner-cone-deg: full intensity up to {inner} degrees cannot end at {outer}; allowed: up to --outer-cone-deg"
+    )]
+    Cones { inner: f64, outer: f64 },
     /// More rows than a table may have.
     #[error("{option}: the table would have {rows} rows; allowed: up to {most}")]
     Rows {

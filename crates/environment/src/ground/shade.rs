@@ -9,7 +9,7 @@ use bansho_base::{
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
-        surroundings::{Backdrop, Surroundings},
+        surroundings::{Backdrop, IncidentLight, Light, Occluder, Surroundings},
     },
 };
 
@@ -20,6 +20,7 @@ use super::{
     waves::WaveSlope,
     wet_reflection::{fresnel, glossy_reflection},
 };
+use crate::shadow::{sky_visibility, visibility};
 
 /// Depth at which the ground ends, m: in front of the sky, behind all other phenomena.
 pub(super) const HORIZON: f64 = 1e6;
@@ -27,6 +28,9 @@ pub(super) const HORIZON: f64 = 1e6;
 const WET_DARKENING: f64 = 0.55;
 /// Fraction that puddles lose beyond that: they are deeper, and often turbid.
 const PUDDLE_DARKENING: f64 = 0.4;
+/// Radius of lamps for the width of half shadows, m; and the angular radius of sun and moon.
+const SOURCE_RADIUS: f64 = 0.08;
+const SUN_RADIUS: f64 = 0.004_65;
 /// Albedo of deep water.
 const WATER_ALBEDO: f32 = 0.02;
 
@@ -47,6 +51,27 @@ impl GroundParameters {
             }
         }
     }
+}
+
+/// A light that arrives at a point of the ground, in the shadows of obstacles: illuminance on a plane that faces it, lux, and the unit vector toward it.
+pub(super) type ShadowedLight = ([f32; 3], DVec3);
+
+/// The lights that arrive at a point of the ground. Shadows in lights that contribute next to nothing there are left out.
+fn shadowed_lights(lights: &[Light], casters: &[Occluder], point: DVec3) -> Vec<ShadowedLight> {
+    /// Fraction of all light.
+    const NEGLIGIBLE: f32 = 1e-3;
+    let arriving: Vec<IncidentLight> = lights.iter().map(|light| light.incident_light(point)).collect();
+    let whole: f32 = arriving.iter().map(|light| luminance(light.illuminance)).sum();
+    let shadowed = |IncidentLight { illuminance, toward, distance }: IncidentLight| {
+        if casters.is_empty() || toward.y <= 0.0 || luminance(illuminance) <= NEGLIGIBLE * whole {
+            return (illuminance, toward);
+        }
+        let reach = if distance > 0.0 { distance - SOURCE_RADIUS } else { f64::INFINITY };
+        let size = if distance > 0.0 { SOURCE_RADIUS / distance } else { SUN_RADIUS };
+        let visible = visibility(casters, point, toward, reach, size) as f32;
+        (illuminance.map(|value| value * visible), toward)
+    };
+    arriving.into_iter().map(shadowed).collect()
 }
 
 /// One frame of the ground.
@@ -94,12 +119,16 @@ impl PreparedGround<'_> {
     }
 
     /// Lambertian reflection: `albedo / pi` times the illuminance.
-    fn diffuse(&self, hit: &Hit, sample: &SurfaceSample) -> [f32; 3] {
+    fn diffuse(&self, hit: &Hit, sample: &SurfaceSample, lights: &[ShadowedLight]) -> [f32; 3] {
         let plate = self.parameters.kind == GroundKind::Plate;
         // The plate already contains the light of its own sky.
+        let casters = &self.surroundings.others.shadow_casters;
         let mut illuminance = if plate { [0.0; 3] } else { self.surroundings.sky.horizontal_illuminance() };
-        for light in &self.surroundings.others.lights {
-            let (each, toward) = light.illuminance(hit.point);
+        if !casters.is_empty() {
+            let open = sky_visibility(casters, hit.point) as f32;
+            illuminance = illuminance.map(|value| value * open);
+        }
+        for (each, toward) in lights {
             let facing = toward.y.max(0.0) as f32;
             (0..3).for_each(|c| illuminance[c] = each[c].fma(facing, illuminance[c]));
         }
@@ -120,18 +149,18 @@ impl PreparedGround<'_> {
     }
 
     /// Radiance that water on the ground reflects.
-    fn specular(&self, hit: &Hit, sample: &SurfaceSample) -> [f32; 3] {
+    fn specular(&self, hit: &Hit, sample: &SurfaceSample, lights: &[ShadowedLight]) -> [f32; 3] {
         if self.wetness <= 0.0 {
             return [0.0; 3];
         }
         match &self.lake {
             Some(lake) => self.lake_specular(hit, lake),
-            None => self.film_reflection(hit, sample),
+            None => self.film_reflection(hit, sample, lights),
         }
     }
 
     /// Wet ground: sharp reflections in puddles, glossy ones between them.
-    fn film_reflection(&self, hit: &Hit, sample: &SurfaceSample) -> [f32; 3] {
+    fn film_reflection(&self, hit: &Hit, sample: &SurfaceSample, lights: &[ShadowedLight]) -> [f32; 3] {
         let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
         let position = DVec2::new(hit.point.x, hit.point.z);
         let microfacets = self.surface.microfacets(position, hit.footprint, sample.film);
@@ -139,7 +168,8 @@ impl PreparedGround<'_> {
             let [red, green, blue, _] = image.sample_bilinear(hit.pixel / *side as f64);
             [red, green, blue]
         });
-        let blurred_reflection = glossy_reflection(self.surroundings, backdrop, hit.point, viewer, &microfacets);
+        let blurred_reflection =
+            glossy_reflection(self.surroundings, lights, backdrop, hit.point, viewer, &microfacets);
         let mirror_image = self.surroundings.reflection.map_or([0.0; 4], |image| image.sample_bilinear(hit.pixel));
         let (puddle, fresnel, wetness) = (sample.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
         [0, 1, 2].map(|c| wetness * (puddle * fresnel).fma(mirror_image[c], (1.0 - puddle) * blurred_reflection[c]))
@@ -169,7 +199,9 @@ impl PreparedGround<'_> {
 
     fn radiance(&self, hit: &Hit) -> [f32; 3] {
         let sample = self.surface.at(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let (diffuse, specular) = (self.diffuse(hit, &sample), self.specular(hit, &sample));
+        let others = &self.surroundings.others;
+        let lights = shadowed_lights(&others.lights, &others.shadow_casters, hit.point);
+        let (diffuse, specular) = (self.diffuse(hit, &sample, &lights), self.specular(hit, &sample, &lights));
         [0, 1, 2].map(|c| hit.coverage as f32 * (diffuse[c] + specular[c]))
     }
 

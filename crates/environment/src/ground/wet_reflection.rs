@@ -7,6 +7,12 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Surroundings},
 };
 
+use super::shade::ShadowedLight;
+use crate::shadow::visibility;
+
+/// Distance that stands for infinity, m.
+const FAR: f64 = 1e3;
+
 /// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
 pub(super) fn fresnel(cos: f64) -> f64 {
     let grazing = 1.0 - cos.clamp(0.0, 1.0);
@@ -63,9 +69,10 @@ fn gtr3_distribution_with_masking(square: f64, slope: f64, light: f64, viewer: f
 }
 
 /// Radiance of a film of water on horizontal ground at `point`, toward the unit vector `viewer`. It reflects
-/// `backdrop`, or else the sky.
+/// `backdrop`, or else the sky, and `lights`: those of the surroundings as they arrive there.
 pub(super) fn glossy_reflection(
     surroundings: &Surroundings,
+    lights: &[ShadowedLight],
     backdrop: Option<[f32; 3]>,
     point: DVec3,
     viewer: DVec3,
@@ -75,15 +82,16 @@ pub(super) fn glossy_reflection(
     // directions.
     let rise = math::hypot(viewer.y, microfacets.mean_slope());
     let specular = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
+    let casters = &surroundings.others.shadow_casters;
     let backdrop_radiance = backdrop.unwrap_or_else(|| surroundings.sky.radiance(specular));
-    let mut radiance = backdrop_radiance.map(|value| value * fresnel(rise) as f32);
-    for light in &surroundings.others.lights {
-        let (illuminance, toward) = light.illuminance(point);
+    let open = visibility(casters, point, specular, FAR, microfacets.mean_slope().max(0.02));
+    let mut radiance = backdrop_radiance.map(|value| value * (fresnel(rise) * open) as f32);
+    for (light, (illuminance, toward)) in surroundings.others.lights.iter().zip(lights) {
         let width = match light.emitter {
             Emitter::Point { position, radius } => radius / (position - point).length().max(radius),
             Emitter::Directional { .. } | Emitter::Spot { .. } => 0.0,
         };
-        let weight = microfacets.specular_lobe(toward, viewer, width) as f32;
+        let weight = microfacets.specular_lobe(*toward, viewer, width) as f32;
         (0..3).for_each(|c| radiance[c] = illuminance[c].fma(weight, radiance[c]));
     }
     radiance

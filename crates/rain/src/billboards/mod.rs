@@ -130,11 +130,13 @@ impl<'a> Billboards<'a> {
         };
         let velocity = billboard.velocity.as_vec3().to_array();
         let (diameter_mm, count) = (class.diameter_mm as f32, class.count() as f32);
+        let opacity_factor = self.projection.shutter_state.opacity_factor(class.diameter_mm, class.speed) as f32;
         for (batch, texture) in billboard.texture.iter().enumerate() {
             let mut drops = DropBatch {
                 positions: [ZERO_LANES; 3],
                 velocities: velocity.map(|v| [v; LANES]),
                 diameter_mm,
+                opacity_factor,
                 presence: ZERO_LANES,
             };
             for i in 0..LANES {

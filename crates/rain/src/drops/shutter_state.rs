@@ -20,6 +20,7 @@ use crate::{
     Rain,
     lanes::smoothstep,
     shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
+    streaks::coverage::OpacityLaw,
 };
 
 /// Largest difference between the gust displacement of a drop and that of its cell's center, m.
@@ -88,6 +89,8 @@ pub(crate) struct ShutterState {
     pub(crate) distance: f64,
     /// Opacity gain: a factor on the physical opacity.
     pub(crate) gain: f64,
+    /// Law of the opacity.
+    opacity: OpacityLaw,
     /// Horizontal mean wind, scaled by the response of the drops, m/s.
     wind: DVec3,
     gusts: Option<GustField>,
@@ -111,6 +114,7 @@ impl ShutterState {
             ground,
             distance: parameters.distance,
             gain: parameters.opacity_gain,
+            opacity: parameters.opacity,
             wind: DVec3::new(mean.x, 0.0, mean.z),
             gusts: GustField::new(wind, response, cameras.middle().position, radius, t),
             occluders: surroundings.others.occluders.iter().filter(|solid| !is_ground(solid)).cloned().collect(),
@@ -124,6 +128,11 @@ impl ShutterState {
     pub(crate) fn streak_weight(&self, distance: f32) -> f32 {
         let region = self.distance as f32;
         smoothstep(((1.0 + 0.5 * REGION_FADE as f32) * region - distance) / (REGION_FADE as f32 * region))
+    }
+
+    /// Factor of the opacity of drops of a diameter that fall with `speed` (m/s): the gain, and the law.
+    pub(crate) fn opacity_factor(&self, diameter_mm: f64, speed: f64) -> f64 {
+        self.gain * self.opacity.factor(diameter_mm, speed, self.cameras.exposure_time)
     }
 
     /// The sphere of `radius` (m) around the camera.
@@ -234,6 +243,9 @@ const MAX_OCCLUDER_HEIGHT: f64 = 200.0;
 
 /// Sphere tracing from `point` toward `up`: whether the ray meets the solid.
 fn ray_hits_occluder(occluder: &Occluder, point: DVec3, up: DVec3) -> bool {
+    if occluder.bounding_sphere().is_some_and(|sphere| ray_misses_sphere(sphere, point, up)) {
+        return false;
+    }
     let mut travel = 0.0;
     for _ in 0..MAX_TRACE_STEPS {
         let distance = occluder.signed_distance(point + up * travel);
@@ -246,6 +258,14 @@ fn ray_hits_occluder(occluder: &Occluder, point: DVec3, up: DVec3) -> bool {
         }
     }
     false
+}
+
+/// Whether a ray stays outside of a sphere, with a margin for what sphere tracing counts as a hit.
+fn ray_misses_sphere((center, radius): (DVec3, f64), point: DVec3, up: DVec3) -> bool {
+    const MARGIN: f64 = 2e-3;
+    let offset = center - point;
+    let nearest = offset - up * offset.dot(up).max(0.0);
+    nearest.length_squared() > (radius + MARGIN) * (radius + MARGIN)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use bansho_base::{
         strip::{AovDescriptor, AovPlane, AovRule, DepthInterval, Strip, View},
         surroundings::Surroundings,
     },
+    world::sky::Sky,
 };
 use fearless_simd::{Level, Simd, dispatch};
 
@@ -31,6 +32,7 @@ use crate::{
         },
         splashes::Splashes,
     },
+    textured_billboards::TexturedBillboards,
 };
 
 /// The AOVs of rain, in the order of a strip's planes.
@@ -56,7 +58,7 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
 ];
 
 /// Writes the AOVs of one pixel of a streak; `depth` in m.
-fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
+pub(crate) fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
     debug_assert!(aovs.is_empty() || aovs.len() == AOVS.len(), "a plane for each AOV, or none");
     let [opacities, depths, diameters] = aovs else { return };
     if opacity > 0.0 {
@@ -77,6 +79,8 @@ pub(crate) struct PreparedRain<'a> {
     chunks: Vec<StreakChunk>,
     /// Maximum distance of a streak, m.
     streaks_end: f64,
+    /// The paper's billboards.
+    textured: Option<TexturedBillboards<'a>>,
     single_scattering: Option<SingleScattering<'a>>,
     metadata: Vec<MetadataEntry>,
 }
@@ -99,6 +103,7 @@ impl<'a> PreparedRain<'a> {
         };
         let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
         let mut billboards = 0;
+        let mut textured = None;
         let mut chunks = match rain.parameters.method {
             Method::Drops => frame.projection(DropSelection::All).drop_chunks(&[bounds]),
             Method::Billboards => {
@@ -110,14 +115,33 @@ impl<'a> PreparedRain<'a> {
                 chunks.extend(billboard_chunks);
                 chunks
             }
+            Method::Textures => {
+                textured = TexturedBillboards::new(rain, &shutter_state, lights, view, frame.culling_radiance());
+                billboards = textured.as_ref().map_or(0, TexturedBillboards::count);
+                Vec::new()
+            }
         };
         chunks.extend(frame.splashes());
         let end = if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 };
         let farthest = rain.reach(surroundings);
+        let unlit = DropLighting { lights: &[], ..lighting };
+        // The paper only dims what is far away.
+        let (lighting, sky_lighting) = match rain.parameters.method {
+            Method::Textures => (&unlit, rain.skies.for_view(&rain.optics.phase_function, view, Sky::DARK)),
+            Method::Billboards | Method::Drops => (&lighting, sky_lighting.clone()),
+        };
         let single_scattering =
-            SingleScattering::new(&shutter_state, &lighting, sky_lighting.clone(), view, extinction, end, farthest);
+            SingleScattering::new(&shutter_state, lighting, sky_lighting, view, extinction, end, farthest);
         let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
-        Self { view, level: Level::new(), chunks, streaks_end: rain.streaks_end(), single_scattering, metadata }
+        Self {
+            view,
+            level: Level::new(),
+            chunks,
+            streaks_end: rain.streaks_end(),
+            textured,
+            single_scattering,
+            metadata,
+        }
     }
 }
 
@@ -140,6 +164,7 @@ impl<'a> FrameInputs<'a> {
             lighting: self.lighting,
             lights: self.prepared_lights,
             sky: self.bright_sky(),
+            oscillation: self.rain.parameters.oscillation,
             selection,
         }
     }
@@ -191,6 +216,9 @@ impl Prepared for PreparedRain<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let rect = strip.rect;
+        if let Some(textured) = &self.textured {
+            textured.draw(slice, strip);
+        }
         for tile_row in rect.y / TILE_ROWS..rect.bottom().div_ceil(TILE_ROWS) {
             let tile = tile_row * TILE_ROWS..(tile_row + 1) * TILE_ROWS;
             let rows = Rect { x: rect.x, y: tile.start, width: rect.width, height: TILE_ROWS }.intersection(&rect);

@@ -2,6 +2,7 @@
 
 pub(crate) mod bin;
 pub mod coverage;
+pub mod oscillation;
 pub(crate) mod project;
 pub(crate) mod project_lanes;
 pub(crate) mod rasterize;

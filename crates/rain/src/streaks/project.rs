@@ -13,7 +13,9 @@ use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},
+    oscillation::Oscillation,
     project_lanes::{DropPaths, StreakBatch},
+    rasterize::StreakSegment,
 };
 use crate::{
     drops::{
@@ -29,6 +31,7 @@ use crate::{
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
 const DROP: Purpose = Purpose::named("rain drop");
+const OSCILLATION: Purpose = Purpose::named("rain drop oscillation");
 /// Number of chunks of all cells, and bounds on the number of cells in each.
 const CHUNK_COUNT: usize = 64;
 const CELLS_PER_CHUNK: [usize; 2] = [8, 256];
@@ -45,6 +48,8 @@ pub(crate) struct StreakProjection<'a> {
     pub(crate) lights: &'a [PreparedLight],
     /// Radiance of drops under the sky; `None` for a dark sky.
     pub(crate) sky: Option<&'a SkyOnDrops>,
+    /// Amplitude of the brightness of streaks as drops oscillate.
+    pub(crate) oscillation: f64,
     /// Weights of the drops.
     pub(crate) selection: DropSelection<'a>,
 }
@@ -87,6 +92,8 @@ pub(crate) struct DropBatch {
     pub(crate) velocities: Vec3Lanes,
     /// mm.
     pub(crate) diameter_mm: f32,
+    /// Factor of the physical opacity.
+    pub(crate) opacity_factor: f32,
     /// Fade-in weight, 0 to 1; 0 in unused lanes.
     pub(crate) presence: Lanes,
 }
@@ -145,6 +152,7 @@ impl StreakProjection<'_> {
         let count = random::poisson(class.max_density * class.lattice.volume(), [words[0], words[1]]) as usize;
         let state = self.shutter_state.cell_state(class, cell);
         let rising = ((1.0 + FADE_IN) * class.fraction) as f32;
+        let opacity_factor = self.shutter_state.opacity_factor(class.diameter_mm, class.speed) as f32;
         for first in (0..count).step_by(LANES) {
             let [x, y, z, threshold] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
             let mut presence = ZERO_LANES;
@@ -154,7 +162,7 @@ impl StreakProjection<'_> {
             }
             let (positions, velocities) = state.drop_states(&[x, y, z]);
             let diameter_mm = class.diameter_mm as f32;
-            self.add_drops(&DropBatch { positions, velocities, diameter_mm, presence }, 0.0, builder);
+            self.add_drops(&DropBatch { positions, velocities, diameter_mm, opacity_factor, presence }, 0.0, builder);
         }
     }
 
@@ -174,7 +182,7 @@ impl StreakProjection<'_> {
         for i in 0..LANES {
             let distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
             paths.gain[i] =
-                drops.presence[i] * shutter_state.streak_weight(distance) * weights[i] * shutter_state.gain as f32;
+                drops.presence[i] * shutter_state.streak_weight(distance) * weights[i] * drops.opacity_factor;
         }
         for axis in 0..3 {
             for i in 0..LANES {
@@ -223,10 +231,42 @@ impl StreakProjection<'_> {
                 continue;
             }
             let mut segment = streaks.segment(i, diameters_mm[i], radiance[i]);
-            if let Some(sky) = self.sky {
-                segment.shading.add_light(sky.tiles.at(&sky.radiance, segment.center));
+            let sky = self.sky.map_or([0.0; 3], |sky| sky.tiles.at(&sky.radiance, segment.center));
+            if self.oscillation > 0.0 {
+                let position = [0, 1, 2].map(|axis| positions[axis][i]);
+                self.add_speckled(&segment, sky, position, builder);
+                continue;
+            }
+            if self.sky.is_some() {
+                segment.shading.add_light(sky);
             }
             builder.add(&segment, streaks.extent(i));
+        }
+    }
+
+    /// Adds a streak whose drop oscillates: in the light of lamps and fires its pieces are brighter and darker. The sky lights a drop from all sides, so
+    /// its shape changes little there.
+    fn add_speckled(
+        &self,
+        segment: &StreakSegment,
+        sky: [f32; 3],
+        position: [f32; 3],
+        builder: &mut StreakChunkBuilder,
+    ) {
+        let exposure = self.shutter_state.cameras.exposure_time;
+        let words = position.map(f32::to_bits);
+        let id = u64::from(words[0]) << 32 | u64::from(words[1]);
+        let phases = self.shutter_state.key.uniforms(id, words[2], OSCILLATION);
+        let oscillation = Oscillation::new(segment.diameter_mm.into(), self.oscillation, [phases[0], phases[1]]);
+        let count = oscillation.piece_count(exposure, segment.length());
+        for index in 0..count {
+            let [from, to] = [index, index + 1].map(|step| exposure * step as f64 / count as f64);
+            let brightness = oscillation.mean_brightness(from, to) as f32;
+            let mut piece = segment.piece(index, count);
+            piece.shading.light = segment.shading.light.map(|light| light * brightness);
+            piece.shading.add_light(sky);
+            let extent = piece.extent();
+            builder.add(&piece, extent);
         }
     }
 }

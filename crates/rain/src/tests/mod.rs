@@ -85,7 +85,7 @@ pub(super) fn opacity(strip: &Strip) -> Vec<f32> {
     (0..strip.len()).map(|index| strip.aovs[0].resolve(index, AovRule::Sum)).collect()
 }
 
-fn lit(wind: &Wind) -> Surroundings<'_> {
+pub(super) fn lit(wind: &Wind) -> Surroundings<'_> {
     let lights = vec![lamp([0.8, 3.0, -3.0], 500.0)];
     let sky = SkyParameters { luminance: 20.0.into(), ..SkyParameters::default() }.at(0.0);
     Surroundings { sky, others: Publication { lights, ..Publication::default() }, ..Surroundings::from_wind(wind) }

@@ -58,8 +58,44 @@ pub(crate) struct Composition<'a> {
     pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
     pub(crate) slices: &'a [Slice],
     pub(crate) plate: &'a PlateFrame,
+    /// What hides phenomena.
+    pub(crate) hiding: &'a HidingDepth,
     /// What is behind the slices.
     pub(crate) background: Background<'a>,
+}
+
+/// Depth beyond which a phenomenon is hidden: that of the plate, and of the opaque surfaces of other phenomena.
+#[derive(Default)]
+pub(crate) struct HidingDepth {
+    /// The nearest of all; `None` if only the plate hides anything.
+    nearest: Option<Image<1>>,
+    /// The members with opaque surfaces, which are hidden by the plate and sort themselves.
+    opaque: Vec<usize>,
+}
+
+impl HidingDepth {
+    /// That of the prepared phenomena in front of a plate.
+    pub(crate) fn new(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame) -> Self {
+        let surfaces = || prepared.iter().enumerate().filter_map(|(member, each)| Some((member, each.opaque_depth()?)));
+        let mut nearest: Option<Image<1>> = None;
+        for depth in surfaces().map(|(_, depth)| depth).chain(&plate.depth) {
+            match &mut nearest {
+                None => nearest = Some(depth.clone()),
+                Some(nearest) => {
+                    let both = nearest.pixels_mut().iter_mut().zip(depth.pixels());
+                    both.for_each(|(nearest, depth)| nearest[0] = nearest[0].min(depth[0]));
+                }
+            }
+        }
+        let opaque: Vec<usize> = surfaces().map(|(member, _)| member).collect();
+        Self { nearest: nearest.filter(|_| !opaque.is_empty()), opaque }
+    }
+
+    /// What hides a phenomenon; `None` if nothing does.
+    fn of_member<'a>(&'a self, member: usize, plate: &'a PlateFrame) -> Option<&'a Image<1>> {
+        let is_opaque = self.opaque.contains(&member);
+        self.nearest.as_ref().filter(|_| !is_opaque).or(plate.depth.as_ref())
+    }
 }
 
 /// Scratch memory of one thread.
@@ -118,7 +154,6 @@ impl Composition<'_> {
     fn accumulate(&self, level: Level, rect: Rect, scratch: &mut StripScratch) {
         let aovs = self.aov_counts();
         scratch.accumulator.reset(rect, self.layer_count(), &aovs);
-        let plate_depth = self.plate.depth.as_ref();
         for slice in self.slices {
             for &member in &slice.members {
                 let prepared = &self.prepared[member];
@@ -129,7 +164,7 @@ impl Composition<'_> {
                 }
                 // AOV planes are added as a whole, so strips with AOVs have the full size.
                 let drawn = if aov_count > 0 { rect } else { touched };
-                match plate_depth {
+                match self.hiding.of_member(member, self.plate) {
                     Some(image) => scratch.strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
                     None => scratch.strip.reset(drawn, None, aov_count),
                 }

@@ -28,7 +28,7 @@ use crate::{
         plate_cache::PlateCache,
         refraction,
         slices::{self, Slice},
-        strips::{self, Composition, Outputs},
+        strips::{self, Composition, HidingDepth, Outputs},
     },
     context::ShotContext,
     plan::Plan,
@@ -223,6 +223,7 @@ impl Shot {
             prepared: &prepared,
             slices: &slices,
             plate,
+            hiding: &HidingDepth::new(&prepared, plate),
             background: Background::plate(plate),
         };
         let header = self.context.header(self.number);
@@ -272,6 +273,7 @@ impl Shot {
             prepared: &prepared,
             slices: &slices,
             plate: mirrored,
+            hiding: &HidingDepth::new(&prepared, mirrored),
             background: Background::plate(mirrored),
         };
         let mut image = strips::draw_frame(&composition, self.context.header(self.number), None, observer)?.beauty;

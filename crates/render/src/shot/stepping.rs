@@ -42,7 +42,7 @@ fn others(context: &ShotContext, publications: &[Publication], index: usize, shu
 /// The scene's own lights and obstacles during `shutter`.
 pub(crate) fn scene_publication(context: &ShotContext, shutter: Shutter) -> Publication {
     let lights = context.plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
-    Publication { lights, occluders: context.compiled.obstacles().cloned().collect(), ..Publication::default() }
+    Publication { lights, occluders: context.compiled.obstacles(shutter.middle()).collect(), ..Publication::default() }
 }
 
 /// Steps all phenomena to the states from which the exposure `shutter` is drawn. The one whose time is earliest steps next, so that the order

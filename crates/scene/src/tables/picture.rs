@@ -154,7 +154,7 @@ bansho_base::parameters! {
         /// Position (point and spot).
         position: Animated<[f64; 3]> = Animated::from([0.0, 3.0, 0.0]), unit("m");
         /// Direction of the emitted light (directional and spot).
-        direction: [f64; 3] = [0.0, -1.0, 0.0];
+        direction: Animated<[f64; 3]> = Animated::from([0.0, -1.0, 0.0]);
         /// Linear sRGB color; its luminance is scaled to `intensity`.
         color: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
         /// Luminous intensity (candela) of points and spots, illuminance (lux) of directional lights.
@@ -176,9 +176,9 @@ impl LightParameters {
         self.kind != LightKind::Point
     }
 
-    /// Whether the vector of its direction is not zero.
+    /// Whether the vector of its direction is not zero at any key.
     pub fn has_valid_direction(&self) -> bool {
-        DVec3::from(self.direction).try_normalize().is_some()
+        self.direction.values().into_iter().all(|direction| DVec3::from(direction).try_normalize().is_some())
     }
 
     /// Whether it has a position.
@@ -189,7 +189,7 @@ impl LightParameters {
     /// The light at time `t`.
     pub fn at(&self, t: f64) -> Light {
         let position = DVec3::from(self.position.at(t));
-        let direction = DVec3::from(self.direction).try_normalize().unwrap_or(-DVec3::Y);
+        let direction = DVec3::from(self.direction.at(t)).try_normalize().unwrap_or(-DVec3::Y);
         let emitter = match self.kind {
             LightKind::Point => Emitter::Point { position, radius: self.radius },
             LightKind::Directional => Emitter::Directional { toward: -direction },

@@ -78,6 +78,19 @@ pub enum StreaksError {
     /// The vector toward the light is zero.
     #[error("the vector toward the light has no length; allowed: three numbers that are not all 0")]
     LightDirection,
+    /// The amplitude of the oscillation is out of range.
+    #[error("an oscillation of {0}; allowed: 0 to 1")]
+    Oscillation(f64),
+    /// Oscillating drops without a light.
+    #[error(
+        "an oscillation changes the brightness of drops in a light, not their opacity, and there is none; allowed: with a light direction"
+    )]
+    OscillationWithoutLight,
+    /// Oscillating drops of the paper's opacity.
+    #[error(
+        "the paper's streaks are lines of even brightness and do not oscillate; allowed: the opacity exposure_fraction"
+    )]
+    OscillationOfLines,
     /// More drops than the index can list.
     #[error(
         "a texture at {rate} mm/h and {diameter_mm} mm would hold {drops:.0} drops; allowed: up to {MAX_DROPS}, so choose a smaller cube"

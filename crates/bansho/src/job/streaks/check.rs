@@ -2,7 +2,10 @@
 
 use super::Streaks;
 use crate::job::error::{MAX_DROPS, StreakList, StreaksError};
-use bansho_rain::drops::size_distribution::{DropSizeDistribution, SizeBin};
+use bansho_rain::{
+    drops::size_distribution::{DropSizeDistribution, SizeBin},
+    streaks::coverage::OpacityLaw,
+};
 
 /// Checks all parameters.
 ///
@@ -26,6 +29,15 @@ pub(crate) fn check(streaks: &Streaks) -> Result<(), StreaksError> {
     }
     if streaks.light.is_some_and(|light| !light.iter().map(|x| x * x).sum::<f64>().is_normal()) {
         return Err(StreaksError::LightDirection);
+    }
+    if !(0.0..=1.0).contains(&streaks.oscillation) {
+        return Err(StreaksError::Oscillation(streaks.oscillation));
+    }
+    if streaks.oscillation > 0.0 && streaks.light.is_none() {
+        return Err(StreaksError::OscillationWithoutLight);
+    }
+    if streaks.oscillation > 0.0 && cube.opacity == OpacityLaw::Paper {
+        return Err(StreaksError::OscillationOfLines);
     }
     check_counts(streaks)
 }

@@ -101,18 +101,24 @@ impl TextureWriter {
         Ok(atomic::write_bytes_with(path, bytes, &self.overwrite)?)
     }
 
-    /// Writes the pictures of a texture.
-    pub(crate) fn write(&self, file: &str, opacity: &Image<1>) -> Result<WrittenTexture, JobError> {
+    /// Writes the pictures of a texture. `speckled` is its opacity times the brightness of drops that oscillate.
+    pub(crate) fn write(
+        &self,
+        file: &str,
+        opacity: &Image<1>,
+        speckled: Option<&Image<1>>,
+    ) -> Result<WrittenTexture, JobError> {
+        let brightness = speckled.unwrap_or(opacity);
         match self.format {
-            StreakFormat::Png => self.write_png(file, opacity),
-            StreakFormat::Exr => self.write_exr(file, opacity),
+            StreakFormat::Png => self.write_png(file, opacity, brightness),
+            StreakFormat::Exr => self.write_exr(file, opacity, brightness),
         }
     }
 
-    fn write_png(&self, file: &str, opacity: &Image<1>) -> Result<WrittenTexture, JobError> {
+    fn write_png(&self, file: &str, opacity: &Image<1>, brightness: &Image<1>) -> Result<WrittenTexture, JobError> {
         let scale = self.write_measured(file, 1, opacity, opacity.pixels().as_flattened())?;
         let lit = self.light.zip(self.lit_name(file)).map(|(light, name)| {
-            let radiance: Vec<f32> = self.radiance(&light, opacity).into_flattened();
+            let radiance: Vec<f32> = self.radiance(&light, brightness).into_flattened();
             let scale = self.write_measured(&name, 3, opacity, &radiance)?;
             Ok::<_, JobError>(LitPicture { file: name, scale })
         });
@@ -128,11 +134,11 @@ impl TextureWriter {
         Ok(picture.scale)
     }
 
-    fn write_exr(&self, file: &str, opacity: &Image<1>) -> Result<WrittenTexture, JobError> {
+    fn write_exr(&self, file: &str, opacity: &Image<1>, brightness: &Image<1>) -> Result<WrittenTexture, JobError> {
         let values = opacity.pixels().as_flattened();
         // Without a light, the radiance is the opacity: white streaks.
         let radiance = match &self.light {
-            Some(light) => self.radiance(light, opacity),
+            Some(light) => self.radiance(light, brightness),
             None => values.iter().map(|&opacity| [opacity; 3]).collect(),
         };
         let pixels = radiance.iter().zip(values).map(|(&[r, g, b], &opacity)| [r, g, b, opacity]).collect();
@@ -149,8 +155,8 @@ impl TextureWriter {
         Ok(WrittenTexture { scale: None, lit: None })
     }
 
-    fn radiance(&self, light: &DistantLight, opacity: &Image<1>) -> Vec<[f32; 3]> {
-        opacity.pixels().iter().map(|[opacity]| light.radiance.map(|radiance| radiance * opacity)).collect()
+    fn radiance(&self, light: &DistantLight, brightness: &Image<1>) -> Vec<[f32; 3]> {
+        brightness.pixels().iter().map(|[brightness]| light.radiance.map(|radiance| radiance * brightness)).collect()
     }
 
     fn header(&self, file: &str, image: &Image<1>) -> FrameHeader {
@@ -177,12 +183,15 @@ impl TextureWriter {
 
     /// The fingerprint of everything that the pixels of a file depend on.
     fn fingerprint(&self, file: &str) -> [u8; 32] {
-        let Streaks { cube, law, diameters, seed, light, bits, variants, .. } = &self.streaks;
+        let Streaks { cube, law, diameters, seed, light, oscillation, bits, variants, .. } = &self.streaks;
         let mut hasher = blake3::Hasher::new();
         hasher.update(
             format!("bansho {VERSION} {file} {cube:?} {law:?} {diameters:?} {seed} {light:?} {bits:?} {variants}")
                 .as_bytes(),
         );
+        if *oscillation > 0.0 {
+            hasher.update(format!(" oscillation {oscillation}").as_bytes());
+        }
         *hasher.finalize().as_bytes()
     }
 }

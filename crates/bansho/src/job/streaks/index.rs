@@ -8,6 +8,10 @@ use bansho_rain::{
     billboards::texture::{FallingDrop, StreakCube},
     drops::size_distribution::{DropSizeDistribution, SizeBin},
     lighting::extinction::{ExtinctionEfficiency, extinction, visibility},
+    streaks::{
+        coverage::{OpacityLaw, paper_opacity},
+        oscillation::mode_frequency,
+    },
 };
 use bansho_render::display::BitDepth;
 
@@ -59,14 +63,24 @@ impl Entry {
 
 fn describe_drop(cube: &StreakCube, drop: &FallingDrop) -> Value {
     let streak = cube.streak(drop);
+    let [opacity, mean_opacity] = opacities(cube, drop);
     json!({
         "diameter_mm": drop.diameter_mm,
         "velocity_m_per_s": drop.speed,
         "length_m": streak.length,
-        "opacity": streak.profile(0.0),
-        "mean_opacity": streak.mean_opacity().min(1.0),
+        "opacity": opacity,
+        "mean_opacity": mean_opacity,
         "position_m": drop.position,
     })
+}
+
+/// Opacity on the axis of a drop's streak, and its mean across the streak.
+fn opacities(cube: &StreakCube, drop: &FallingDrop) -> [f64; 2] {
+    let streak = cube.streak(drop);
+    match cube.opacity {
+        OpacityLaw::ExposureFraction => [streak.profile(0.0), streak.mean_opacity().min(1.0)],
+        OpacityLaw::Paper => [paper_opacity(drop.diameter_mm, drop.speed); 2],
+    }
 }
 
 /// The index of all textures.
@@ -87,11 +101,19 @@ pub(crate) fn describe(
         "pixel_m": cube.pixel(),
         "exposure_s": cube.exposure,
         "velocity": streaks.law.name(),
+        "opacity_law": cube.opacity.name(),
         "air": { "density_kg_per_m3": cube.terminal_velocity.air.density, "viscosity_pa_s": cube.terminal_velocity.air.viscosity },
         "diameters": if cube.spread { "sampled within the bin for each drop" } else { "that of the bin" },
         "seed": streaks.seed,
         "how_to_read": how_to_read(streaks, writer),
     });
+    if streaks.oscillation > 0.0 {
+        index["oscillation"] = json!({
+            "amplitude": streaks.oscillation,
+            "what": "the radiance of a streak is 1 + amplitude (2/3 sin(2 pi f2 t) + 1/3 sin(2 pi f3 t)) times that of a steady drop, with \
+                     Rayleigh's frequencies of the modes 2 and 3, and random phases",
+        });
+    }
     if let Some(light) = &writer.light {
         index["light"] = json!({
             "toward": light.toward.to_array(),
@@ -114,14 +136,22 @@ fn how_to_read(streaks: &Streaks, writer: &TextureWriter) -> Value {
             format!("opacity = code / {largest} * opacity_scale, linear: no gamma")
         }
     };
+    let drop = match streaks.cube.opacity {
+        OpacityLaw::ExposureFraction => {
+            "a round drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on the axis, \
+             `mean_opacity` across the streak; it covers (pi/4) D^2 for any exposure"
+        }
+        OpacityLaw::Paper => {
+            "a line one pixel wide, of the opacity 2 D / v with D in mm and v in m/s, for any exposure"
+        }
+    };
     let mut description = json!({
         "pixel": pixel,
         "opacity": "fraction of the pixel that drops cover, averaged over the exposure; to composite over a picture: picture * (1 - opacity) + drops",
         "tiling": "the texture repeats in both directions: a streak that leaves at an edge enters at the opposite one",
         "axes": "position_m is right, up, toward the viewer, from the lower left far corner; \
                  the center of the drop when the shutter opens; it then falls straight down by length_m",
-        "drop": "a round, steady drop: opacity 2 sqrt(r^2 - b^2) / (v T) at distance b from the axis, `opacity` on the axis, \
-                 `mean_opacity` across the streak; it covers (pi/4) D^2 for any exposure",
+        "drop": drop,
         "rain": "Marshall and Palmer 1948: 8000 exp(-4.1 R^-0.21 D) drops per m^3 and mm; \
                  with these velocities its rain rate is 14 to 18 % higher than R",
         "extinction": "extinction_per_m is geometric (Q = 1), over all diameters; \
@@ -164,14 +194,17 @@ fn describe_rain(rate: f64, sizes: &DropSizeDistribution, bins: &[SizeBin], cube
 
 fn describe_bin(bin: &SizeBin, cube: &StreakCube) -> Value {
     let speed = cube.terminal_velocity.speed(bin.diameter_mm);
-    let streak = cube.streak(&FallingDrop { diameter_mm: bin.diameter_mm, speed, position: [0.0; 3] });
+    let drop = FallingDrop { diameter_mm: bin.diameter_mm, speed, position: [0.0; 3] };
+    let (streak, [opacity, mean_opacity]) = (cube.streak(&drop), opacities(cube, &drop));
+    let oscillation_hz = [2, 3].map(|mode| mode_frequency(mode, bin.diameter_mm));
     json!({
         "diameter_mm": bin.diameter_mm,
         "range_mm": bin.range_mm,
         "velocity_m_per_s": speed,
         "length_m": streak.length,
-        "opacity": streak.profile(0.0),
-        "mean_opacity": streak.mean_opacity().min(1.0),
+        "opacity": opacity,
+        "mean_opacity": mean_opacity,
+        "oscillation_hz": oscillation_hz,
         "hidden_mm2": 0.25 * PI * bin.diameter_mm * bin.diameter_mm,
     })
 }

@@ -64,6 +64,8 @@ pub struct Streaks {
     pub seed: u64,
     /// Vector toward a distant light, if there is one: right, up, toward the viewer.
     pub light: Option<[f64; 3]>,
+    /// Amplitude of the brightness of lit streaks as their drops oscillate, 0 to 1; needs a light.
+    pub oscillation: f64,
     /// File format.
     pub format: StreakFormat,
     /// Bits of each channel of PNG files.
@@ -84,6 +86,7 @@ impl Default for Streaks {
             variants: 1,
             seed: 1,
             light: None,
+            oscillation: 0.0,
             format: StreakFormat::default(),
             bits: BitDepth::Sixteen,
             out: None,
@@ -226,8 +229,13 @@ impl PreparedStreaks {
             self.cube.draw_over(drops, &mut image);
         }
         check_cancelled(observer)?;
+        let speckled = (self.streaks.oscillation > 0.0).then(|| {
+            let mut brightness = self.cube.draw(&[]);
+            self.cube.draw_speckled_over(&drops, self.streaks.oscillation, self.streaks.seed, &mut brightness);
+            brightness
+        });
         let file = self.writer.name(texture);
-        let written = self.writer.write(&file, &image)?;
+        let written = self.writer.write(&file, &image, speckled.as_ref())?;
         Ok(Entry::new(texture, &self.cube, file, drops, &image, written))
     }
 }

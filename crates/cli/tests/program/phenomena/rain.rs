@@ -113,7 +113,7 @@ fn nonsense_is_located() {
         ("diameters_mm = [1.0, -2.0]", ["rain.0.diameters_mm", "-2"]),
         ("diameters_mm = [1.0, 2.0, 1.5]", ["rain.0.diameters_mm", "1.5"]),
         ("diameters_mm = []", ["rain.0.diameters_mm", "1 to 12"]),
-        ("method = \"streaks\"", ["rain.0.method", "billboards, drops"]),
+        ("method = \"streaks\"", ["rain.0.method", "billboards, drops, textures"]),
         ("distance = 0.0", ["rain.0.distance: 0", "allowed: 1 to 40 m"]),
     ] {
         let run = scene(&format!("[[rain]]\n{line}\n")).run(&["render", "scene.toml"]);

@@ -103,6 +103,45 @@ fn light_makes_radiance_in_proportion_to_opacity() {
 }
 
 #[test]
+fn the_papers_textures_are_lines_of_two_diameters_over_the_velocity() {
+    let folder = Folder::new();
+    folder.succeed(&["streaks", "--opacity", "paper", "--bits", "8", "--terminal-velocity", "rigid_sphere"]);
+    let about = index(&folder, "out/streaks/streaks.json");
+    assert_eq!((entries(&about, "textures").len(), about["opacity_law"].as_str()), (24, Some("paper")));
+    for bin in entries(&about, "bins") {
+        let expected = 2.0 * number(&bin["diameter_mm"]) / number(&bin["velocity_m_per_s"]);
+        assert!((number(&bin["opacity"]) - expected).abs() < 1e-12 && number(&bin["opacity"]) > 0.49, "{bin}");
+    }
+    // A line has that opacity over its length and one pixel; few of the drops of 2 mm cross.
+    let entry = entries(&about, "textures").iter().find(|entry| entry["file"] == "streak_20_2.png").unwrap();
+    let png = decode_png(&folder.files("out/streaks")["streak_20_2.png"]);
+    let drops = entries(entry, "drops");
+    let (opacity, length) = (number(&drops[0]["opacity"]), number(&drops[0]["length_m"]));
+    let scale = number(&entry["opacity_scale"]) / 255.0;
+    let sum: f64 = png.bytes.iter().map(|code| f64::from(*code) * scale).sum();
+    let expected = drops.len() as f64 * opacity * length * 512.0;
+    assert!((0.97..1.005).contains(&(sum / expected)), "{sum} {expected}");
+}
+
+#[test]
+fn oscillating_drops_speckle_their_light_and_keep_opacity_and_mean() {
+    let folder = Folder::new();
+    let common = ["streaks", "--rates", "20", "--diameters", "2", "--light-direction", "0,0.2,-1", "--format", "exr"];
+    folder.succeed(&[&common[..], &["-o", "steady"]].concat());
+    folder.succeed(&[&common[..], &["--oscillation", "0.6", "-o", "speckled"]].concat());
+    let [steady, speckled] =
+        ["steady", "speckled"].map(|name| read_exr(&folder.path(&format!("{name}/streak_20_2.exr"))));
+    assert_eq!(steady.channels["opacity.V"], speckled.channels["opacity.V"]);
+    let sum = |values: &[f32]| values.iter().map(|value| f64::from(*value)).sum::<f64>();
+    let [before, after] = [&steady, &speckled].map(|picture| &picture.channels["G"]);
+    assert!((sum(after) / sum(before) - 1.0).abs() < 0.05, "{} {}", sum(before), sum(after));
+    let change = before.iter().zip(after).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / sum(before);
+    assert!((0.15..0.6).contains(&change), "{change}");
+    let about = index(&folder, "speckled/streaks.json");
+    assert!((number(&entries(&about, "bins")[0]["oscillation_hz"][0]) - 121.57).abs() < 0.05);
+}
+
+#[test]
 fn variants_and_spread_drops_differ_and_any_threads_give_the_same_bytes() {
     let folder = Folder::new();
     let options = [
@@ -154,6 +193,20 @@ fn nonsense_is_refused_and_nothing_is_written() {
         (&["--variants", "0"], "--variants: 0 variants; allowed: 1 to 1000"),
         (&["--light-direction", "0,0,0"], "--light-direction: the vector toward the light has no length"),
         (&["--light-direction", "up"], "three numbers"),
+        (&["--opacity", "papers"], "exposure_fraction, paper"),
+        (
+            &["--oscillation", "1.5", "--light-direction", "0,0,1"],
+            "--oscillation: an oscillation of 1.5; allowed: 0 to 1",
+        ),
+        (
+            &["--oscillation", "nan", "--light-direction", "0,0,1"],
+            "--oscillation: an oscillation of NaN; allowed: 0 to 1",
+        ),
+        (&["--oscillation", "0.5"], "--oscillation: an oscillation changes the brightness of drops in a light"),
+        (
+            &["--oscillation", "0.5", "--opacity", "paper", "--light-direction", "0,0,1"],
+            "--oscillation: the paper's streaks are lines of even brightness",
+        ),
         (&["--terminal-velocity", "guessed"], "gunn_kinzer, rigid_sphere"),
         (&["--terminal-velocity", "rigid_sphere", "--diameters", "0.08,1"], "no solution for a drop of 0.08 mm"),
         (&["--format", "jpg"], "png, exr"),

@@ -8,12 +8,12 @@ use crate::streaks::coverage::Streak;
 const SAMPLE_LINES: usize = 4;
 
 /// Draws a streak over an image, with wrap-around. The drop's center is at `start` when the shutter opens, m from the
-/// left and upper edges, and falls. A pixel is `pixel` wide and high, m. `weight` (0 to 1) scales the opacity.
+/// left and upper edges, and falls. A pixel is `pixel` wide and high, m. `weight` scales the opacity between two positions along the streak, m.
 pub(crate) fn draw_streak(
     streak: &Streak,
     [axis, start]: [f64; 2],
     pixel: [f64; 2],
-    weight: f64,
+    weight: &dyn Fn(f64, f64) -> f64,
     image: &mut Image<1>,
 ) {
     let [width, height] = pixel;
@@ -29,7 +29,19 @@ pub(crate) fn draw_streak(
         let whole = streak.is_within(from) && streak.is_within(from + height);
         let opacities = if whole { &within } else { across.end_row(from, &mut opacities) };
         let y = row.rem_euclid(image.height() as i64) as usize;
-        blend(image.row_mut(y), first_column as i64, weight, opacities);
+        blend(image.row_mut(y), first_column as i64, weight(from, from + height), opacities);
+    }
+}
+
+/// Draws the paper's line over an image, with wrap-around: one pixel wide, alike in opacity from `start` downward over `length`, m.
+pub(crate) fn draw_line([x, start]: [f64; 2], length: f64, opacity: f64, pixel: f64, image: &mut Image<1>) {
+    let column = (x / pixel).floor() as i64;
+    let (first, last) = ((start / pixel).floor() as i64, ((start + length) / pixel).floor() as i64);
+    for row in first..=last {
+        let top = row as f64 * pixel;
+        let covered = ((top + pixel).min(start + length) - top.max(start)) / pixel;
+        let y = row.rem_euclid(image.height() as i64) as usize;
+        blend(image.row_mut(y), column, covered.clamp(0.0, 1.0), &[opacity]);
     }
 }
 

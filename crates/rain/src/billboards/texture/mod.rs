@@ -9,14 +9,17 @@ use bansho_base::{
     image::Image,
     math::random::{self, Key, Purpose},
 };
-pub(super) use draw::draw_streak;
+use draw::{draw_line, draw_streak};
 
 use crate::{
     drops::{
         size_distribution::{DropSizeDistribution, SizeBin, stratified_count},
         terminal_velocity::TerminalVelocity,
     },
-    streaks::coverage::Streak,
+    streaks::{
+        coverage::{OpacityLaw, Streak, paper_opacity},
+        oscillation::Oscillation,
+    },
 };
 
 /// Parameters of streak textures; the defaults are the paper's.
@@ -30,6 +33,8 @@ pub struct StreakCube {
     pub exposure: f64,
     /// Terminal velocity of the drops.
     pub terminal_velocity: TerminalVelocity,
+    /// Opacity of streaks.
+    pub opacity: OpacityLaw,
     /// Whether each drop has its own random diameter within its bin, instead of the bin's.
     pub spread: bool,
 }
@@ -41,6 +46,7 @@ impl Default for StreakCube {
             size: 512,
             exposure: 1.0 / 30.0,
             terminal_velocity: TerminalVelocity::default(),
+            opacity: OpacityLaw::default(),
             spread: false,
         }
     }
@@ -59,6 +65,7 @@ pub struct FallingDrop {
 
 const COUNT: Purpose = Purpose::named("drop count");
 const POSITION: Purpose = Purpose::named("drop place");
+const PHASE: Purpose = Purpose::named("drop phase");
 
 impl StreakCube {
     /// Edge of a pixel, m.
@@ -106,7 +113,29 @@ impl StreakCube {
         for drop in drops {
             // Image rows run downward, as the drop falls.
             let [x, y, _] = drop.position;
-            draw_streak(&self.streak(drop), [x, self.edge - y], [self.pixel(); 2], 1.0, image);
+            let start = [x, self.edge - y];
+            match self.opacity {
+                OpacityLaw::ExposureFraction => {
+                    draw_streak(&self.streak(drop), start, [self.pixel(); 2], &|_, _| 1.0, image);
+                }
+                OpacityLaw::Paper => {
+                    let opacity = paper_opacity(drop.diameter_mm, drop.speed);
+                    draw_line(start, self.streak(drop).length, opacity, self.pixel(), image);
+                }
+            }
+        }
+    }
+
+    /// Draws the brightness of oscillating drops over a texture of this cube: their opacity times their brightness, relative to that of drops that do not
+    /// oscillate. `amplitude` is that of [`Oscillation`]; the phases follow from the seed.
+    pub fn draw_speckled_over(&self, drops: &[FallingDrop], amplitude: f64, seed: u64, image: &mut Image<1>) {
+        let key = Key::new(seed, "oscillation of drops");
+        for drop in drops {
+            let [x, y, z] = drop.position;
+            let phases = key.uniforms(x.to_bits(), (y + z).to_bits() as u32, PHASE);
+            let oscillation = Oscillation::new(drop.diameter_mm, amplitude, [phases[0], phases[1]]);
+            let brightness = |from: f64, to: f64| oscillation.mean_brightness(from / drop.speed, to / drop.speed);
+            draw_streak(&self.streak(drop), [x, self.edge - y], [self.pixel(); 2], &brightness, image);
         }
     }
 }

@@ -86,6 +86,19 @@ impl StreakSegment {
         }
     }
 
+    /// Its length along the major axis, pixels.
+    pub(crate) fn length(&self) -> f64 {
+        2.0 * f64::from(self.half_length)
+    }
+
+    /// One of `count` pieces of equal length, in the order in which the drop passes them downward or to the right. All together cover what it covers.
+    pub(crate) fn piece(&self, index: usize, count: usize) -> Self {
+        let half_length = self.half_length / count as f32;
+        let along = (2 * index + 1) as f32 * half_length - self.half_length;
+        let offset = if self.steep { [self.slope * along, along] } else { [along, self.slope * along] };
+        Self { center: [0, 1].map(|axis| self.center[axis] + offset[axis]), half_length, ..*self }
+    }
+
     /// Maximum opacity of its pixels: that on its axis, or the whole coverage of a line where it is narrower than a
     /// pixel.
     #[inline(always)]
@@ -180,6 +193,26 @@ mod tests {
                 // A drop that does not move is opaque and cannot hide more.
                 let tolerance = if longest < 2.0 * radius { 0.15 } else { 1e-4 };
                 assert!((sum / disc(radius) - 1.0).abs() < tolerance, "{to:?} {radius}: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_pieces_of_a_streak_cover_what_it_covers() {
+        for (to, radius) in [([24.9, 50.0], 0.3), ([50.0, 26.0], 0.9), ([29.0, 52.0], 3.0)] {
+            let whole = segment([20.3, 20.9], to, radius);
+            let opacity = drawn(&whole, [64, 64], 0);
+            let mut sum = vec![0.0; opacity.len()];
+            for index in 0..7 {
+                let piece = drawn(&whole.piece(index, 7), [64, 64], 0);
+                sum.iter_mut().zip(piece).for_each(|(sum, piece)| *sum += piece);
+            }
+            let [all, pieces] = [&opacity, &sum].map(|values| values.iter().sum::<f32>());
+            assert!((pieces / all - 1.0).abs() < 1e-3, "{to:?}: {pieces} {all}");
+            // Where two pieces meet within a pixel, they cross it at two positions.
+            let largest = opacity.iter().copied().fold(0.0, f32::max);
+            for (index, (sum, whole)) in sum.iter().zip(&opacity).enumerate() {
+                assert!((sum - whole).abs() < 0.04 * largest, "{to:?} {index}: {sum} {whole}");
             }
         }
     }

@@ -1,0 +1,39 @@
+//! Visible obstacles: boxes, spheres, cylinders and meshes, lit by lamps, fires, the sky and the ground around them.
+//!
+//! They are there to stand in rain and light: a car, a lamp post. There is direct light with shadows among themselves, one bounce from the ground,
+//! and the reflection of lamps and sky in a glossy surface; no interreflection.
+//!
+//! # References
+//! - T. Moller and B. Trumbore, "Fast, minimum storage ray/triangle intersection" (1997).
+//! - B. Walter, S. Marschner, H. Li and K. Torrance, "Microfacet models for refraction through rough surfaces" (2007): GGX.
+//! - E. Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces" (2017): approximation of Smith's masking.
+//! - C. Schlick, "An inexpensive BRDF model for physically-based rendering" (1994): Fresnel approximation.
+//!
+//! # Equations
+//!
+//! | equation | function |
+//! | --- | --- |
+//! | ray and triangle | `bvh::Triangle::intersect` |
+//! | ray and sphere, box, cylinder | `intersect::sphere`, `intersect::cuboid`, `intersect::cylinder` |
+//! | diffuse reflection `albedo E cos / pi` | `shade::Shading::lights` |
+//! | GGX reflection `F D G / (4 cos cos)` | `shade::specular_brdf` |
+//! | one bounce from the ground, `albedo E / pi` times its solid angle | `shade::Shading::ambient` |
+//!
+//! # Data flow
+//! [`Solids`] holds the obstacles, with a bounding volume hierarchy for each mesh. For a frame, `trace` places them at several times while the shutter is
+//! open (`pose`), and finds for each pixel what it shows: where the corners of a pixel show one smooth surface, one ray, else sixteen. `shade` computes
+//! the radiance. The drawn pixels are copied to the strips; where a pixel is fully covered, its depth hides all other phenomena
+//! ([`Prepared::opaque_depth`](bansho_base::phenomenon::Prepared::opaque_depth)).
+
+mod bvh;
+mod intersect;
+mod model;
+mod phenomenon;
+mod pose;
+mod shade;
+mod trace;
+
+pub use model::Solids;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,64 @@
+//! The visible obstacles of a scene.
+
+use bansho_base::{
+    color::acescg_from_srgb,
+    world::obstacle::{Obstacle, ObstacleParameters, ObstacleShape},
+};
+
+use super::bvh::TriangleBvh;
+
+/// The visible obstacles of a scene.
+#[derive(Debug)]
+pub struct Solids {
+    pub(super) solids: Vec<Solid>,
+}
+
+/// A visible obstacle.
+#[derive(Debug)]
+pub(super) struct Solid {
+    pub(super) obstacle: Obstacle,
+    /// Its triangles, if it is a mesh.
+    pub(super) triangles: Option<TriangleBvh>,
+    pub(super) material: Material,
+}
+
+/// How a surface reflects light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Material {
+    /// ACEScg.
+    pub(super) albedo: [f32; 3],
+    /// GGX alpha.
+    pub(super) roughness: f64,
+    /// Reflectance at normal incidence.
+    pub(super) reflectance: f64,
+}
+
+impl Material {
+    fn new(parameters: &ObstacleParameters) -> Self {
+        Self {
+            albedo: acescg_from_srgb(parameters.color.map(|value| value as f32)),
+            roughness: parameters.roughness,
+            reflectance: parameters.reflectance,
+        }
+    }
+}
+
+impl Solids {
+    /// The name of their layer.
+    pub const NAME: &str = "obstacles";
+
+    /// Whether an obstacle is drawn.
+    pub fn draws(obstacle: &Obstacle) -> bool {
+        obstacle.parameters().visible && obstacle.parameters().shape != ObstacleShape::Plane
+    }
+
+    /// Those of some obstacles that are drawn.
+    pub fn new(obstacles: Vec<Obstacle>) -> Self {
+        let solid = |obstacle: Obstacle| Solid {
+            triangles: obstacle.mesh().map(|mesh| TriangleBvh::new(&mesh.mesh)),
+            material: Material::new(obstacle.parameters()),
+            obstacle,
+        };
+        Self { solids: obstacles.into_iter().filter(Self::draws).map(solid).collect() }
+    }
+}

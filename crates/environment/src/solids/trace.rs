@@ -1,0 +1,255 @@
+//! The pixels of a frame: what each shows of the obstacles, antialiased, with motion blur.
+
+use bansho_base::{
+    host::observer::{Cancelled, Observer, check},
+    image::{Image, Rect},
+    math::{DVec2, DVec3},
+    phenomenon::{
+        Prepared,
+        strip::{DepthInterval, Strip, View},
+        surroundings::Surroundings,
+    },
+};
+use rayon::prelude::*;
+
+use super::{
+    model::Solids,
+    pose::{Pose, SurfacePoint, poses},
+    shade::Shading,
+};
+
+/// Rays of a pixel that shows an edge, or motion.
+const SAMPLES: usize = 16;
+/// Cosine of the angle between the normals at the corners of a pixel up to which it shows one smooth surface.
+const SMOOTH_COS: f64 = 0.97;
+
+/// A pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pixel {
+    /// ACEScg, premultiplied, cd/m^2.
+    radiance: [f32; 3],
+    /// 0 to 1.
+    coverage: f32,
+    /// Of the nearest surface, m.
+    depth: f32,
+    /// Depth beyond which it hides everything, m; infinite if it is not fully covered.
+    opaque_depth: f32,
+}
+
+impl Pixel {
+    const EMPTY: Self = Self { radiance: [0.0; 3], coverage: 0.0, depth: f32::INFINITY, opaque_depth: f32::INFINITY };
+}
+
+/// A frame of the obstacles.
+pub(super) struct PreparedSolids {
+    /// The pixels that may show one.
+    rect: Rect,
+    pixels: Vec<Pixel>,
+    opaque_depth: Image<1>,
+}
+
+/// Position of ray `index` within its pixel (Hammersley).
+fn sample_offset(index: usize) -> DVec2 {
+    let reversed = (index as u8).reverse_bits() >> (8 - SAMPLES.ilog2());
+    DVec2::new(index as f64 + 0.5, f64::from(reversed) + 0.5) / SAMPLES as f64
+}
+
+/// Depths that the obstacles fill during an exposure, overlapping ones merged.
+pub(super) fn depth_intervals(solids: &Solids, view: &View) -> Vec<DepthInterval> {
+    let (poses, _) = poses(solids, view);
+    let mut depths: Vec<[f64; 2]> = poses.iter().flat_map(|pose| pose.depths().collect::<Vec<_>>()).collect();
+    depths.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut intervals: Vec<DepthInterval> = Vec::new();
+    for [near, far] in depths {
+        let far = far.next_up();
+        match intervals.last_mut() {
+            Some(last) if near <= last.far => last.far = last.far.max(far),
+            _ => intervals.push(DepthInterval { near, far }),
+        }
+    }
+    intervals
+}
+
+/// The rectangle of the picture that each obstacle may cover in any of the poses.
+fn bounds(poses: &[Pose], view: &View) -> Vec<Rect> {
+    let mut all = poses[0].bounds();
+    for pose in &poses[1..] {
+        all.iter_mut().zip(pose.bounds()).for_each(|(all, one)| *all = [all[0].min(one[0]), all[1].max(one[1])]);
+    }
+    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
+    let rect = |[low, high]: [DVec2; 2]| {
+        let [x, y] = [clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1])];
+        let [right, bottom] = [clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1])];
+        let rect = Rect { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) };
+        rect.intersection(&view.window)
+    };
+    all.into_iter().map(rect).collect()
+}
+
+/// Whether a pixel is in one of some rectangles.
+fn is_in_any(rects: &[Rect], x: usize, y: usize) -> bool {
+    rects.iter().any(|rect| (rect.x..rect.right()).contains(&x) && (rect.y..rect.bottom()).contains(&y))
+}
+
+impl PreparedSolids {
+    /// Traces the pixels of the view's window.
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    pub(super) fn new(
+        solids: &Solids,
+        view: &View,
+        surroundings: &Surroundings,
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let (poses, moves) = poses(solids, view);
+        let rects = bounds(&poses, view);
+        let rect = rects.iter().fold(Rect::default(), |all, rect| all.union(rect));
+        let moving: Vec<Rect> = rects.iter().zip(moves).filter(|(_, moves)| *moves).map(|(rect, _)| *rect).collect();
+        let tracer = Tracer { poses: &poses, shading: Shading::new(surroundings), rects: &rects, moving: &moving };
+        let corners = tracer.corners(rect, observer)?;
+        let mut pixels = vec![Pixel::EMPTY; rect.width * rect.height];
+        pixels.par_chunks_mut(rect.width.max(1)).enumerate().try_for_each(|(y, row)| {
+            check(observer)?;
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let first = y * (rect.width + 1) + x;
+                let around = [first, first + 1, first + rect.width + 1, first + rect.width + 2];
+                *pixel = tracer.pixel([rect.x + x, rect.y + y], around.map(|index| corners[index]));
+            }
+            Ok(())
+        })?;
+        let mut opaque_depth = Image::filled(view.size[0], view.size[1], [f32::INFINITY]);
+        for (y, row) in pixels.chunks(rect.width.max(1)).enumerate() {
+            let out = &mut opaque_depth.row_mut(rect.y + y)[rect.x..rect.right()];
+            out.iter_mut().zip(row).for_each(|(out, pixel)| *out = [pixel.opaque_depth]);
+        }
+        Ok(Self { rect, pixels, opaque_depth })
+    }
+}
+
+/// The surface at a corner of a pixel: index of the solid and normal.
+type Corner = Option<(usize, DVec3)>;
+
+struct Tracer<'a> {
+    poses: &'a [Pose<'a>],
+    shading: Shading<'a>,
+    /// The pixels of each obstacle.
+    rects: &'a [Rect],
+    /// Those of each obstacle that moves in the picture.
+    moving: &'a [Rect],
+}
+
+/// Whether two corners show one smooth surface, or both nothing.
+fn is_smooth(a: Corner, b: Corner) -> bool {
+    match (a, b) {
+        (None, None) => true,
+        (Some((solid, normal)), Some((other, other_normal))) => solid == other && normal.dot(other_normal) > SMOOTH_COS,
+        _ => false,
+    }
+}
+
+impl Tracer<'_> {
+    /// The pose in the middle of the exposure.
+    fn middle(&self) -> &Pose<'_> {
+        &self.poses[self.poses.len() / 2]
+    }
+
+    /// The surfaces at all corners of the pixels of a rectangle in the middle of the exposure, row by row.
+    fn corners(&self, rect: Rect, observer: &dyn Observer) -> Result<Vec<Corner>, Cancelled> {
+        let width = rect.width + 1;
+        let mut corners = vec![None; width * (rect.height + 1)];
+        corners.par_chunks_mut(width).enumerate().try_for_each(|(y, row)| {
+            check(observer)?;
+            for (x, corner) in row.iter_mut().enumerate() {
+                let [x, y] = [rect.x + x, rect.y + y];
+                // A corner belongs to four pixels.
+                let is_near = [
+                    [x, y],
+                    [x.saturating_sub(1), y.saturating_sub(1)],
+                    [x, y.saturating_sub(1)],
+                    [x.saturating_sub(1), y],
+                ]
+                .into_iter()
+                .any(|[x, y]| is_in_any(self.rects, x, y));
+                if is_near {
+                    let seen = self.middle().seen(DVec2::new(x as f64, y as f64));
+                    *corner = seen.map(|surface| (surface.index, surface.normal));
+                }
+            }
+            Ok(())
+        })?;
+        Ok(corners)
+    }
+
+    /// A pixel, with the surfaces at its corners.
+    fn pixel(&self, [x, y]: [usize; 2], corners: [Corner; 4]) -> Pixel {
+        if !is_in_any(self.rects, x, y) {
+            return Pixel::EMPTY;
+        }
+        let position = DVec2::new(x as f64, y as f64);
+        if is_in_any(self.moving, x, y) || corners.iter().any(|corner| !is_smooth(corners[0], *corner)) {
+            return self.supersampled(position);
+        }
+        let center = self.middle().seen(position + 0.5);
+        if !is_smooth(corners[0], center.map(|surface| (surface.index, surface.normal))) {
+            return self.supersampled(position);
+        }
+        center.map_or(Pixel::EMPTY, |surface| self.covered(&surface, self.middle()))
+    }
+
+    /// A pixel that shows one surface.
+    fn covered(&self, surface: &SurfacePoint, pose: &Pose) -> Pixel {
+        let depth = surface.t as f32;
+        Pixel { radiance: self.shading.radiance(surface, pose), coverage: 1.0, depth, opaque_depth: depth }
+    }
+
+    /// A pixel by many rays, each at its own time. Where they all meet one smooth surface, it is shaded once.
+    fn supersampled(&self, position: DVec2) -> Pixel {
+        let sample = |index: usize| {
+            // The times are in another order than the columns, so that motion does not shear an edge.
+            let pose = &self.poses[(index * 7 % SAMPLES) * self.poses.len() / SAMPLES];
+            pose.seen(position + sample_offset(index)).map(|surface| (surface, pose))
+        };
+        let samples: [Option<(SurfacePoint, &Pose)>; SAMPLES] = std::array::from_fn(sample);
+        let corner =
+            |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
+        let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)));
+        let mut pixel = Pixel { opaque_depth: 0.0, ..Pixel::EMPTY };
+        for (index, (surface, pose)) in samples.iter().flatten().enumerate() {
+            if !is_one || index == 0 {
+                let weight = if is_one { 1.0 } else { 1.0 / SAMPLES as f32 };
+                let radiance = self.shading.radiance(surface, pose);
+                (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * weight);
+            }
+            pixel.coverage += 1.0 / SAMPLES as f32;
+            pixel.depth = pixel.depth.min(surface.t as f32);
+            pixel.opaque_depth = pixel.opaque_depth.max(surface.t as f32);
+        }
+        let is_covered = pixel.coverage == 1.0;
+        Pixel { opaque_depth: if is_covered { pixel.opaque_depth } else { f32::INFINITY }, ..pixel }
+    }
+}
+
+impl Prepared for PreparedSolids {
+    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+        self.rect
+    }
+
+    fn opaque_depth(&self) -> Option<&Image<1>> {
+        Some(&self.opaque_depth)
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let touched = self.rect.intersection(&strip.rect);
+        for y in touched.y..touched.bottom() {
+            for x in touched.x..touched.right() {
+                let pixel = &self.pixels[(y - self.rect.y) * self.rect.width + x - self.rect.x];
+                let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                let is_drawn = pixel.coverage > 0.0 && slice.contains(f64::from(pixel.depth));
+                if is_drawn && strip.visible(index, pixel.depth) {
+                    strip.add_behind(index, pixel.radiance, [1.0 - pixel.coverage; 3], pixel.depth);
+                }
+            }
+        }
+    }
+}

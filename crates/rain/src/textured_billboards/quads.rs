@@ -1,0 +1,249 @@
+//! The billboards of a frame: where they are, how they are lit, and their pixels.
+
+use std::f64::consts::PI;
+
+use bansho_base::{
+    image::Rect,
+    math::{DVec2, DVec3},
+    phenomenon::{
+        strip::{DepthInterval, GrayPlanes, Strip, View},
+        surroundings::Light,
+    },
+};
+
+use super::texture_set::Texture;
+use crate::{Rain, drops::shutter_state::ShutterState, render::prepared::write_aovs};
+
+/// Edge of a voxel and of a billboard, m.
+const VOXEL: f64 = 1.0;
+
+/// The billboards of a frame, nearest first.
+pub(crate) struct TexturedBillboards<'a> {
+    view: &'a View,
+    quads: Vec<Quad<'a>>,
+    /// Opacity of a code.
+    opacity_of_code: f32,
+    /// Height of the ground, m.
+    ground: f64,
+}
+
+/// A billboard.
+pub(super) struct Quad<'a> {
+    pub(super) center: DVec3,
+    /// Horizontal unit vector across it.
+    pub(super) right: DVec3,
+    texture: &'a Texture,
+    /// Mipmap.
+    level: usize,
+    diameter_mm: f32,
+    /// Depth of its center, m.
+    depth: f64,
+    /// Radiance at full opacity at its corners: lower left, lower right, upper left, upper right.
+    pub(super) radiance: [[f32; 3]; 4],
+    /// The pixels that it may cover.
+    bounds: Rect,
+}
+
+/// Height of the centers of billboards that fall with `speed` (m/s) in `rows` voxels above the ground, at time `t`, m. Each falls until it is in the ground, and
+/// then returns to the top.
+pub(super) fn heights(rows: usize, speed: f64, t: f64) -> impl Iterator<Item = f64> {
+    let fallen = speed * t / VOXEL;
+    (0..rows).map(move |row| ((row as f64 + 1.0 - fallen).rem_euclid(rows as f64) - 0.5) * VOXEL)
+}
+
+impl<'a> Quad<'a> {
+    /// A billboard at `center`, turned about the vertical so that it is perpendicular to the horizontal part of the line from the camera, and lit at its
+    /// corners: the illuminance of each light falls with the square of the distance.
+    pub(super) fn new(center: DVec3, diameter_mm: f32, texture: &'a Texture, lights: &[Light], view: &View) -> Self {
+        let toward = center - view.camera.position;
+        let right = DVec3::new(-toward.z, 0.0, toward.x).normalize_or(DVec3::X);
+        let corner = |index: usize| {
+            let [across, up] = [(index & 1) as f64 - 0.5, (index >> 1) as f64 - 0.5];
+            center + right * (across * VOXEL) + DVec3::Y * (up * VOXEL)
+        };
+        let corners: [DVec3; 4] = std::array::from_fn(corner);
+        let radiance = corners.map(|corner| {
+            lights.iter().fold([0.0; 3], |sum: [f32; 3], light| {
+                let (illuminance, _) = light.illuminance(corner);
+                [0, 1, 2].map(|c| sum[c] + illuminance[c] * (0.25 / PI) as f32)
+            })
+        });
+        let depth = view.camera.depth(center);
+        let texels = depth.max(view.camera.near) / view.camera.focal_pixels * 512.0 / VOXEL;
+        Self {
+            center,
+            right,
+            texture,
+            level: texture.level(texels),
+            diameter_mm,
+            depth,
+            radiance,
+            bounds: pixel_bounds(&corners, view),
+        }
+    }
+
+    fn max_radiance(&self) -> f32 {
+        self.radiance.iter().flatten().copied().fold(0.0, f32::max)
+    }
+}
+
+/// The pixels between the corners of a billboard; all of them if a corner is beside or behind the camera.
+fn pixel_bounds(corners: &[DVec3; 4], view: &View) -> Rect {
+    let whole = Rect::from_size(view.size[0], view.size[1]);
+    let mut bounds = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    for corner in corners {
+        let Some(projection) = view.camera.project(*corner) else { return whole };
+        bounds = [bounds[0].min(projection.pixel), bounds[1].max(projection.pixel)];
+    }
+    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
+    let [x, y] = [clamp(bounds[0].x.floor(), view.size[0]), clamp(bounds[0].y.floor(), view.size[1])];
+    let [right, bottom] = [clamp(bounds[1].x.ceil(), view.size[0]), clamp(bounds[1].y.ceil(), view.size[1])];
+    Rect { x, y, width: right - x, height: bottom - y }
+}
+
+impl<'a> TexturedBillboards<'a> {
+    /// The billboards that may be seen; those whose light is below `culling_radiance` (cd/m^2) everywhere are left out. `None` without rain.
+    pub(crate) fn new(
+        rain: &'a Rain,
+        shutter_state: &ShutterState,
+        lights: &[Light],
+        view: &'a View,
+        culling_radiance: f32,
+    ) -> Option<Self> {
+        let t = view.shutter.middle();
+        let set = rain.textures.as_ref()?;
+        let opacity_of_code = set.opacity_of_code() * rain.parameters.opacity_gain as f32;
+        let eye = view.camera.position;
+        let (distance, ground) = (shutter_state.distance, shutter_state.ground);
+        let rows = ((eye.y - ground).abs() + distance).ceil().max(1.0) as usize;
+        let range = |center: f64| (center - distance).floor() as i64..=(center + distance).floor() as i64;
+        let mut quads = Vec::new();
+        for (class, texture) in shutter_state.classes.iter().zip(set.of_rate(rain.rate(t))) {
+            let heights: Vec<f64> = heights(rows, class.speed, t).collect();
+            for (x, z) in range(eye.x).flat_map(|x| range(eye.z).map(move |z| (x, z))) {
+                for height in &heights {
+                    let center = DVec3::new((x as f64 + 0.5) * VOXEL, ground + height, (z as f64 + 0.5) * VOXEL);
+                    let is_near = (center - eye).length() <= distance;
+                    if !is_near || view.camera.depth(center) < -VOXEL {
+                        continue;
+                    }
+                    let quad = Quad::new(center, class.diameter_mm as f32, texture, lights, view);
+                    let brightest = quad.max_radiance() * f32::from(texture.largest()) * opacity_of_code;
+                    if brightest.min(quad.max_radiance()) >= culling_radiance && !quad.bounds.is_empty() {
+                        quads.push(quad);
+                    }
+                }
+            }
+        }
+        quads.sort_by(|a, b| (a.center - eye).length_squared().total_cmp(&(b.center - eye).length_squared()));
+        Some(Self { view, quads, opacity_of_code, ground })
+    }
+
+    /// Number of billboards.
+    pub(crate) fn count(&self) -> usize {
+        self.quads.len()
+    }
+
+    /// Draws the billboards whose centers are in a slice.
+    pub(crate) fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let rect = strip.rect;
+        let visible = |quad: &&Quad| {
+            slice.contains(quad.depth.max(self.view.camera.near)) && !quad.bounds.intersection(&rect).is_empty()
+        };
+        let mut quads = self.quads.iter().filter(visible).peekable();
+        if quads.peek().is_none() {
+            return;
+        }
+        let pixel = |index: usize| {
+            let [x, y] = [rect.x + index % rect.width, rect.y + index / rect.width];
+            let direction = self.view.camera.direction(DVec2::new(x as f64, y as f64) + 0.5);
+            direction.unwrap_or(DVec3::ZERO).as_vec3().to_array()
+        };
+        let directions: Vec<[f32; 3]> = (0..strip.len()).map(pixel).collect();
+        let mut aovs = std::mem::take(&mut strip.aovs);
+        // Only rain draws into its strip, and its transmittance is the same for all colors.
+        if let Some(mut planes) = strip.gray_planes_mut() {
+            for quad in quads {
+                let touched = quad.bounds.intersection(&rect);
+                let plane = self.plane(quad);
+                for y in touched.y..touched.bottom() {
+                    let first = (y - rect.y) * rect.width + touched.x - rect.x;
+                    for (index, direction) in (first..).zip(&directions[first..first + touched.width]) {
+                        let Some((position, depth)) = plane.hit(*direction) else { continue };
+                        let code = quad.texture.sample(quad.level, position);
+                        if code > 0.0 && planes.plate_depth.get(index).is_none_or(|plate| depth < *plate) {
+                            let opacity = (code * self.opacity_of_code).min(1.0);
+                            composite_under(&mut planes, index, interpolated(&quad.radiance, position), opacity, depth);
+                            write_aovs(&mut aovs, index, opacity, depth, quad.diameter_mm);
+                        }
+                    }
+                }
+            }
+        }
+        strip.aovs = aovs;
+    }
+
+    fn plane(&self, quad: &Quad) -> QuadPlane {
+        let eye = self.view.camera.position;
+        let (right, offset) = (quad.right, quad.center - eye);
+        let normal = right.cross(DVec3::Y);
+        QuadPlane {
+            normal: [normal.x as f32, normal.z as f32],
+            right: [(right.x / VOXEL) as f32, (right.z / VOXEL) as f32],
+            distance: offset.dot(normal) as f32,
+            across: (0.5 - offset.dot(right) / VOXEL) as f32,
+            up: (0.5 - offset.y / VOXEL) as f32,
+            lowest: ((self.ground - (quad.center.y - 0.5 * VOXEL)) / VOXEL).max(0.0) as f32,
+            near: self.view.camera.near as f32,
+        }
+    }
+}
+
+/// `L += T a l; T -= T a`.
+fn composite_under(planes: &mut GrayPlanes, index: usize, light: [f32; 3], opacity: f32, depth: f32) {
+    let blocked = planes.transmittance[index] * opacity;
+    for (plane, light) in planes.radiance.iter_mut().zip(light) {
+        plane[index] += blocked * light;
+    }
+    planes.transmittance[index] -= blocked;
+    planes.depth[index] = planes.depth[index].min(depth);
+}
+
+/// The plane of a billboard, relative to the camera. It is vertical, so directions have two components, x and z.
+struct QuadPlane {
+    normal: [f32; 2],
+    /// Unit vector across it, over its width.
+    right: [f32; 2],
+    /// Of the camera along the normal, m.
+    distance: f32,
+    /// Position of the camera's own perpendicular on the billboard, 0 to 1.
+    across: f32,
+    up: f32,
+    /// Position of the ground on the billboard.
+    lowest: f32,
+    near: f32,
+}
+
+impl QuadPlane {
+    /// Where a line of sight meets the billboard, from its lower left corner (0 to 1), and the depth there, m.
+    #[inline(always)]
+    fn hit(&self, [x, y, z]: [f32; 3]) -> Option<([f32; 2], f32)> {
+        let t = self.distance / (x * self.normal[0] + z * self.normal[1]);
+        let u = self.across + t * (x * self.right[0] + z * self.right[1]);
+        let v = self.up + t * y * (1.0 / VOXEL as f32);
+        // Comparisons with NaN are false.
+        let is_inside = t >= self.near && u >= 0.0 && u < 1.0 && v >= self.lowest && v < 1.0;
+        is_inside.then_some(([u, v], t))
+    }
+}
+
+/// Bilinear interpolation of the colors of the corners.
+#[inline(always)]
+pub(super) fn interpolated(corners: &[[f32; 3]; 4], [u, v]: [f32; 2]) -> [f32; 3] {
+    let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+    let mut color = [0.0; 3];
+    for (corner, weight) in corners.iter().zip(weights) {
+        (0..3).for_each(|c| color[c] += corner[c] * weight);
+    }
+    color
+}
