@@ -161,4 +161,17 @@ mod tests {
         };
         assert!(transmittance(Emitter::NitrogenIon) < 0.5 * transmittance(Emitter::OxygenGreen).abs());
     }
+
+    /// (2.27) by hand: d = 0.001 per km, 300 km across the field and 100 km up a vertical field.
+    #[test]
+    fn light_is_attenuated_by_the_square_of_its_distance() {
+        let rendering = RenderingParameters { attenuation_per_km: 1e-3, ..RenderingParameters::default() };
+        let attenuation = AttenuationByDistance::new(&rendering, 90.0);
+        let level = (0..).find(|level| level_altitude_km(*level) >= 100.0).unwrap();
+        let [up, across] = [attenuation.of_level(level), f64::from(attenuation.of_field_line([180.0, 240.0]))];
+        assert!((up - 0.990_050).abs() < 1e-6 && (across - 0.913_931).abs() < 1e-6, "{up} {across}");
+        // The distance is the hypotenuse: exp(-0.1).
+        assert!((up * across - 0.904_837).abs() < 1e-6);
+        assert_eq!(AttenuationByDistance::default().of_level(level), 1.0);
+    }
 }

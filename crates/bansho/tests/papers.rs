@@ -1,0 +1,240 @@
+//! The four papers, item by item: each page of the book in `docs/src/papers` has a table of every numbered equation, figure, table and item of future work.
+//! Every row names a scene, a command or a function that exists, a number, a test that measures it, and whether it is done or why not.
+
+#[path = "support/sources.rs"]
+mod sources;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
+
+use sources::{cells, exists, has_words, read, rust_files};
+
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// A paper, and what is numbered in it.
+struct Paper {
+    /// Page in `docs/src/papers`, and the folder of its scenes in `scenes/papers`.
+    name: &'static str,
+    /// Crate of the functions that its table names.
+    in_crate: &'static str,
+    /// Numbers of its equations, figures, pictures and tables: kind, then numbers and ranges.
+    numbered: &'static [(&'static str, &'static str)],
+    /// At least so many items of future work.
+    future_work: usize,
+}
+
+const PAPERS: [Paper; 4] = [
+    Paper {
+        name: "ohshima_itahashi",
+        in_crate: "fire",
+        numbered: &[("equation", "1-7, 9-18, 20"), ("figure", "1-7"), ("picture", "1-9"), ("table", "1")],
+        future_work: 5,
+    },
+    Paper { name: "inagaki", in_crate: "fire", numbered: &[("equation", "1-17"), ("figure", "1-10")], future_work: 0 },
+    // There is no figure 2.
+    Paper {
+        name: "yoshida_dobashi_yamamoto",
+        in_crate: "rain",
+        numbered: &[("equation", "1-4"), ("figure", "1, 3-5, 6a, 6b, 7a, 7b")],
+        future_work: 5,
+    },
+    Paper {
+        name: "sekiguchi",
+        in_crate: "aurora",
+        numbered: &[("equation", "2.1-2.30"), ("figure", "1.1-1.3, 2.1-2.21, 3.1-3.14"), ("table", "2.1-2.4, 3.1-3.3")],
+        future_work: 4,
+    },
+];
+
+/// A row of a table.
+struct Row {
+    item: String,
+    subject: String,
+    measured: String,
+    test: String,
+    state: String,
+}
+
+#[test]
+fn every_item_of_the_papers_is_in_the_book() {
+    report(PAPERS.iter().flat_map(|paper| uncovered(paper, &rows(paper))).collect());
+}
+
+#[test]
+fn every_row_names_what_exists_and_a_number_that_a_test_measures() {
+    let tests = test_names();
+    let of_paper =
+        |paper: &Paper| -> Vec<String> { rows(paper).iter().flat_map(|row| faults(paper, row, &tests)).collect() };
+    report(PAPERS.iter().flat_map(of_paper).collect());
+}
+
+fn report(faults: Vec<String>) {
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+/// The rows under the heading `Everything numbered` of a page.
+fn rows(paper: &Paper) -> Vec<Row> {
+    let page = read(&Path::new(ROOT).join("docs/src/papers").join(paper.name).with_extension("md"));
+    let section = page.lines().skip_while(|line| line.trim() != "## Everything numbered").skip(1);
+    let table = section.skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
+    let rows: Vec<Row> = table.skip(2).map(|line| row(paper.name, line)).collect();
+    assert!(!rows.is_empty(), "{}: no table under the heading `Everything numbered`", paper.name);
+    rows
+}
+
+fn row(page: &str, line: &str) -> Row {
+    let [item, _, subject, measured, test, state] = <[String; 6]>::try_from(cells(line))
+        .unwrap_or_else(|cells| panic!("{page}: six columns, not {}: {line}", cells.len()));
+    Row { item, subject, measured, test, state }
+}
+
+/// Items of a paper without a row, items with two, and numbers that the paper does not have.
+fn uncovered(paper: &Paper, rows: &[Row]) -> Vec<String> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    rows.iter().for_each(|row| *counts.entry(&row.item).or_default() += 1);
+    let required: BTreeSet<String> = paper.numbered.iter().flat_map(|(kind, numbers)| items(kind, numbers)).collect();
+    let kinds: Vec<String> = paper.numbered.iter().map(|(kind, _)| format!("{kind} ")).collect();
+    let mut faults: Vec<String> = required
+        .iter()
+        .filter(|item| !counts.contains_key(item.as_str()))
+        .map(|item| format!("{}: no row for {item}", paper.name))
+        .collect();
+    for (item, count) in &counts {
+        let is_numbered = kinds.iter().any(|kind| item.starts_with(kind.as_str()));
+        if is_numbered && !required.contains(*item) {
+            faults.push(format!("{}: {item} is not in the paper", paper.name));
+        }
+        if *count > 1 {
+            faults.push(format!("{}: {count} rows for {item}", paper.name));
+        }
+    }
+    let future = counts.keys().filter(|item| item.starts_with("future work: ")).count();
+    if future < paper.future_work {
+        faults.push(format!("{}: {future} items of future work of {}", paper.name, paper.future_work));
+    }
+    faults
+}
+
+/// The items of a kind with these numbers: `1-3, 6a` is 1, 2, 3 and 6a; `2.1-2.3` is within a chapter.
+fn items(kind: &str, numbers: &str) -> Vec<String> {
+    let name =
+        |number: &str| if kind == "equation" { format!("equation ({number})") } else { format!("{kind} {number}") };
+    let range = |(first, last): (&str, &str)| -> Vec<String> {
+        let split = |number: &str| match number.rsplit_once('.') {
+            Some((chapter, own)) => (format!("{chapter}."), own.parse::<u32>().unwrap()),
+            None => (String::new(), number.parse::<u32>().unwrap()),
+        };
+        let ((chapter, from), (_, to)) = (split(first), split(last));
+        (from..=to).map(|own| name(&format!("{chapter}{own}"))).collect()
+    };
+    numbers.split(", ").flat_map(|part| part.split_once('-').map_or_else(|| vec![name(part)], range)).collect()
+}
+
+/// What is wrong with a row.
+fn faults(paper: &Paper, row: &Row, tests: &BTreeSet<String>) -> Vec<String> {
+    let fault = |what: String| format!("{}: {}: {what}", paper.name, row.item);
+    let mut faults = Vec::new();
+    let is_done = row.state == "done";
+    let has_reason = ["not done: ", "replaced: "]
+        .iter()
+        .any(|start| row.state.strip_prefix(start).is_some_and(|reason| reason.len() > 10));
+    if !is_done && !has_reason {
+        faults.push(fault(format!("`{}` is neither done nor has a reason", row.state)));
+    }
+    let subjects = code(&row.subject);
+    for subject in &subjects {
+        if !subject_exists(paper, subject) {
+            faults.push(fault(format!("`{subject}` does not exist")));
+        }
+    }
+    if is_done && subjects.is_empty() {
+        faults.push(fault("names no scene, command or function".into()));
+    }
+    if is_done && !row.measured.chars().any(|letter| letter.is_ascii_digit()) {
+        faults.push(fault("has no number".into()));
+    }
+    let measured_by = code(&row.test);
+    for name in measured_by.iter().filter(|name| !name.starts_with("bansho ") && !tests.contains(*name)) {
+        faults.push(fault(format!("there is no test `{name}`")));
+    }
+    if is_done && measured_by.is_empty() {
+        faults.push(fault("names no test or command that measures its number".into()));
+    }
+    faults
+}
+
+/// The pieces of code in a cell.
+fn code(cell: &str) -> Vec<String> {
+    cell.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// Whether a scene, a command with the scenes that it names, or a function exists.
+fn subject_exists(paper: &Paper, subject: &str) -> bool {
+    let scenes = |text: &str| text.split_whitespace().filter(|word| word.starts_with("scenes/")).all(is_scene);
+    if subject.starts_with("bansho ") {
+        let command = subject.split_whitespace().nth(1).unwrap_or_default();
+        return scenes(subject) && has_words(&read(&Path::new(ROOT).join("docs/src/guide/program.md")), command);
+    }
+    if subject.starts_with("scenes/") {
+        return is_scene(subject);
+    }
+    // Keys and values of scene files are no paths.
+    if !subject.contains("::") {
+        return true;
+    }
+    exists(paper.in_crate, subject)
+}
+
+/// Whether a path from the root is that of a scene.
+fn is_scene(path: &str) -> bool {
+    Path::new(ROOT).join(path).is_file()
+}
+
+/// The names of all functions with the attribute `#[test]`.
+fn test_names() -> BTreeSet<String> {
+    let files: Vec<PathBuf> = rust_files(&Path::new(ROOT).join("crates"));
+    let of_file = |file: &PathBuf| -> Vec<String> {
+        let source = read(file);
+        let after = source.split("#[test]").skip(1);
+        after.filter_map(|rest| Some(rest.split_once("fn ")?.1.split_once('(')?.0.to_owned())).collect()
+    };
+    files.iter().flat_map(of_file).collect()
+}
+
+/// The checks find what is wrong.
+mod checks {
+    use super::*;
+
+    fn of(line: &str) -> Vec<String> {
+        let tests = BTreeSet::from(["a_test".to_owned()]);
+        faults(&PAPERS[3], &row("page", line), &tests)
+    }
+
+    #[test]
+    fn a_good_row_has_no_fault_and_each_missing_thing_is_one() {
+        let scene = "`scenes/sekiguchi_1.toml`";
+        assert!(of(&format!("| figure 1 | a | {scene} | 3 km | `a_test` | done |")).is_empty());
+        assert!(of("| figure 1 | a | | | | not done: it is a photograph |").is_empty());
+        for (line, expected) in [
+            (format!("| figure 1 | a | {scene} | some | `a_test` | done |"), "has no number"),
+            (format!("| figure 1 | a | {scene} | 3 km | `other` | done |"), "there is no test `other`"),
+            (format!("| figure 1 | a | {scene} | 3 km | | done |"), "names no test"),
+            (format!("| figure 1 | a | {scene} | 3 km | `a_test` | nearly |"), "neither done nor has a reason"),
+            ("| figure 1 | a | | 3 km | `a_test` | done |".to_owned(), "names no scene"),
+            ("| figure 1 | a | `scenes/none.toml` | 3 km | `a_test` | done |".to_owned(), "does not exist"),
+            ("| figure 1 | a | `simulate::none` | 3 km | `a_test` | done |".to_owned(), "does not exist"),
+            ("| figure 1 | a | `bansho plit x` | 3 km | `a_test` | done |".to_owned(), "does not exist"),
+        ] {
+            let found = of(&line);
+            assert!(found.len() == 1 && found[0].contains(expected), "{line}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn items_are_written_out() {
+        assert_eq!(items("equation", "2.9-2.10"), ["equation (2.9)", "equation (2.10)"]);
+        assert_eq!(items("figure", "1, 6a"), ["figure 1", "figure 6a"]);
+    }
+}
