@@ -82,7 +82,7 @@ fn an_obstacle_and_a_light_move_by_their_keys() {
         sum / whole
     };
     // 5 m away a meter is 64 / (2 tan 15 degrees) / 5 = 23.9 pixels; the middle of the exposure is half of 1/60 s after the frame begins.
-    let pixels = 32.0 / 15_f32.to_radians().tan() / 5.0;
+    let pixels = 32.0 / 0.267_949_2 / 5.0;
     let at = |number: i64| 48.0 + pixels * (-0.8 + 1.6 * (number as f32 / 30.0 + 1.0 / 120.0) / 0.3);
     for number in [0, 4, 8] {
         assert!((middle(number) - at(number)).abs() < 0.7, "{number}: {} {}", middle(number), at(number));

@@ -15,6 +15,10 @@ const SKY_SAMPLES: [[f64; 2]; 4] = [[0.08, 0.25], [0.25, 0.25], [0.6, 0.3], [1.5
 /// Fraction of a light that reaches `point`: it is in direction `toward` (unit vector) at `distance` (m), and has the angular radius `size`. Half shadows
 /// follow from how nearly the ray misses a solid.
 pub(crate) fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f64, size: f64) -> f64 {
+    // Within the lamp nothing is between.
+    if distance <= 0.0 {
+        return 1.0;
+    }
     let mut visible = 1.0_f64;
     for caster in casters {
         if misses_bounds(caster, point, toward, distance, size) {
@@ -77,6 +81,7 @@ mod tests {
         // The edge of the penumbra of a light of angular radius 0.05, 2 m away, is 0.1 m beyond the ball's.
         assert!((0.02..0.98).contains(&seen(0.55, 10.0)) && seen(0.61, 10.0) == 1.0, "{}", seen(0.55, 10.0));
         assert_eq!(seen(0.0, 1.0), 1.0, "a light in front of it is not hidden");
+        assert_eq!(visibility(&ball, DVec3::ZERO, DVec3::Y, -0.04, 0.05), 1.0, "within the lamp");
         assert_eq!(visibility(&[], DVec3::ZERO, DVec3::Y, 10.0, 0.05), 1.0);
     }
 

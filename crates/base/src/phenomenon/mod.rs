@@ -270,9 +270,9 @@ pub trait Prepared: Send + Sync {
         self.deflection().is_some()
     }
 
-    /// Depth of its opaque surfaces over the whole picture, m; infinite where it is not fully opaque. All other phenomena are hidden behind it
-    /// exactly, as they are behind a plate. It draws these surfaces itself.
-    fn opaque_depth(&self) -> Option<&Image<1>> {
+    /// Its opaque surfaces. All other phenomena are hidden behind them exactly, as they are behind a plate. It draws them itself, as if they covered whole
+    /// pixels.
+    fn opaque_surfaces(&self) -> Option<&OpaqueSurfaces> {
         None
     }
 
@@ -280,6 +280,15 @@ pub trait Prepared: Send + Sync {
     fn deflection(&self) -> Option<Deflection<'_>> {
         None
     }
+}
+
+/// Opaque surfaces over the whole picture.
+#[derive(Clone, Debug)]
+pub struct OpaqueSurfaces {
+    /// Depth beyond which they hide everything, m; infinite where there are none.
+    pub depth: Image<1>,
+    /// Fraction of a pixel that they cover. The rest of it shows the scene without them.
+    pub coverage: Image<1>,
 }
 
 /// A field of small angles by which light from behind is deflected.

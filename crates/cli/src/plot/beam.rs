@@ -107,7 +107,7 @@ mod tests {
         assert!((row(10.0)[1] - 90.0).abs() < 1e-3 && (row(10.0)[2] / 90.0 - 0.988).abs() < 2e-4);
         assert!((row(1000.0)[2] / 0.009 - 0.301).abs() < 3e-3, "{}", row(1000.0)[2]);
         // Half way between the cosines of the cones the smoothstep is a half.
-        let half = (0.5 * (math::cos(5_f64.to_radians()) + math::cos(22_f64.to_radians()))).acos().to_degrees();
+        let half = math::acos(0.5 * (math::cos(5_f64.to_radians()) + math::cos(22_f64.to_radians()))).to_degrees();
         let nearest =
             figure.table.rows.iter().min_by(|a, b| (a[3] - half).abs().total_cmp(&(b[3] - half).abs())).unwrap();
         assert!((nearest[4] / 4500.0 - 1.0).abs() < 0.03, "{nearest:?}");

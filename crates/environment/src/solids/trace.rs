@@ -5,7 +5,7 @@ use bansho_base::{
     image::{Image, Rect},
     math::{DVec2, DVec3},
     phenomenon::{
-        Prepared,
+        OpaqueSurfaces, Prepared,
         strip::{DepthInterval, Strip, View},
         surroundings::Surroundings,
     },
@@ -26,13 +26,13 @@ const SMOOTH_COS: f64 = 0.97;
 /// A pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pixel {
-    /// ACEScg, premultiplied, cd/m^2.
+    /// Mean of the part that is covered, ACEScg, cd/m^2.
     radiance: [f32; 3],
     /// 0 to 1.
     coverage: f32,
-    /// Of the nearest surface, m.
+    /// Of the nearest surface, m; infinite if there is none.
     depth: f32,
-    /// Depth beyond which it hides everything, m; infinite if it is not fully covered.
+    /// Depth of the farthest surface, beyond which nothing is seen in that part, m.
     opaque_depth: f32,
 }
 
@@ -45,7 +45,7 @@ pub(super) struct PreparedSolids {
     /// The pixels that may show one.
     rect: Rect,
     pixels: Vec<Pixel>,
-    opaque_depth: Image<1>,
+    surfaces: OpaqueSurfaces,
 }
 
 /// Position of ray `index` within its pixel (Hammersley).
@@ -118,12 +118,15 @@ impl PreparedSolids {
             }
             Ok(())
         })?;
-        let mut opaque_depth = Image::filled(view.size[0], view.size[1], [f32::INFINITY]);
+        let filled = |value: f32| Image::filled(view.size[0], view.size[1], [value]);
+        let mut surfaces = OpaqueSurfaces { depth: filled(f32::INFINITY), coverage: filled(0.0) };
         for (y, row) in pixels.chunks(rect.width.max(1)).enumerate() {
-            let out = &mut opaque_depth.row_mut(rect.y + y)[rect.x..rect.right()];
-            out.iter_mut().zip(row).for_each(|(out, pixel)| *out = [pixel.opaque_depth]);
+            for (x, pixel) in row.iter().enumerate().filter(|(_, pixel)| pixel.coverage > 0.0) {
+                surfaces.depth.row_mut(rect.y + y)[rect.x + x] = [pixel.opaque_depth];
+                surfaces.coverage.row_mut(rect.y + y)[rect.x + x] = [pixel.coverage];
+            }
         }
-        Ok(Self { rect, pixels, opaque_depth })
+        Ok(Self { rect, pixels, surfaces })
     }
 }
 
@@ -214,19 +217,21 @@ impl Tracer<'_> {
         let corner =
             |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
         let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)));
-        let mut pixel = Pixel { opaque_depth: 0.0, ..Pixel::EMPTY };
+        let hits = samples.iter().flatten().count();
+        if hits == 0 {
+            return Pixel::EMPTY;
+        }
+        let mut pixel = Pixel { coverage: hits as f32 / SAMPLES as f32, opaque_depth: 0.0, ..Pixel::EMPTY };
         for (index, (surface, pose)) in samples.iter().flatten().enumerate() {
             if !is_one || index == 0 {
-                let weight = if is_one { 1.0 } else { 1.0 / SAMPLES as f32 };
+                let weight = if is_one { 1.0 } else { 1.0 / hits as f32 };
                 let radiance = self.shading.radiance(surface, pose);
                 (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * weight);
             }
-            pixel.coverage += 1.0 / SAMPLES as f32;
             pixel.depth = pixel.depth.min(surface.t as f32);
             pixel.opaque_depth = pixel.opaque_depth.max(surface.t as f32);
         }
-        let is_covered = pixel.coverage == 1.0;
-        Pixel { opaque_depth: if is_covered { pixel.opaque_depth } else { f32::INFINITY }, ..pixel }
+        pixel
     }
 }
 
@@ -235,8 +240,8 @@ impl Prepared for PreparedSolids {
         self.rect
     }
 
-    fn opaque_depth(&self) -> Option<&Image<1>> {
-        Some(&self.opaque_depth)
+    fn opaque_surfaces(&self) -> Option<&OpaqueSurfaces> {
+        Some(&self.surfaces)
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
@@ -247,7 +252,7 @@ impl Prepared for PreparedSolids {
                 let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                 let is_drawn = pixel.coverage > 0.0 && slice.contains(f64::from(pixel.depth));
                 if is_drawn && strip.visible(index, pixel.depth) {
-                    strip.add_behind(index, pixel.radiance, [1.0 - pixel.coverage; 3], pixel.depth);
+                    strip.add_behind(index, pixel.radiance, [0.0; 3], pixel.depth);
                 }
             }
         }

@@ -232,7 +232,7 @@ impl QuadPlane {
         let u = self.across + t * (x * self.right[0] + z * self.right[1]);
         let v = self.up + t * y * (1.0 / VOXEL as f32);
         // Comparisons with NaN are false.
-        let is_inside = t >= self.near && u >= 0.0 && u < 1.0 && v >= self.lowest && v < 1.0;
+        let is_inside = t >= self.near && (0.0..1.0).contains(&u) && (self.lowest..1.0).contains(&v);
         is_inside.then_some(([u, v], t))
     }
 }

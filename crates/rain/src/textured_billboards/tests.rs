@@ -130,14 +130,12 @@ fn a_rate_that_rises_and_falls_never_pops_but_with_the_papers_textures() {
         let opacities = mean_opacities(streaks(method, 50.0), &rates);
         assert!(opacities.is_sorted(), "{method:?}: heavier rain never hides less");
         let step = largest_step(&opacities);
-        eprintln!("{method:?} {step} {:?}", &opacities[..4]);
         assert!(step < 0.06 && opacities[60] > 8.0 * opacities[0], "{method:?}: {step}");
         let back = mean_opacities(streaks(method, 50.0), &[50.0, 20.0, rates[30]]);
         assert_eq!(back[2], opacities[30], "{method:?}: on its way back it is the same rain");
     }
     let literal = mean_opacities(paper(50.0), &rates);
     let step = largest_step(&literal);
-    eprintln!("literal {step}");
     assert!(step > 0.15, "it jumps from texture to texture: {step}");
     let jumps = literal.windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert_eq!(jumps, 3, "and is constant between them");

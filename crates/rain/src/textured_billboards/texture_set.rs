@@ -1,6 +1,6 @@
 //! The streak textures of all rain rates and diameters, in 8 bits, with mipmaps.
 
-use bansho_base::image::Image;
+use bansho_base::{image::Image, math};
 
 use crate::{
     RainParameters,
@@ -106,7 +106,7 @@ impl Texture {
 
     /// The mipmap for a pixel that covers `texels` texels; 0 is the texture itself.
     pub(crate) fn level(&self, texels: f64) -> usize {
-        (texels.max(1.0).log2().round() as usize).min(self.mipmaps.len())
+        (math::log2(texels.max(1.0)).round() as usize).min(self.mipmaps.len())
     }
 
     /// The code at a position from the lower left corner (0 to 1), bilinear within a mipmap; the texture repeats.

@@ -83,6 +83,31 @@ impl Accumulator {
         }
     }
 
+    /// Mixes with another composite of some of its pixels: `own_weight` (column and row in the picture) is its own weight, the other's is the rest. AOVs
+    /// stay.
+    pub(crate) fn mix(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32) {
+        if other.absorbs {
+            self.start_absorbing();
+        }
+        let rect = other.rect;
+        for from in 0..rect.width * rect.height {
+            let [x, y] = [rect.x + from % rect.width, rect.y + from / rect.width];
+            let (to, weight) = ((y - self.rect.y) * self.rect.width + x - self.rect.x, own_weight(x, y));
+            let lerp = |own: &mut f32, other: f32| *own = (*own - other).fma(weight, other);
+            let transmittance = other.transmittance_at(from);
+            for c in 0..3 {
+                lerp(&mut self.color[c][to], other.color[c][from]);
+                if self.absorbs {
+                    lerp(&mut self.transmittance[c][to], transmittance[c]);
+                }
+            }
+            for (own, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
+                lerp(&mut own[to], other[from]);
+            }
+            self.depth[to] = self.depth[to].min(other.depth[from]);
+        }
+    }
+
     fn add_row(&mut self, level: Level, strip: &Strip, from: usize, to: usize) {
         let width = strip.rect.width;
         for c in 0..3 {

@@ -2,6 +2,7 @@
 
 mod accumulate;
 pub(crate) mod background;
+pub(crate) mod hiding;
 pub(crate) mod mirror;
 pub(crate) mod plate;
 pub(crate) mod plate_cache;

@@ -17,6 +17,7 @@ use bansho_base::{
 use super::{
     accumulate::Accumulator,
     background::{Background, BentPixels},
+    hiding::HidingDepth,
     plate::PlateFrame,
     slices::Slice,
 };
@@ -64,45 +65,13 @@ pub(crate) struct Composition<'a> {
     pub(crate) background: Background<'a>,
 }
 
-/// Depth beyond which a phenomenon is hidden: that of the plate, and of the opaque surfaces of other phenomena.
-#[derive(Default)]
-pub(crate) struct HidingDepth {
-    /// The nearest of all; `None` if only the plate hides anything.
-    nearest: Option<Image<1>>,
-    /// The members with opaque surfaces, which are hidden by the plate and sort themselves.
-    opaque: Vec<usize>,
-}
-
-impl HidingDepth {
-    /// That of the prepared phenomena in front of a plate.
-    pub(crate) fn new(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame) -> Self {
-        let surfaces = || prepared.iter().enumerate().filter_map(|(member, each)| Some((member, each.opaque_depth()?)));
-        let mut nearest: Option<Image<1>> = None;
-        for depth in surfaces().map(|(_, depth)| depth).chain(&plate.depth) {
-            match &mut nearest {
-                None => nearest = Some(depth.clone()),
-                Some(nearest) => {
-                    let both = nearest.pixels_mut().iter_mut().zip(depth.pixels());
-                    both.for_each(|(nearest, depth)| nearest[0] = nearest[0].min(depth[0]));
-                }
-            }
-        }
-        let opaque: Vec<usize> = surfaces().map(|(member, _)| member).collect();
-        Self { nearest: nearest.filter(|_| !opaque.is_empty()), opaque }
-    }
-
-    /// What hides a phenomenon; `None` if nothing does.
-    fn of_member<'a>(&'a self, member: usize, plate: &'a PlateFrame) -> Option<&'a Image<1>> {
-        let is_opaque = self.opaque.contains(&member);
-        self.nearest.as_ref().filter(|_| !is_opaque).or(plate.depth.as_ref())
-    }
-}
-
 /// Scratch memory of one thread.
 #[derive(Default)]
 struct StripScratch {
     strip: Strip,
     accumulator: Accumulator,
+    /// What partly covered pixels show without the opaque surfaces.
+    uncovered: Accumulator,
     /// The refracted pixels of the background.
     bent: BentPixels,
     /// A row of refracted colors.
@@ -150,12 +119,33 @@ impl Composition<'_> {
         self.runs.iter().map(|run| run.info().aovs.len()).collect()
     }
 
-    /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first.
+    /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first. Where opaque surfaces cover pixels partly, what those show
+    /// without the surfaces is mixed in.
     fn accumulate(&self, level: Level, rect: Rect, scratch: &mut StripScratch) {
-        let aovs = self.aov_counts();
-        scratch.accumulator.reset(rect, self.layer_count(), &aovs);
+        let StripScratch { strip, accumulator, uncovered, .. } = scratch;
+        self.accumulate_with(level, rect, true, strip, accumulator);
+        for edge in self.hiding.edges(rect) {
+            self.accumulate_with(level, edge, false, strip, uncovered);
+            accumulator.mix(uncovered, |x, y| self.hiding.coverage(x, y));
+        }
+    }
+
+    /// Draws the slices within `rect` into an accumulator, with opaque surfaces or without them.
+    fn accumulate_with(
+        &self,
+        level: Level,
+        rect: Rect,
+        with_opaque: bool,
+        strip: &mut Strip,
+        accumulator: &mut Accumulator,
+    ) {
+        let aovs = if with_opaque { self.aov_counts() } else { Vec::new() };
+        accumulator.reset(rect, self.layer_count(), &aovs);
         for slice in self.slices {
             for &member in &slice.members {
+                if !with_opaque && self.hiding.is_opaque(member) {
+                    continue;
+                }
                 let prepared = &self.prepared[member];
                 let aov_count = aovs.get(member).copied().unwrap_or(0);
                 let touched = prepared.bounds(&slice.interval).intersection(&rect);
@@ -164,12 +154,12 @@ impl Composition<'_> {
                 }
                 // AOV planes are added as a whole, so strips with AOVs have the full size.
                 let drawn = if aov_count > 0 { rect } else { touched };
-                match self.hiding.of_member(member, self.plate) {
-                    Some(image) => scratch.strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
-                    None => scratch.strip.reset(drawn, None, aov_count),
+                match self.hiding.depth_for(member, with_opaque, self.plate) {
+                    Some(image) => strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
+                    None => strip.reset(drawn, None, aov_count),
                 }
-                prepared.draw(&slice.interval, &mut scratch.strip);
-                scratch.accumulator.add_behind(level, &scratch.strip, member, self.runs[member].info().aovs);
+                prepared.draw(&slice.interval, strip);
+                accumulator.add_behind(level, strip, member, self.runs[member].info().aovs);
             }
         }
     }
