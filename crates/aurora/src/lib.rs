@@ -37,7 +37,7 @@
 //! | (2.24) | next position, deflected by a collision | `physics::precipitation::electron_track::TrackState::advance` |
 //! | (2.25) | probability of quenching | [`hard_sphere_quenching`](physics::emission::collisions::hard_sphere_quenching), [`radiated_fraction`](physics::emission::quenching::radiated_fraction) |
 //! | (2.26) | mean thermal speed | [`thermal_speed`](physics::emission::collisions::thermal_speed) |
-//! | (2.27) | attenuation by distance, by default replaced by the extinction of the lower atmosphere | `render::shade::attenuation::AttenuationByDistance`, [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
+//! | (2.27) | attenuation by distance, by default replaced by the extinction of the lower atmosphere | `physics::attenuation_by_distance::AttenuationByDistance`, [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
 //! | (2.28) | Gaussian blur in the picture | `render::single_collisions::blur::BlurKernel::new`, `render::single_collisions::blur::BlurredImage::new` |
 //! | (2.29) | XYZ of spectral lines | `physics::emission::emitter::absolute_xyz`, `physics::emission::table_2_1::srgb` |
 //! | (2.30) | XYZ to RGB, by default ACEScg | `physics::emission::table_2_1::srgb`, [`ACESCG_FROM_XYZ`](bansho_base::color::space::ACESCG_FROM_XYZ) |

@@ -17,12 +17,14 @@ use super::{
     simulate::{AuroraSimulation, check_neighbors},
 };
 use crate::{
-    physics::{emission::Emission, precipitation::energy_grid::HIGHEST_EV},
+    physics::{
+        attenuation_by_distance::AttenuationByDistance, emission::Emission, precipitation::energy_grid::HIGHEST_EV,
+    },
     render::{
         bin::sources::{EmissionInputs, nearest_node},
         integrate::emission_profile::EmissionProfiles,
         project::field_lines::FieldLines,
-        shade::attenuation::{AttenuationByDistance, EmitterColors},
+        shade::attenuation::EmitterColors,
         single_collisions::collision_pass::CollisionRenderer,
     },
 };
@@ -141,7 +143,7 @@ impl Aurora {
         let max_energy_ev = (max_factor * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
         let highest_node = nearest_node(max_energy_ev) + SPECTRUM_NODES;
         let key = Key::new(self.seed, &self.name);
-        let attenuation = AttenuationByDistance::new(&parameters.rendering, parameters.dip_deg);
+        let attenuation = AttenuationByDistance::new(parameters.rendering.attenuation_per_km, parameters.dip_deg);
         let collisions = || CollisionRenderer::new(emission, &parameters.rendering, &attenuation, highest_node, key);
         RunState {
             collisions: by_collisions.then(|| Arc::new(collisions())),
@@ -206,7 +208,7 @@ impl Aurora {
             lateral_spread_km: simulation
                 .emission()
                 .lateral_spread_km(parameters.rendering.collision_deflection, energy_ev),
-            attenuation: AttenuationByDistance::new(&parameters.rendering, parameters.dip_deg),
+            attenuation: AttenuationByDistance::new(parameters.rendering.attenuation_per_km, parameters.dip_deg),
         }
     }
 }

@@ -49,11 +49,13 @@
 //! 6. `render::prepared` draws a strip tile by tile: `streaks::rasterize` computes the exact coverage of each pixel and composites front to back;
 //!    then `lighting::single_scattering` adds the medium under it.
 
+pub(crate) mod aovs;
 pub mod billboards;
 pub mod drops;
 pub(crate) mod lanes;
 pub mod lighting;
 mod model;
+pub mod opacity_law;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;

@@ -2,7 +2,7 @@
 
 use bansho_base::parameters::{Length, Range, animated::Animated};
 
-use crate::{drops::terminal_velocity::VelocityLaw, streaks::coverage::OpacityLaw};
+use crate::{drops::terminal_velocity::VelocityLaw, opacity_law::OpacityLaw};
 
 /// The paper's six diameters, mm.
 const PAPER_DIAMETERS_MM: [f64; 6] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0];

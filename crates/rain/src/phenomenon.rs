@@ -14,7 +14,7 @@ use bansho_base::{
 };
 
 use super::{model::Rain, parameters::RainParameters};
-use crate::render::prepared::{AOVS, PreparedRain};
+use crate::{aovs::AOVS, render::prepared::PreparedRain};
 
 impl Describe for RainParameters {
     const KEY: &'static str = "rain";

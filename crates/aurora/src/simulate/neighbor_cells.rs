@@ -169,7 +169,7 @@ impl NeighborCells {
     ) {
         let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
         let (xs, zs) = (&self.positions[0][range.clone()], &self.positions[1][range.clone()]);
-        let own = &own[range.clone()];
+        let own = &own[range];
         let (max, min) = (self.support * self.support, COINCIDENCE * self.support * self.support);
         let [first, second] = sums;
         first.resize(xs.len(), 0.0);

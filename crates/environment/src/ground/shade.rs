@@ -18,7 +18,7 @@ use super::{
     parameters::{GroundKind, GroundParameters},
     surface::{Surface, SurfaceSample},
     waves::WaveSlope,
-    wet_reflection::{fresnel, glossy_reflection},
+    wet_reflection::{ShadowedLight, fresnel, glossy_reflection},
 };
 use crate::shadow::{sky_visibility, visibility};
 
@@ -52,9 +52,6 @@ impl GroundParameters {
         }
     }
 }
-
-/// A light that arrives at a point of the ground, in the shadows of obstacles: illuminance on a plane that faces it, lux, and the unit vector toward it.
-pub(super) type ShadowedLight = ([f32; 3], DVec3);
 
 /// The lights that arrive at a point of the ground. Shadows in lights that contribute next to nothing there are left out.
 fn shadowed_lights(lights: &[Light], casters: &[Occluder], point: DVec3) -> Vec<ShadowedLight> {

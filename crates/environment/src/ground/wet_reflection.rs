@@ -7,8 +7,10 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Surroundings},
 };
 
-use super::shade::ShadowedLight;
 use crate::shadow::visibility;
+
+/// A light that arrives at a point of the ground, in the shadows of obstacles: illuminance on a plane that faces it, lux, and the unit vector toward it.
+pub(super) type ShadowedLight = ([f32; 3], DVec3);
 
 /// Distance that stands for infinity, m.
 const FAR: f64 = 1e3;

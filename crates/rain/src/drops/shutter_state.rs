@@ -19,8 +19,8 @@ use super::{
 use crate::{
     Rain,
     lanes::smoothstep,
+    opacity_law::OpacityLaw,
     shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
-    streaks::coverage::OpacityLaw,
 };
 
 /// Largest difference between the gust displacement of a drop and that of its cell's center, m.

@@ -5,7 +5,7 @@ use bansho_base::{
     image::Rect,
     phenomenon::{
         Prepared,
-        strip::{AovDescriptor, AovPlane, AovRule, DepthInterval, Strip, View},
+        strip::{DepthInterval, Strip, View},
         surroundings::Surroundings,
     },
     world::sky::Sky,
@@ -14,6 +14,7 @@ use fearless_simd::{Level, Simd, dispatch};
 
 use crate::{
     Rain,
+    aovs::write_aovs,
     billboards::Billboards,
     drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
     lighting::{
@@ -34,39 +35,6 @@ use crate::{
     },
     textured_billboards::TexturedBillboards,
 };
-
-/// The AOVs of rain, in the order of a strip's planes.
-pub(crate) const AOVS: &[AovDescriptor] = &[
-    AovDescriptor {
-        name: "streak_opacity",
-        unit: "",
-        doc: "Opacity of the streaks in a pixel, summed; 0 where there are none. The airlight of far rain is not included.",
-        rule: AovRule::Sum,
-    },
-    AovDescriptor {
-        name: "streak_depth",
-        unit: "m",
-        doc: "Depth of the nearest streak in a pixel; 0 where there is none.",
-        rule: AovRule::Nearest,
-    },
-    AovDescriptor {
-        name: "diameter_mm",
-        unit: "mm",
-        doc: "Diameter of the drop of the nearest streak in a pixel; 0 where there is none.",
-        rule: AovRule::Nearest,
-    },
-];
-
-/// Writes the AOVs of one pixel of a streak; `depth` in m.
-pub(crate) fn write_aovs(aovs: &mut [AovPlane], index: usize, opacity: f32, depth: f32, diameter_mm: f32) {
-    debug_assert!(aovs.is_empty() || aovs.len() == AOVS.len(), "a plane for each AOV, or none");
-    let [opacities, depths, diameters] = aovs else { return };
-    if opacity > 0.0 {
-        opacities.add(index, 1.0, opacity);
-        depths.keep_nearest(index, depth, depth);
-        diameters.keep_nearest(index, diameter_mm, depth);
-    }
-}
 
 /// Culling threshold as a fraction of display white: a hundred overlapping streaks below it stay below one 8-bit code.
 const CULLING_FRACTION: f64 = 1.0 / (255.0 * 128.0);

@@ -12,7 +12,7 @@ use bansho_base::{
 };
 
 use super::texture_set::Texture;
-use crate::{Rain, drops::shutter_state::ShutterState, render::prepared::write_aovs};
+use crate::{Rain, aovs::write_aovs, drops::shutter_state::ShutterState};
 
 /// Edge of a voxel and of a billboard, m.
 const VOXEL: f64 = 1.0;

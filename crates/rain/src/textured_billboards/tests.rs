@@ -12,7 +12,8 @@ use super::{
 use crate::{
     Method, RainParameters,
     drops::terminal_velocity::VelocityLaw,
-    streaks::coverage::{OpacityLaw, paper_opacity},
+    opacity_law::OpacityLaw,
+    streaks::coverage::paper_opacity,
     tests::{METHODS, draw, lamp, lit, opacity, rain, streaks, view_at, wind},
 };
 

@@ -10,13 +10,13 @@ use rayon::prelude::*;
 use super::source_bins::{FieldLineSource, REACH};
 use crate::{
     physics::{
+        attenuation_by_distance::AttenuationByDistance,
         emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES},
         precipitation::energy_grid::{LOWEST_EV, NODES, node_coordinate, node_energy_ev},
     },
     render::{
         Blur, RenderingParameters, Sampling,
         project::field_lines::{FieldLines, FootPoint},
-        shade::attenuation::AttenuationByDistance,
     },
     simulate::{
         AuroraParticles,

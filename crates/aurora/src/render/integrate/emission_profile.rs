@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use bansho_base::math;
 
 use crate::{
+    physics::attenuation_by_distance::AttenuationByDistance,
     physics::{
         atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
         emission::{
@@ -13,7 +14,6 @@ use crate::{
         },
         precipitation::energy_grid::NODES,
     },
-    render::shade::attenuation::AttenuationByDistance,
 };
 
 /// Tables per node of the energy grid: the nearest is within 0.5 % of the energy, and the red column, which varies

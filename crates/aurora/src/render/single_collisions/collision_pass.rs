@@ -23,6 +23,7 @@ use super::{
 use crate::{
     physics::{
         atmosphere::atmosphere,
+        attenuation_by_distance::AttenuationByDistance,
         emission::{Emission, PerEmitter},
         precipitation::{
             Deposition,
@@ -41,7 +42,6 @@ use crate::{
             chart::{BLOCK_COLUMNS, Chart, ChartProjection},
             field_lines::FieldLines,
         },
-        shade::attenuation::AttenuationByDistance,
     },
 };
 

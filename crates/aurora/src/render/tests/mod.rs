@@ -24,6 +24,7 @@ use crate::{
     Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
         atmosphere::atmosphere,
+        attenuation_by_distance::AttenuationByDistance,
         emission::{EMITTERS, Emission, Emitter, LineSet, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
         precipitation::spectrum::ARC,
     },
@@ -39,7 +40,6 @@ use crate::{
             field_lines::{EARTH_RADIUS_KM, FieldLines},
             pixel_batch::PixelBatch,
         },
-        shade::attenuation::AttenuationByDistance,
         single_collisions::{
             blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS, collision_pass::CollisionRenderer,
         },

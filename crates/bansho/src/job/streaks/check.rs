@@ -4,7 +4,7 @@ use super::Streaks;
 use crate::job::error::{MAX_DROPS, StreakList, StreaksError};
 use bansho_rain::{
     drops::size_distribution::{DropSizeDistribution, SizeBin},
-    streaks::coverage::OpacityLaw,
+    opacity_law::OpacityLaw,
 };
 
 /// Checks all parameters.

@@ -8,10 +8,8 @@ use bansho_rain::{
     billboards::texture::{FallingDrop, StreakCube},
     drops::size_distribution::{DropSizeDistribution, SizeBin},
     lighting::extinction::{ExtinctionEfficiency, extinction, visibility},
-    streaks::{
-        coverage::{OpacityLaw, paper_opacity},
-        oscillation::mode_frequency,
-    },
+    opacity_law::OpacityLaw,
+    streaks::{coverage::paper_opacity, oscillation::mode_frequency},
 };
 use bansho_render::display::BitDepth;
 

@@ -16,8 +16,9 @@ use crate::{
         size_distribution::{DropSizeDistribution, SizeBin, stratified_count},
         terminal_velocity::TerminalVelocity,
     },
+    opacity_law::OpacityLaw,
     streaks::{
-        coverage::{OpacityLaw, Streak, paper_opacity},
+        coverage::{Streak, paper_opacity},
         oscillation::Oscillation,
     },
 };
