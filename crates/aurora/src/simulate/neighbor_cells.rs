@@ -256,7 +256,8 @@ mod tests {
         let cell = |i: usize| positions.each_ref().map(|values| (f64::from(values[i]) / 0.5).floor());
         let is_near = |i: usize, j: usize| {
             let ([a, b], [c, d]) = (cell(i), cell(j));
-            let squared: f64 = positions.iter().map(|values| f64::from(values[i] - values[j]).powi(2)).sum();
+            let squared: f64 =
+                positions.iter().map(|values| f64::from(values[i] - values[j])).map(|apart| apart * apart).sum();
             (a - c).abs() <= 1.0 && (b - d).abs() <= 1.0 && squared < 1.0
         };
         let found = by_cells(&positions, 1.0);

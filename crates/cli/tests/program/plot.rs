@@ -382,7 +382,7 @@ fn what_cannot_be_plotted_is_one_clear_error() {
         (&["black-body", "--to", "1e99"], "allowed: a number from 1 to 10000 K"),
         (&["black-body", "--from", "3000", "--to", "2000"], "--from: 3000 to 2000 K is no range"),
         (&["black-body", "--step", "0.01", "--from", "nan"], "allowed: a number"),
-        (&["black-body", "--texture", "srbg"], "a similar value exists: 'srgb'"),
+        (&["black-body", "--texture", "srgbb"], "a similar value exists: 'srgb'"),
         (&["black-body", "--texture", "srgb", "-o", "a.csv"], "a.csv: a picture without axes is a PNG; allowed: .png"),
         (&["kernel", "--size", "1"], "allowed: a number from 2 to 4096 pixels"),
         (&["kernel", "--texture", "density", "-o", "-"], "allowed: .png"),
