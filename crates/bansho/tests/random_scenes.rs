@@ -124,6 +124,7 @@ fn scene(seed: u64) -> String {
     for (index, kind) in KINDS.iter().enumerate() {
         let mut table = sample((kind.table)(), &mut uniform);
         keep_small(&mut table, kind.key);
+        keep_compatible(&mut table, kind.key);
         // Most random shapes are refused: flames wider than their sheet, auroras that cross. Most scenes do without, so that they
         // are drawn.
         if !seed.is_multiple_of(4) {
@@ -135,6 +136,24 @@ fn scene(seed: u64) -> String {
         }
     }
     text
+}
+
+/// Leaves out a choice that another choice of the same table does not allow: most random tables would be refused for it.
+fn keep_compatible(table: &mut Table, kind: &str) {
+    let is = |table: &Table, key: &str, name: &str| {
+        let found = table.entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node.value);
+        matches!(found, Some(Value::Text(text)) if text == name)
+    };
+    if kind == "flame_sheet" && is(table, "method", "soot_field") {
+        // A soot field has no texture to show.
+        table.entries.retain(|entry| entry.key != "stage");
+    }
+    let rendering = table.entries.iter_mut().find(|entry| entry.key == "rendering").map(|entry| &mut entry.node.value);
+    if let (true, Some(Value::Table(rendering))) = (kind == "aurora", rendering) {
+        // The thesis's color table has no other lines than those of its hard spheres.
+        let has_five_lines = is(rendering, "energy_deposition", "hard_sphere");
+        rendering.entries.retain(|entry| has_five_lines || entry.key != "color_matching");
+    }
 }
 
 /// Keeps a simulation short and rain near, and leaves out meshes, which random tables cannot name.

@@ -28,7 +28,7 @@ The extension of --out says the format: .svg (the default), .png, or .csv with t
 Examples:
   bansho plot black-body                          out/plots/black-body.svg
   bansho plot black-body -o black_body.csv        a table for a shader
-  bansho plot black-body --texture srgb           a texture, one texel for each kelvin
+  bansho plot black-body --texture srgb           a texture, a texel for 1 K
   bansho plot drop-sizes --rates 1,10,100 -o -    numbers to standard output
   bansho plot emission --energy-ev 3000 -o 3kev.png
   bansho plot parameters torch.toml --path wind.velocity")]

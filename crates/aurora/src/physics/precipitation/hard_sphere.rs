@@ -172,6 +172,15 @@ mod tests {
         assert!((end_km(1e3) - 129.0).abs() < 2.5, "{}", end_km(1e3));
     }
 
+    /// The radius of the literal scenes.
+    #[test]
+    fn ten_kilovolts_end_near_130_km_in_larger_spheres() {
+        let spheres = HardSphereAtmosphere::new(atmosphere(), 1e-10, 0.0);
+        let ends = (0..500).filter_map(|particle| spheres.track(1e4, Key::new(1, "aurora"), particle).last());
+        let end_km = ends.map(|collision| collision.altitude_km as f64).sum::<f64>() / 500.0;
+        assert!((end_km - 130.0).abs() < 3.0, "{end_km}");
+    }
+
     #[test]
     fn profiles_are_the_mean_of_many_falls() {
         let spheres = HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0);

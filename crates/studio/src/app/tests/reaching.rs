@@ -28,7 +28,7 @@ fn a_new_scene_is_made_from_its_template_and_asks_about_unsaved_work() {
 #[test]
 fn parameters_are_found_by_name_and_description() {
     let mut harness = window(SCENE);
-    assert!(harness.query_by_label("octaves").is_none(), "its section is closed");
+    assert!(harness.query_by_label("tongue width").is_none(), "its section is closed");
     let find = |harness: &mut egui_kittest::Harness<'_, super::Studio>, words: &str| {
         harness.get_by_role_and_label(Role::TextInput, "Find").focus();
         harness.run_steps(2);
@@ -36,8 +36,8 @@ fn parameters_are_found_by_name_and_description() {
         harness.event(Event::Text(words.to_owned()));
         harness.run_steps(20);
     };
-    find(&mut harness, "Octaves");
-    harness.get_by_role_and_label(Role::SpinButton, "octaves");
+    find(&mut harness, "Tongue width");
+    harness.get_by_role_and_label(Role::SpinButton, "tongue width");
     assert!(harness.query_by_role_and_label(Role::SpinButton, "height").is_none());
     find(&mut harness, "sheet heights per second");
     harness.get_by_role_and_label(Role::SpinButton, "speed");
