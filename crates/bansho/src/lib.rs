@@ -24,10 +24,11 @@
 
 use std::sync::Arc;
 
-mod build;
+pub mod effect;
 #[cfg(feature = "files")]
 pub mod job;
 mod kinds;
+mod scene_builder;
 
 #[cfg(feature = "aurora")]
 pub use bansho_aurora as aurora;
@@ -44,22 +45,37 @@ pub use bansho_scene as scene;
 #[cfg(any(feature = "aurora", feature = "fire"))]
 pub use bansho_sph as sph;
 
+#[cfg(feature = "aurora")]
+pub use bansho_aurora::AuroraParameters;
 pub use bansho_base::{
+    camera::CameraParameters,
     color::{AlphaConvention, View},
     frame::{DisplayImage, Frame},
+    geometry::point_cloud::PointCloud,
     host::{
         assets::{Assets, MemoryAssets},
         observer::{Cancelled, Observer, Stage, Unobserved},
     },
     image::{Image, Rect},
+    parameters::animated::Animated,
+    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
+pub use bansho_environment::ground::GroundParameters;
+#[cfg(feature = "fire")]
+pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters};
+#[cfg(feature = "rain")]
+pub use bansho_rain::RainParameters;
 pub use bansho_render::{
     BuildErrors, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},
 };
-pub use bansho_scene::{LoopError, Scene, SceneError, SceneOptions};
-pub use build::SceneBuilder;
+pub use bansho_scene::{
+    LightParameters, LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,
+};
+pub use effect::{Effect, EffectError, LiveEffect, Picture};
+pub use half;
 pub use kinds::{KINDS, parse_scene};
+pub use scene_builder::SceneBuilder;
 
 /// Parses a scene and builds its phenomena.
 ///

@@ -53,7 +53,8 @@ fn the_guide_lists_every_aov() {
     for kind in KINDS {
         let scene = format!("bansho = 2\n[[{}]]\n", kind.key);
         let scene = Scene::parse("aovs", &scene, KINDS).unwrap_or_else(|error| panic!("{error}"));
-        let context = BuildContext { name: "any", seed: 0, loop_s: None, assets: &MemoryAssets::default() };
+        let context =
+            BuildContext { name: "any", seed: 0, loop_s: None, assets: &MemoryAssets::default(), previous: None };
         let phenomenon = scene.instances[0].parameters.build(&context).unwrap_or_else(|error| panic!("{error:?}"));
         for aov in phenomenon.info().aovs {
             assert!(page.contains(&format!("`{}`", aov.name)), "{}: {} is not listed", kind.key, aov.name);

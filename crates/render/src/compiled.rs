@@ -104,6 +104,32 @@ impl CompiledScene {
         Ok(Self { wind, obstacles, built, enabled, scene, assets })
     }
 
+    /// The same scene with another instance at `index`, as a program changes parameters while a shot runs: only that phenomenon is built, from the one
+    /// before where parts of it are the same. The fingerprints of what is built by `revision`, a number of its own for each change, replace those of the
+    /// parameters.
+    ///
+    /// # Errors
+    /// Parameters that contradict each other, or assets that cannot be read.
+    pub fn with_instance(&self, index: usize, instance: Instance, revision: u64) -> Result<Self, BuildErrors> {
+        let mut scene = Scene::clone(&self.scene);
+        let others = scene.instances.iter().enumerate().filter(|(other, each)| *other != index && each.enabled);
+        let budget = others.map(|(_, each)| each).chain(Some(&instance).filter(|own| own.enabled));
+        let error = |error| BuildErrors(vec![(instance.name.clone(), error)]);
+        budget.clone().try_fold(0, |total, each| each.parameters.check_particle_budget(total)).map_err(error)?;
+        let before = self.phenomenon(&instance.name);
+        let phenomenon = build_instance(&instance, &self.scene, self.assets.as_ref(), before).map_err(error)?;
+        let fingerprint = fingerprint::of_revision(&instance.name, revision);
+        let built = BuiltPhenomenon { fingerprint, phenomenon };
+        let mut enabled = self.enabled.clone();
+        if let Some(old) = enabled.iter_mut().find(|old| old.phenomenon.info().name == instance.name) {
+            *old = built;
+        }
+        if let Some(old) = scene.instances.get_mut(index) {
+            *old = instance;
+        }
+        Ok(Self { enabled, scene: Arc::new(scene), ..self.clone() })
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
@@ -139,6 +165,11 @@ impl CompiledScene {
         let mut hasher = blake3::Hasher::new();
         fingerprint::hash_state(&self.scene, self.assets.as_ref(), &mut hasher);
         *hasher.finalize().as_bytes()
+    }
+
+    /// The enabled phenomenon of this name.
+    fn phenomenon(&self, name: &str) -> Option<&dyn Phenomenon> {
+        self.phenomena().map(Arc::as_ref).find(|phenomenon| phenomenon.info().name == name)
     }
 
     /// As [`phenomena`](Self::phenomena), with fingerprints.
@@ -254,7 +285,8 @@ fn build_instances(
             let fingerprint = fingerprint();
             previous.built.get(&fingerprint).map(|phenomenon| (fingerprint, phenomenon.clone()))
         });
-        let build = || build_instance(instance, scene, assets).map(|phenomenon| (fingerprint(), phenomenon));
+        let before = previous.and_then(|previous| previous.phenomenon(&instance.name));
+        let build = || build_instance(instance, scene, assets, before).map(|phenomenon| (fingerprint(), phenomenon));
         match known.map_or_else(build, Ok) {
             Ok((fingerprint, phenomenon)) => {
                 built.insert(fingerprint, phenomenon);
@@ -266,8 +298,13 @@ fn build_instances(
     (built, enabled)
 }
 
-fn build_instance(instance: &Instance, scene: &Scene, assets: &dyn Assets) -> Result<Arc<dyn Phenomenon>, BuildError> {
-    let context = BuildContext { name: &instance.name, seed: scene.seed, loop_s: scene.loop_s, assets };
+fn build_instance(
+    instance: &Instance,
+    scene: &Scene,
+    assets: &dyn Assets,
+    previous: Option<&dyn Phenomenon>,
+) -> Result<Arc<dyn Phenomenon>, BuildError> {
+    let context = BuildContext { name: &instance.name, seed: scene.seed, loop_s: scene.loop_s, assets, previous };
     instance.parameters.build(&context)
 }
 

@@ -5,7 +5,10 @@ use std::sync::{Arc, OnceLock};
 use bansho_base::{
     frame::FrameHeader,
     host::once::get_or_compute,
-    world::sky::{ElevationProfile, Sky},
+    world::{
+        sky::{ElevationProfile, Sky},
+        wind::Wind,
+    },
 };
 
 use crate::{compiled::CompiledScene, composite::plate_light, plan::Plan};
@@ -15,13 +18,15 @@ use bansho_scene::Scene;
 pub(crate) struct ShotContext {
     pub(crate) compiled: Arc<CompiledScene>,
     pub(crate) plan: Arc<Plan>,
+    /// The wind of the scene, with its changes during the shot.
+    pub(crate) wind: Wind,
     /// The light that the plate shows, relative to display white; computed on first use.
     plate_light: OnceLock<Option<ElevationProfile>>,
 }
 
 impl ShotContext {
     pub(crate) fn new(compiled: Arc<CompiledScene>, plan: Arc<Plan>) -> Self {
-        Self { compiled, plan, plate_light: OnceLock::new() }
+        Self { wind: compiled.wind().clone(), compiled, plan, plate_light: OnceLock::new() }
     }
 
     pub(crate) fn scene(&self) -> &Scene {
@@ -38,8 +43,13 @@ impl ShotContext {
         light.map_or(Sky::DARK, |light| Sky::measured(light.scaled(1.0 / self.plan.exposure_scale())))
     }
 
-    /// The header of frame `number`.
-    pub(crate) fn header(&self, number: i64) -> FrameHeader {
-        self.plan.header(number, self.plan.frame_fingerprint(number, self.compiled.assets().as_ref()))
+    /// The header of frame `number`, which begins at time `t`.
+    pub(crate) fn header(&self, number: i64, t: f64) -> FrameHeader {
+        let fingerprint = if self.plan.fingerprint_frames {
+            self.plan.frame_fingerprint(number, self.compiled.assets().as_ref())
+        } else {
+            [0; 32]
+        };
+        self.plan.header_at(number, t, fingerprint)
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    camera::CameraParameters,
     color,
     frame::FrameHeader,
     host::assets::Assets,
@@ -60,6 +61,8 @@ pub enum PlanError {
 #[derive(Clone)]
 pub struct Plan {
     pub(crate) scene: Arc<Scene>,
+    /// The camera: that of the scene, unless a program moves another one.
+    pub camera: CameraParameters,
     pub(crate) size: [usize; 2],
     /// Pixels around the picture on every side.
     pub(crate) overscan: usize,
@@ -76,6 +79,9 @@ pub struct Plan {
     pub metadata: bool,
     /// The view transform of display formats, without the camera's white balance.
     pub display: color::View,
+    /// Whether the headers of frames get a fingerprint of all that their pixels depend on; otherwise it is 0. It takes about as long as drawing a small
+    /// picture.
+    pub fingerprint_frames: bool,
 }
 
 impl Plan {
@@ -102,6 +108,8 @@ impl Plan {
             aovs: options.aovs,
             metadata: options.metadata,
             display: options.display,
+            fingerprint_frames: true,
+            camera: scene.camera.clone(),
             scene,
         })
     }
@@ -177,19 +185,40 @@ impl Plan {
         index as f64 * f64::from(fps.seconds) / f64::from(fps.frames)
     }
 
+    /// The number of the frame in which time `t` lies; in a loop, that of the frame in its first period.
+    pub fn number_at(&self, t: f64) -> i64 {
+        let fps = self.fps();
+        let index = (t * f64::from(fps.frames) / f64::from(fps.seconds) + 1e-6).floor() as i64;
+        let index = match self.loop_s() {
+            Some(_) => (index - self.loop_start).rem_euclid(self.frames().end - self.frames().start),
+            None => index,
+        };
+        self.scene.picture.first_frame.saturating_add(index)
+    }
+
     /// The interval of time in which the shutter is open for frame `number`.
     pub fn shutter(&self, number: i64) -> Shutter {
-        let camera = &self.scene.camera;
-        let open = self.time(number) + camera.shutter_offset_s;
+        self.shutter_at(self.time(number))
+    }
+
+    /// The interval of time in which the shutter is open for a frame that begins at time `t`, s.
+    pub fn shutter_at(&self, t: f64) -> Shutter {
+        let camera = &self.camera;
+        let open = t + camera.shutter_offset_s;
         Shutter { open, close: open + camera.shutter_s.unwrap_or(0.5 * self.fps().frame_s()) }
     }
 
     /// Camera, shutter and window of frame `number`.
     pub fn view(&self, number: i64) -> View {
-        let shutter = self.shutter(number);
+        self.view_at(self.time(number))
+    }
+
+    /// Camera, shutter and window of a frame that begins at time `t`, s.
+    pub fn view_at(&self, t: f64) -> View {
+        let shutter = self.shutter_at(t);
         let overscan = self.overscan;
         let next = shutter.middle() + self.fps().frame_s();
-        let mut view = View::new(self.scene.camera.clone(), shutter, next, self.size, overscan);
+        let mut view = View::new(self.camera.clone(), shutter, next, self.size, overscan);
         view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view.aovs_requested = self.aovs;
         let view = view.with_window(self.window);
@@ -216,7 +245,7 @@ impl Plan {
             text("white balance", &kelvin);
         }
         text("fps", &format_args!("{:?}", self.fps()));
-        text("camera", &Value::Table(self.scene.camera.to_table()));
+        text("camera", &Value::Table(self.camera.to_table()));
         text("plate", &Value::Table(self.scene.plate.to_table()));
         let plate = &self.scene.plate;
         for path in [&plate.image, &plate.depth].into_iter().flatten() {
@@ -229,15 +258,20 @@ impl Plan {
 
     /// The header of frame `number`, whose pixels have the fingerprint `fingerprint`.
     pub fn header(&self, number: i64, fingerprint: Fingerprint) -> FrameHeader {
-        let view = self.view(number);
+        self.header_at(number, self.time(number), fingerprint)
+    }
+
+    /// The header of frame `number` if it begins at time `t`, s.
+    pub(crate) fn header_at(&self, number: i64, t: f64, fingerprint: Fingerprint) -> FrameHeader {
+        let shutter = self.shutter_at(t);
         let overscan = self.overscan as i64;
         FrameHeader {
             number,
             exposure_ev100: self.exposure_ev100,
             white_balance_k: self.scene.picture.white_balance_k.map(|kelvin| kelvin as f32),
             fps: [self.fps().frames, self.fps().seconds],
-            exposure_time_s: view.shutter.duration() as f32,
-            camera: self.scene.camera.at(view.shutter.middle(), self.size).header(),
+            exposure_time_s: shutter.duration() as f32,
+            camera: self.camera.at(shutter.middle(), self.size).header(),
             fingerprint,
             display_size: self.size,
             data_origin: [self.window.x as i64 - overscan, self.window.y as i64 - overscan],

@@ -8,7 +8,7 @@ mod tables;
 pub mod template;
 mod text;
 
-use std::{collections::HashSet, sync::Arc};
+use std::{collections::HashSet, fmt, sync::Arc};
 
 use bansho_base::{
     camera::{CameraParameters, SKY_FOV_DEG},
@@ -16,7 +16,7 @@ use bansho_base::{
         self, Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value,
         animated::Animated,
     },
-    phenomenon::kind::{CheckedParameters, PhenomenonKind},
+    phenomenon::kind::{self, CheckedParameters, Describe, PhenomenonKind},
     world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
 
@@ -95,6 +95,39 @@ pub struct Instance {
     pub enabled: bool,
     /// Its parameters.
     pub parameters: Arc<dyn CheckedParameters>,
+}
+
+impl Instance {
+    /// The same phenomenon with other parameters, which a program has set.
+    ///
+    /// # Errors
+    /// Every value that is out of range or not finite, with the path of its parameter and what is allowed.
+    pub fn with_parameters<P: Describe>(&self, parameters: P) -> Result<Self, ParameterProblems> {
+        let mut reader = Reader::new();
+        let parameters = reader.within(self.name.clone(), |reader| kind::check_parameters(parameters, reader));
+        if !reader.is_clean() {
+            return Err(ParameterProblems(reader.into_problems()));
+        }
+        Ok(Self { kind: P::KIND, parameters, ..self.clone() })
+    }
+}
+
+/// Problems of parameters that a program has set, each with the path of the parameter, what is wrong and what is allowed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ParameterProblems(pub Problems);
+
+impl std::error::Error for ParameterProblems {}
+
+impl fmt::Display for ParameterProblems {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, problem) in self.0.listed.iter().enumerate() {
+            write!(f, "{}{problem}", if index > 0 { "\n" } else { "" })?;
+        }
+        match self.0.omitted {
+            0 => Ok(()),
+            omitted => write!(f, "\nand {omitted} more"),
+        }
+    }
 }
 
 /// A checked scene.
@@ -195,6 +228,39 @@ impl Scene {
             check::values(&scene, &root, &mut reader);
         }
         if reader.is_clean() { Ok(scene) } else { Err(fail(reader.into_problems())) }
+    }
+
+    /// Reads and checks a scene whose tables a program has made. No text is printed or parsed.
+    ///
+    /// # Errors
+    /// All problems, each with the path of its parameter, what is wrong and what is allowed.
+    pub fn from_table(root: &Table, kinds: &[PhenomenonKind]) -> Result<Self, ParameterProblems> {
+        let mut reader = Reader::new();
+        let scene = Self::read(root, kinds, &mut reader);
+        if reader.is_clean() {
+            check::values(&scene, root, &mut reader);
+        }
+        if reader.is_clean() { Ok(scene) } else { Err(ParameterProblems(reader.into_problems())) }
+    }
+
+    /// Checks the values of the shared tables and how they fit together, after a program has changed them. Those of phenomena are checked by
+    /// [`Instance::with_parameters`].
+    ///
+    /// # Errors
+    /// All problems, each with the path of its parameter, what is wrong and what is allowed.
+    pub fn check(&self) -> Result<(), ParameterProblems> {
+        let mut reader = Reader::new();
+        reader.within("picture", |reader| self.picture.check_values(reader));
+        reader.within("camera", |reader| self.camera.check_values(reader));
+        reader.within("plate", |reader| self.plate.check_values(reader));
+        reader.within("wind", |reader| self.wind.check_values(reader));
+        reader.within("air", |reader| self.air.check_values(reader));
+        reader.within("sky", |reader| self.sky.iter().for_each(|sky| sky.check_values(reader)));
+        reader.within("ground", |reader| self.ground.iter().for_each(|ground| ground.check_values(reader)));
+        check_list("light", &self.lights, &mut reader);
+        check_list("obstacle", &self.obstacles, &mut reader);
+        check::values(self, &Table::default(), &mut reader);
+        if reader.is_clean() { Ok(()) } else { Err(ParameterProblems(reader.into_problems())) }
     }
 
     /// Applies the options: replaces the seed, closes the loop, hides the implied backdrop.
@@ -308,7 +374,7 @@ fn read_shared<P: Parameters>(root: &Table, key: &'static str, reader: &mut Read
 }
 
 /// The tables of the list `[[key]]`.
-fn tables<'a>(root: &'a Table, key: &str, reader: &mut Reader) -> Vec<&'a Table> {
+fn tables<'a>(root: &'a Table, key: &'static str, reader: &mut Reader) -> Vec<&'a Table> {
     let Some(node) = root.get(key) else { return Vec::new() };
     let mut tables = Vec::new();
     let items = match &node.value {
@@ -366,6 +432,12 @@ fn read_instance(kind: PhenomenonKind, index: usize, table: &Table, reader: &mut
         name: name.unwrap_or_else(|| default_name(kind.key, index)),
         enabled: enabled.unwrap_or(true),
         parameters: Arc::from((kind.read)(table, reader)),
+    }
+}
+
+fn check_list<P: Parameters>(key: &'static str, list: &[P], reader: &mut Reader) {
+    for (index, parameters) in list.iter().enumerate() {
+        reader.within(key, |reader| reader.within(index.to_string(), |reader| parameters.check_values(reader)));
     }
 }
 

@@ -38,6 +38,11 @@ impl<const N: usize> Animate for [f64; N] {
     }
 }
 
+/// Duration of the past for which keys of values that a program changes are kept, s.
+pub const KEY_MEMORY_S: f64 = 30.0;
+/// Duration in which a value passes from one key to another that is meant to be at the same time, s.
+const FOLD_S: f64 = 1e-6;
+
 /// A constant, or a value keyframed over time. Before the first and after the last key it is constant, unless it repeats. Times are in
 /// seconds.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,6 +113,48 @@ impl<T: Animate> Animated<T> {
         let Some(period) = self.period else { return (0.0, t) };
         let periods = (t / period).floor();
         (periods, t - periods * period)
+    }
+
+    /// Makes it continue `before` at time `t` (s): what `before` was until then stays, and within `transition_s` it changes linearly to the own value. So a
+    /// distance that is covered at a speed does not jump when a program changes the speed. Does nothing where the two are equal, where the own
+    /// value is keyframed, or where one of them repeats.
+    ///
+    /// Keys older than [`KEY_MEMORY_S`] are folded into a constant with the same integral from time 0 on, so that a value that always changes has few keys.
+    pub fn continue_after(&mut self, before: &Self, t: f64, transition_s: f64) {
+        let (Motion::Constant(value), None, None) = (&self.motion, self.period, before.period) else { return };
+        if before.motion == self.motion || !t.is_finite() {
+            return;
+        }
+        let (oldest, value) = (t - KEY_MEMORY_S, *value);
+        let mut keys: Vec<(f64, T)> = Vec::new();
+        let earlier = before.linear_keys(oldest, t);
+        if earlier.last().is_some_and(|(time, last)| *time <= t && *last == value) {
+            *self = before.clone();
+            return;
+        }
+        if earlier.first().is_some_and(|(time, _)| *time < oldest) && oldest > 0.0 {
+            let integral = before.integral(0.0, oldest);
+            let mean = T::from_components(|component| integral.component(component) / oldest);
+            keys.extend([(oldest - FOLD_S, mean), (oldest, before.at(oldest))]);
+        }
+        keys.extend(earlier.into_iter().filter(|(time, _)| *time > oldest && *time < t));
+        keys.extend([(t, before.at(t)), (t + transition_s.max(FOLD_S), value)]);
+        if let Ok(continued) = Self::keyed(keys, Interpolation::Linear) {
+            *self = continued;
+        }
+    }
+
+    /// Keys between which the value is linear; for other interpolations it is sampled from `from` to `to`.
+    fn linear_keys(&self, from: f64, to: f64) -> Vec<(f64, T)> {
+        /// Samples per second.
+        const RATE: f64 = 20.0;
+        let keys = self.keys();
+        if keys.len() < 2 || self.interpolation() == Interpolation::Linear {
+            return keys;
+        }
+        let count = ((to - from) * RATE).ceil().max(1.0) as usize;
+        let at = |index: usize| crate::math::lerp(from, to, index as f64 / count as f64);
+        (0..=count).map(|index| (at(index), self.at(at(index)))).collect()
     }
 
     /// The value if it is constant: it has no keys, or all keys have the same value.
@@ -222,6 +269,26 @@ mod tests {
     fn keys_that_agree_are_a_constant() {
         let still = Animated::keyed(vec![(0.0, 3.0), (1.0, 3.0)], Interpolation::Monotone).unwrap();
         assert_eq!(still.constant(), Some(3.0));
+    }
+
+    #[test]
+    fn a_value_that_a_program_changes_continues_and_keeps_its_integral() {
+        let mut speed = Animated::from(1.0);
+        let mut distance = 0.0;
+        let (dt, mut now) = (0.05, 0.0);
+        for step in 1..4000_i32 {
+            let before = speed.clone();
+            speed = Animated::from(f64::from(step % 7));
+            speed.continue_after(&before, now, dt);
+            assert_eq!(speed.at(now), before.at(now), "{step}");
+            distance += speed.integral(now, now + dt);
+            now += dt;
+            assert!((speed.integral(0.0, now) - distance).abs() < 1e-3 * distance.max(1.0), "{step}");
+        }
+        assert!(speed.keys().len() < 700, "{}", speed.keys().len());
+        let same = speed.clone();
+        speed.continue_after(&same, now, dt);
+        assert_eq!(speed, same);
     }
 
     #[test]

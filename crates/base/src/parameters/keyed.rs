@@ -4,7 +4,7 @@ use super::{
     Kind, Node, Parameter, ProblemKind, Range, Reader, Table, Value,
     animated::{Animate, Animated},
     nearest,
-    types::read_number,
+    types::{check_number, read_number},
 };
 use crate::math::curve::{Curve, CurveError, Interpolation};
 
@@ -167,6 +167,20 @@ impl Parameter for Curve {
         }
     }
 
+    fn check(&self, limits: &CurveLimits, _unit: &'static str, reader: &mut Reader) {
+        let points = self.points();
+        if points.len() > MAX_POINTS {
+            reader.report_value(ProblemKind::ListLength { found: points.len(), min: 1, max: MAX_POINTS });
+        }
+        for [x, y] in points {
+            check_number(*x, &limits.x, "", reader);
+            check_number(*y, &limits.y, "", reader);
+        }
+        if let Some(pair) = points.windows(2).find(|pair| limits.rising && pair[1][1] < pair[0][1]) {
+            reader.report_value(ProblemKind::NotRising { from: pair[0][0], to: pair[1][0] });
+        }
+    }
+
     fn to_value(&self) -> Option<Value> {
         let points = Value::List(self.points().iter().map(|point| Value::numbers(*point).into()).collect());
         Some(match self.interpolation() {
@@ -217,6 +231,20 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
                 None
             }
         }
+    }
+
+    fn check(&self, limits: &T::Limits, unit: &'static str, reader: &mut Reader) {
+        if let Some(constant) = self.constant() {
+            return constant.check(limits, unit, reader);
+        }
+        for (time, value) in self.keys() {
+            check_number(time, &Range::default(), "s", reader);
+            value.check(limits, unit, reader);
+        }
+    }
+
+    fn continue_from(&mut self, before: &Self, t: f64, transition_s: f64) {
+        self.continue_after(before, t, transition_s);
     }
 
     fn to_value(&self) -> Option<Value> {

@@ -66,6 +66,13 @@ macro_rules! parameters {
                 result
             }
 
+            fn check_values(&self, reader: &mut $crate::parameters::Reader) {
+                $(reader.within(stringify!($key), |reader| {
+                    let limits = $crate::parameters!(@limits $type $(, $limits)?);
+                    <$type as $crate::parameters::Parameter>::check(&self.$key, &limits, concat!($($unit)?), reader);
+                });)*
+            }
+
             fn to_table(&self) -> $crate::parameters::Table {
                 let mut table = $crate::parameters::Table::default();
                 $(if let Some(value) = $crate::parameters::Parameter::to_value(&self.$key) {
@@ -96,6 +103,14 @@ macro_rules! parameters {
 
             fn to_value(&self) -> Option<$crate::parameters::Value> {
                 Some($crate::parameters::Value::Table(<Self as $crate::parameters::Parameters>::to_table(self)))
+            }
+
+            fn check(&self, _limits: &(), _unit: &'static str, reader: &mut $crate::parameters::Reader) {
+                <Self as $crate::parameters::Parameters>::check_values(self, reader);
+            }
+
+            fn continue_from(&mut self, before: &Self, t: f64, transition_s: f64) {
+                $($crate::parameters::Parameter::continue_from(&mut self.$key, &before.$key, t, transition_s);)*
             }
 
             fn close_loop(&mut self, _period: f64) -> Option<String> {
@@ -178,6 +193,8 @@ macro_rules! choice {
             fn to_value(&self) -> Option<$crate::parameters::Value> {
                 Some($crate::parameters::Value::Text(self.name().to_owned()))
             }
+
+            fn check(&self, _limits: &(), _unit: &'static str, _reader: &mut $crate::parameters::Reader) {}
         }
     };
 }

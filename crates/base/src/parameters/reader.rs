@@ -1,5 +1,7 @@
 //! Reads the values of a scene file: tracks the current path and collects problems.
 
+use std::borrow::Cow;
+
 use super::{Choice, Kind, Node, Problem, ProblemKind, Span, nearest};
 
 /// Maximum number of problems of a file that are kept: the first ones. Nobody reads more of them, and a file can contain a million.
@@ -17,7 +19,7 @@ pub struct Problems {
 /// Collects problems while values are read, with the path of the current value.
 #[derive(Debug, Default)]
 pub struct Reader {
-    path: Vec<String>,
+    path: Vec<Cow<'static, str>>,
     problems: Vec<Problem>,
     omitted: usize,
     /// Location of the last problem that is still listed, once there are more problems than are kept.
@@ -31,7 +33,7 @@ impl Reader {
     }
 
     /// Runs `read` with `segment` appended to the path.
-    pub fn within<T>(&mut self, segment: impl Into<String>, read: impl FnOnce(&mut Self) -> T) -> T {
+    pub fn within<T>(&mut self, segment: impl Into<Cow<'static, str>>, read: impl FnOnce(&mut Self) -> T) -> T {
         self.path.push(segment.into());
         let result = read(self);
         self.path.pop();
@@ -46,6 +48,11 @@ impl Reader {
     /// Reports a problem at `span`.
     pub fn report_at(&mut self, span: Option<Span>, kind: ProblemKind) {
         self.report_with(span, || kind);
+    }
+
+    /// Reports a problem of a value that is not from a text.
+    pub fn report_value(&mut self, kind: ProblemKind) {
+        self.report_at(None, kind);
     }
 
     /// Reports a problem at `span`; `kind` is called only if the problem will be listed.

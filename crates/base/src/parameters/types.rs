@@ -16,6 +16,12 @@ pub trait Parameter: Sized {
     /// The value as in a file; `None` if a file would omit it.
     fn to_value(&self) -> Option<Value>;
 
+    /// Reports what [`read`](Self::read) would report of this value, which a program has set.
+    fn check(&self, limits: &Self::Limits, unit: &'static str, reader: &mut Reader);
+
+    /// Makes keyframed values continue those of `before` at time `t` (s): they change from them to the own values within `transition_s`.
+    fn continue_from(&mut self, _before: &Self, _t: f64, _transition_s: f64) {}
+
     /// Makes keyframed values periodic by repeating the interval from 0 to `period` (s, above 0). Returns the path of the first value that differs at
     /// both ends, empty for the value itself.
     fn close_loop(&mut self, _period: f64) -> Option<String> {
@@ -33,6 +39,10 @@ pub trait Parameters: Sized + Default {
 
     /// The table with every parameter.
     fn to_table(&self) -> Table;
+
+    /// Reports every value that is out of range, not finite, or does not make a curve, with its path. A file with such a value would be refused in the
+    /// same words.
+    fn check_values(&self, reader: &mut Reader);
 
     /// Reports keys that are neither parameters nor `ignored`.
     fn report_unknown(table: &Table, reader: &mut Reader, ignored: &[&str]) {
@@ -72,6 +82,13 @@ impl Default for Range {
     }
 }
 
+/// Reports a number that is out of range or not finite.
+pub(super) fn check_number(value: f64, range: &Range, unit: &'static str, reader: &mut Reader) {
+    if !(range.min..=range.max).contains(&value) {
+        reader.report_value(ProblemKind::OutOfRange { value, min: range.min, max: range.max, unit });
+    }
+}
+
 pub(super) fn read_number(
     node: &Node,
     range: &Range,
@@ -101,6 +118,10 @@ impl Parameter for f64 {
         read_number(node, limits, unit, &Self::kind(limits), reader)
     }
 
+    fn check(&self, limits: &Range, unit: &'static str, reader: &mut Reader) {
+        check_number(*self, limits, unit, reader);
+    }
+
     fn to_value(&self) -> Option<Value> {
         Some(Value::Number(*self))
     }
@@ -119,6 +140,10 @@ impl Parameter for i64 {
             return None;
         };
         read_number(node, limits, unit, &Self::kind(limits), reader).map(|_| value)
+    }
+
+    fn check(&self, limits: &Range, unit: &'static str, reader: &mut Reader) {
+        check_number(*self as f64, limits, unit, reader);
     }
 
     fn to_value(&self) -> Option<Value> {
@@ -141,6 +166,8 @@ impl Parameter for bool {
         None
     }
 
+    fn check(&self, _limits: &(), _unit: &'static str, _reader: &mut Reader) {}
+
     fn to_value(&self) -> Option<Value> {
         Some(Value::Bool(*self))
     }
@@ -160,6 +187,8 @@ impl Parameter for String {
         reader.wrong_type(node, &Self::kind(limits));
         None
     }
+
+    fn check(&self, _limits: &(), _unit: &'static str, _reader: &mut Reader) {}
 
     fn to_value(&self) -> Option<Value> {
         Some(Value::Text(self.clone()))
@@ -184,6 +213,12 @@ impl Parameter for AssetPath {
                 reader.wrong_type(node, &Self::kind(limits));
                 None
             }
+        }
+    }
+
+    fn check(&self, limits: &(), _unit: &'static str, reader: &mut Reader) {
+        if self.0.is_empty() {
+            reader.wrong_type(&Value::Text(String::new()).into(), &Self::kind(limits));
         }
     }
 
@@ -214,6 +249,10 @@ impl<const N: usize> Parameter for [f64; N] {
             *value = read_number(item, limits, unit, &expected, reader)?;
         }
         Some(values)
+    }
+
+    fn check(&self, limits: &Range, unit: &'static str, reader: &mut Reader) {
+        self.iter().for_each(|value| value.check(limits, unit, reader));
     }
 
     fn to_value(&self) -> Option<Value> {
@@ -250,6 +289,10 @@ impl<const N: usize> Parameter for [i64; N] {
         Some(values)
     }
 
+    fn check(&self, limits: &Range, unit: &'static str, reader: &mut Reader) {
+        self.iter().for_each(|value| value.check(limits, unit, reader));
+    }
+
     fn to_value(&self) -> Option<Value> {
         Some(Value::List(self.iter().map(|value| Value::Integer(*value).into()).collect()))
     }
@@ -283,6 +326,18 @@ impl<T: Parameter> Parameter for Auto<T> {
         T::read(node, limits, unit, reader).map(Self::Set)
     }
 
+    fn check(&self, limits: &T::Limits, unit: &'static str, reader: &mut Reader) {
+        if let Self::Set(value) = self {
+            value.check(limits, unit, reader);
+        }
+    }
+
+    fn continue_from(&mut self, before: &Self, t: f64, transition_s: f64) {
+        if let (Self::Set(value), Self::Set(before)) = (self, before) {
+            value.continue_from(before, t, transition_s);
+        }
+    }
+
     fn to_value(&self) -> Option<Value> {
         match self {
             Self::Auto => Some(Value::Text("auto".into())),
@@ -307,6 +362,18 @@ impl<T: Parameter> Parameter for Option<T> {
 
     fn read(node: &Node, limits: &T::Limits, unit: &'static str, reader: &mut Reader) -> Option<Self> {
         T::read(node, limits, unit, reader).map(Some)
+    }
+
+    fn check(&self, limits: &T::Limits, unit: &'static str, reader: &mut Reader) {
+        if let Some(value) = self {
+            value.check(limits, unit, reader);
+        }
+    }
+
+    fn continue_from(&mut self, before: &Self, t: f64, transition_s: f64) {
+        if let (Some(value), Some(before)) = (self, before) {
+            value.continue_from(before, t, transition_s);
+        }
     }
 
     fn to_value(&self) -> Option<Value> {
@@ -355,6 +422,19 @@ impl<T: Parameter> Parameter for Vec<T> {
             reader.within(index.to_string(), |reader| T::read(item, &limits.item, unit, reader))
         };
         items.iter().enumerate().map(read_item).collect()
+    }
+
+    fn check(&self, limits: &Self::Limits, unit: &'static str, reader: &mut Reader) {
+        if !(limits.min..=limits.max).contains(&self.len()) {
+            reader.report_value(ProblemKind::ListLength { found: self.len(), min: limits.min, max: limits.max });
+        }
+        for (index, item) in self.iter().enumerate() {
+            reader.within(index.to_string(), |reader| item.check(&limits.item, unit, reader));
+        }
+    }
+
+    fn continue_from(&mut self, before: &Self, t: f64, transition_s: f64) {
+        self.iter_mut().zip(before).for_each(|(value, before)| value.continue_from(before, t, transition_s));
     }
 
     fn to_value(&self) -> Option<Value> {

@@ -1,6 +1,6 @@
 //! Kinds of phenomena: how each is read from its table in a scene, and built.
 
-use std::sync::Arc;
+use std::{any::Any, sync::Arc};
 
 use crate::{
     host::assets::Assets,
@@ -23,6 +23,8 @@ pub struct BuildContext<'a> {
     pub loop_s: Option<f64>,
     /// Loader of assets.
     pub assets: &'a dyn Assets,
+    /// The phenomenon of the same name before its parameters were changed; what does not depend on the changes can be taken from it.
+    pub previous: Option<&'a dyn Phenomenon>,
 }
 
 /// The checked parameters of a phenomenon.
@@ -38,6 +40,24 @@ pub trait CheckedParameters: Send + Sync {
 
     /// See [`Describe::stage_view`].
     fn stage_view(&self) -> Option<StageView>;
+
+    /// The parameters themselves, of the type that implements [`Describe`].
+    fn as_any(&self) -> &dyn Any;
+
+    /// The same parameters, whose keyframed values continue those of `before` at time `t` (s) and reach their own within `transition_s`: see
+    /// [`Parameter::continue_from`]. `None` if those are of another kind.
+    fn continuing(
+        &self,
+        before: &dyn CheckedParameters,
+        t: f64,
+        transition_s: f64,
+    ) -> Option<Arc<dyn CheckedParameters>>;
+
+    /// See [`Describe::with_flow`].
+    fn with_flow(&self, flow: f64) -> Option<Arc<dyn CheckedParameters>>;
+
+    /// See [`Describe::with_position`].
+    fn with_position(&self, position: [f64; 3]) -> Option<Arc<dyn CheckedParameters>>;
 
     /// Builds the phenomenon.
     ///
@@ -100,6 +120,16 @@ pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
         None
     }
 
+    /// The same parameters with another gas flow, as a fraction of full flow: 0 puts a flame out. `None` for what does not burn.
+    fn with_flow(&self, _flow: f64) -> Option<Self> {
+        None
+    }
+
+    /// The same parameters at another position, m. `None` for what has no position of its own.
+    fn with_position(&self, _position: [f64; 3]) -> Option<Self> {
+        None
+    }
+
     /// Builds the phenomenon.
     ///
     /// # Errors
@@ -123,6 +153,12 @@ fn read_described<P: Describe>(table: &Table, reader: &mut Reader) -> Box<dyn Ch
     Box::new(Described(P::read_table(table, reader, &COMMON_KEYS)))
 }
 
+/// Checks parameters that a program has set, without a text. Problems are reported to `reader`.
+pub fn check_parameters<P: Describe>(parameters: P, reader: &mut Reader) -> Arc<dyn CheckedParameters> {
+    parameters.check_values(reader);
+    Arc::new(Described(parameters))
+}
+
 struct Described<P>(P);
 
 impl<P: Describe> CheckedParameters for Described<P> {
@@ -140,6 +176,29 @@ impl<P: Describe> CheckedParameters for Described<P> {
 
     fn stage_view(&self) -> Option<StageView> {
         self.0.stage_view()
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        &self.0
+    }
+
+    fn continuing(
+        &self,
+        before: &dyn CheckedParameters,
+        t: f64,
+        transition_s: f64,
+    ) -> Option<Arc<dyn CheckedParameters>> {
+        let mut parameters = self.0.clone();
+        parameters.continue_from(before.as_any().downcast_ref::<P>()?, t, transition_s);
+        Some(Arc::new(Self(parameters)))
+    }
+
+    fn with_flow(&self, flow: f64) -> Option<Arc<dyn CheckedParameters>> {
+        Some(Arc::new(Self(self.0.with_flow(flow)?)))
+    }
+
+    fn with_position(&self, position: [f64; 3]) -> Option<Arc<dyn CheckedParameters>> {
+        Some(Arc::new(Self(self.0.with_position(position)?)))
     }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {

@@ -6,7 +6,7 @@ pub mod kind;
 pub mod strip;
 pub mod surroundings;
 
-use std::{fmt, sync::Arc};
+use std::{any::Any, fmt, sync::Arc};
 
 use crate::{
     frame::MetadataEntry,
@@ -159,6 +159,11 @@ pub trait Phenomenon: Send + Sync {
 
     /// A note for the user about how it will look among the other phenomena.
     fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
+        None
+    }
+
+    /// Itself, for phenomena that give what they computed to their successor: see [`BuildContext::previous`](kind::BuildContext::previous).
+    fn as_any(&self) -> Option<&dyn Any> {
         None
     }
 

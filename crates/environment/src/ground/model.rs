@@ -31,7 +31,8 @@ impl Ground {
         let parameters = &self.parameters;
         let reflection = surroundings.reflection.filter(|_| parameters.kind == GroundKind::Water)?;
         let t = view.shutter.middle();
-        let wind = surroundings.wind.mean(t);
+        // Waves that turned with a wind that changes during the shot would jump.
+        let wind = surroundings.wind.planned_mean(t);
         let heading = DVec2::new(wind.x, wind.z).try_normalize().unwrap_or(DVec2::X);
         let waves = Waves::new(self.key, parameters.waves, parameters.wave_length, heading, t, self.loop_s);
         Some(LakeFrame {

@@ -21,7 +21,8 @@ use super::{
     error::ParticleErrorKind,
     model::FlameParticles,
     parameters::{
-        CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters, GasModel, TemperatureLaw,
+        BurnerParameters, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters, GasModel,
+        TemperatureLaw,
     },
     render::{self, PreparedGas, SpriteStyle},
 };
@@ -31,6 +32,17 @@ use crate::particles::simulate::{
     particles::Particles,
     snapshot,
 };
+
+impl FlameParticlesParameters {
+    /// The same parameters with a list of burners that is not empty.
+    fn with_stated_burners(&self) -> Self {
+        let mut stated = self.clone();
+        if stated.burners.is_empty() {
+            stated.burners.push(BurnerParameters::default());
+        }
+        stated
+    }
+}
 
 impl Describe for FlameParticlesParameters {
     const KEY: &'static str = "flame_particles";
@@ -57,6 +69,25 @@ impl Describe for FlameParticlesParameters {
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
         check_particle_count(self.particles, others).map_err(|error| BuildError::new(error.key, error.kind))?;
         Ok(self.particles + others)
+    }
+
+    fn with_flow(&self, flow: f64) -> Option<Self> {
+        let mut changed = self.with_stated_burners();
+        changed.burners.iter_mut().for_each(|burner| burner.flow = flow.into());
+        Some(changed)
+    }
+
+    /// Moves the burners, so that the first is at `position`. Gas that burns already stays where it is.
+    fn with_position(&self, position: [f64; 3]) -> Option<Self> {
+        let mut changed = self.with_stated_burners();
+        let last =
+            |burner: &BurnerParameters| burner.position.values().last().map_or(DVec3::ZERO, |last| DVec3::from(*last));
+        let first = changed.burners.first().map_or(DVec3::ZERO, last);
+        let displacement = DVec3::from(position) - DVec3::from(self.position) - first;
+        for burner in &mut changed.burners {
+            burner.position = (last(burner) + displacement).to_array().into();
+        }
+        Some(changed)
     }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {

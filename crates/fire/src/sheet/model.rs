@@ -6,7 +6,7 @@ use bansho_base::{
     camera::{Camera, upright_quad::right_facing},
     host::{constructions, once::get_or_compute},
     math::{self, DVec2, DVec3, random::Key},
-    parameters::{ParameterError, ParameterErrorKind},
+    parameters::{ParameterError, ParameterErrorKind, animated::Animated},
 };
 
 use super::{
@@ -14,7 +14,7 @@ use super::{
         clock::Clock,
         warp::{FlameWaves, WarpState, WindLean},
     },
-    parameters::{Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
+    parameters::{ColorParameters, Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
     texture::{FractalLayers, PaperLayer, PaperSum, TextureSource},
@@ -27,7 +27,7 @@ pub struct FlameSheet {
     pub(super) parameters: FlameSheetParameters,
     pub(super) clock: Clock,
     /// Computed when the sheet is first drawn: a scene may contain thousands of sheets, and each is constructed to check its parameters.
-    pub(super) tables: OnceLock<Tables>,
+    pub(super) tables: OnceLock<Arc<Tables>>,
     pub(super) flames: Vec<FlameInstance>,
 }
 
@@ -72,12 +72,25 @@ impl FlameSheet {
     pub(super) fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
         let has_soot_field = self.parameters.method == SheetMethod::SootField;
-        let compute = || Tables {
-            shape: Box::new(ShapeTables::new(shape, texture, color)),
-            ramp: Box::new(ColorRamp::new(texture, color, *stage)),
-            soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
+        let compute = || {
+            Arc::new(Tables {
+                shape: Box::new(ShapeTables::new(shape, texture, color)),
+                ramp: Box::new(ColorRamp::new(texture, color, *stage)),
+                soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
+            })
         };
-        get_or_compute(&self.tables, compute)
+        &*get_or_compute(&self.tables, compute)
+    }
+
+    /// Takes the tables of `previous`, if its parameters give the same: a program changes position, flow and luminance far more often than shape and colors.
+    pub(super) fn share_tables(&mut self, previous: &Self) {
+        let same_tables = |FlameSheetParameters { shape, texture, color, stage, method, soot_field, .. }| {
+            let luminance = Animated::from(0.0);
+            (shape, texture, ColorParameters { luminance, ..color }, stage, method, soot_field)
+        };
+        if same_tables(self.parameters.clone()) == same_tables(previous.parameters.clone()) {
+            self.tables.clone_from(&previous.tables);
+        }
     }
 
     /// The mapping to flame coordinates and the threshold: tables that do not change with time.
@@ -149,7 +162,29 @@ impl FlameSheet {
 
     /// Luminance of the brightest color at `t`, cd/m^2.
     pub(crate) fn luminance_at(&self, t: f64) -> f64 {
-        self.parameters.color.luminance.at(self.clock.time(t))
+        /// Fraction of full flow below which the soot of a flame that goes out becomes dark.
+        const DARK_FLOW: f64 = 0.05;
+        self.parameters.color.luminance.at(self.clock.time(t)) * (self.flow_at(t) / DARK_FLOW).min(1.0)
+    }
+
+    /// Gas flow at `t` as a fraction of full flow.
+    pub(crate) fn flow_at(&self, t: f64) -> f64 {
+        self.parameters.flow.at(self.clock.time(t))
+    }
+
+    /// Whether nothing burns at `t`.
+    pub(crate) fn is_out(&self, t: f64) -> bool {
+        /// Below this fraction of full flow a flame is less than a hundredth of its height.
+        const LEAST_FLOW: f64 = 1e-5;
+        self.flow_at(t) < LEAST_FLOW
+    }
+
+    /// Height at `t` as a fraction of that at full flow: the power 2/5 of the heat release rate (Heskestad 1983).
+    pub(crate) fn height_fraction(&self, t: f64) -> f64 {
+        match self.flow_at(t) {
+            1.0 => 1.0,
+            flow => math::pow(flow, 0.4),
+        }
     }
 }
 

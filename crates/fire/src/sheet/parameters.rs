@@ -252,6 +252,9 @@ bansho_base::parameters! {
         yaw_deg: f64 = 0.0, limits(Range::new(-3600.0, 3600.0)), unit("degrees");
         /// Scroll speed s, eq. (1), in sheet heights per second.
         speed: Animated<f64> = Animated::from(1.1), limits(Range::new(0.0, 100.0)), unit("1/s");
+        /// Gas flow as a fraction of full flow: the height of the flame is proportional to its power of 2/5 (Heskestad 1983), and fewer sparks and less smoke
+        /// rise. At 0 it is out.
+        flow: Animated<f64> = Animated::from(1.0), limits(FRACTION);
         /// Time offset: how far it is ahead.
         phase_s: f64 = 0.0, unit("s");
         /// Number that selects other random numbers for an otherwise equal flame.

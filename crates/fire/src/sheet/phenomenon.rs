@@ -1,6 +1,6 @@
 //! `impl Phenomenon` for the flame sheet.
 
-use std::sync::Arc;
+use std::{any::Any, sync::Arc};
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
@@ -46,9 +46,22 @@ impl Describe for FlameSheetParameters {
         Some(StageView { size_m: [self.width, self.height], white_luminance: is_gray.then_some(highest) })
     }
 
+    fn with_flow(&self, flow: f64) -> Option<Self> {
+        Some(Self { flow: flow.into(), ..self.clone() })
+    }
+
+    fn with_position(&self, position: [f64; 3]) -> Option<Self> {
+        Some(Self { position: position.into(), ..self.clone() })
+    }
+
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match FlameSheet::new(self.clone(), context.name, context.seed, context.loop_s) {
-            Ok(sheet) => Ok(Arc::new(sheet)),
+            Ok(mut sheet) => {
+                if let Some(previous) = context.previous.and_then(|previous| previous.as_any()?.downcast_ref()) {
+                    sheet.share_tables(previous);
+                }
+                Ok(Arc::new(sheet))
+            }
             Err(error) => Err(BuildError::new(error.key, error.kind)),
         }
     }
@@ -63,6 +76,10 @@ impl Phenomenon for FlameSheet {
         /// Luminance of the bright parts relative to the maximum: most of a flame is far dimmer than its hottest soot.
         const BRIGHT_PARTS: f64 = 0.28;
         BRIGHT_PARTS * self.parameters.color.luminance.bounds()[1]
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {

@@ -9,7 +9,7 @@ use bansho_base::{
         self, DVec2, DVec3,
         random::{Key, Purpose},
     },
-    parameters::Range,
+    parameters::{Range, animated::Animated},
     phenomenon::strip::View,
     world::wind::Wind,
 };
@@ -64,6 +64,10 @@ pub(crate) struct SparkEmitter<'a> {
     /// The fire's own time at the middle of the exposure, s; periodic in a loop.
     pub(crate) now: f64,
     pub(crate) loop_s: Option<f64>,
+    /// Gas flow over the time of the scene, as a fraction of full flow: the fraction of sparks that start.
+    pub(crate) flow: Option<&'a Animated<f64>>,
+    /// How far the fire's own time is ahead of that of the scene, s.
+    pub(crate) phase_s: f64,
     /// Center of its base, m.
     pub(crate) base: DVec3,
     /// Width and height, m.
@@ -107,7 +111,8 @@ impl SparkEmitter<'_> {
         let age = seconds_since_due - first[0] / rate;
         let lifetime_s = sparks.lifetime_s * (0.35 + 0.65 * first[1] * first[1]);
         let vary = |variate: f64| 1.0 + sparks.speed_variation * (2.0 * variate - 1.0);
-        (0.0..lifetime_s).contains(&age).then(|| Spark {
+        let starts = (0.0..lifetime_s).contains(&age) && self.starts(id, self.now - age);
+        starts.then(|| Spark {
             age,
             lifetime_s,
             start: DVec3::new(0.5 * (first[2] - 0.5), 0.05 + 0.35 * first[3], 0.3 * (second[3] - 0.5)),
@@ -115,6 +120,14 @@ impl SparkEmitter<'_> {
             phases: [second[1], second[2]],
             turns: 0.6 + 1.2 * second[3],
         })
+    }
+
+    /// Whether spark `id` starts, which is due at time `t`.
+    fn starts(&self, id: u64, t: f64) -> bool {
+        let Some(flow) = self.flow.filter(|flow| flow.constant() != Some(1.0)) else { return true };
+        let t = t - self.phase_s;
+        let t = self.loop_s.map_or(t, |length| t - (t / length).floor() * length);
+        f64::from(self.key.uniforms(id, 0, Purpose::named("spark flow"))[0]) < flow.at(t)
     }
 
     /// Displacement of a spark at `age` in still air, m: it decelerates by drag and swirls in a growing spiral.
@@ -136,8 +149,14 @@ impl SparkEmitter<'_> {
     fn drift(&self, wind: &Wind, origin: DVec3, t: f64, age: f64) -> DVec3 {
         const STEPS: usize = 4;
         let step = age / STEPS as f64;
-        let mean: DVec3 =
-            (0..STEPS).map(|i| wind.at(origin, t - age + step * (i as f64 + 0.5))).sum::<DVec3>() / STEPS as f64;
+        let instants = (0..STEPS).map(|i| t - age + step * (i as f64 + 0.5));
+        let mean: DVec3 = if wind.is_planned() {
+            instants.map(|t| wind.at(origin, t)).sum::<DVec3>() / STEPS as f64
+        } else {
+            // A sudden change would be felt by all sparks at once whenever one of the instants passes it, so the mean wind is integrated exactly.
+            let gusts = instants.map(|t| wind.at(origin, t) - wind.mean(t)).sum::<DVec3>() / STEPS as f64;
+            if age > 0.0 { wind.travel(t - age, t) / age + gusts } else { DVec3::ZERO }
+        };
         // A spark is heavy: its velocity relaxes to that of the wind with a time constant of 0.33 s.
         mean * self.wind_response * (age + 0.33 * math::exp_m1(-age / 0.33))
     }

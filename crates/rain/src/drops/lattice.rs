@@ -39,6 +39,9 @@ pub(crate) struct LatticeMotion<'a> {
 /// the wind. The point where a drop lands does not depend on the wind, only the direction from which it comes. So a
 /// small change of the wind moves drops by a small amount, however late in the shot; counted from time 0 it would move
 /// them by the change times the elapsed time. In a loop, a row that repeats another has the same displacement.
+///
+/// A wind that is changed during a shot is not known in advance, and a row that is in the air must not jump. So t0 is that of the planned wind, and all
+/// rows are displaced alike by the distance that the wind has deviated from it since.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
     /// Height of a cell, m.
@@ -68,8 +71,10 @@ impl Lattice {
         let (first, last) = (row(*heights.start()), row(*heights.end()));
         // Bounds the time to the ground, for drops that hardly fall.
         let slowest = speed.max(1e-6);
+        let unplanned = wind.unplanned_travel(t);
         let drift = |row: i64| {
-            let drift = wind.travel((row as f64 + 0.5) * height / slowest, t) * response;
+            let planned = wind.planned_travel((row as f64 + 0.5) * height / slowest, t);
+            let drift = unplanned.map_or(planned, |unplanned| planned + unplanned) * response;
             DVec2::new(drift.x, drift.z)
         };
         Self { height, base, first, drift: (first..=last).map(drift).collect(), rows }
@@ -172,6 +177,17 @@ mod tests {
             // 3.5 m above the ground, which it comes to in 3.5 / 6 s.
             assert!((displacement.x + 0.1 * 3.5 / 6.0).abs() < 1e-6 && displacement.y == 0.0, "{t}: {displacement}");
         }
+    }
+
+    #[test]
+    fn a_drop_in_the_air_does_not_jump_when_the_wind_changes_but_drifts_with_the_new_wind() {
+        let mut wind = wind([2.0, 0.0, 0.0], None);
+        let at = |wind: &Wind, t: f64| lattice(6.0, wind, None, t).point_in_world(Cell([0, 361, 0]), DVec3::splat(0.5));
+        let before = [at(&wind, 59.5), at(&wind, 60.0)];
+        wind.change(60.0, DVec3::new(5.0, 0.0, -3.0), 0.3, 0.0).unwrap();
+        assert_eq!([at(&wind, 59.5), at(&wind, 60.0)], before);
+        let displacement = at(&wind, 60.5) - before[1];
+        assert!((displacement - DVec3::new(2.5, -3.0, -1.5)).length() < 1e-9, "{displacement}");
     }
 
     #[test]

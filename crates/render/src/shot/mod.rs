@@ -10,12 +10,14 @@ use bansho_base::{
     geometry::point_cloud::PointCloud,
     host::observer::{self, Cancelled, Observer, Stage, StageGuard},
     image::Rect,
+    math::DVec3,
     parameters::BuildError,
     phenomenon::{
         LevelMirror, Prepared, SnapshotError,
         strip::View,
         surroundings::{Publication, Surroundings},
     },
+    world::wind::{FixedWind, Wind, WindParameters},
 };
 use rayon::prelude::*;
 
@@ -61,6 +63,8 @@ pub struct Shot {
     plates: PlateCache,
     /// Number of the frame that the shot was advanced to.
     number: i64,
+    /// Time at which that frame begins, s.
+    time: f64,
     /// Whether the state was simulated, at least partly, with an earlier scene.
     has_earlier_state: bool,
     frame: Option<Frame>,
@@ -68,12 +72,16 @@ pub struct Shot {
     recycled: Option<Frame>,
 }
 
+/// Duration over which a wind that was edited takes the place of the one before, s.
+const WIND_TRANSITION_S: f64 = 0.25;
+
 impl Shot {
     /// A shot of `compiled` in its initial state. Builds nothing.
     pub fn open(compiled: Arc<CompiledScene>, plan: Arc<Plan>) -> Self {
         Self {
             runs: compiled.start(),
             number: plan.frames().start,
+            time: plan.time(plan.frames().start),
             context: ShotContext::new(compiled, plan),
             plates: PlateCache::default(),
             has_earlier_state: false,
@@ -87,15 +95,79 @@ impl Shot {
     /// # Errors
     /// The observer asked to stop. The shot is then at some earlier step and may be advanced again.
     pub fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
+        let time = self.context.plan.time(number);
+        if self.is_past(time) {
+            self.restart();
+        } else if time <= self.time {
+            // What is drawn again is drawn with the wind of the scene.
+            self.context.wind = self.context.compiled.wind().clone();
+        }
+        self.step_to(time, u64::MAX, observer)?;
+        self.number = number;
+        Ok(())
+    }
+
+    /// Steps all simulations to time `t` (s), but takes at most `max_steps` steps; returns the time that is owed, s. If any is, the shot is at the time
+    /// that was reached, or at its former time if that is later. The time may be between frames and before the first; it must not be
+    /// [past](Self::is_past) for simulations.
+    ///
+    /// # Errors
+    /// The observer asked to stop. The shot is then at some earlier step and may be advanced again.
+    pub fn advance_to(&mut self, t: f64, max_steps: u64, observer: &dyn Observer) -> Result<f64, RenderError> {
+        let before = self.time;
+        self.step_to(t, max_steps, observer)?;
+        let shutter = self.context.plan.shutter_at(t);
+        let behind = stepping::time_behind(&self.runs, shutter);
+        self.time = if behind > 0.0 { (t - behind).max(before.min(t)) } else { t };
+        self.number = self.context.plan.number_at(self.time);
+        Ok(t - self.time)
+    }
+
+    /// Whether a simulation has been stepped beyond the state from which a frame at time `t` (s) is drawn.
+    pub fn is_past(&self, t: f64) -> bool {
+        let shutter = self.context.plan.shutter_at(t);
+        self.runs.iter().any(|run| run.steps_taken > run.steps_until(shutter))
+    }
+
+    /// Number of steps that simulations have to take until the first frame can be drawn.
+    pub fn preroll_steps_left(&self) -> u64 {
+        let plan = &self.context.plan;
+        let shutter = plan.shutter_at(plan.time(plan.frames().start));
+        self.runs.iter().map(|run| run.steps_until(shutter).saturating_sub(run.steps_taken)).sum()
+    }
+
+    /// Puts all simulations back to their initial states, before the preroll, and the wind to that of the scene.
+    pub fn restart(&mut self) {
+        self.runs = self.context.compiled.start();
+        self.has_earlier_state = false;
+        self.context.wind = self.context.compiled.wind().clone();
+        self.frame = None;
+    }
+
+    /// Time at which the frame begins that the shot was advanced to, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Changes the wind from the end of the current frame's exposure on: mean velocity (m/s) and turbulence intensity change linearly to these values within
+    /// `transition_s`. Nothing jumps: gusts, drops and waves go on from where they are. It lasts until the shot
+    /// restarts or [advances](Self::advance) to a frame that is not later.
+    ///
+    /// # Errors
+    /// The scene is a seamless loop, whose wind is fixed.
+    pub fn change_wind(&mut self, velocity: DVec3, gust: f64, transition_s: f64) -> Result<(), FixedWind> {
+        let close = self.context.plan.shutter_at(self.time).close;
+        self.context.wind.change(close, velocity, gust, transition_s)?;
+        self.has_earlier_state |= !self.context.wind.is_planned();
+        Ok(())
+    }
+
+    fn step_to(&mut self, t: f64, max_steps: u64, observer: &dyn Observer) -> Result<(), RenderError> {
         let _stage = StageGuard::begin(observer, Stage::Advance);
         self.frame = None;
-        let shutter = self.context.plan.shutter(number);
-        if self.runs.iter().any(|run| run.steps_taken > run.steps_until(shutter)) {
-            self.runs = self.context.compiled.start();
-            self.has_earlier_state = false;
-        }
-        stepping::advance(&self.context, &mut self.runs, shutter, observer)?;
-        self.number = number;
+        let shutter = self.context.plan.shutter_at(t);
+        stepping::advance(&self.context, &mut self.runs, shutter, max_steps, observer)?;
+        self.time = t;
         Ok(())
     }
 
@@ -114,7 +186,7 @@ impl Shot {
             Some((_, mirror)) => self.plates.mirrored(&self.context.plan, mirror, observer)?,
             None => Arc::default(),
         };
-        let mut view = self.context.plan.view(self.number);
+        let mut view = self.context.plan.view_at(self.time);
         let recycled = self.recycled.take();
         let frame = match self.compose(&view, &plate, &mirrored, recycled, observer)? {
             Some(frame) => frame,
@@ -143,6 +215,32 @@ impl Shot {
     /// restore it; the others restart.
     pub fn replan(&mut self, compiled: Arc<CompiledScene>, plan: Arc<Plan>) {
         let is_same_scene = self.context.compiled.state_fingerprint() == compiled.state_fingerprint();
+        self.continue_with(compiled, plan, is_same_scene);
+    }
+
+    /// Continues with a scene of which a program has changed parameters, as [`replan`](Self::replan) does, but compares nothing but what was built.
+    pub fn replace_scene(&mut self, compiled: Arc<CompiledScene>) {
+        let plan = self.context.plan.clone();
+        self.continue_with(compiled, plan, false);
+    }
+
+    /// Continues with another plan of the same scene, such as one with another camera. Nothing is compared.
+    pub fn replace_plan(&mut self, plan: Arc<Plan>) {
+        self.context.plan = plan;
+        self.frame = None;
+    }
+
+    /// The scene that is drawn.
+    pub fn compiled(&self) -> &Arc<CompiledScene> {
+        &self.context.compiled
+    }
+
+    /// The plan that is followed.
+    pub fn plan(&self) -> &Arc<Plan> {
+        &self.context.plan
+    }
+
+    fn continue_with(&mut self, compiled: Arc<CompiledScene>, plan: Arc<Plan>, is_same_scene: bool) {
         let mut old: Vec<Option<ActiveRun>> = std::mem::take(&mut self.runs).into_iter().map(Some).collect();
         let kept: Vec<Option<ActiveRun>> =
             compiled.enabled().iter().map(|built| take_equal_run(&mut old, built)).collect();
@@ -156,8 +254,28 @@ impl Shot {
         if self.context.plan.scene.plate != plan.scene.plate {
             self.plates = PlateCache::default();
         }
+        let wind = self.wind_after_edit(&compiled);
+        self.has_earlier_state |= !wind.is_planned();
         self.context = ShotContext::new(compiled, plan);
-        (self.frame, self.recycled) = (None, None);
+        self.context.wind = wind;
+        self.frame = None;
+    }
+
+    /// The wind with which the shot continues in another scene: a changed wind blows from now on, as if it had been changed live, so that nothing jumps.
+    fn wind_after_edit(&self, compiled: &CompiledScene) -> Wind {
+        let (old, new) = (self.context.compiled.scene(), compiled.scene());
+        let is_same_wind =
+            WindParameters { velocity: new.wind.velocity.clone(), gust: new.wind.gust, ..old.wind.clone() } == new.wind;
+        let is_continued = is_same_wind && (old.seed, old.loop_s) == (new.seed, None);
+        let mut wind = self.context.wind.clone();
+        let close = self.context.plan.shutter_at(self.time).close;
+        let velocity = DVec3::from(new.wind.velocity.at(close));
+        let is_changed = old.wind != new.wind;
+        if is_continued && (!is_changed || wind.change(close, velocity, new.wind.gust, WIND_TRANSITION_S).is_ok()) {
+            wind
+        } else {
+            compiled.wind().clone()
+        }
     }
 
     /// Whether the state is the one to which the scene leads from its initial state. After [`replan`](Self::replan) it may differ until the
@@ -168,7 +286,7 @@ impl Shot {
 
     /// The particles of all phenomena, at the frame that the shot was advanced to.
     pub fn particles(&self) -> PointCloud {
-        let t = self.context.plan.shutter(self.number).middle();
+        let t = self.context.plan.shutter_at(self.time).middle();
         let mut all = PointCloud::default();
         self.runs.iter().filter_map(|run| run.run.export(t)).for_each(|cloud| all.extend(&cloud));
         all
@@ -187,6 +305,7 @@ impl Shot {
         let mut runs = self.context.compiled.start();
         snapshot::read(&self.context.compiled, snapshot, &mut runs)?;
         (self.runs, self.has_earlier_state, self.frame) = (runs, false, None);
+        self.context.wind = self.context.compiled.wind().clone();
         Ok(())
     }
 
@@ -227,7 +346,7 @@ impl Shot {
             hiding: &HidingDepth::new(&prepared, plate),
             background: Background::plate(plate),
         };
-        let header = self.context.header(self.number);
+        let header = self.context.header(self.number, self.time);
         let mut frame = if is_refracted {
             refraction::draw_frame(&composition, header, recycled, observer)?
         } else {
@@ -277,7 +396,8 @@ impl Shot {
             hiding: &HidingDepth::new(&prepared, mirrored),
             background: Background::plate(mirrored),
         };
-        let mut image = strips::draw_frame(&composition, self.context.header(self.number), None, observer)?.beauty;
+        let mut image =
+            strips::draw_frame(&composition, self.context.header(self.number, self.time), None, observer)?.beauty;
         let sky = self.context.sky(view.shutter.middle());
         // An invisible sky lights the ground, but is not reflected in still water.
         let is_visible = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);

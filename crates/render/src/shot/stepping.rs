@@ -19,7 +19,7 @@ pub(crate) fn surroundings<'a>(
     mirror: Option<&'a Mirror>,
 ) -> Surroundings<'a> {
     Surroundings {
-        wind: context.compiled.wind(),
+        wind: &context.wind,
         air: &context.plan.scene.air,
         sky: context.sky(shutter.middle()),
         reflection: mirror.map(|mirror| &mirror.image),
@@ -46,19 +46,20 @@ pub(crate) fn scene_publication(context: &ShotContext, shutter: Shutter) -> Publ
 }
 
 /// Steps all phenomena to the states from which the exposure `shutter` is drawn. The one whose time is earliest steps next, so that the order
-/// of steps depends only on the lengths of the steps.
+/// of steps depends only on the lengths of the steps. Stops after `max_steps`; returns how many steps were taken.
 pub(crate) fn advance(
     context: &ShotContext,
     runs: &mut [ActiveRun],
     shutter: Shutter,
+    max_steps: u64,
     observer: &dyn Observer,
-) -> Result<(), Cancelled> {
-    loop {
+) -> Result<u64, Cancelled> {
+    for taken in 0..max_steps {
         let earliest = (0..runs.len())
             .filter(|&index| runs[index].steps_taken < runs[index].steps_until(shutter))
             .filter_map(|index| Some((index, runs[index].stepping?.time_after(runs[index].steps_taken))))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((index, now)) = earliest else { return Ok(()) };
+        let Some((index, now)) = earliest else { return Ok(taken) };
         observer::check(observer)?;
         let instant = Shutter { open: now, close: now };
         let publications: Vec<Publication> = runs.iter().map(|other| other.run.publish(instant)).collect();
@@ -68,4 +69,15 @@ pub(crate) fn advance(
         }
         runs[index].steps_taken += 1;
     }
+    Ok(max_steps)
+}
+
+/// Time by which the phenomena are behind the states from which `shutter` is drawn, s; 0 once all have been stepped there.
+pub(crate) fn time_behind(runs: &[ActiveRun], shutter: Shutter) -> f64 {
+    let behind = |run: &ActiveRun| {
+        let (stepping, stepped) = (run.stepping?, run.as_stepped()?);
+        (run.steps_taken < run.steps_until(shutter))
+            .then(|| stepped.time_for(shutter) - stepping.time_after(run.steps_taken))
+    };
+    runs.iter().filter_map(behind).fold(0.0, f64::max)
 }

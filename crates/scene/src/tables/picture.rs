@@ -73,6 +73,13 @@ impl Parameter for FrameRate {
         }
     }
 
+    fn check(&self, _limits: &(), unit: &'static str, reader: &mut Reader) {
+        let value = f64::from(self.frames) / f64::from(self.seconds);
+        if !(0.1..=1000.0).contains(&value) {
+            reader.report_value(ProblemKind::OutOfRange { value, min: 0.1, max: 1000.0, unit });
+        }
+    }
+
     fn to_value(&self) -> Option<Value> {
         Some(match self.seconds {
             1 => Value::Integer(i64::from(self.frames)),

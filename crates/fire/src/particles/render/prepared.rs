@@ -85,6 +85,8 @@ fn spark_emitter<'a>(gas: &Gas, rendering: &'a RenderingParameters, view: &View)
         key: gas.key,
         now: view.shutter.middle(),
         loop_s: None,
+        flow: None,
+        phase_s: 0.0,
         base: gas.base,
         size: gas.size,
         scale: 1.0,

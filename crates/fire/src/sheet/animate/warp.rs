@@ -98,6 +98,11 @@ impl WarpState {
         fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, lean))
     }
 
+    /// The warp of a flame that is `fraction` as high.
+    pub(crate) fn with_height(self, fraction: f64) -> Self {
+        Self { height_scale: self.height_scale / fraction as f32, ..self }
+    }
+
     /// Inverse warp: the point of the undeformed flame of mean height that appears at (x, y) of the sheet.
     #[inline(always)]
     pub(crate) fn unwarp<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>) -> (Lanes<S>, Lanes<S>) {

@@ -35,7 +35,8 @@ impl FlameSheet {
     pub(crate) fn row_intensities(&self, flame: &FlameInstance, t: f64) -> RowIntensities {
         let no_wind = WindLean { across: 0.0, toward: 0.0 };
         let time = self.flame_time(flame, t);
-        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, no_wind);
+        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, no_wind)
+            .with_height(self.height_fraction(t));
         if self.parameters.method == SheetMethod::SootField {
             return self.soot_row_intensities(flame, warp, t);
         }
@@ -50,6 +51,9 @@ impl FlameSheet {
     /// Point lights that represent a flame while the shutter is open.
     pub(crate) fn point_lights(&self, flame: &FlameInstance, shutter: Shutter) -> Vec<Light> {
         let t = shutter.middle();
+        if self.is_out(t) {
+            return Vec::new();
+        }
         let (base, size) = (self.base(flame, t), self.sheet_size(flame));
         let row_intensities = self.row_intensities(flame, t);
         let count = self.parameters.light.count.max(1) as usize;

@@ -86,6 +86,7 @@ impl FlameSheet {
         let count = self.time_samples(flame, view.shutter, scale);
         let depth = view.camera.depth(quad.point(0.5, 0.5));
         match self.parameters.method {
+            _ if self.is_out(view.shutter.middle()) => {}
             SheetMethod::Texture => {
                 let texture = flame.texture_source.filtered(scale * quad.size.y);
                 let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);
@@ -118,6 +119,8 @@ impl FlameSheet {
             key: flame.key,
             now: self.clock.time(self.flame_time(flame, t)),
             loop_s: self.clock.loop_s(),
+            flow: Some(&self.parameters.flow),
+            phase_s: self.parameters.phase_s + flame.placement.phase_s,
             base: self.base(flame, t),
             size: self.sheet_size(flame),
             scale: flame.placement.scale,

@@ -67,7 +67,7 @@ impl FlameSheet {
             warp,
         };
         let smoke_state = SmokeState {
-            optical_depth: smoke.optical_depth as f32,
+            optical_depth: (smoke.optical_depth * self.flow_at(t)) as f32,
             base_width: (0.8 / smoke.width).min(1.0) as f32,
             scattered: self.smoke_light(flame, &quad, t, surroundings),
         };

@@ -34,7 +34,8 @@ impl FlameSheet {
         let lean = WindLean::new(wind, middle, t, right, self.rise_speed(flame, t), self.parameters.wind_response);
         let quad = UprightQuad::new(base, right, size, lean.toward);
         let time = self.flame_time(flame, t);
-        (quad, WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, lean))
+        let warp = WarpState::new(&self.parameters, self.shape(), &flame.waves, &self.clock, time, lean);
+        (quad, warp.with_height(self.height_fraction(t)))
     }
 
     /// Number of time samples of the exposure; by default the gas moves by 8 pixels between them.

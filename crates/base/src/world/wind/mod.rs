@@ -1,5 +1,9 @@
 //! The wind of a scene: it bends flames, slants rain and advects particles.
 
+mod live;
+
+use live::{LiveState, LiveWind};
+
 use glam::DVec3;
 
 use crate::{
@@ -38,7 +42,14 @@ pub struct Wind {
     /// Offset in the noise domain, so that seeds differ even at the origin.
     origin: DVec3,
     loop_s: Option<f64>,
+    /// The wind since it was changed during the shot.
+    live: Option<LiveWind>,
 }
+
+/// Error: the wind of a seamless loop is fixed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the wind of a seamless loop cannot be changed while it runs")]
+pub struct FixedWind;
 
 impl Wind {
     /// The wind with these parameters; in a loop it is periodic with `loop_s` seconds.
@@ -57,30 +68,78 @@ impl Wind {
         if let Some(seconds) = loop_s {
             parameters.velocity.make_periodic(seconds);
         }
-        Self { parameters, gusts, origin: origin * 64.0, loop_s }
+        Self { parameters, gusts, origin: origin * 64.0, loop_s, live: None }
+    }
+
+    /// Changes the wind from time `t` on, as a program does while a shot runs: mean velocity (m/s) and turbulence intensity change linearly to these values
+    /// within `transition_s`. What has blown before stays, so gusts do not jump.
+    ///
+    /// # Errors
+    /// The wind is that of a seamless loop.
+    pub fn change(&mut self, t: f64, velocity: DVec3, gust: f64, transition_s: f64) -> Result<(), FixedWind> {
+        if self.loop_s.is_some() {
+            return Err(FixedWind);
+        }
+        let planned = LiveState {
+            velocity: self.planned_mean(t),
+            gust: self.parameters.gust,
+            travel: self.planned_travel(0.0, t),
+        };
+        self.live.get_or_insert_with(|| LiveWind::new(t, planned)).change(t, velocity, gust, transition_s);
+        Ok(())
+    }
+
+    /// Whether it was never [changed](Self::change) during the shot.
+    pub fn is_planned(&self) -> bool {
+        self.live.is_none()
     }
 
     /// Mean velocity at time `t`, m/s.
     pub fn mean(&self, t: f64) -> DVec3 {
-        DVec3::from(self.parameters.velocity.at(t))
+        self.live_at(t).map_or_else(|| self.planned_mean(t), |live| live.velocity)
     }
 
     /// Displacement by the mean wind from one time to another, m.
     pub fn travel(&self, from: f64, to: f64) -> DVec3 {
+        if self.live.is_none() {
+            return self.planned_travel(from, to);
+        }
+        let since_zero = |t| self.live_at(t).map_or_else(|| self.planned_travel(0.0, t), |live| live.travel);
+        since_zero(to) - since_zero(from)
+    }
+
+    /// Mean velocity at time `t` without [changes](Self::change) during the shot, m/s.
+    pub fn planned_mean(&self, t: f64) -> DVec3 {
+        DVec3::from(self.parameters.velocity.at(t))
+    }
+
+    /// Displacement by the mean wind from one time to another without [changes](Self::change) during the shot, m. It also knows the future.
+    pub fn planned_travel(&self, from: f64, to: f64) -> DVec3 {
         DVec3::from(self.parameters.velocity.integral(from, to))
+    }
+
+    /// Displacement until time `t` by which the mean wind has deviated from the planned wind, m; `None` if it was never changed.
+    pub fn unplanned_travel(&self, t: f64) -> Option<DVec3> {
+        self.live.as_ref().map(|live| live.at(t).map_or(DVec3::ZERO, |live| live.travel - self.planned_travel(0.0, t)))
+    }
+
+    fn live_at(&self, t: f64) -> Option<LiveState> {
+        self.live.as_ref()?.at(t)
     }
 
     /// Size of the gusts, m; `None` if there are never any.
     pub fn gust_length(&self) -> Option<f64> {
         let [low, high] = self.parameters.velocity.bounds();
-        let gusty = self.parameters.gust > 0.0 && [low, high].into_iter().flatten().any(|speed| speed != 0.0);
+        let planned = self.parameters.gust > 0.0 && [low, high].into_iter().flatten().any(|speed| speed != 0.0);
+        let gusty = planned || self.live.as_ref().is_some_and(LiveWind::is_gusty);
         gusty.then_some(self.parameters.gust_length)
     }
 
     /// Velocity at a point at time `t`, including gusts, m/s.
     pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
         let mean = self.mean(t);
-        let strength = self.parameters.gust * mean.length();
+        let intensity = self.live_at(t).map_or(self.parameters.gust, |live| live.gust);
+        let strength = intensity * mean.length();
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
         let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
         let (drift, noise_time) = match self.loop_s {

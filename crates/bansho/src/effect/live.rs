@@ -1,0 +1,159 @@
+//! An open effect: its time, its pictures, its data.
+
+use bansho_base::{frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved};
+use bansho_render::Shot;
+
+use super::{EffectError, Picture, pool::Pool};
+
+/// Longest time step, and largest time before and after time 0, s: a year of frames is a mistake of the caller.
+pub const MAX_ADVANCE_S: f64 = 86_400.0;
+/// Largest time, s. In double precision a time of this size is still exact to a nanosecond.
+const MAX_TIME_S: f64 = 4e6;
+
+/// An effect that follows a program's time. It is `Send` and `Sync`; nothing in it reads a clock.
+pub struct LiveEffect {
+    pub(super) shot: Shot,
+    pub(super) pool: Pool,
+    max_steps: u64,
+    /// The picture of the current state; `None` before it is drawn, and after a change.
+    frame: Option<Frame>,
+    /// Time that the last call could not simulate, s.
+    owed_s: f64,
+    /// Number of changes of parameters so far.
+    pub(super) revision: u64,
+}
+
+impl LiveEffect {
+    pub(super) fn new(shot: Shot, max_steps: u64, pool: Pool) -> Self {
+        Self { shot, pool, max_steps, frame: None, owed_s: 0.0, revision: 0 }
+    }
+
+    /// Time of the current picture, at which its shutter opens, s. It begins at 0.
+    pub fn time(&self) -> f64 {
+        self.shot.time()
+    }
+
+    /// Width and height of the picture, pixels.
+    pub fn size(&self) -> [usize; 2] {
+        self.shot.plan().size()
+    }
+
+    /// Takes up to `max_steps` steps of the preroll and returns how many are left. Only needed after
+    /// [`Effect::preroll_in_pieces`](super::Effect::preroll_in_pieces).
+    ///
+    /// # Errors
+    /// None in practice: nothing is read and nothing can stop it.
+    pub fn preroll(&mut self, max_steps: u64) -> Result<u64, EffectError> {
+        let time = self.time();
+        let shot = &mut self.shot;
+        self.pool.run(|| shot.advance_to(time, max_steps, &Unobserved))?;
+        Ok(self.shot.preroll_steps_left())
+    }
+
+    /// Lets `dt` seconds pass and draws the picture. Simulations take at most [`max_steps`](super::Effect::max_steps) steps; the time that they could not
+    /// simulate is [owed](Picture::owed_s), and the effect is at the time that they reached: pass what is owed with the next `dt` to catch up,
+    /// or drop it.
+    ///
+    /// # Errors
+    /// `dt` is not a number from 0 to [`MAX_ADVANCE_S`] (for effects without simulations from minus that), the preroll is not complete, or a picture
+    /// of the plate cannot be read.
+    pub fn advance(&mut self, dt: f64) -> Result<Picture<'_>, EffectError> {
+        let min = if self.is_simulated() { 0.0 } else { -MAX_ADVANCE_S };
+        if !(min..=MAX_ADVANCE_S).contains(&dt) {
+            return Err(EffectError::Time { name: "dt", value: dt, min, max: MAX_ADVANCE_S });
+        }
+        let max_steps = self.max_steps;
+        self.go_to(self.time() + dt, max_steps)?;
+        self.picture()
+    }
+
+    /// Goes to `seconds` and draws the picture: that of `bansho render` at that time, to the bit, if nothing was changed live. Effects without simulations
+    /// can go backward. Simulations take as many steps as it needs.
+    ///
+    /// # Errors
+    /// The time is not a number within 46 days, is before the time that simulations have reached, the preroll is not complete, or a picture of
+    /// the plate cannot be read.
+    pub fn at(&mut self, seconds: f64) -> Result<Picture<'_>, EffectError> {
+        self.go_to(seconds, u64::MAX)?;
+        self.picture()
+    }
+
+    fn go_to(&mut self, time: f64, max_steps: u64) -> Result<(), EffectError> {
+        if !(-MAX_TIME_S..=MAX_TIME_S).contains(&time) {
+            return Err(EffectError::Time { name: "time", value: time, min: -MAX_TIME_S, max: MAX_TIME_S });
+        }
+        let steps = self.shot.preroll_steps_left();
+        if steps > 0 {
+            return Err(EffectError::Preroll { steps });
+        }
+        if self.shot.is_past(time) {
+            return Err(EffectError::Backward { time, reached: self.time() });
+        }
+        self.recycle();
+        let shot = &mut self.shot;
+        self.owed_s = self.pool.run(|| shot.advance_to(time, max_steps, &Unobserved))?;
+        Ok(())
+    }
+
+    /// The picture of the current state. It is drawn once, and again after changes.
+    ///
+    /// # Errors
+    /// The preroll is not complete, or a picture of the plate cannot be read.
+    pub fn picture(&mut self) -> Result<Picture<'_>, EffectError> {
+        let steps = self.shot.preroll_steps_left();
+        if steps > 0 {
+            return Err(EffectError::Preroll { steps });
+        }
+        let frame = match self.frame.take() {
+            Some(frame) => frame,
+            None => {
+                let shot = &mut self.shot;
+                self.pool.run(|| {
+                    shot.draw(&Unobserved)?;
+                    shot.read().ok_or(bansho_render::RenderError::from(bansho_base::host::observer::Cancelled))
+                })?
+            }
+        };
+        let (time_s, owed_s) = (self.shot.time(), self.owed_s);
+        Ok(Picture { frame: self.frame.insert(frame), time_s, owed_s, pool: &self.pool })
+    }
+
+    /// Gives the memory of the last picture to the next one.
+    pub(super) fn recycle(&mut self) {
+        if let Some(frame) = self.frame.take() {
+            self.shot.recycle(frame);
+        }
+    }
+
+    /// Whether anything in it is simulated in steps. Everything else is computed for any time directly.
+    pub fn is_simulated(&self) -> bool {
+        self.shot.compiled().is_stepped()
+    }
+
+    /// Begins again at time 0 with other or the same random numbers, as opening it again would, but builds nothing: simulations run their preroll, live wind
+    /// is forgotten, changed parameters stay.
+    ///
+    /// # Errors
+    /// As for [`preroll`](Self::preroll).
+    pub fn restart(&mut self) -> Result<(), EffectError> {
+        self.recycle();
+        let shot = &mut self.shot;
+        self.pool.run(|| {
+            shot.restart();
+            let start = shot.plan().time(shot.plan().frames().start);
+            shot.advance_to(start, u64::MAX, &Unobserved)
+        })?;
+        self.owed_s = 0.0;
+        Ok(())
+    }
+
+    /// The particles of its phenomena with their attributes, at the current time.
+    pub fn particles(&self) -> PointCloud {
+        self.shot.particles()
+    }
+
+    /// The shot that is drawn, for what this interface does not offer.
+    pub fn shot(&self) -> &Shot {
+        &self.shot
+    }
+}
