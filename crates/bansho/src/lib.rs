@@ -45,7 +45,7 @@ pub use bansho_scene as scene;
 pub use bansho_sph as sph;
 
 pub use bansho_base::{
-    color::{AlphaConvention, View},
+    color::{AlphaConvention, AlphaMode, ColorSpace, View},
     frame::{DisplayImage, Frame},
     host::{
         assets::{Assets, MemoryAssets},
@@ -56,6 +56,10 @@ pub use bansho_base::{
 pub use bansho_render::{
     BuildErrors, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},
+    pixels::{
+        BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8,
+        write_rgba16f, write_rgba32f,
+    },
 };
 pub use bansho_scene::{LoopError, Scene, SceneError, SceneOptions};
 pub use build::SceneBuilder;
