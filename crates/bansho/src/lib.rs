@@ -49,7 +49,7 @@ pub use bansho_sph as sph;
 pub use bansho_aurora::AuroraParameters;
 pub use bansho_base::{
     camera::CameraParameters,
-    color::{AlphaConvention, View},
+    color::{AlphaConvention, AlphaMode, ColorSpace, View},
     frame::{DisplayImage, Frame},
     geometry::point_cloud::PointCloud,
     host::{
@@ -68,12 +68,15 @@ pub use bansho_rain::RainParameters;
 pub use bansho_render::{
     BuildErrors, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},
+    pixels::{
+        BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8,
+        write_rgba16f, write_rgba32f,
+    },
 };
 pub use bansho_scene::{
     LightParameters, LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,
 };
 pub use effect::{Effect, EffectError, LiveEffect, Picture};
-pub use half;
 pub use kinds::{KINDS, parse_scene};
 pub use scene_builder::SceneBuilder;
 

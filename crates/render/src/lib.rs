@@ -1,7 +1,7 @@
 //! From a scene to frames: compiling, planning, drawing a shot.
 //!
 //! [`CompiledScene`] builds what the scene contains, once; [`Plan`] fixes everything before the first frame; [`Shot`] steps simulations and
-//! draws frames; [`display`](mod@display) applies the view transform for display formats.
+//! draws frames; [`display`](mod@display) applies the view transform for display formats, and [`pixels`] writes frames into buffers of the caller.
 
 pub mod compiled;
 mod composite;
@@ -10,6 +10,7 @@ mod crossfade;
 pub mod display;
 mod faint;
 pub mod fingerprint;
+pub mod pixels;
 pub mod plan;
 mod planning;
 pub mod remarks;

@@ -22,7 +22,7 @@ const DEFAULT_MAX_STEPS: u64 = 30;
 /// Phenomena with their surroundings and the picture that is drawn of them. [`open`](Self::open) makes a [`LiveEffect`] of it.
 ///
 /// ```
-/// use bansho::{Effect, FlameSheetParameters, half::f16};
+/// use bansho::{Effect, FlameSheetParameters, f16};
 ///
 /// let mut torch = Effect::new(FlameSheetParameters { width: 0.4, height: 0.8, ..Default::default() }).size(64, 64).open()?;
 /// let mut texture = vec![f16::ZERO; 64 * 64 * 4];

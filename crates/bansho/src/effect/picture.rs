@@ -1,10 +1,11 @@
 //! A picture of an effect, and how it is written into the caller's buffers.
 
 use bansho_base::{
-    color::{AlphaConvention, View},
+    color::{AlphaMode, ColorSpace, View},
     frame::Frame,
     image::Rect,
 };
+use bansho_render::pixels::{self, BufferLengthError, ChannelError, f16};
 
 use super::pool::Pool;
 
@@ -35,6 +36,47 @@ impl<'a> Picture<'a> {
     /// Bounding rectangle of the pixels that are not empty: only these need to be uploaded.
     pub fn content(&self) -> Rect {
         self.frame.content
+    }
+
+    /// Writes premultiplied linear sRGB as half floats, what engines blend (`Rgba16Float`): see [`pixels::write_rgba16f`].
+    ///
+    /// # Errors
+    /// `pixels` does not have width x height x 4 values.
+    pub fn write_rgba16f(&self, pixels: &mut [f16]) -> Result<(), BufferLengthError> {
+        self.pool.run(|| pixels::write_rgba16f(self.frame, pixels))
+    }
+
+    /// Writes premultiplied light as floats in a space: see [`pixels::write_rgba32f`].
+    ///
+    /// # Errors
+    /// `pixels` does not have width x height x 4 values.
+    pub fn write_rgba32f(&self, space: ColorSpace, pixels: &mut [f32]) -> Result<(), BufferLengthError> {
+        self.pool.run(|| pixels::write_rgba32f(self.frame, space, pixels))
+    }
+
+    /// Writes 8-bit display codes with a view transform and the alpha that the program blends with: see [`pixels::write_rgba8`].
+    ///
+    /// # Errors
+    /// `pixels` does not have width x height x 4 values.
+    pub fn write_rgba8(&self, view: &View, alpha: AlphaMode, pixels: &mut [u8]) -> Result<(), BufferLengthError> {
+        self.pool.run(|| pixels::write_rgba8(self.frame, view, alpha, pixels))
+    }
+
+    /// Writes the depth of the nearest object drawn, m; infinity where there is none.
+    ///
+    /// # Errors
+    /// `depth_m` does not have width x height values.
+    pub fn write_depth32f(&self, depth_m: &mut [f32]) -> Result<(), BufferLengthError> {
+        pixels::write_depth32f(self.frame, depth_m)
+    }
+
+    /// Writes a channel of a layer or an AOV, such as `rain.streak_opacity`; they are drawn with [`Effect::aovs`](super::Effect::aovs) and
+    /// [`Effect::layers`](super::Effect::layers).
+    ///
+    /// # Errors
+    /// There is no channel of that name, or `values` does not have width x height values.
+    pub fn write_channel32f(&self, name: &str, values: &mut [f32]) -> Result<(), ChannelError> {
+        pixels::write_channel32f(self.frame, name, values)
     }
 
     /// The picture itself: premultiplied ACEScg, depth, layers and AOVs.

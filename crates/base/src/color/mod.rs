@@ -11,18 +11,20 @@
 pub mod blackbody;
 pub mod display;
 pub mod exposure;
+pub mod pixel_formats;
 pub mod space;
 pub mod spectrum;
 pub mod white_balance;
 
 pub use blackbody::{BlackBody, black_body};
 pub use display::{
-    alpha::AlphaConvention,
+    alpha::{AlphaConvention, AlphaMode},
     quantize::DisplayCode,
     transfer::{decode_srgb, decode_srgb8, encode_srgb},
     view::{UnknownView, View},
 };
 pub use exposure::{MAX_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};
+pub use pixel_formats::{ColorSpace, LinearTransform};
 pub use space::{
     ACESCG_FROM_SRGB, ACESCG_FROM_XYZ, LUMINANCE_WEIGHTS, Matrix3, SRGB_FROM_ACESCG, SRGB_FROM_XYZ, XYZ_FROM_ACESCG,
     XYZ_FROM_SRGB, acescg_from_srgb, acescg_from_xyz, luminance, srgb_from_acescg, xyz_from_acescg,

@@ -100,6 +100,11 @@ pub const SRGB_PRIMARIES: [[f64; 2]; 3] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.
 /// Red, green and blue of ACEScg (AP1; Academy S-2014-004).
 pub const AP1_PRIMARIES: [[f64; 2]; 3] = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044]];
 
+/// Red, green and blue of ACES2065-1 (AP0; SMPTE ST 2065-1).
+pub const AP0_PRIMARIES: [[f64; 2]; 3] = [[0.7347, 0.2653], [0.0, 1.0], [0.0001, -0.0770]];
+/// Red, green and blue of Rec. 2020 (ITU-R BT.2020).
+pub const REC2020_PRIMARIES: [[f64; 2]; 3] = [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]];
+
 /// Bradford adaptation of XYZ from D65 to D60.
 pub const BRADFORD_D65_TO_D60: Matrix3 = adaptation(D65, D60);
 /// Bradford adaptation of XYZ from D60 to D65.
@@ -116,6 +121,12 @@ pub const XYZ_FROM_ACESCG: Matrix3 = BRADFORD_D60_TO_D65.times(&xyz_from_rgb(AP1
 pub const ACESCG_FROM_SRGB: Matrix3 = ACESCG_FROM_XYZ.times(&XYZ_FROM_SRGB);
 /// Linear sRGB of ACEScg, adapted: white stays (1, 1, 1).
 pub const SRGB_FROM_ACESCG: Matrix3 = ACESCG_FROM_SRGB.inverse();
+
+/// ACES2065-1 of ACEScg. Both have the D60 white, so nothing is adapted.
+pub const ACES2065_1_FROM_ACESCG: Matrix3 =
+    xyz_from_rgb(AP0_PRIMARIES, D60).inverse().times(&xyz_from_rgb(AP1_PRIMARIES, D60));
+/// Linear Rec. 2020 of ACEScg, adapted: white stays (1, 1, 1).
+pub const REC2020_FROM_ACESCG: Matrix3 = xyz_from_rgb(REC2020_PRIMARIES, D65).inverse().times(&XYZ_FROM_ACESCG);
 
 /// Weights of the luminance of ACEScg: the Y, relative to D65, of the light before adaptation. They are the Y weights of AP1 (0.2722, 0.6741,
 /// 0.0537) combined with the adaptation back to D65, since emitted light is adapted on conversion to ACEScg; they sum to 1.

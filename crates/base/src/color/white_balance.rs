@@ -1,7 +1,7 @@
 //! The white balance of a camera: the light that is shown as white.
 
 use super::{
-    space::{ACESCG_FROM_XYZ, D65, XYZ_FROM_ACESCG, adaptation},
+    space::{ACESCG_FROM_XYZ, D65, Matrix3, XYZ_FROM_ACESCG, adaptation},
     spectrum::{planck_radiance_per_nm, xyz_of_spectrum},
 };
 
@@ -16,8 +16,14 @@ impl WhiteBalance {
     /// The white balance for a black body of that temperature, K.
     #[must_use]
     pub fn from_black_body(temperature_k: f64) -> Self {
-        let balanced = ACESCG_FROM_XYZ.times(&adaptation(chromaticity(temperature_k), D65).times(&XYZ_FROM_ACESCG));
+        let balanced = Self::matrix(temperature_k);
         Self { forward: balanced.single(), inverse: balanced.inverse().single() }
+    }
+
+    /// The matrix of [`apply`](Self::apply) in double precision, for products with other matrices.
+    #[must_use]
+    pub fn matrix(temperature_k: f64) -> Matrix3 {
+        ACESCG_FROM_XYZ.times(&adaptation(chromaticity(temperature_k), D65).times(&XYZ_FROM_ACESCG))
     }
 
     /// The adapted light.

@@ -112,18 +112,31 @@ pub(super) fn linear_alpha_codes<C: DisplayCode, const RAW: bool>(light: [f32; 3
     [r, g, b, round_to_code(code)]
 }
 
-/// The background over which [`encoded_alpha_codes`] are closest to the exact result: mid-gray, half of the encoded range.
+/// The background over which [`premultiplied_encoded_codes`] are closest to the exact result: mid-gray, half of the encoded range.
 const MID_GRAY_ENCODED: f32 = 0.5;
 /// Its linear light.
 const MID_GRAY: f32 = 0.214_041_14;
 
-/// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = A color + (1 - A) background`.
-///
-/// With the codes `E = encode(rgb)` over black, the color is `E / A`, so that the blend over black is `E` for any `A`.
-/// `A` is the least-squares solution over a mid-gray background `G`: the exact result there is `encode(rgb + (1 - alpha) G)`, hence
-/// `1 - A = mean over r, g, b of (encode(rgb + (1 - alpha) G) - E) / encode(G)`; `A` is at least the largest `E`, so that no color exceeds 1.
+/// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = A color + (1 - A) background`: the
+/// [`premultiplied_encoded_codes`], with the color divided by `A`.
 #[inline(always)]
 pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+    let [r, g, b, code] = premultiplied_encoded_codes::<C>(light, alpha, phase);
+    let quotient = C::MAX_CODE / code as f32;
+    let scale = if code > 0 { quotient } else { 0.0 };
+    // At most the largest code, since `code` is at least as large as each component.
+    let color = |component: u32| round_to_code(component as f32 * scale);
+    [color(r), color(g), color(b), code]
+}
+
+/// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = color + (1 - A) background`.
+///
+/// The color is `E = encode(rgb)`, so that the blend over black is `E` for any `A`.
+/// `A` is the least-squares solution over a mid-gray background `G`: the exact result there is `encode(rgb + (1 - alpha) G)`, hence
+/// `1 - A = mean over r, g, b of (encode(rgb + (1 - alpha) G) - E) / encode(G)`; `A` is at least the largest `E`, so that no straight color
+/// `E / A` exceeds 1.
+#[inline(always)]
+pub(super) fn premultiplied_encoded_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
     let over_black = opaque_codes::<C, false>(light, phase);
     let transmitted = (1.0 - clamp_unit(alpha)) * MID_GRAY;
     let mut gained = 0.0;
@@ -134,12 +147,19 @@ pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, p
 
     let dithered = round_to_code(coverage.fma(C::MAX_CODE, dither::<C>(phase, 3)));
     let [r, g, b, _] = over_black;
-    let code = dithered.max(r).max(g).max(b);
-    let quotient = C::MAX_CODE / code as f32;
-    let scale = if code > 0 { quotient } else { 0.0 };
-    // At most the largest code, since `code` is at least as large as each component.
-    let color = |component: u32| round_to_code(component as f32 * scale);
-    [color(r), color(g), color(b), code]
+    [r, g, b, dithered.max(r).max(g).max(b)]
+}
+
+/// Codes of a pixel without a plate behind it, for programs that blend linear light, `out = color + (1 - A) background`: the light over black,
+/// encoded unless `RAW`, and alpha as it is.
+#[inline(always)]
+pub(super) fn premultiplied_linear_codes<C: DisplayCode, const RAW: bool>(
+    light: [f32; 3],
+    alpha: f32,
+    phase: u32,
+) -> [u32; 4] {
+    let [r, g, b, _] = opaque_codes::<C, RAW>(light, phase);
+    [r, g, b, component_code::<C, true>(alpha, phase, 3)]
 }
 
 #[cfg(test)]

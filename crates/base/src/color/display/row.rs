@@ -2,9 +2,12 @@
 //! loops; since no operation crosses lanes, every vector width gives the same bits.
 
 use super::{
-    alpha::AlphaConvention,
+    alpha::{AlphaConvention, AlphaMode},
     gamut::{acescg_from_display, display_from_acescg},
-    quantize::{DisplayCode, dither_phase, encoded_alpha_codes, linear_alpha_codes, opaque_codes},
+    quantize::{
+        DisplayCode, dither_phase, encoded_alpha_codes, linear_alpha_codes, opaque_codes, premultiplied_encoded_codes,
+        premultiplied_linear_codes,
+    },
     tone::ToneCurve,
     transfer::clamp_components,
 };
@@ -86,20 +89,50 @@ impl PixelEncoding for EncodedAlpha {
     }
 }
 
+struct PremultipliedLinear<const RAW: bool>;
+
+impl<const RAW: bool> PixelEncoding for PremultipliedLinear<RAW> {
+    type OpaqueEncoding = Opaque<RAW>;
+    const OPAQUE: bool = false;
+    #[inline(always)]
+    fn codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+        premultiplied_linear_codes::<C, RAW>(light, alpha, phase)
+    }
+}
+
+struct PremultipliedEncoded;
+
+impl PixelEncoding for PremultipliedEncoded {
+    type OpaqueEncoding = Opaque<false>;
+    const OPAQUE: bool = false;
+    #[inline(always)]
+    fn codes<C: DisplayCode>(light: [f32; 3], alpha: f32, phase: u32) -> [u32; 4] {
+        premultiplied_encoded_codes::<C>(light, alpha, phase)
+    }
+}
+
 /// Converts a row through a tone curve to sRGB-encoded codes.
 #[inline(always)]
 pub(super) fn encode_row<C: DisplayCode>(
     tone: &ToneCurve,
     pixels: &[[f32; 4]],
     position: PixelPosition,
-    alpha: Option<AlphaConvention>,
+    alpha: Option<AlphaMode>,
     out: &mut [[C; 4]],
 ) {
+    use AlphaConvention::{Encoded, Linear};
+    use AlphaMode::{Premultiplied, Straight};
     let view = ToneMapped(tone);
     match alpha {
         None => convert::<C, ToneMapped<'_>, Opaque<false>>(&view, pixels, position, out),
-        Some(AlphaConvention::Linear) => convert::<C, ToneMapped<'_>, LinearAlpha<false>>(&view, pixels, position, out),
-        Some(AlphaConvention::Encoded) => convert::<C, ToneMapped<'_>, EncodedAlpha>(&view, pixels, position, out),
+        Some(Straight(Linear)) => convert::<C, ToneMapped<'_>, LinearAlpha<false>>(&view, pixels, position, out),
+        Some(Straight(Encoded)) => convert::<C, ToneMapped<'_>, EncodedAlpha>(&view, pixels, position, out),
+        Some(Premultiplied(Linear)) => {
+            convert::<C, ToneMapped<'_>, PremultipliedLinear<false>>(&view, pixels, position, out);
+        }
+        Some(Premultiplied(Encoded)) => {
+            convert::<C, ToneMapped<'_>, PremultipliedEncoded>(&view, pixels, position, out);
+        }
     }
 }
 
@@ -108,12 +141,15 @@ pub(super) fn encode_row<C: DisplayCode>(
 pub(super) fn encode_raw_row<C: DisplayCode>(
     pixels: &[[f32; 4]],
     position: PixelPosition,
-    alpha: Option<AlphaConvention>,
+    alpha: Option<AlphaMode>,
     out: &mut [[C; 4]],
 ) {
     match alpha {
         None => convert::<C, Clamped, Opaque<true>>(&Clamped, pixels, position, out),
-        Some(_) => convert::<C, Clamped, LinearAlpha<true>>(&Clamped, pixels, position, out),
+        Some(AlphaMode::Straight(_)) => convert::<C, Clamped, LinearAlpha<true>>(&Clamped, pixels, position, out),
+        Some(AlphaMode::Premultiplied(_)) => {
+            convert::<C, Clamped, PremultipliedLinear<true>>(&Clamped, pixels, position, out);
+        }
     }
 }
 

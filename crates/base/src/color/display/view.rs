@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch};
 
 use super::{
-    alpha::AlphaConvention,
+    alpha::{AlphaConvention, AlphaMode},
     gamut::{acescg_from_display, display_from_acescg, sanitized},
     quantize::DisplayCode,
     row,
@@ -143,6 +143,19 @@ impl View {
         alpha: Option<AlphaConvention>,
         out: &mut [[C; 4]],
     ) {
+        self.display_row_with_mode(level, pixels, y, x0, alpha.map(AlphaMode::Straight), out);
+    }
+
+    /// [`display_row`](Self::display_row) with straight or premultiplied alpha.
+    pub fn display_row_with_mode<C: DisplayCode>(
+        &self,
+        level: Level,
+        pixels: &[[f32; 4]],
+        y: i64,
+        x0: i64,
+        alpha: Option<AlphaMode>,
+        out: &mut [[C; 4]],
+    ) {
         let Some(balance) = &self.balance else { return self.row(level, pixels, [x0, y], alpha, out) };
         let mut buffer = [[0.0; 4]; BALANCE_CHUNK];
         for ((input, out), first) in
@@ -163,7 +176,7 @@ impl View {
         level: Level,
         pixels: &[[f32; 4]],
         [x0, y]: [i64; 2],
-        alpha: Option<AlphaConvention>,
+        alpha: Option<AlphaMode>,
         out: &mut [[C; 4]],
     ) {
         // Coordinates are only used by the dither, which repeats after 2^32 pixels.
