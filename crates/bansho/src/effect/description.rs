@@ -16,8 +16,8 @@ use bansho_scene::{LightParameters, Scene, SceneOptions};
 use super::{EffectError, LiveEffect, pool::Pool};
 use crate::SceneBuilder;
 
-/// Most simulation steps of one call by default. A flame of particles takes 60 a second.
-const DEFAULT_MAX_STEPS: u64 = 30;
+/// Most simulation steps of one call by default. A flame of particles takes about 120 a second.
+const DEFAULT_MAX_STEPS: u64 = 60;
 
 /// Phenomena with their surroundings and the picture that is drawn of them. [`open`](Self::open) makes a [`LiveEffect`] of it.
 ///
@@ -196,7 +196,7 @@ impl Effect {
         Self { assets, ..self }
     }
 
-    /// Most simulation steps that one call of [`LiveEffect::advance`] takes; what is left is owed. 30 by default.
+    /// Most simulation steps that one call of [`LiveEffect::advance`] takes; what is left is owed. 60 by default.
     #[must_use]
     pub fn max_steps(self, steps: u64) -> Self {
         Self { max_steps: steps.max(1), ..self }

@@ -308,6 +308,12 @@ pub enum Auto<T> {
     Set(T),
 }
 
+impl<T> From<T> for Auto<T> {
+    fn from(value: T) -> Self {
+        Self::Set(value)
+    }
+}
+
 impl<T: Parameter> Parameter for Auto<T> {
     type Limits = T::Limits;
 

@@ -162,8 +162,8 @@ impl FlameSheet {
 
     /// Luminance of the brightest color at `t`, cd/m^2.
     pub(crate) fn luminance_at(&self, t: f64) -> f64 {
-        /// Fraction of full flow below which the soot of a flame that goes out becomes dark.
-        const DARK_FLOW: f64 = 0.05;
+        /// Fraction of full flow below which a flame that goes out has too little soot for its full luminance.
+        const DARK_FLOW: f64 = 0.2;
         self.parameters.color.luminance.at(self.clock.time(t)) * (self.flow_at(t) / DARK_FLOW).min(1.0)
     }
 
