@@ -27,8 +27,8 @@ use rayon::prelude::*;
 /// Rows that one parallel task converts.
 const TASK_ROWS: usize = 16;
 
-/// Pixels up to which light is converted on the calling thread, and pixels up to which display codes are. Either takes about 0.1 ms; waking other threads
-/// takes a tenth of that, and in a game they have work of their own.
+/// Pixels up to which light is converted on the calling thread, and pixels up to which display codes are. Either takes about 0.05 ms; waking other threads
+/// takes a fifth of that, and in a game they have work of their own.
 const SERIAL_LIGHT: usize = 256 * 256;
 const SERIAL_CODES: usize = 128 * 128;
 

@@ -10,7 +10,9 @@
 //! where `d0` to `d3` hold the diagonals of the 4 x 4 matrix. Products and sums are rounded one by one, in this order, so that every vector
 //! width and WebAssembly give the same bits.
 
-use fearless_simd::{Level, Simd, dispatch, i32x16, prelude::*, u16x8, u16x16};
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::u16x8;
+use fearless_simd::{Level, Simd, dispatch, i32x16, prelude::*, u16x16};
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{__m128i, __m256, _mm256_cvtps_ph};
 
