@@ -66,12 +66,9 @@ pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetPara
 #[cfg(feature = "rain")]
 pub use bansho_rain::RainParameters;
 pub use bansho_render::{
-    BuildErrors, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
+    BufferLengthError, BuildErrors, ChannelError, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},
-    pixels::{
-        BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8,
-        write_rgba16f, write_rgba32f,
-    },
+    f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f, write_rgba32f,
 };
 pub use bansho_scene::{
     LightParameters, LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,

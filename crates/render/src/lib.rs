@@ -17,5 +17,9 @@ pub mod remarks;
 pub mod shot;
 
 pub use compiled::{BuildErrors, CompiledScene};
+pub use pixels::{
+    BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f,
+    write_rgba32f,
+};
 pub use plan::{Plan, PlanError, PlanOptions};
 pub use shot::{RenderError, Shot};

@@ -12,8 +12,8 @@
 //! premultiplied pixels with `out = color + (1 - alpha) background` (in wgpu `BlendState::PREMULTIPLIED_ALPHA_BLENDING`): fire and aurora mostly
 //! add light, which straight alpha cannot express.
 //!
-//! Only the pixels of [`nonzero_rect`] are converted, the others are set to zero. Small pictures are converted on the calling thread without any
-//! heap allocation, larger ones in the rayon pool of the caller. Both give the same bytes.
+//! Only the pixels of [`nonzero_rect`] are converted, the others are set to zero. Up to 256 x 256 of them (128 x 128 for display
+//! codes) are converted on the calling thread without any heap allocation, more in the rayon pool of the caller. Both give the same bytes.
 
 pub use bansho_base::color::pixel_formats::f16;
 use bansho_base::{
@@ -27,8 +27,10 @@ use rayon::prelude::*;
 /// Rows that one parallel task converts.
 const TASK_ROWS: usize = 16;
 
-/// Pixels up to which a picture is converted on the calling thread: waking others would take longer.
-const SERIAL_PIXELS: usize = 128 * 128;
+/// Pixels up to which light is converted on the calling thread, and pixels up to which display codes are. Either takes about 0.05 ms; waking other threads
+/// takes a fifth of that, and in a game they have work of their own.
+const SERIAL_LIGHT: usize = 256 * 256;
+const SERIAL_CODES: usize = 128 * 128;
 
 /// Error: a buffer does not have the length that the frame needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -109,7 +111,7 @@ pub fn nonzero_rect(frame: &Frame) -> Rect {
 pub fn write_rgba16f(frame: &Frame, pixels: &mut [f16]) -> Result<(), BufferLengthError> {
     check_length(frame, 4, pixels)?;
     let (level, transform) = (Level::new(), transform(frame, ColorSpace::LinearSrgb));
-    convert(frame, Background::Fill([f16::ZERO; 4]), pixels.as_chunks_mut().0, |_, light, out| {
+    convert(frame, SERIAL_LIGHT, Background::Fill([f16::ZERO; 4]), pixels.as_chunks_mut().0, |_, light, out| {
         transform.rgba16f_row(level, light, out);
     });
     Ok(())
@@ -126,7 +128,7 @@ pub fn write_rgba16f(frame: &Frame, pixels: &mut [f16]) -> Result<(), BufferLeng
 pub fn write_rgba32f(frame: &Frame, space: ColorSpace, pixels: &mut [f32]) -> Result<(), BufferLengthError> {
     check_length(frame, 4, pixels)?;
     let (level, transform) = (Level::new(), transform(frame, space));
-    convert(frame, Background::Fill([0.0; 4]), pixels.as_chunks_mut().0, |_, light, out| {
+    convert(frame, SERIAL_LIGHT, Background::Fill([0.0; 4]), pixels.as_chunks_mut().0, |_, light, out| {
         transform.rgba32f_row(level, light, out);
     });
     Ok(())
@@ -146,8 +148,8 @@ pub fn write_rgba8(frame: &Frame, view: &View, alpha: AlphaMode, pixels: &mut [u
     Ok(())
 }
 
-/// Writes the depth of the nearest object drawn, in meters along the camera's axis; infinity where there is none, and everywhere if the frame has no
-/// depth. `depth_m` has width x height values.
+/// Writes the depth of the nearest object drawn, in meters; infinity where there is none, and everywhere if the frame has no depth. It is measured along
+/// the camera's axis with a perspective lens, and from the camera with fisheye and panorama. `depth_m` has width x height values.
 ///
 /// # Errors
 /// The buffer does not have that length; nothing is written.
@@ -201,7 +203,7 @@ pub(crate) fn write_codes<C: DisplayCode + Send + Sync>(
     let alpha = (!frame.opaque).then_some(alpha);
     let (level, view) = (Level::new(), view.with_white_balance(frame.header.white_balance_k.map(f64::from)));
     let ([x0, y0], left) = (frame.header.data_origin, nonzero_rect(frame).x);
-    convert(frame, background, pixels, |y, light, out| {
+    convert(frame, SERIAL_CODES, background, pixels, |y, light, out| {
         view.display_row_with_mode(level, light, y0 + y as i64, x0 + left as i64, alpha, out);
     });
 }
@@ -215,9 +217,11 @@ pub(crate) enum Background<T> {
     Fill(T),
 }
 
-/// Calls `convert` with the number, the light and the output of each row of [`nonzero_rect`].
+/// Calls `convert` with the number, the light and the output of each row of [`nonzero_rect`]; on the calling thread if that has at most `serial_pixels`
+/// pixels.
 fn convert<T: Copy + Send + Sync>(
     frame: &Frame,
+    serial_pixels: usize,
     background: Background<T>,
     pixels: &mut [T],
     convert: impl Fn(usize, &[[f32; 4]], &mut [T]) + Sync,
@@ -240,7 +244,7 @@ fn convert<T: Copy + Send + Sync>(
     if pixels.is_empty() {
         return;
     }
-    if rect.width * rect.height <= SERIAL_PIXELS {
+    if rect.width * rect.height <= serial_pixels {
         pixels.chunks_mut(width).enumerate().for_each(|(y, out)| convert_row(y, out));
         return;
     }

@@ -5,6 +5,7 @@ mod display;
 mod exr;
 mod film;
 mod light;
+mod pixels;
 mod still;
 
 use std::{

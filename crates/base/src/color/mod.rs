@@ -7,6 +7,7 @@
 //! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`display::tone`]) acts on the largest component, highlights
 //!    desaturate toward white and colors outside sRGB lose saturation ([`display::gamut`]), followed by sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
 //!    The view is invertible on the whole sRGB cube ([`View::to_scene`]), so a plate in an empty scene is unchanged.
+//! 5. [`LinearTransform`]: instead of the view, exposed ACEScg to half or single floats in a linear [`ColorSpace`], for programs that blend light.
 
 pub mod blackbody;
 pub mod display;

@@ -199,6 +199,15 @@ mod tests {
         assert_near(xyz_from_rgb(AP1_PRIMARIES, D60).0[1], [0.2722287168, 0.6740817658, 0.0536895174], 1e-9);
         // The widely used sRGB -> ACEScg matrix with Bradford adaptation.
         assert_near(ACESCG_FROM_SRGB.0[0], [0.613097, 0.339523, 0.047379], 2e-5);
+        // Academy S-2014-004 gives AP1 to AP0 to ten places.
+        assert_near(ACES2065_1_FROM_ACESCG.0[0], [0.6954522414, 0.1406786965, 0.1638690622], 1e-9);
+        assert_near(ACES2065_1_FROM_ACESCG.0[2], [-0.0055258826, 0.0040252103, 1.0015006723], 1e-9);
+        // ITU-R BT.2020 gives the luminance weights to four places.
+        let y = xyz_from_rgb(REC2020_PRIMARIES, D65).0[1];
+        assert_near(y, [0.2627, 0.6780, 0.0593], 5e-5);
+        // The widely used ACEScg -> Rec. 2020 matrix with Bradford adaptation.
+        assert_near(REC2020_FROM_ACESCG.0[0], [1.025825, -0.020053, -0.005772], 2e-5);
+        assert_near(REC2020_FROM_ACESCG.0[2], [-0.005013, -0.025290, 1.030303], 2e-5);
     }
 
     #[test]

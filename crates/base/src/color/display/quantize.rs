@@ -229,8 +229,11 @@ mod tests {
                     let linear = linear_alpha_codes::<C, false>(light.map(seen), alpha, phase);
                     let raw = linear_alpha_codes::<C, true>(light.map(seen), alpha, phase);
                     let encoded = encoded_alpha_codes::<C>(light, alpha, phase);
+                    let premultiplied = premultiplied_encoded_codes::<C>(light, alpha, phase);
                     let opaque = opaque_codes::<C, false>(light, phase);
-                    for codes in [linear, raw, encoded, opaque] {
+                    let added = premultiplied_linear_codes::<C, false>(light, alpha, phase);
+                    assert!(added.iter().all(|code| *code <= largest), "{light:?} {alpha}: {added:?}");
+                    for codes in [linear, raw, encoded, premultiplied, opaque] {
                         assert!(codes.iter().all(|code| *code <= largest), "{light:?} {alpha}: {codes:?}");
                         let brightest = light.map(seen).into_iter().fold(seen(alpha), f32::max);
                         if brightest == 1.0 {
@@ -270,6 +273,47 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn premultiplied_encoded_codes_are_the_straight_ones_before_the_division() {
+        for (light, alpha) in pixels() {
+            for phase in phases().step_by(61) {
+                let [r, g, b, a] = premultiplied_encoded_codes::<u8>(light, alpha, phase);
+                assert_eq!([r, g, b], opaque_codes::<u8, false>(light, phase)[..3], "{light:?} {alpha}");
+                assert!(r.max(g).max(b) <= a, "{light:?} {alpha}: no color exceeds alpha");
+                let straight = encoded_alpha_codes::<u8>(light, alpha, phase);
+                assert_eq!(straight[3], a);
+                for (color, premultiplied) in straight.into_iter().zip([r, g, b]) {
+                    assert_eq!((color * a + 127) / 255, premultiplied, "{light:?} {alpha}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_premultiplied_linear_blend_is_exact_to_a_code_over_every_background() {
+        for (light, alpha) in pixels() {
+            for phase in phases().step_by(61) {
+                let [r, g, b, a] = premultiplied_linear_codes::<u8, false>(light, alpha, phase);
+                for background in [0.0, 0.2, 1.0] {
+                    for (code, light) in [r, g, b].into_iter().zip(light) {
+                        let blended = decode_srgb8(code as u8) + (1.0 - a as f32 / 255.0) * background;
+                        let exact = light + (1.0 - alpha) * background;
+                        // One code of the color, whose steps are the widest at full light, and one of alpha.
+                        let step = 1.0 / 255.0 * background + 1.0 - decode_srgb8(254);
+                        assert!(
+                            (blended - exact).abs() <= step,
+                            "{light} {alpha} over {background}: {blended} {exact}"
+                        );
+                    }
+                }
+            }
+        }
+        let quiet = dither_phase(0, 0);
+        assert_eq!(premultiplied_linear_codes::<u8, false>([1.0, 0.0, 0.0], 0.0, quiet), [255, 0, 0, 0]);
+        assert_eq!(premultiplied_linear_codes::<u8, false>([0.0; 3], 0.4, quiet), [0, 0, 0, 102]);
+        assert_eq!(premultiplied_linear_codes::<u16, true>([0.5, 0.25, 0.0], 0.25, quiet), [32_768, 16_384, 0, 16_384]);
     }
 
     #[test]

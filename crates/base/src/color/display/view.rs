@@ -199,6 +199,15 @@ mod tests {
     use super::*;
     use crate::color::decode_srgb8;
 
+    /// Every mode of alpha; opaque without.
+    const ALPHA_MODES: [Option<AlphaMode>; 5] = [
+        None,
+        Some(AlphaMode::Straight(AlphaConvention::Linear)),
+        Some(AlphaMode::Straight(AlphaConvention::Encoded)),
+        Some(AlphaMode::Premultiplied(AlphaConvention::Linear)),
+        Some(AlphaMode::Premultiplied(AlphaConvention::Encoded)),
+    ];
+
     /// Well spread 32-bit numbers, for pictures without structure.
     fn scattered(index: u32) -> u32 {
         let mixed = (index ^ (index >> 16)).wrapping_mul(0x7FEB_352D);
@@ -262,14 +271,14 @@ mod tests {
     fn every_level_gives_the_same_bytes() {
         let pixels = wild_pixels(4099);
         for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.with_white_balance(Some(4000.0))] {
-            for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
+            for alpha in ALPHA_MODES {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
-                view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
-                view.display_row(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
+                view.display_row_with_mode(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row_with_mode(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
                 assert_eq!(wide, narrow);
                 let (mut wide, mut narrow) = (vec![[0_u16; 4]; 4099], vec![[9_u16; 4]; 4099]);
-                view.display_row(Level::new(), &pixels, 5, 11, alpha, &mut wide);
-                view.display_row(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
+                view.display_row_with_mode(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row_with_mode(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
                 assert_eq!(wide, narrow);
             }
             let (mut wide, mut narrow) = (pixels.clone(), pixels.clone());
@@ -300,13 +309,29 @@ mod tests {
     #[test]
     fn a_crop_is_part_of_the_whole() {
         let pixels = wild_pixels(300);
-        for alpha in [None, Some(AlphaConvention::Linear), Some(AlphaConvention::Encoded)] {
+        for alpha in ALPHA_MODES {
             let mut whole = vec![[0_u8; 4]; 300];
-            View::DISPLAY.display_row(Level::new(), &pixels, 40, -20, alpha, &mut whole);
+            View::DISPLAY.display_row_with_mode(Level::new(), &pixels, 40, -20, alpha, &mut whole);
             for (start, end) in [(0, 1), (7, 100), (33, 290), (299, 300)] {
                 let mut part = vec![[0_u8; 4]; end - start];
-                View::DISPLAY.display_row(Level::new(), &pixels[start..end], 40, start as i64 - 20, alpha, &mut part);
+                let first = start as i64 - 20;
+                View::DISPLAY.display_row_with_mode(Level::new(), &pixels[start..end], 40, first, alpha, &mut part);
                 assert_eq!(part, whole[start..end]);
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_of_opaque_pixels_are_the_same_in_every_mode() {
+        let pixels: Vec<[f32; 4]> = wild_pixels(320).into_iter().map(|[r, g, b, _]| [r, g, b, 1.0]).collect();
+        let mixed: Vec<[f32; 4]> = pixels.iter().flat_map(|pixel| [*pixel, [0.0; 4]]).collect();
+        for view in [View::DISPLAY, View::RAW] {
+            for alpha in ALPHA_MODES {
+                let (mut opaque, mut one_by_one) = (vec![[0_u16; 4]; 320], vec![[0_u16; 4]; 640]);
+                view.display_row_with_mode(Level::new(), &pixels, 0, 0, alpha, &mut opaque);
+                view.display_row_with_mode(Level::new(), &mixed, 0, 0, alpha, &mut one_by_one);
+                let every_other: Vec<[u16; 4]> = one_by_one.iter().step_by(2).copied().collect();
+                assert_eq!(opaque, every_other, "{alpha:?}");
             }
         }
     }
