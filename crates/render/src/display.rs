@@ -3,10 +3,10 @@
 use bansho_base::{
     color::{AlphaConvention, DisplayCode, View},
     frame::{DisplayImage, DisplayPixels, Frame},
+    host::parallel::prelude::*,
     image::Rect,
 };
 use fearless_simd::Level;
-use rayon::prelude::*;
 
 bansho_base::choice! {
     /// Bits of each channel of a display format.

@@ -8,7 +8,10 @@ use std::sync::Arc;
 use bansho_base::{
     frame::{Channel, Frame, PhenomenonMetadata},
     geometry::point_cloud::PointCloud,
-    host::observer::{self, Cancelled, Observer, Stage, StageGuard},
+    host::{
+        observer::{self, Cancelled, Observer, Stage, StageGuard},
+        parallel::prelude::*,
+    },
     image::Rect,
     parameters::BuildError,
     phenomenon::{
@@ -17,7 +20,6 @@ use bansho_base::{
         surroundings::{Publication, Surroundings},
     },
 };
-use rayon::prelude::*;
 
 use crate::{
     compiled::{ActiveRun, BuiltPhenomenon, CompiledScene},
