@@ -56,7 +56,7 @@ pub enum RenderError {
 
 /// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
 ///
-/// It runs on the CPU, in the rayon pool of the caller. The same scene and plan give the same bytes with any number of threads.
+/// It runs on the CPU, in the rayon pool of the caller, or on its thread (see [`bansho_base::host::parallel`]). The same scene and plan give the same bytes with any number of threads.
 pub struct Shot {
     context: ShotContext,
     runs: Vec<ActiveRun>,

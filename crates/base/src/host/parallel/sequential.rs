@@ -54,17 +54,12 @@ pub trait ParallelIterator: Sized {
 
     /// Calls `op` with each item and a scratch value, which `init` makes once.
     fn for_each_init<T>(self, init: impl Fn() -> T + Sync + Send, op: impl Fn(&mut T, Self::Item) + Sync + Send) {
-        self.for_each_with_scratch(init(), op);
+        let mut scratch = init();
+        self.into_sequential_iter().for_each(|item| op(&mut scratch, item));
     }
 
-    /// Calls `op` with each item and the scratch value `init`.
-    fn for_each_with<T: Send + Clone>(self, init: T, op: impl Fn(&mut T, Self::Item) + Sync + Send) {
-        self.for_each_with_scratch(init, op);
-    }
-
-    /// What [`for_each_init`](Self::for_each_init) and [`for_each_with`](Self::for_each_with) do once they have a scratch value.
-    #[doc(hidden)]
-    fn for_each_with_scratch<T>(self, mut scratch: T, op: impl Fn(&mut T, Self::Item) + Sync + Send) {
+    /// Calls `op` with each item and the scratch value `scratch`.
+    fn for_each_with<T: Send + Clone>(self, mut scratch: T, op: impl Fn(&mut T, Self::Item) + Sync + Send) {
         self.into_sequential_iter().for_each(|item| op(&mut scratch, item));
     }
 
