@@ -2,7 +2,7 @@
 //!
 //! A scene is text in TOML or made by a [`SceneBuilder`]. A [`CompiledScene`] builds its phenomena once, a [`Plan`] fixes size, exposure and
 //! loop of the shot, and the [`Shot`] draws frames to memory. The library does not print, read the clock, or create threads: work runs in the
-//! caller's rayon pool and reports to the caller's [`Observer`].
+//! caller's rayon pool, or on the caller's thread alone, and reports to the caller's [`Observer`].
 //!
 //! ```
 //! use std::sync::Arc;
@@ -17,7 +17,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The feature `files` (on by default) adds the module `job`: from a scene file to pictures on disk, like the program `bansho render`.
+//! The feature `files` (on by default) adds the module `job`: from a scene file to pictures on disk, like the program `bansho render`. It enables
+//! `rayon`.
+//!
+//! The feature `rayon` (on by default) divides work among the threads of the rayon pool whose `ThreadPool::install` calls the library; outside of
+//! any, of rayon's global pool, which rayon starts when it is first used. Without this feature all work runs on the caller's thread, for programs
+//! that have a job system of their own, such as games. The bytes are the same (see [`base::host::parallel`]).
 //!
 //! The features `fire`, `rain` and `aurora` (all on by default) enable the kinds of phenomena. A scene with a kind whose feature is disabled is
 //! refused with an error that names the feature.

@@ -4,8 +4,8 @@
 //! spread. A cell is one support radius wide, and a quarter of that along x. Cells are ordered along x, so the near cells of one
 //! row hold one contiguous range of particles: 3 ranges in 2-D, 9 in 3-D.
 
+use bansho_base::host::parallel::{self, prelude::*};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{
     cell_rows::{CELLS_PER_RADIUS_X, CellRows, Keys, RowChunk, SEARCH_WIDTH},
@@ -186,7 +186,7 @@ impl<const D: usize> Cells<D> {
     /// If there is not one value per particle.
     pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
         let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
-        let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
+        let threads = parallel::current_num_threads().clamp(1, arrays.len().max(1));
         let Self { order, scratch, .. } = self;
         scratch.resize_with(threads, Vec::new);
         let arrays_per_thread = arrays.len().div_ceil(threads).max(1);

@@ -6,8 +6,7 @@ use crate::{
     neighbor_sums::{Pair, PairTerm},
     sorting::MIN_PARTICLES_PER_TASK,
 };
-use bansho_base::math::simd::Real;
-use rayon::prelude::*;
+use bansho_base::{host::parallel::prelude::*, math::simd::Real};
 
 /// Term `m_j W(|x_i - x_j|)` of the density sum.
 struct DensityTerm<K>(K);

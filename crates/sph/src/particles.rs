@@ -1,7 +1,7 @@
 //! Particles as structure of arrays, and their time integration.
 
+use bansho_base::host::parallel::prelude::*;
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{cells::Cells, sorting::MIN_PARTICLES_PER_TASK};
 

@@ -1,6 +1,7 @@
 //! Projection of drops into streaks: which drops of which cells are visible, and how each is lit.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{
         DVec3,
         random::{self, Purpose},
@@ -9,7 +10,6 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Light},
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},

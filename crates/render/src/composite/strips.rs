@@ -4,6 +4,7 @@ use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     host::{
         observer::{self, Cancelled, Observer},
+        parallel::prelude::*,
         scratch_pool::ScratchPool,
     },
     image::{Image, Rect},
@@ -24,7 +25,6 @@ use super::{
 use crate::{compiled::ActiveRun, plan::Plan};
 use bansho_scene::PLATE_LAYER;
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// Rows of a strip: few enough that the planes of a strip of 1920 pixels fit in the L2 cache of a core.
 pub(crate) const STRIP_ROWS: usize = 8;

@@ -8,7 +8,10 @@ use std::sync::Arc;
 use bansho_base::{
     frame::{Channel, Frame, PhenomenonMetadata},
     geometry::point_cloud::PointCloud,
-    host::observer::{self, Cancelled, Observer, Stage, StageGuard},
+    host::{
+        observer::{self, Cancelled, Observer, Stage, StageGuard},
+        parallel::prelude::*,
+    },
     image::Rect,
     math::DVec3,
     parameters::BuildError,
@@ -19,7 +22,6 @@ use bansho_base::{
     },
     world::wind::{FixedWind, Wind, WindParameters},
 };
-use rayon::prelude::*;
 
 use crate::{
     compiled::{ActiveRun, BuiltPhenomenon, CompiledScene},
@@ -56,7 +58,7 @@ pub enum RenderError {
 
 /// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
 ///
-/// It runs on the CPU, in the rayon pool of the caller. The same scene and plan give the same bytes with any number of threads.
+/// It runs on the CPU, in the rayon pool of the caller, or on its thread (see [`bansho_base::host::parallel`]). The same scene and plan give the same bytes with any number of threads.
 pub struct Shot {
     context: ShotContext,
     runs: Vec<ActiveRun>,
