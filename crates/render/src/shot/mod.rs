@@ -33,7 +33,7 @@ use crate::{
         plate_cache::PlateCache,
         refraction,
         slices::{self, Slice},
-        strips::{self, Composition, Outputs},
+        strips::{self, Composition, Outputs, StripScratches},
     },
     context::ShotContext,
     plan::Plan,
@@ -72,6 +72,7 @@ pub struct Shot {
     frame: Option<Frame>,
     /// A frame whose memory the next one reuses.
     recycled: Option<Frame>,
+    scratches: StripScratches,
 }
 
 /// Duration over which a wind that was edited takes the place of the one before, s.
@@ -89,6 +90,7 @@ impl Shot {
             has_earlier_state: false,
             frame: None,
             recycled: None,
+            scratches: strips::scratches(),
         }
     }
 
@@ -347,6 +349,7 @@ impl Shot {
             plate,
             hiding: &HidingDepth::new(&prepared, plate),
             background: Background::plate(plate),
+            scratches: &self.scratches,
         };
         let header = self.context.header(self.number, self.time);
         let mut frame = if is_refracted {
@@ -397,6 +400,7 @@ impl Shot {
             plate: mirrored,
             hiding: &HidingDepth::new(&prepared, mirrored),
             background: Background::plate(mirrored),
+            scratches: &self.scratches,
         };
         let mut image =
             strips::draw_frame(&composition, self.context.header(self.number, self.time), None, observer)?.beauty;
