@@ -1,5 +1,34 @@
 //! Fire, rain and aurora for pictures, as a library.
 //!
+//! An [`Effect`] is made of plain structs of parameters. Opened, it follows the time of the program and writes its pictures into the program's buffers,
+//! and the program may change the wind, the camera and the parameters at any time:
+//!
+//! ```
+//! use bansho::{Effect, FlameSheetParameters, f16};
+//!
+//! let mut torch = Effect::new(FlameSheetParameters { width: 0.4, ..Default::default() }).size(64, 64).open()?;
+//! let mut texture = vec![f16::ZERO; 64 * 64 * 4];
+//! for frame in 0..3 {
+//!     torch.set_wind([0.5, 0.0, 0.1 * f64::from(frame)], 0.8)?; // m/s, turbulence intensity
+//!     torch.advance(1.0 / 60.0)?.write_rgba16f(&mut texture)?; // premultiplied linear sRGB
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! An aurora as an image, with the stars behind it:
+//!
+//! ```
+//! use bansho::{AlphaConvention, AlphaMode, AuroraParameters, Effect, View};
+//!
+//! let mut aurora = Effect::new(AuroraParameters::default()).backdrop(true).size(64, 36).open()?;
+//! let mut pixels = vec![0; 64 * 36 * 4];
+//! aurora.at(2.0)?.write_rgba8(&View::DISPLAY, AlphaMode::Straight(AlphaConvention::Encoded), &mut pixels)?;
+//! assert!(pixels.iter().any(|code| *code > 100)); // sRGB codes, row after row from the top
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # From a scene file to frames
+//!
 //! A scene is text in TOML or made by a [`SceneBuilder`]. A [`CompiledScene`] builds its phenomena once, a [`Plan`] fixes size, exposure and
 //! loop of the shot, and the [`Shot`] draws frames to memory. The library does not print, read the clock, or create threads: work runs in the
 //! caller's rayon pool, or on the caller's thread alone, and reports to the caller's [`Observer`].
@@ -16,6 +45,21 @@
 //! assert_eq!((frame.beauty.width(), frame.beauty.height()), (64, 36));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # What is where
+//!
+//! | looked for | found in |
+//! | --- | --- |
+//! | parameters of a phenomenon | [`FlameSheetParameters`], [`FlameParticlesParameters`], [`RainParameters`], [`AuroraParameters`]; their tables in [`fire`], [`rain`], [`aurora`] |
+//! | camera, wind, air, sky, ground, lamps, obstacles | [`CameraParameters`], [`WindParameters`], [`Air`], [`SkyParameters`], [`GroundParameters`], [`LightParameters`], [`ObstacleParameters`] |
+//! | values that change over time | [`Animated`] |
+//! | pixels, depth, AOVs | [`Picture`]; for whole frames [`write_rgba16f`] and its kin |
+//! | light for other objects, particles, drops | [`LiveEffect::lights`], [`LiveEffect::particles`] |
+//! | streak textures of any drop | [`rain::billboards::texture::StreakCube`] |
+//! | smoothed-particle hydrodynamics alone | [`sph`] |
+//! | a phenomenon of your own | [`base::phenomenon`] |
+//!
+//! # Features
 //!
 //! The feature `files` (on by default) adds the module `job`: from a scene file to pictures on disk, like the program `bansho render`. It enables
 //! `rayon`.
@@ -36,22 +80,33 @@ mod kinds;
 mod scene_builder;
 
 #[cfg(feature = "aurora")]
+#[doc(inline)]
 pub use bansho_aurora as aurora;
+#[doc(inline)]
 pub use bansho_base as base;
+#[doc(inline)]
 pub use bansho_environment as environment;
 #[cfg(feature = "fire")]
+#[doc(inline)]
 pub use bansho_fire as fire;
 #[cfg(feature = "files")]
+#[doc(inline)]
 pub use bansho_media as media;
 #[cfg(feature = "rain")]
+#[doc(inline)]
 pub use bansho_rain as rain;
+#[doc(inline)]
 pub use bansho_render as render;
+#[doc(inline)]
 pub use bansho_scene as scene;
 #[cfg(any(feature = "aurora", feature = "fire"))]
+#[doc(inline)]
 pub use bansho_sph as sph;
 
 #[cfg(feature = "aurora")]
+#[doc(inline)]
 pub use bansho_aurora::AuroraParameters;
+#[doc(inline)]
 pub use bansho_base::{
     camera::CameraParameters,
     color::{AlphaConvention, AlphaMode, ColorSpace, View},
@@ -65,16 +120,21 @@ pub use bansho_base::{
     parameters::animated::Animated,
     world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
+#[doc(inline)]
 pub use bansho_environment::ground::GroundParameters;
 #[cfg(feature = "fire")]
+#[doc(inline)]
 pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters};
 #[cfg(feature = "rain")]
+#[doc(inline)]
 pub use bansho_rain::RainParameters;
+#[doc(inline)]
 pub use bansho_render::{
     BufferLengthError, BuildErrors, ChannelError, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},
     f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f, write_rgba32f,
 };
+#[doc(inline)]
 pub use bansho_scene::{
     LightParameters, LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,
 };
