@@ -17,4 +17,4 @@ pub mod shot;
 
 pub use compiled::{BuildErrors, CompiledScene};
 pub use plan::{Plan, PlanError, PlanOptions};
-pub use shot::{RenderError, Shot};
+pub use shot::{PhenomenonLight, RenderError, Shot};
