@@ -59,6 +59,57 @@
 //! | smoothed-particle hydrodynamics alone | [`sph`] |
 //! | a phenomenon of your own | [`base::phenomenon`] |
 //!
+//! # Data
+//!
+//! A shot also gives what is in a frame as data: [`Shot::particles`] the gas of particle flames, the electrons of auroras and the drops of rain,
+//! [`Shot::lights`] the lights of flames and auroras. Positions are in m, y up; velocities in m/s. Each further attribute of a particle is a
+//! [`Quantity`](base::geometry::point_cloud::Quantity), whose [`name`](base::geometry::point_cloud::Quantity::name) is also that in PLY files:
+//!
+//! | name | unit | of | what |
+//! |---|---|---|---|
+//! | `temperature` | K | `flame_particles` | of the gas |
+//! | `density` | kg/m^3 | `flame_particles` | of the gas |
+//! | `energy` | eV | `aurora` | of each electron that a particle represents |
+//! | `power` | W | `aurora` | that the particle deposits in the atmosphere |
+//! | `diameter_mm` | mm | `rain` | of the drop |
+//! | `opacity` | 1 | `rain` | of the streak of the drop, on its axis |
+//!
+//! ```
+//! # #[cfg(all(feature = "fire", feature = "rain"))] {
+//! use std::sync::Arc;
+//! use bansho::{MemoryAssets, Plan, PlanOptions, Shot, Unobserved, base::geometry::point_cloud::Quantity, compile_scene};
+//!
+//! let text = "bansho = 2\n[picture]\nsize = [64, 36]\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.2\n[[rain]]\n";
+//! let compiled = compile_scene("data", text, Arc::new(MemoryAssets::default()))?;
+//! let plan = Plan::new(&compiled, &PlanOptions::default())?;
+//! let mut shot = Shot::open(compiled, Arc::new(plan));
+//! shot.advance(5, &Unobserved)?; // simulates; nothing is drawn
+//!
+//! let points = shot.particles();
+//! assert_eq!((points.positions.len(), points.velocities.len()), (points.len(), points.len()));
+//! for (quantity, values) in &points.quantities {
+//!     println!("{} in {}: {} values", quantity.name(), quantity.unit(), values.len());
+//! }
+//! // A quantity is 0 for particles that lack it: drops have no temperature.
+//! let hottest = points.quantities[&Quantity::Temperature].iter().copied().fold(0.0, f32::max);
+//! assert!(hottest > 600.0);
+//!
+//! // The particles of one phenomenon, by its name in the scene.
+//! let clouds = shot.point_clouds();
+//! let (_, drops) = clouds.iter().find(|(name, _)| name == "rain").expect("it rains");
+//! assert!(drops.quantities[&Quantity::DiameterMm].iter().all(|diameter| (1.0..=2.0).contains(diameter)));
+//!
+//! // Lights for a renderer of your own: position, linear sRGB and candela.
+//! for light in shot.lights() {
+//!     let (position, srgb) = (light.light.emitter.position(), light.light.srgb());
+//!     println!("{}: {position:?}, {:?} times {} cd", light.phenomenon, srgb.color, srgb.intensity);
+//! }
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Every drop with its path and weight: [`rain::Rain::drops`]. Textures of streaks: [`rain::billboards::texture`].
+//!
 //! # Features
 //!
 //! The feature `files` (on by default) adds the module `job`: from a scene file to pictures on disk, like the program `bansho render`. It enables
@@ -130,7 +181,8 @@ pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetPara
 pub use bansho_rain::RainParameters;
 #[doc(inline)]
 pub use bansho_render::{
-    BufferLengthError, BuildErrors, ChannelError, CompiledScene, Plan, PlanError, PlanOptions, RenderError, Shot,
+    BufferLengthError, BuildErrors, ChannelError, CompiledScene, PhenomenonLight, Plan, PlanError, PlanOptions,
+    RenderError, Shot,
     display::{BitDepth, display},
     f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f, write_rgba32f,
 };
