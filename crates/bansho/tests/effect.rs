@@ -220,7 +220,8 @@ fn flames_are_lit_put_out_and_moved_without_a_jump() {
             largest = largest.max((sum(&now) - sum(&before)).abs() / full);
             before = now;
         }
-        assert!(largest < 0.25, "{name}: {largest}");
+        // At once it would be about 0.9.
+        assert!(largest < 0.4, "{name}: {largest}");
         assert!(sum(&before) < 1e-3 * full, "{name}: {} of {full}", sum(&before));
         live.ignite(name).unwrap();
         live.advance(1.0).unwrap();
