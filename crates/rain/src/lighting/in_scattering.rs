@@ -1,14 +1,14 @@
 //! Light of lamps and fires that the rain scatters toward the camera: integrated along the lines of sight at the corners of a grid, and kept while camera,
 //! lamps and rain stay the same.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use bansho_base::{
     camera::Camera,
     image::Rect,
     math::{self, DVec2, DVec3},
     phenomenon::{
-        strip::View,
+        strip::{DepthInterval, View},
         surroundings::{Emitter, Light},
     },
 };
@@ -71,6 +71,33 @@ pub(super) struct LampHalo {
     pub(super) fine_tiles: TileGrid,
     pub(super) fine_in_scattering: InScattering,
     pub(super) ray_distance: Vec<f32>,
+    /// Corrections of its pixels for recent depth intervals.
+    pub(super) corrections: HaloCorrectionCache,
+}
+
+/// Corrections of the pixels near a lamp, row by row, for recent depth intervals without a plate. They are the same in every frame while camera, lamps and
+/// slices stay the same.
+#[derive(Debug, Default)]
+pub(super) struct HaloCorrectionCache(Mutex<Vec<(DepthInterval, Arc<HaloCorrections>)>>);
+
+/// Corrections of the pixels near a lamp: a row is computed by the strip that first draws it.
+pub(super) type HaloCorrections = Vec<OnceLock<Vec<[f32; 3]>>>;
+
+impl HaloCorrectionCache {
+    /// Number of depth intervals kept: a scene with other phenomena has several slices.
+    const CAPACITY: usize = 4;
+
+    /// The rows of a depth interval, at first without values.
+    pub(super) fn rows(&self, slice: &DepthInterval, height: usize) -> Arc<HaloCorrections> {
+        let mut recent = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, rows)) = recent.iter().find(|(known, _)| known == slice) {
+            return rows.clone();
+        }
+        let rows = Arc::new((0..height).map(|_| OnceLock::new()).collect::<HaloCorrections>());
+        recent.insert(0, (*slice, rows.clone()));
+        recent.truncate(Self::CAPACITY);
+        rows
+    }
 }
 
 /// Radius around a lamp with the finer grid, pixels.
@@ -227,7 +254,16 @@ impl InScatterIntegrator<'_> {
             InScattering::new(&radiance, self.distances.len())
         });
         let ray_distance = fine_tiles.directions.iter().map(|direction| ray_distance(offset, *direction)).collect();
-        LampHalo { offset, pixel, rect, in_scattering, fine_tiles, fine_in_scattering, ray_distance }
+        LampHalo {
+            offset,
+            pixel,
+            rect,
+            in_scattering,
+            fine_tiles,
+            fine_in_scattering,
+            ray_distance,
+            corrections: HaloCorrectionCache::default(),
+        }
     }
 
     /// Light of some lamps scattered toward the camera up to each distance.

@@ -4,6 +4,7 @@
 use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
+    host::once::get_or_compute,
     image::Rect,
     math::{self, DVec2, MulAdd},
     phenomenon::strip::{DepthInterval, Strip, View},
@@ -196,22 +197,51 @@ impl<'a> SingleScattering<'a> {
         Some(correction)
     }
 
+    /// The correction of a pixel near a lamp, faded toward the edge of its halo; 0 where there is none.
+    fn faded_correction(
+        &self,
+        halo: &LampHalo,
+        x: usize,
+        y: usize,
+        slice: &DepthInterval,
+        plate: Option<f64>,
+    ) -> [f32; 3] {
+        let distance = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
+        let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
+        if fade <= 0.0 {
+            return [0.0; 3];
+        }
+        self.halo_correction(halo, x, y, slice, plate).map_or([0.0; 3], |light| light.map(|value| fade * value))
+    }
+
     /// Adds the corrections near lamps to a row of tiles.
     fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         for halo in &self.lamps.halos {
             let rect = halo.rect.intersection(&rows);
+            if rect.is_empty() {
+                continue;
+            }
+            let cached = (!strip.has_plate()).then(|| halo.corrections.rows(slice, halo.rect.height));
             for y in rect.y..rect.bottom() {
+                let row = cached.as_ref().map(|rows| {
+                    let columns = halo.rect.x..halo.rect.right();
+                    let compute = || columns.map(|x| self.faded_correction(halo, x, y, slice, None)).collect();
+                    get_or_compute(&rows[y - halo.rect.y], compute)
+                });
                 for x in rect.x..rect.right() {
-                    let distance = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                    let plate = strip.has_plate().then(|| f64::from(strip.plate_depth(index)));
-                    let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
-                    let Some(light) = self.halo_correction(halo, x, y, slice, plate).filter(|_| fade > 0.0) else {
-                        continue;
+                    let light = match row {
+                        Some(row) => row[x - halo.rect.x],
+                        None => {
+                            let plate = Some(f64::from(strip.plate_depth(index)));
+                            self.faded_correction(halo, x, y, slice, plate)
+                        }
                     };
+                    if light == [0.0; 3] {
+                        continue;
+                    }
                     // The medium in front of it is contained in the strip's transmittance too; its effect is small.
-                    (0..3)
-                        .for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + fade * light[c]).max(0.0));
+                    (0..3).for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + light[c]).max(0.0));
                 }
             }
         }
