@@ -404,6 +404,32 @@ fn a_moved_camera_sees_what_a_scene_with_that_camera_shows() {
 fn a_scene_can_be_built_and_shown() {
     let picture = PictureParameters { size: [32, 18], ..Default::default() };
     let scene = SceneBuilder::new().picture(&picture).phenomenon("torch", &torch()).build().unwrap();
-    let mut live = Effect::from_scene(scene).open().unwrap();
+    let mut live = Effect::from_scene(scene.clone()).open().unwrap();
     assert_eq!(live.advance(0.1).unwrap().size(), [32, 18]);
+    // What is added to a scene is checked as what it is made of.
+    let more = Effect::from_scene(scene.clone()).with("rain", RainParameters::default());
+    assert_eq!(more.scene().unwrap().instances.len(), 2);
+    for (name, parameters, says) in [
+        ("torch", torch(), "the name \"torch\" is taken"),
+        ("a.b", torch(), "cannot be a name"),
+        ("second", FlameSheetParameters { width: -1.0, ..torch() }, "second.width: -1 is out of range"),
+    ] {
+        let message = Effect::from_scene(scene.clone()).with(name, parameters).open().unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
+}
+
+#[test]
+fn a_live_wind_goes_on_after_other_random_numbers() {
+    let camera =
+        CameraParameters { position: [0.0, 0.6, 6.0].into(), target: [0.0, 0.6, 0.0].into(), ..Default::default() };
+    let open = || Effect::new(torch()).camera(camera.clone()).size(SIZE, SIZE).open().unwrap();
+    let (mut live, mut calm) = (open(), open());
+    live.set_wind([4.0, 0.0, 0.0], 0.0).unwrap();
+    live.at(2.0).unwrap();
+    calm.at(2.0).unwrap();
+    live.reseed(5).unwrap();
+    calm.reseed(5).unwrap();
+    let (live, calm) = (light_of(&mut live, 1.0), light_of(&mut calm, 1.0));
+    assert!(center(&live) > center(&calm) + 0.5, "{} {}", center(&live), center(&calm));
 }

@@ -34,7 +34,7 @@
 //! | visibility | `3.912 / beta` | [`visibility`](lighting::extinction::visibility) |
 //! | phase function | p: light that a drop scatters by angle | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
 //! | sky light through a drop | integral of `p L` over the sky | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
-//! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::single_scattering::InScatterIntegrator::segment` |
+//! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::in_scattering::InScatterIntegrator::segment` |
 //! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::displacement` |
 //!
 //! # Data flow

@@ -86,6 +86,13 @@ pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
     }
 }
 
+/// Reports a name that a phenomenon cannot have.
+pub(super) fn instance_name(name: &str, reader: &mut Reader) {
+    if let Some(reason) = name_problem(name) {
+        reader.report_value(ProblemKind::Conflict(reason));
+    }
+}
+
 fn allowed_names() -> String {
     let reserved = RESERVED_NAMES.join(", ");
     format!("1 to {MAX_NAME_BYTES} bytes of text without dots and control characters, and none of {reserved}")

@@ -101,17 +101,20 @@ pub struct Instance {
 }
 
 impl Instance {
+    /// A phenomenon with parameters that a program has set. [`Scene::check`] checks them.
+    pub fn new<P: Describe>(name: impl Into<String>, parameters: P) -> Self {
+        Self { kind: P::KIND, name: name.into(), enabled: true, parameters: kind::set_parameters(parameters) }
+    }
+
     /// The same phenomenon with other parameters, which a program has set.
     ///
     /// # Errors
     /// Every value that is out of range or not finite, with the path of its parameter and what is allowed.
     pub fn with_parameters<P: Describe>(&self, parameters: P) -> Result<Self, ParameterProblems> {
+        let changed = Self { enabled: self.enabled, ..Self::new(self.name.clone(), parameters) };
         let mut reader = Reader::new();
-        let parameters = reader.within(self.name.clone(), |reader| kind::check_parameters(parameters, reader));
-        if !reader.is_clean() {
-            return Err(ParameterProblems(reader.into_problems()));
-        }
-        Ok(Self { kind: P::KIND, parameters, ..self.clone() })
+        reader.within(self.name.clone(), |reader| changed.parameters.check_values(reader));
+        if reader.is_clean() { Ok(changed) } else { Err(ParameterProblems(reader.into_problems())) }
     }
 }
 
@@ -246,8 +249,7 @@ impl Scene {
         if reader.is_clean() { Ok(scene) } else { Err(ParameterProblems(reader.into_problems())) }
     }
 
-    /// Checks the values of the shared tables and how they fit together, after a program has changed them. Those of phenomena are checked by
-    /// [`Instance::with_parameters`].
+    /// Checks all values and how they fit together, after a program has changed them.
     ///
     /// # Errors
     /// All problems, each with the path of its parameter, what is wrong and what is allowed.
@@ -262,8 +264,22 @@ impl Scene {
         reader.within("ground", |reader| self.ground.iter().for_each(|ground| ground.check_values(reader)));
         check_list("light", &self.lights, &mut reader);
         check_list("obstacle", &self.obstacles, &mut reader);
+        self.check_instances(&mut reader);
         check::values(self, &Table::default(), &mut reader);
         if reader.is_clean() { Ok(()) } else { Err(ParameterProblems(reader.into_problems())) }
+    }
+
+    fn check_instances(&self, reader: &mut Reader) {
+        let mut names = HashSet::new();
+        for instance in &self.instances {
+            reader.within(instance.name.clone(), |reader| {
+                check::instance_name(&instance.name, reader);
+                if !names.insert(instance.name.as_str()) {
+                    reader.report_value(ProblemKind::DuplicateName { name: instance.name.clone() });
+                }
+                instance.parameters.check_values(reader);
+            });
+        }
     }
 
     /// Applies the options: replaces the seed, closes the loop, hides the implied backdrop.

@@ -1,6 +1,6 @@
 //! What an effect shows, before it is opened.
 
-use std::sync::Arc;
+use std::{fmt, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters,
@@ -11,7 +11,7 @@ use bansho_base::{
 };
 use bansho_environment::ground::GroundParameters;
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
-use bansho_scene::{LightParameters, Scene, SceneOptions};
+use bansho_scene::{Instance, LightParameters, Scene, SceneOptions};
 
 use super::{EffectError, LiveEffect, pool::Pool};
 use crate::SceneBuilder;
@@ -49,6 +49,12 @@ pub struct Effect {
     pub(super) pool: Pool,
 }
 
+impl fmt::Debug for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Effect").field("size", &self.size).field("seed", &self.seed).finish_non_exhaustive()
+    }
+}
+
 /// Where the scene comes from.
 #[derive(Clone)]
 enum Source {
@@ -84,10 +90,11 @@ impl Effect {
         }
     }
 
-    /// Changes the tables of the scene. Does nothing to an effect that was made [from a scene](Self::from_scene), whose fields can be changed directly.
-    fn tables(mut self, change: impl FnOnce(SceneBuilder) -> SceneBuilder) -> Self {
-        if let Source::Tables(builder) = &mut self.source {
-            *builder = change(std::mem::take(builder));
+    /// Changes the scene, whether it is still made of tables or was given.
+    fn change(mut self, tables: impl FnOnce(SceneBuilder) -> SceneBuilder, scene: impl FnOnce(&mut Scene)) -> Self {
+        match &mut self.source {
+            Source::Tables(builder) => *builder = tables(std::mem::take(builder)),
+            Source::Scene(given) => scene(given),
         }
         self
     }
@@ -95,49 +102,52 @@ impl Effect {
     /// Adds a phenomenon. Names are unique.
     #[must_use]
     pub fn with<P: Describe>(self, name: &str, parameters: P) -> Self {
-        self.tables(|builder| builder.phenomenon(name, &parameters))
+        self.change(
+            |builder| builder.phenomenon(name, &parameters),
+            |scene| scene.instances.push(Instance::new(name, parameters.clone())),
+        )
     }
 
     /// Sets the camera. Without one, phenomena of one kind with default position and size are seen from where they fill the picture.
     #[must_use]
     pub fn camera(self, parameters: CameraParameters) -> Self {
-        self.tables(|builder| builder.camera(&parameters))
+        self.change(|builder| builder.camera(&parameters), |scene| scene.camera = parameters.clone())
     }
 
     /// Sets the wind at the start; [`LiveEffect::set_wind`] changes it.
     #[must_use]
     pub fn wind(self, parameters: WindParameters) -> Self {
-        self.tables(|builder| builder.wind(&parameters))
+        self.change(|builder| builder.wind(&parameters), |scene| scene.wind = parameters.clone())
     }
 
     /// Sets temperature, pressure and humidity of the air.
     #[must_use]
     pub fn air(self, parameters: Air) -> Self {
-        self.tables(|builder| builder.air(&parameters))
+        self.change(|builder| builder.air(&parameters), |scene| scene.air = parameters.clone())
     }
 
     /// Sets a sky, which lights the phenomena and is drawn behind them if it is visible.
     #[must_use]
     pub fn sky(self, parameters: SkyParameters) -> Self {
-        self.tables(|builder| builder.sky(&parameters))
+        self.change(|builder| builder.sky(&parameters), |scene| scene.sky = Some(parameters.clone()))
     }
 
     /// Sets a ground.
     #[must_use]
     pub fn ground(self, parameters: GroundParameters) -> Self {
-        self.tables(|builder| builder.ground(&parameters))
+        self.change(|builder| builder.ground(&parameters), |scene| scene.ground = Some(parameters.clone()))
     }
 
     /// Adds a light.
     #[must_use]
     pub fn light(self, parameters: LightParameters) -> Self {
-        self.tables(|builder| builder.light(&parameters))
+        self.change(|builder| builder.light(&parameters), |scene| scene.lights.push(parameters.clone()))
     }
 
     /// Adds a solid obstacle.
     #[must_use]
     pub fn obstacle(self, parameters: ObstacleParameters) -> Self {
-        self.tables(|builder| builder.obstacle(&parameters))
+        self.change(|builder| builder.obstacle(&parameters), |scene| scene.obstacles.push(parameters.clone()))
     }
 
     /// Width and height of the picture, pixels: 1 to 16384 each.

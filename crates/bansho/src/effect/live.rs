@@ -1,5 +1,7 @@
 //! An open effect: its time, its pictures, its data.
 
+use std::fmt;
+
 use bansho_base::{frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved};
 use bansho_render::{PhenomenonLight, Shot};
 
@@ -21,6 +23,12 @@ pub struct LiveEffect {
     owed_s: f64,
     /// Number of changes of parameters so far.
     pub(super) revision: u64,
+}
+
+impl fmt::Debug for LiveEffect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LiveEffect").field("time", &self.time()).field("size", &self.size()).finish_non_exhaustive()
+    }
 }
 
 impl LiveEffect {
@@ -130,7 +138,7 @@ impl LiveEffect {
         self.shot.compiled().is_stepped()
     }
 
-    /// Begins again at time 0 with other or the same random numbers, as opening it again would, but builds nothing: simulations run their preroll, live wind
+    /// Begins again at time 0 with the same random numbers, as opening it again would, but builds nothing: simulations run their preroll, live wind
     /// is forgotten, changed parameters stay.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! A picture of an effect, and how it is written into the caller's buffers.
 
+use std::fmt;
+
 use bansho_base::{
     color::{AlphaMode, ColorSpace, View},
     frame::Frame,
@@ -15,6 +17,14 @@ pub struct Picture<'a> {
     pub(super) time_s: f64,
     pub(super) owed_s: f64,
     pub(super) pool: &'a Pool,
+}
+
+impl fmt::Debug for Picture<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut picture = f.debug_struct("Picture");
+        picture.field("size", &self.size()).field("time_s", &self.time_s).field("owed_s", &self.owed_s);
+        picture.finish_non_exhaustive()
+    }
 }
 
 impl<'a> Picture<'a> {

@@ -24,7 +24,14 @@ macro_rules! parameters {
     }) => {
         $(#[doc = $table_doc])*
         #[derive(Clone, Debug, PartialEq)]
-        pub struct $Table { $($(#[doc = $doc])* pub $key: $type,)* }
+        pub struct $Table { $(
+            $(#[doc = $doc])*
+            ///
+            $(#[doc = concat!("Unit: ", $unit, ".")])?
+            #[doc = concat!("Default: `", stringify!($default), "`.")]
+            $(#[doc = concat!("Limits: `", stringify!($limits), "`.")])?
+            pub $key: $type,
+        )* }
 
         impl Default for $Table {
             fn default() -> Self { Self { $($key: $default,)* } }

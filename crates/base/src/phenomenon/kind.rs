@@ -41,6 +41,9 @@ pub trait CheckedParameters: Send + Sync {
     /// See [`Describe::stage_view`].
     fn stage_view(&self) -> Option<StageView>;
 
+    /// Reports every value that is out of range or not finite: see [`Parameters::check_values`].
+    fn check_values(&self, reader: &mut Reader);
+
     /// The parameters themselves, of the type that implements [`Describe`].
     fn as_any(&self) -> &dyn Any;
 
@@ -153,9 +156,8 @@ fn read_described<P: Describe>(table: &Table, reader: &mut Reader) -> Box<dyn Ch
     Box::new(Described(P::read_table(table, reader, &COMMON_KEYS)))
 }
 
-/// Checks parameters that a program has set, without a text. Problems are reported to `reader`.
-pub fn check_parameters<P: Describe>(parameters: P, reader: &mut Reader) -> Arc<dyn CheckedParameters> {
-    parameters.check_values(reader);
+/// Parameters that a program has set. They are not checked yet: see [`CheckedParameters::check_values`].
+pub fn set_parameters<P: Describe>(parameters: P) -> Arc<dyn CheckedParameters> {
     Arc::new(Described(parameters))
 }
 
@@ -176,6 +178,10 @@ impl<P: Describe> CheckedParameters for Described<P> {
 
     fn stage_view(&self) -> Option<StageView> {
         self.0.stage_view()
+    }
+
+    fn check_values(&self, reader: &mut Reader) {
+        self.0.check_values(reader);
     }
 
     fn as_any(&self) -> &dyn Any {

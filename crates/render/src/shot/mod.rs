@@ -279,16 +279,24 @@ impl Shot {
         let (old, new) = (self.context.compiled.scene(), compiled.scene());
         let is_same_wind =
             WindParameters { velocity: new.wind.velocity.clone(), gust: new.wind.gust, ..old.wind.clone() } == new.wind;
-        let is_continued = is_same_wind && (old.seed, old.loop_s) == (new.seed, None);
-        let mut wind = self.context.wind.clone();
-        let close = self.context.plan.shutter_at(self.time).close;
-        let velocity = DVec3::from(new.wind.velocity.at(close));
-        let is_changed = old.wind != new.wind;
-        if is_continued && (!is_changed || wind.change(close, velocity, new.wind.gust, WIND_TRANSITION_S).is_ok()) {
-            wind
-        } else {
-            compiled.wind().clone()
+        if !is_same_wind || old.loop_s.is_some() || new.loop_s.is_some() {
+            return compiled.wind().clone();
         }
+        let mut wind = if old.seed == new.seed {
+            self.context.wind.clone()
+        } else {
+            let mut reseeded = compiled.wind().clone();
+            reseeded.take_changes(&self.context.wind);
+            reseeded
+        };
+        if old.wind != new.wind {
+            let close = self.context.plan.shutter_at(self.time).close;
+            let velocity = DVec3::from(new.wind.velocity.at(close));
+            if wind.change(close, velocity, new.wind.gust, WIND_TRANSITION_S).is_err() {
+                return compiled.wind().clone();
+            }
+        }
+        wind
     }
 
     /// Whether the state is the one to which the scene leads from its initial state. After [`replan`](Self::replan) it may differ until the

@@ -89,6 +89,11 @@ impl Wind {
         Ok(())
     }
 
+    /// Takes over the [changes](Self::change) of another wind, as when its random numbers are replaced.
+    pub fn take_changes(&mut self, from: &Self) {
+        self.live.clone_from(&from.live);
+    }
+
     /// Whether it was never [changed](Self::change) during the shot.
     pub fn is_planned(&self) -> bool {
         self.live.is_none()
