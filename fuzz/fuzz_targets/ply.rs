@@ -6,8 +6,6 @@ use std::collections::BTreeMap;
 use bansho_base::geometry::point_cloud::{PointCloud, Quantity};
 use bansho_media::ply;
 
-const QUANTITIES: [Quantity; 4] = [Quantity::Temperature, Quantity::Density, Quantity::Energy, Quantity::Power];
-
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let points = points(bytes);
     let file = ply::encode(&points);
@@ -28,7 +26,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
 fn points(bytes: &[u8]) -> PointCloud {
     let (kinds, bytes) = bytes.split_first().map_or((0, bytes), |(kinds, rest)| (*kinds, rest));
     let known: Vec<Quantity> =
-        QUANTITIES.into_iter().enumerate().filter(|(index, _)| kinds >> index & 1 == 1).map(|(_, q)| q).collect();
+        Quantity::ALL.into_iter().enumerate().filter(|(index, _)| kinds >> index & 1 == 1).map(|(_, q)| q).collect();
     let numbers: Vec<f32> = bytes.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
     let mut points = PointCloud::default();
     for row in numbers.chunks_exact(6 + known.len()) {

@@ -10,7 +10,17 @@ use std::{
     sync::{Arc, LazyLock},
 };
 
-use bansho_base::{host::{assets::MemoryAssets, observer::Unobserved}, phenomenon::Run, geometry::point_cloud::PointCloud};
+use bansho_base::{
+    camera::CameraParameters,
+    geometry::point_cloud::PointCloud,
+    host::{assets::MemoryAssets, observer::Unobserved},
+    phenomenon::{
+        Run,
+        strip::{Shutter, View},
+        surroundings::Surroundings,
+    },
+    world::wind::{Wind, WindParameters},
+};
 use bansho::compile_scene;
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
 use bansho_fuzz::one_thread;
@@ -74,7 +84,10 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
             if stepped.restore(&rest[CLOCK..]).is_ok() {
                 let again = stepped.snapshot();
                 stepped.restore(&again).expect("what was restored is written as something that can be restored");
-                run.export(0.0).iter().for_each(check);
+                let shutter = Shutter { open: 0.0, close: 0.0 };
+                let view = View::new(CameraParameters::default(), shutter, 0.0, [8, 6], 0);
+                let wind = Wind::new(WindParameters::default(), 1, None);
+                run.export(&view, &Surroundings::from_wind(&wind)).iter().for_each(check);
             }
         }
     });

@@ -118,7 +118,8 @@ impl Run for Aurora {
         }
     }
 
-    fn export(&self, t: f64) -> Option<PointCloud> {
+    fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
+        let t = view.shutter.middle();
         let step = AuroraSimulation::STEP_S;
         if t - self.simulation().time() <= step {
             return Some(point_cloud(self.simulation().particles(), t - self.simulation().time()));

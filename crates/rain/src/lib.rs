@@ -44,7 +44,7 @@
 //! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
 //! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`) into lit streaks. On
 //!    [`billboards`], drops come from the positions of a streak texture; on the ground `streaks::splashes` adds droplets. With `method = "textures"`,
-//!    [`textured_billboards`] draws the paper's textures instead.
+//!    [`textured_billboards`] draws the paper's textures instead. [`Rain::drops`] lists the drops as data.
 //! 5. `streaks::bin` sorts packed streaks into tiles of 128 x 8 pixels, in chunks.
 //! 6. `render::prepared` draws a strip tile by tile: `streaks::rasterize` computes the exact coverage of each pixel and composites front to back;
 //!    then `lighting::single_scattering` adds the medium under it.
@@ -58,6 +58,7 @@ mod model;
 pub mod opacity_law;
 mod parameters;
 mod phenomenon;
+mod raindrop;
 pub(crate) mod render;
 pub(crate) mod shutter_cameras;
 pub mod streaks;
@@ -65,6 +66,7 @@ pub mod textured_billboards;
 
 pub use model::Rain;
 pub use parameters::{Method, RainParameters, SplashParameters};
+pub use raindrop::Raindrop;
 
 #[cfg(test)]
 mod tests;

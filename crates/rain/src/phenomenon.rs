@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    geometry::point_cloud::PointCloud,
     host::observer::{Cancelled, Observer, check},
     parameters::BuildError,
     phenomenon::{
@@ -14,7 +15,7 @@ use bansho_base::{
 };
 
 use super::{model::Rain, parameters::RainParameters};
-use crate::{aovs::AOVS, render::prepared::PreparedRain};
+use crate::{aovs::AOVS, raindrop, render::prepared::PreparedRain};
 
 impl Describe for RainParameters {
     const KEY: &'static str = "rain";
@@ -91,5 +92,10 @@ impl Run for Rain {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         check(observer)?;
         Ok(Box::new(PreparedRain::new(self, view, surroundings)))
+    }
+
+    /// [`Rain::drops`], with their diameters and opacities.
+    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
+        Some(raindrop::point_cloud(&self.drops(view, surroundings)))
     }
 }

@@ -168,8 +168,8 @@ impl Run for CrossfadeRun {
         Ok(Box::new(PreparedCrossfade { deflection, aovs: self.aovs, current, adjacent, current_weight: weight }))
     }
 
-    fn export(&self, t: f64) -> Option<PointCloud> {
-        self.current.run.export(t)
+    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
+        self.current.run.export(view, surroundings)
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {

@@ -22,4 +22,4 @@ pub use pixels::{
     write_rgba32f,
 };
 pub use plan::{Plan, PlanError, PlanOptions};
-pub use shot::{RenderError, Shot};
+pub use shot::{PhenomenonLight, RenderError, Shot};

@@ -163,7 +163,13 @@ mod tests {
         step_until(aurora.simulation_mut().unwrap(), 0.0);
         let early = aurora.clone();
         step_until(aurora.simulation_mut().unwrap(), 1.0);
-        assert_eq!(early.export(1.0), aurora.export(1.0));
-        assert_ne!(early.export(0.0), aurora.export(1.0));
+        let wind = Wind::new(WindParameters::default(), 1, None);
+        let exported = |aurora: &Aurora, middle: f64| {
+            let shutter = Shutter { open: middle - 0.5, close: middle + 0.5 };
+            let view = View::new(CameraParameters::default(), shutter, 0.0, SIZE, 0);
+            aurora.export(&view, &Surroundings::from_wind(&wind)).unwrap()
+        };
+        assert_eq!(exported(&early, 1.0), exported(&aurora, 1.0));
+        assert_ne!(exported(&early, 0.0), exported(&aurora, 1.0));
     }
 }

@@ -13,9 +13,17 @@ pub enum Quantity {
     Energy,
     /// Power that the particle deposits in the atmosphere, W.
     Power,
+    /// Diameter of a drop, mm.
+    DiameterMm,
+    /// Opacity on the axis of the streak of a drop, 0 to 1.
+    Opacity,
 }
 
 impl Quantity {
+    /// All quantities, in the order in which files list them.
+    pub const ALL: [Self; 6] =
+        [Self::Temperature, Self::Density, Self::Energy, Self::Power, Self::DiameterMm, Self::Opacity];
+
     /// Its name in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -24,10 +32,12 @@ impl Quantity {
             Self::Density => "density",
             Self::Energy => "energy",
             Self::Power => "power",
+            Self::DiameterMm => "diameter_mm",
+            Self::Opacity => "opacity",
         }
     }
 
-    /// Its unit.
+    /// Its unit; `1` for a dimensionless number.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -35,6 +45,8 @@ impl Quantity {
             Self::Density => "kg/m^3",
             Self::Energy => "eV",
             Self::Power => "W",
+            Self::DiameterMm => "mm",
+            Self::Opacity => "1",
         }
     }
 }

@@ -190,8 +190,9 @@ pub trait Run: Send + Sync {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled>;
 
-    /// Its particles at time `t`, within the exposure, for export; `None` if it has none.
-    fn export(&self, _t: f64) -> Option<PointCloud> {
+    /// Its particles at the middle of the exposure `view.shutter`, for export; `None` if it never has any. What exists only around a camera, as drops of rain
+    /// do, is exported as far as the view shows it; a simulation exports all of its particles.
+    fn export(&self, _view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
         None
     }
 
@@ -225,8 +226,8 @@ impl<P: Run + ?Sized> Run for Arc<P> {
         (**self).prepare(view, surroundings, observer)
     }
 
-    fn export(&self, t: f64) -> Option<PointCloud> {
-        (**self).export(t)
+    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
+        (**self).export(view, surroundings)
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {

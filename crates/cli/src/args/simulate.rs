@@ -20,7 +20,8 @@ Examples:
   bansho simulate torch.toml --particles gas.####.ply --snapshots states
 
 Each file is a binary PLY with x y z (m, y up) and vx vy vz (m/s) of every particle in the middle of the frame's exposure; of a \
-particle flame also temperature (K) and density (kg/m^3), of an aurora also energy (eV) and power (W). Blender, MeshLab and Open3D read it.")]
+particle flame also temperature (K) and density (kg/m^3), of an aurora also energy (eV) and power (W), of \
+rain diameter_mm (mm) and opacity (of the streak, on its axis) of every drop that the camera sees as a streak. Blender, MeshLab and Open3D read it.")]
 pub(crate) struct SimulateArgs {
     /// The scene file; `-` reads it from standard input.
     pub(crate) scene: PathBuf,

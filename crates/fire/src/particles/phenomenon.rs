@@ -194,7 +194,8 @@ impl Run for FlameParticles {
         Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.rendering, view, surroundings, observer)?))
     }
 
-    fn export(&self, t: f64) -> Option<PointCloud> {
+    fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
+        let t = view.shutter.middle();
         let gas = self.gas();
         let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
         Some(PointCloud {

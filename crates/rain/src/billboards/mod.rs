@@ -24,7 +24,8 @@ use crate::{
     lanes::{Lanes, ZERO_LANES, fast_max, fast_min},
     streaks::{
         bin::{StreakChunk, StreakChunkBuilder},
-        project::{DropBatch, FADE_IN, StreakProjection},
+        cell_drops::{DropBatch, FADE_IN},
+        project::StreakProjection,
     },
 };
 

@@ -1,11 +1,7 @@
 //! Projection of drops into streaks: which drops of which cells are visible, and how each is lit.
 
 use bansho_base::{
-    math::{
-        DVec3,
-        random::{self, Purpose},
-        simd::LANES,
-    },
+    math::{DVec3, random::Purpose, simd::LANES},
     phenomenon::surroundings::{Emitter, Light},
 };
 use fearless_simd::{Level, dispatch};
@@ -13,6 +9,7 @@ use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},
+    cell_drops::{CellDrops, DropBatch},
     oscillation::Oscillation,
     project_lanes::{DropPaths, StreakBatch},
     rasterize::StreakSegment,
@@ -22,22 +19,17 @@ use crate::{
         lattice::{CELL_SIZE, Cell},
         shutter_state::{DropClassState, ShutterState, Sphere, VisibleCell},
     },
-    lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min, smoothstep},
+    lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, smoothstep},
     lighting::{
         drop_lighting::{DropLighting, PreparedLight},
         sky::SkyOnDrops,
     },
 };
 
-const COUNT: Purpose = Purpose::named("rain drops of a cell");
-const DROP: Purpose = Purpose::named("rain drop");
 const OSCILLATION: Purpose = Purpose::named("rain drop oscillation");
 /// Number of chunks of all cells, and bounds on the number of cells in each.
 const CHUNK_COUNT: usize = 64;
 const CELLS_PER_CHUNK: [usize; 2] = [8, 256];
-/// Range of the drop count over which a drop fades in, as a fraction of all drops, so that a rising rate does not pop.
-pub(crate) const FADE_IN: f64 = 0.02;
-
 /// Projects drops into lit streaks.
 #[derive(Clone, Copy)]
 pub(crate) struct StreakProjection<'a> {
@@ -65,7 +57,55 @@ pub(crate) enum DropSelection<'a> {
     Billboard(&'a PerDropRegion),
 }
 
+/// Streaks of sixteen drops, and how they were weighted.
+pub(crate) struct VisibleStreaks {
+    /// Weights of the drops, 0 to 1: presence, and what the selection and the distance from the camera leave of it.
+    pub(crate) weights: Lanes,
+    /// Paths, clipped at the ground.
+    pub(crate) paths: DropPaths,
+    pub(crate) streaks: StreakBatch,
+}
+
 impl DropSelection<'_> {
+    /// The streaks of drops in the picture, without light. Drops that a solid shelters are not visible.
+    #[inline(always)]
+    pub(crate) fn visible_streaks(&self, shutter_state: &ShutterState, drops: &DropBatch) -> VisibleStreaks {
+        let [xs, ys, zs] = &drops.positions;
+        let selected = self.weights(&drops.positions);
+        let half = 0.5 * shutter_state.cameras.exposure_time as f32;
+        let mut weights = ZERO_LANES;
+        let mut paths = DropPaths {
+            from: drops.positions,
+            to: drops.positions,
+            diameter_mm: [drops.diameter_mm; LANES],
+            gain: ZERO_LANES,
+        };
+        for i in 0..LANES {
+            let distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
+            weights[i] = drops.presence[i] * shutter_state.streak_weight(distance) * selected[i];
+            paths.gain[i] = weights[i] * drops.opacity_factor;
+        }
+        for axis in 0..3 {
+            for i in 0..LANES {
+                let travel = half * drops.velocities[axis][i];
+                paths.from[axis][i] -= travel;
+                paths.to[axis][i] += travel;
+            }
+        }
+        let eye = shutter_state.cameras.middle().position;
+        paths.clip_at_ground((shutter_state.ground - eye.y) as f32);
+        let mut streaks = paths.streaks(&shutter_state.cameras);
+        if shutter_state.has_occluders() {
+            for i in 0..LANES {
+                let [position, velocity] = [&drops.positions, &drops.velocities].map(|vectors| vector(vectors, i));
+                if streaks.visible[i] != 0 && shutter_state.is_sheltered(eye + position, velocity) {
+                    streaks.visible[i] = 0;
+                }
+            }
+        }
+        VisibleStreaks { weights, paths, streaks }
+    }
+
     /// Weights of drops at positions relative to the camera.
     #[inline(always)]
     fn weights(&self, positions: &Vec3Lanes) -> Lanes {
@@ -82,20 +122,6 @@ impl DropSelection<'_> {
         }
         weights
     }
-}
-
-/// Sixteen drops of one diameter at the middle of the exposure.
-pub(crate) struct DropBatch {
-    /// Positions relative to the camera, m.
-    pub(crate) positions: Vec3Lanes,
-    /// m/s.
-    pub(crate) velocities: Vec3Lanes,
-    /// mm.
-    pub(crate) diameter_mm: f32,
-    /// Factor of the physical opacity.
-    pub(crate) opacity_factor: f32,
-    /// Fade-in weight, 0 to 1; 0 in unused lanes.
-    pub(crate) presence: Lanes,
 }
 
 impl StreakProjection<'_> {
@@ -116,92 +142,29 @@ impl StreakProjection<'_> {
         half_width: f64,
         add: impl Fn(&DropClassState, Cell, &mut StreakChunkBuilder) + Sync,
     ) -> Vec<StreakChunk> {
-        let classes = self.shutter_state.classes.par_iter().filter(|class| class.fraction > 0.0);
-        let lists: Vec<Vec<_>> = classes
-            .map(|class| self.cells(class, within, half_width).into_iter().map(|visible| (visible, class)).collect())
-            .collect();
-        let mut cells = lists.concat();
-        cells.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance));
         let size = self.shutter_state.cameras.size();
-        let fill = |cells: &[(VisibleCell, &DropClassState)]| {
+        map_cell_chunks(self.shutter_state, within, half_width, |cells| {
             let mut builder = StreakChunkBuilder::new(size);
             for (visible, class) in cells {
                 builder.add_cell(|builder| add(class, visible.cell, builder));
             }
             builder.build()
-        };
-        let [min, max] = CELLS_PER_CHUNK;
-        cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(min, max)).map(fill).collect()
-    }
-
-    /// The cells of a class, without duplicates.
-    fn cells(&self, class: &DropClassState, within: &[Sphere], half_width: f64) -> Vec<VisibleCell> {
-        let mut cells: Vec<_> =
-            within.iter().flat_map(|sphere| self.shutter_state.visible_cells(class, *sphere, half_width)).collect();
-        cells.sort_by_key(|visible| visible.cell);
-        cells.dedup_by_key(|visible| visible.cell);
-        cells
+        })
     }
 
     /// Adds the streaks of a cell, drop by drop.
     #[inline(always)]
     fn add_cell(&self, class: &DropClassState, cell: Cell, builder: &mut StreakChunkBuilder) {
-        let key = self.shutter_state.key;
-        let contents = class.lattice.contents(cell);
-        let words = key.words(contents, 0, class.purpose(COUNT));
-        let count = random::poisson(class.max_density * class.lattice.volume(), [words[0], words[1]]) as usize;
-        let state = self.shutter_state.cell_state(class, cell);
-        let rising = ((1.0 + FADE_IN) * class.fraction) as f32;
-        let opacity_factor = self.shutter_state.opacity_factor(class.diameter_mm, class.speed) as f32;
-        for first in (0..count).step_by(LANES) {
-            let [x, y, z, threshold] = key.uniforms_of_steps(contents, first as u32, class.purpose(DROP));
-            let mut presence = ZERO_LANES;
-            for i in 0..LANES {
-                let risen = fast_min(1.0, fast_max(0.0, (rising - threshold[i]) * (1.0 / FADE_IN) as f32));
-                presence[i] = if first + i < count { risen } else { 0.0 };
-            }
-            let (positions, velocities) = state.drop_states(&[x, y, z]);
-            let diameter_mm = class.diameter_mm as f32;
-            self.add_drops(&DropBatch { positions, velocities, diameter_mm, opacity_factor, presence }, 0.0, builder);
+        let drops = CellDrops::new(self.shutter_state, class, cell);
+        for first in (0..drops.count()).step_by(LANES) {
+            self.add_drops(&drops.batch(first), 0.0, builder);
         }
     }
 
     /// Adds the streaks of visible drops. Those with a peak opacity below `min_peak` are not lit by lamps and fires.
     #[inline(always)]
     pub(crate) fn add_drops(&self, drops: &DropBatch, min_peak: f32, builder: &mut StreakChunkBuilder) {
-        let shutter_state = self.shutter_state;
-        let [xs, ys, zs] = &drops.positions;
-        let weights = self.selection.weights(&drops.positions);
-        let half = 0.5 * shutter_state.cameras.exposure_time as f32;
-        let mut paths = DropPaths {
-            from: drops.positions,
-            to: drops.positions,
-            diameter_mm: [drops.diameter_mm; LANES],
-            gain: ZERO_LANES,
-        };
-        for i in 0..LANES {
-            let distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
-            paths.gain[i] =
-                drops.presence[i] * shutter_state.streak_weight(distance) * weights[i] * drops.opacity_factor;
-        }
-        for axis in 0..3 {
-            for i in 0..LANES {
-                let travel = half * drops.velocities[axis][i];
-                paths.from[axis][i] -= travel;
-                paths.to[axis][i] += travel;
-            }
-        }
-        let eye = shutter_state.cameras.middle().position;
-        paths.clip_at_ground((shutter_state.ground - eye.y) as f32);
-        let mut streaks = paths.streaks(&shutter_state.cameras);
-        if shutter_state.has_occluders() {
-            for i in 0..LANES {
-                let [position, velocity] = [&drops.positions, &drops.velocities].map(|vectors| vector(vectors, i));
-                if streaks.visible[i] != 0 && shutter_state.is_sheltered(eye + position, velocity) {
-                    streaks.visible[i] = 0;
-                }
-            }
-        }
+        let VisibleStreaks { paths, streaks, .. } = self.selection.visible_streaks(self.shutter_state, drops);
         self.add_streaks(&streaks, &drops.positions, &paths.diameter_mm, min_peak, builder);
     }
 
@@ -271,8 +234,40 @@ impl StreakProjection<'_> {
     }
 }
 
+/// Maps all cells that may be visible within some spheres, nearest cells first and a chunk of cells at a time. Drops are
+/// drawn up to `half_width` (m) horizontally from the center of their cell.
+pub(crate) fn map_cell_chunks<T: Send>(
+    shutter_state: &ShutterState,
+    within: &[Sphere],
+    half_width: f64,
+    map: impl Fn(&[(VisibleCell, &DropClassState)]) -> T + Sync,
+) -> Vec<T> {
+    let classes = shutter_state.classes.par_iter().filter(|class| class.fraction > 0.0);
+    let of_class =
+        |class| unique_cells(shutter_state, class, within, half_width).into_iter().map(move |cell| (cell, class));
+    let lists: Vec<Vec<_>> = classes.map(|class| of_class(class).collect()).collect();
+    let mut cells = lists.concat();
+    cells.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance));
+    let [min, max] = CELLS_PER_CHUNK;
+    cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(min, max)).map(&map).collect()
+}
+
+/// The cells of a class that may be visible within any of some spheres, each once.
+fn unique_cells(
+    shutter_state: &ShutterState,
+    class: &DropClassState,
+    within: &[Sphere],
+    half_width: f64,
+) -> Vec<VisibleCell> {
+    let mut cells: Vec<_> =
+        within.iter().flat_map(|sphere| shutter_state.visible_cells(class, *sphere, half_width)).collect();
+    cells.sort_by_key(|visible| visible.cell);
+    cells.dedup_by_key(|visible| visible.cell);
+    cells
+}
+
 /// The vector of one lane.
-fn vector(vectors: &Vec3Lanes, i: usize) -> DVec3 {
+pub(crate) fn vector(vectors: &Vec3Lanes, i: usize) -> DVec3 {
     DVec3::new(vectors[0][i].into(), vectors[1][i].into(), vectors[2][i].into())
 }
 

@@ -1,6 +1,7 @@
 //! Rain as a whole: what its pictures measure.
 
 mod agreement;
+mod drops;
 mod light;
 mod motion;
 pub(crate) mod reference;

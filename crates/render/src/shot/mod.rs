@@ -14,8 +14,8 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         LevelMirror, Prepared, SnapshotError,
-        strip::View,
-        surroundings::{Publication, Surroundings},
+        strip::{Shutter, View},
+        surroundings::{Light, Publication, Surroundings},
     },
     world::wind::{FixedWind, Wind, WindParameters},
 };
@@ -52,6 +52,15 @@ pub enum RenderError {
     /// The snapshot belongs to another scene, seed or version.
     #[error("the snapshot belongs to another scene, seed or version")]
     ForeignSnapshot,
+}
+
+/// A light with which a phenomenon lights the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhenomenonLight {
+    /// Name of the phenomenon in the scene.
+    pub phenomenon: String,
+    /// The light: geometry in m, world coordinates with y up; intensity in ACEScg, candela for points.
+    pub light: Light,
 }
 
 /// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
@@ -284,12 +293,36 @@ impl Shot {
         !self.has_earlier_state
     }
 
-    /// The particles of all phenomena, at the frame that the shot was advanced to.
+    /// The particles of all phenomena, at the middle of the exposure of the frame that the shot was advanced to: the gas of particle flames, the electrons of
+    /// simulated auroras, and the drops of rain that the camera sees as streaks. The phenomena follow each other in the order of the scene.
+    ///
+    /// Positions are in m and velocities in m/s, world coordinates with y up. The other [quantities](PointCloud::quantities) state their name and unit
+    /// themselves ([`Quantity`](bansho_base::geometry::point_cloud::Quantity)); they are 0 for particles that lack one.
     pub fn particles(&self) -> PointCloud {
-        let t = self.context.plan.shutter_at(self.time).middle();
         let mut all = PointCloud::default();
-        self.runs.iter().filter_map(|run| run.run.export(t)).for_each(|cloud| all.extend(&cloud));
+        self.point_clouds().into_iter().for_each(|(_, cloud)| all.extend(&cloud));
         all
+    }
+
+    /// The [particles](Self::particles) of each phenomenon that can have any, with its name in the scene. They may be none at this frame.
+    pub fn point_clouds(&self) -> Vec<(String, PointCloud)> {
+        let view = self.context.plan.view_at(self.time);
+        let publications = self.publications(view.shutter);
+        let surroundings = self.surroundings(&view, &publications, None);
+        let each = self.runs.iter().zip(&surroundings);
+        each.filter_map(|(run, surroundings)| Some((run.info().name.to_owned(), run.run.export(&view, surroundings)?)))
+            .collect()
+    }
+
+    /// The lights with which phenomena light each other, at the frame that the shot was advanced to: of each flame the points that approximate its emission,
+    /// of an aurora a directional light. Lamps and the sky of the scene are not among them. The phenomena follow each other in the order of the scene.
+    pub fn lights(&self) -> Vec<PhenomenonLight> {
+        let publications = self.publications(self.context.plan.shutter_at(self.time));
+        let of_run = |(run, publication): (&ActiveRun, Publication)| {
+            let phenomenon = run.info().name.to_owned();
+            publication.lights.into_iter().map(move |light| PhenomenonLight { phenomenon: phenomenon.clone(), light })
+        };
+        self.runs.iter().zip(publications).flat_map(of_run).collect()
     }
 
     /// The state of all simulations, for [`restore`](Self::restore).
@@ -320,7 +353,7 @@ impl Shot {
         observer: &dyn Observer,
     ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let publications: Vec<Publication> = self.runs.par_iter().map(|run| run.run.publish(view.shutter)).collect();
+        let publications = self.publications(view.shutter);
         let reflection = self.reflection(view, mirrored, &publications, observer)?;
         let surroundings = self.surroundings(view, &publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.runs.len()).collect();
@@ -356,6 +389,11 @@ impl Shot {
             frame.metadata = self.metadata(&prepared);
         }
         Ok(Some(frame))
+    }
+
+    /// What each phenomenon publishes during `shutter`.
+    fn publications(&self, shutter: Shutter) -> Vec<Publication> {
+        self.runs.par_iter().map(|run| run.run.publish(shutter)).collect()
     }
 
     /// The metadata of every phenomenon that has any.

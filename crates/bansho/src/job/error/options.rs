@@ -126,7 +126,7 @@ pub enum OptionError {
     #[error("no frame is selected; allowed: at least one")]
     NoFrames,
     /// A simulation of a scene without particles.
-    #[error("nothing in this scene has particles to write; allowed: a scene with flame_particles or aurora")]
+    #[error("nothing in this scene has particles to write; allowed: a scene with flame_particles, aurora or rain")]
     NoParticles,
     /// An interval of zero frames between snapshots.
     #[error("snapshots every {0} frames; allowed: 1 or more")]

@@ -66,7 +66,7 @@ impl Simulate {
         let options = SceneOptions { seed: self.seed, ..SceneOptions::default() };
         let compiled = self.scene.compile(self.scene.parse()?.with_options(&options)?, &self.scene.assets())?;
         let plan = Arc::new(Plan::new(&compiled, &PlanOptions::default())?);
-        if compiled.phenomena().all(|phenomenon| phenomenon.clone().start().export(0.0).is_none()) {
+        if Shot::open(compiled.clone(), plan.clone()).point_clouds().is_empty() {
             return Err(OptionError::NoParticles.into());
         }
         let frames = selected_frames(self.frames.as_deref(), &plan)?;

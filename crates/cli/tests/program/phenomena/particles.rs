@@ -72,6 +72,24 @@ fn an_auroras_electrons_lie_on_the_shell_at_100_km() {
 }
 
 #[test]
+fn the_drops_of_rain_are_those_in_the_picture() {
+    let folder = Folder::with_scene(
+        "bansho = 2\n[picture]\nsize = [160, 90]\nframes = 2\n[[rain]]\nmethod = \"drops\"\nsplashes = { fraction = 0.0 }\n",
+    );
+    folder.succeed(&["simulate", "scene.toml", "--particles", "drops.ply", "--frames", "1"]);
+    let (names, rows) = read_ply(&folder.files("")["drops.ply"]);
+    assert_eq!(names, ["x", "y", "z", "vx", "vy", "vz", "diameter_mm", "opacity"]);
+    for row in &rows {
+        assert!((-10.0..-3.0).contains(&row[4]) && (0.9..2.1).contains(&row[6]), "{row:?}");
+        assert!(row[7] > 0.0 && row[7] < 0.05, "{row:?}");
+    }
+    folder.succeed(&["render", "scene.toml", "--frames", "1", "--metadata", "--out", "f.png"]);
+    let about: serde_json::Value = serde_json::from_slice(&folder.files("")["f.json"]).unwrap();
+    assert!(rows.len() > 100);
+    assert_eq!(about["phenomena"]["rain"]["drops_in_view"]["value"].as_f64(), Some(rows.len() as f64), "{about}");
+}
+
+#[test]
 fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written() {
     let folder = Folder::with_scene(GAS);
     let name = folder.run(&["simulate", "scene.toml", "--particles", "gas.obj"]);
