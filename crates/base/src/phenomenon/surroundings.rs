@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use glam::DVec3;
 
 use crate::{
+    color::{self, XYZ_FROM_SRGB},
     image::Image,
     world::{air::Air, sky::Sky, wind::Wind},
 };
@@ -48,6 +49,16 @@ pub struct Light {
     pub intensity: [f32; 3],
 }
 
+/// Color and strength of a light as game engines and glTF (`KHR_lights_punctual`) take them: the light is `color * intensity`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SrgbLight {
+    /// Linear sRGB from 0 to 1, with 1 as the largest component. White for a light that is dark.
+    pub color: [f32; 3],
+    /// Factor of the color: candela for points and spots, lux for directional lights. The luminance of `color * intensity` is that of the light, so for a
+    /// saturated color it is more than the luminous intensity.
+    pub intensity: f32,
+}
+
 /// Light from one source that arrives at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncidentLight {
@@ -60,6 +71,55 @@ pub struct IncidentLight {
 }
 
 impl Light {
+    /// One point light in place of several points: their summed intensity at the center of their luminous intensity, with a radius that holds the spread of
+    /// them all (root mean square). `None` if no point shines; lights of other kinds are left out.
+    #[must_use]
+    pub fn merge_points<'a>(lights: impl IntoIterator<Item = &'a Self>) -> Option<Self> {
+        let (mut intensity, mut total, mut moment, mut square) = ([0.0; 3], 0.0, DVec3::ZERO, 0.0);
+        for light in lights {
+            let Emitter::Point { position, radius } = light.emitter else { continue };
+            let weight = f64::from(color::luminance(light.intensity)).max(0.0);
+            (0..3).for_each(|c| intensity[c] += light.intensity[c]);
+            total += weight;
+            moment += position * weight;
+            square += (position.length_squared() + radius * radius) * weight;
+        }
+        let position = moment / total;
+        let radius = (square / total - position.length_squared()).max(0.0).sqrt();
+        (total > 0.0).then_some(Self { emitter: Emitter::Point { position, radius }, intensity })
+    }
+
+    /// Luminous intensity, candela; `None` for a directional light, whose illuminance is [`luminance`](color::luminance) of its intensity, in lux.
+    #[must_use]
+    pub fn luminous_intensity(&self) -> Option<f32> {
+        self.emitter.position().map(|_| color::luminance(self.intensity))
+    }
+
+    /// Its color in linear sRGB and its strength. Components of colors outside of sRGB are clamped at 0, and the strength is raised by what that removes, so
+    /// that the luminance is kept.
+    ///
+    /// ```
+    /// use bansho_base::{color::acescg_from_srgb, math::DVec3, phenomenon::surroundings::{Emitter, Light}};
+    ///
+    /// let emitter = Emitter::Point { position: DVec3::ZERO, radius: 0.05 };
+    /// let light = Light { emitter, intensity: acescg_from_srgb([20.0, 10.0, 4.0]) };
+    /// let srgb = light.srgb();
+    /// assert!((srgb.intensity - 20.0).abs() < 1e-3 && (srgb.color[1] - 0.5).abs() < 1e-4);
+    /// // 0.2126 * 20 + 0.7152 * 10 + 0.0722 * 4 candela.
+    /// assert!((light.luminous_intensity().unwrap() - 11.69).abs() < 1e-2);
+    /// ```
+    #[must_use]
+    pub fn srgb(&self) -> SrgbLight {
+        let srgb = color::srgb_from_acescg(self.intensity).map(|value| value.max(0.0));
+        let largest = srgb.into_iter().fold(0.0, f32::max);
+        if largest <= 0.0 {
+            return SrgbLight { color: [1.0; 3], intensity: 0.0 };
+        }
+        let color = srgb.map(|value| value / largest);
+        let [_, luminance, _] = XYZ_FROM_SRGB.apply(color.map(f64::from));
+        SrgbLight { color, intensity: color::luminance(self.intensity).max(0.0) / luminance as f32 }
+    }
+
     /// The light that arrives at `point`.
     #[inline]
     pub fn incident_light(&self, point: DVec3) -> IncidentLight {
@@ -87,6 +147,15 @@ impl Light {
 }
 
 impl Emitter {
+    /// Position of a point or spot, m; `None` for a light at infinity.
+    #[must_use]
+    pub fn position(&self) -> Option<DVec3> {
+        match *self {
+            Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
+            Self::Directional { .. } => None,
+        }
+    }
+
     /// Fraction of its intensity in a direction (unit vector): a smoothstep between the two cones of a spot, otherwise 1.
     #[inline]
     fn spot_falloff(&self, direction: DVec3) -> f64 {
@@ -207,6 +276,43 @@ mod tests {
             Light { emitter: Emitter::Point { position: DVec3::ZERO, radius: 0.5 }, intensity: [8.0, 4.0, 2.0] };
         assert_eq!(light.illuminance(DVec3::new(2.0, 0.0, 0.0)).0, [2.0, 1.0, 0.5]);
         assert_eq!(light.illuminance(DVec3::new(0.1, 0.0, 0.0)).0, light.illuminance(DVec3::new(0.5, 0.0, 0.0)).0);
+    }
+
+    #[test]
+    fn lights_in_srgb_keep_their_luminance() {
+        let point = Emitter::Point { position: DVec3::ZERO, radius: 0.1 };
+        // White, a flame, and a red and a green outside of sRGB.
+        for intensity in [[3.0; 3], [40.0, 18.0, 3.0], [9.0, 0.0, 0.0], [0.0, 2.0, 0.1]] {
+            let light = Light { emitter: point, intensity };
+            let SrgbLight { color, intensity } = light.srgb();
+            assert!(color.iter().all(|value| (0.0..=1.0).contains(value)) && color.contains(&1.0), "{color:?}");
+            let luminance = color::luminance(color::acescg_from_srgb(color.map(|value| value * intensity)));
+            assert!((luminance / light.luminous_intensity().unwrap() - 1.0).abs() < 1e-4, "{luminance}");
+        }
+        let white = Light { emitter: point, intensity: [3.0; 3] };
+        assert!((white.srgb().intensity - 3.0).abs() < 1e-4 && white.srgb().color.iter().all(|c| *c > 0.999));
+        let dark = Light { emitter: point, intensity: [0.0; 3] };
+        assert_eq!(dark.srgb(), SrgbLight { color: [1.0; 3], intensity: 0.0 });
+        let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [3.0; 3] };
+        assert_eq!((sun.luminous_intensity(), sun.emitter.position()), (None, None));
+    }
+
+    #[test]
+    fn several_points_are_one_at_their_center_of_intensity() {
+        let point = |height: f64, radius: f64, strength: f32| Light {
+            emitter: Emitter::Point { position: DVec3::new(1.0, height, 0.0), radius },
+            intensity: [strength; 3],
+        };
+        let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [3.0; 3] };
+        let merged = Light::merge_points(&[point(0.0, 0.1, 3.0), sun, point(4.0, 0.1, 1.0)]).unwrap();
+        let Emitter::Point { position, radius } = merged.emitter else { panic!("{merged:?}") };
+        assert!((position - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-6 && merged.intensity == [4.0; 3]);
+        // 3/4 of 1 m^2, 1/4 of 9 m^2, and the radius itself.
+        assert!((radius - 3.01_f64.sqrt()).abs() < 1e-6, "{radius}");
+        let single = Light::merge_points(&[point(2.0, 0.5, 3.0)]).unwrap();
+        let Emitter::Point { position, radius } = single.emitter else { panic!("{single:?}") };
+        assert!((position.y - 2.0).abs() < 1e-12 && (radius - 0.5).abs() < 1e-9);
+        assert_eq!(Light::merge_points(&[sun, point(0.0, 0.1, 0.0)]), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use bansho_base::{
     geometry::point_cloud::Quantity,
     image::Rect,
-    math::{DQuat, DVec2, DVec3, curve::Interpolation},
+    math::{self, DQuat, DVec2, DVec3, curve::Interpolation},
     parameters::animated::Animated,
     phenomenon::{
         Run,
@@ -27,7 +27,7 @@ fn disc_points() -> Vec<DVec2> {
     let point = |index: u32| {
         let (radius, angle) =
             (((f64::from(index) + 0.5) / f64::from(POINTS)).sqrt(), 2.399_963_229_7 * f64::from(index));
-        DVec2::from_angle(angle) * radius
+        DVec2::new(math::cos(angle), math::sin(angle)) * radius
     };
     (0..POINTS).map(point).collect()
 }

@@ -22,6 +22,7 @@ use bansho_render::{
 
 use super::{
     FlipbookSummary,
+    lights::{self, FlameLight},
     motion::{self, MotionField},
 };
 use crate::job::{checks::finished_files::FinishedFiles, error::JobError};
@@ -54,6 +55,14 @@ impl Tile {
     fn linear(&self) -> Option<&Image<4>> {
         if let Color::Linear(picture) = &self.color { Some(picture) } else { None }
     }
+}
+
+/// All frames of a flipbook, in order.
+pub(crate) struct DrawnFrames<'a> {
+    pub(crate) numbers: &'a [i64],
+    pub(crate) tiles: &'a [Tile],
+    /// The point lights of each frame.
+    pub(crate) lights: &'a [Vec<FlameLight>],
 }
 
 /// The names and the format of a flipbook's files.
@@ -113,12 +122,11 @@ impl Files {
         &self,
         plan: &Plan,
         sheet: &SheetLayout,
-        numbers: &[i64],
-        tiles: &[Tile],
+        drawn: &DrawnFrames,
         observer: &dyn Observer,
     ) -> Result<FlipbookSummary, JobError> {
         let _stage = StageGuard::begin(observer, Stage::Write);
-        let finished = FinishedFiles::default();
+        let (finished, tiles) = (FinishedFiles::default(), drawn.tiles);
         let motion = tiles.iter().map(|tile| &tile.motion.pixels);
         let scale = if self.is_linear() { 1.0 } else { motion::scale(motion) };
         check(observer).map_err(|_| JobError::Cancelled)?;
@@ -127,7 +135,7 @@ impl Files {
         } else {
             self.write_display(sheet, tiles, scale, &finished)?;
         }
-        let text = format!("{:#}\n", self.description(plan, sheet, numbers, scale));
+        let text = format!("{:#}\n", self.description(plan, sheet, drawn, scale));
         self.write_file(self.path(".json"), text.as_bytes(), &finished)?;
         match finished.removed_or_changed() {
             files if files.is_empty() => Ok(FlipbookSummary { files: self.paths() }),
@@ -198,12 +206,15 @@ impl Files {
         Ok(())
     }
 
-    fn description(&self, plan: &Plan, sheet: &SheetLayout, numbers: &[i64], scale: f32) -> Value {
+    fn description(&self, plan: &Plan, sheet: &SheetLayout, drawn: &DrawnFrames, scale: f32) -> Value {
         let fps = plan.fps();
         let frame = |(index, &number): (usize, &i64)| {
             let rect = sheet.cell_rect(index);
             let time_s = index as f64 * fps.frame_s();
-            json!({ "number": number, "time_s": time_s, "x": rect.x, "y": rect.y, "width": rect.width, "height": rect.height })
+            json!({
+                "number": number, "time_s": time_s, "x": rect.x, "y": rect.y, "width": rect.width, "height": rect.height,
+                "lights": lights::describe(plan, number, &drawn.lights[index]),
+            })
         };
         let color = match self.is_linear() {
             true => {
@@ -245,7 +256,8 @@ impl Files {
         }
         description["blend"] = self.blend();
         description["motion"] = self.motion(scale);
-        description["frames"] = numbers.iter().enumerate().map(frame).collect();
+        description["lights"] = lights::meaning();
+        description["frames"] = drawn.numbers.iter().enumerate().map(frame).collect();
         description
     }
 

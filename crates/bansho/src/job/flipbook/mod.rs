@@ -3,6 +3,7 @@
 
 mod crop;
 mod files;
+mod lights;
 mod motion;
 
 use std::{path::PathBuf, sync::Arc};
@@ -19,7 +20,10 @@ use bansho_media::{
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot, display::BitDepth};
 use bansho_scene::{FrameRate, Scene, SceneOptions};
 
-use self::files::{Files, Tile};
+use self::{
+    files::{DrawnFrames, Files, Tile},
+    lights::LightRecorder,
+};
 use super::{
     checks::{
         memory::{self, MemoryRequest},
@@ -189,13 +193,14 @@ impl PreparedFlipbook {
         let with_position = |error| plates::with_position(scene, error).for_single_file("a flipbook");
         let (plan, sheet) = &self.cropped(observer).map_err(with_position)?;
         let collector = TileCollector::new(sheet.count, observer, |frame, observer| files.tile(frame, observer));
-        let mut shot = Shot::open(compiled.clone(), plan.clone());
+        let mut shot = LightRecorder::new(Shot::open(compiled.clone(), plan.clone()));
         draw_frames(&mut shot, numbers, &Snapshots::default(), &collector, observer).map_err(with_position)?;
         let tiles = collector.into_tiles();
         if !tiles.iter().any(Tile::has_motion) {
             observer.warning(&Warning::NoMotion);
         }
-        files.write(plan, sheet, numbers, &tiles, observer).map_err(|error| error.for_single_file("a flipbook"))
+        let drawn = DrawnFrames { numbers, tiles: &tiles, lights: &shot.into_lights() };
+        files.write(plan, sheet, &drawn, observer).map_err(|error| error.for_single_file("a flipbook"))
     }
 
     /// The plan and the layout of the cropped flipbook. Finding the lit region draws small pictures of all frames.

@@ -100,6 +100,43 @@ fn motion_is_told_in_pixels_around_a_middle() {
 }
 
 #[test]
+fn every_frame_states_the_light_of_its_flame() {
+    let folder = Folder::with_scene(FLAME);
+    folder.succeed(&["flipbook", "scene.toml", "--grid", "3x2", "--size", "48x64", "--out", "fire.png"]);
+    let about = description(&folder, "fire.json");
+    assert!(about["lights"]["intensity_cd"].is_string(), "{about}");
+    let sheet = decode_png(&std::fs::read(folder.path("fire_alpha.png")).unwrap());
+    let numbers = |value: &serde_json::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+    };
+    let mut intensities = Vec::new();
+    for frame in about["frames"].as_array().unwrap() {
+        let [light] = &frame["lights"].as_array().unwrap()[..] else { panic!("{frame}") };
+        assert_eq!(light["phenomenon"], "left log");
+        let (color, pixel) = (numbers(&light["color"]), numbers(&light["tile_pixel"]));
+        assert!(color[0] == 1.0 && color[0] > color[1] && color[1] > color[2] && color[2] >= 0.0, "{light}");
+        let [intensity, candela] = ["intensity_cd", "luminous_intensity_cd"].map(|key| light[key].as_f64().unwrap());
+        let luminance = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2];
+        assert!((candela / (intensity * luminance) - 1.0).abs() < 1e-3 && candela > 0.0, "{light}");
+        assert!(light["radius_m"].as_f64().unwrap() > 0.0);
+        // It is among the tongues of the flame.
+        let [x, y] = [pixel[0] as usize, pixel[1] as usize];
+        let [left, top] = ["x", "y"].map(|key| frame[key].as_u64().unwrap() as usize);
+        let around = sheet.part([left + x - 6, top + y - 6, 13, 13]);
+        assert!(around.iter().filter(|alpha| **alpha > 100).count() > 3 * 10, "{light}");
+        intensities.push(intensity);
+    }
+    let [least, most] = [f64::min, f64::max].map(|choose| intensities.iter().copied().reduce(choose).unwrap());
+    assert!(most > 1.001 * least, "the light flickers: {intensities:?}");
+    // The scene has no other phenomenon that shines.
+    let rain = "bansho = 2\n[picture]\nsize = [48, 32]\n[[rain]]\n[[light]]\nposition = [0.0, 2.0, 0.0]\n";
+    folder.write("rain.toml", rain);
+    folder.succeed(&["flipbook", "rain.toml", "--grid", "2x1", "--size", "48x32", "--out", "rain.png"]);
+    let about = description(&folder, "rain.json");
+    assert!(about["frames"].as_array().unwrap().iter().all(|frame| frame["lights"] == serde_json::json!([])));
+}
+
+#[test]
 fn a_loop_fills_the_sheet_with_one_turn() {
     let folder = Folder::with_scene(FLAME);
     folder.succeed(&[

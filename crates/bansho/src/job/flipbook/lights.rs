@@ -1,0 +1,148 @@
+//! The point lights of a flipbook: one for each phenomenon that shines, in each frame.
+
+use bansho_base::{
+    camera::Camera,
+    frame::Frame,
+    host::observer::Observer,
+    image::Rect,
+    math::DVec3,
+    phenomenon::surroundings::{Emitter, Light},
+};
+use bansho_render::{Plan, RenderError, Shot};
+use serde_json::{Value, json};
+
+use crate::job::pipeline::frame_source::FrameSource;
+
+/// The light of one phenomenon in one frame: all points with which it lights others, as one.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FlameLight {
+    /// Name of the phenomenon in the scene.
+    pub(crate) phenomenon: String,
+    /// Its center, m.
+    pub(crate) position: DVec3,
+    /// m.
+    pub(crate) radius: f64,
+    pub(crate) light: Light,
+}
+
+/// The lights of the phenomena of a shot that shine as points, at the frame that it was advanced to.
+fn flame_lights(shot: &Shot) -> Vec<FlameLight> {
+    let of_phenomenon = |(name, lights): (String, Vec<Light>)| {
+        let light = Light::merge_points(&lights)?;
+        let Emitter::Point { position, radius } = light.emitter else { return None };
+        Some(FlameLight { phenomenon: name, position, radius, light })
+    };
+    let mut groups: Vec<(String, Vec<Light>)> = Vec::new();
+    for each in shot.lights() {
+        match groups.last_mut() {
+            Some((name, lights)) if *name == each.phenomenon => lights.push(each.light),
+            _ => groups.push((each.phenomenon, vec![each.light])),
+        }
+    }
+    groups.into_iter().filter_map(of_phenomenon).collect()
+}
+
+/// A shot whose lights are recorded as its frames are drawn.
+pub(crate) struct LightRecorder {
+    shot: Shot,
+    /// The lights of each frame that was drawn, in order.
+    lights: Vec<Vec<FlameLight>>,
+}
+
+impl LightRecorder {
+    pub(crate) fn new(shot: Shot) -> Self {
+        Self { shot, lights: Vec::new() }
+    }
+
+    /// The lights of each frame that was drawn, in order.
+    pub(crate) fn into_lights(self) -> Vec<Vec<FlameLight>> {
+        self.lights
+    }
+}
+
+impl FrameSource for LightRecorder {
+    fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
+        self.shot.advance(number, observer)
+    }
+
+    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
+        self.shot.draw(observer)?;
+        self.lights.push(flame_lights(&self.shot));
+        Ok(())
+    }
+
+    fn read(&mut self) -> Option<Frame> {
+        self.shot.read()
+    }
+
+    fn recycle(&mut self, recycled: Frame) {
+        self.shot.recycle(recycled);
+    }
+
+    fn snapshot(&self) -> Vec<u8> {
+        self.shot.snapshot()
+    }
+
+    fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
+        self.shot.restore(snapshot)
+    }
+}
+
+/// How to read the lights of all frames.
+pub(crate) fn meaning() -> Value {
+    json!({
+        "meaning": "one point light for each phenomenon that shines: color times intensity_cd, in all directions; absent in a frame in which it is dark",
+        "position_m": "meters in the scene: x to the right, y up, z toward the viewer of the default camera (right-handed)",
+        "tile_pixel": "where the tile shows that position, from its upper left corner to the right and down; null behind the camera",
+        "color": "linear sRGB, the largest component is 1",
+        "intensity_cd": "candela, the factor of the color",
+        "luminous_intensity_cd": "candela, the luminance of color times intensity_cd",
+        "radius_m": "size of the source: within this radius the illuminance is constant",
+    })
+}
+
+/// The lights of frame `number`.
+pub(crate) fn describe(plan: &Plan, number: i64, lights: &[FlameLight]) -> Value {
+    let camera = plan.view(number).camera;
+    lights.iter().map(|light| describe_light(light, &camera, plan.window())).collect()
+}
+
+fn describe_light(
+    FlameLight { phenomenon, position, radius, light }: &FlameLight,
+    camera: &Camera,
+    crop: Rect,
+) -> Value {
+    let srgb = light.srgb();
+    let in_tile =
+        |place: [f64; 2]| [place[0] - crop.x as f64, place[1] - crop.y as f64].map(|value| rounded(value, 100.0));
+    json!({
+        "phenomenon": phenomenon,
+        "position_m": position.to_array().map(|value| rounded(value, 1e5)),
+        "tile_pixel": camera.project(*position).map(|seen| in_tile(seen.pixel.to_array())),
+        "color": srgb.color.map(|value| rounded(value.into(), 1e5)),
+        "intensity_cd": significant(srgb.intensity.into()),
+        "luminous_intensity_cd": light.luminous_intensity().map(|value| significant(value.into())),
+        "radius_m": rounded(*radius, 1e5),
+    })
+}
+
+/// Rounded to a multiple of 1 / `steps`, without a negative zero.
+fn rounded(value: f64, steps: f64) -> f64 {
+    (value * steps).round() / steps + 0.0
+}
+
+/// Rounded to six significant digits.
+fn significant(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_six_digits() {
+        assert_eq!([12_345.678, 0.001_234_567_8, 0.0].map(significant), [12_345.7, 0.001_234_57, 0.0]);
+        assert_eq!(rounded(-1.234_567, 1e3), -1.235);
+    }
+}
