@@ -1,12 +1,13 @@
 //! A torch in the wind, which lights the ground.
 
-use bevy::{core_pipeline::tonemapping::Tonemapping, prelude::*};
+use bevy::{camera::Exposure, core_pipeline::tonemapping::Tonemapping, prelude::*};
 use bevy_bansho::{BanshoEffect, BanshoPlugin, Wind, bansho::FlameSheetParameters};
 
 fn main() -> AppExit {
     App::new()
         .add_plugins((DefaultPlugins, BanshoPlugin))
         .insert_resource(ClearColor(Color::BLACK))
+        .insert_resource(GlobalAmbientLight::NONE)
         .insert_resource(Wind { velocity: Vec3::new(0.5, 0.0, 0.0), gust: 0.8 })
         .add_systems(Startup, setup)
         .run()
@@ -17,8 +18,8 @@ pub(crate) fn setup(
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    let eye = Transform::from_xyz(0.0, 1.7, 4.0).looking_at(Vec3::Y * 0.8, Vec3::Y);
-    commands.spawn((Camera3d::default(), Tonemapping::AcesFitted, eye));
+    let eye = Transform::from_xyz(0.0, 1.5, 2.8).looking_at(Vec3::Y * 0.75, Vec3::Y);
+    commands.spawn((Camera3d::default(), Exposure { ev100: 5.0 }, Tonemapping::AcesFitted, eye));
     let flame = FlameSheetParameters { width: 0.35, height: 0.7, ..default() };
     commands.spawn((BanshoEffect::flame(flame), Transform::from_xyz(0.0, 0.9, 0.0)));
 

@@ -94,7 +94,7 @@ impl BanshoEffect {
         Self::billboard(Effect::new(parameters), meters)
     }
 
-    /// An effect over the whole view of a camera, for example rain. The component must be on the entity of a perspective camera. The picture is 640 x 360
+    /// An effect over the whole view of a camera, for example rain. Nothing of the scene is in front of it. The component must be on the entity of a perspective camera. The picture is 640 x 360
     /// pixels unless [set](Self::pixels); it should have the aspect ratio of the view, of which it otherwise shows more.
     pub fn overlay(effect: Effect) -> Self {
         Self { exposure: EffectExposure::Effect, ..Self::new(effect, Placement::Overlay, [640, 360]) }
@@ -138,7 +138,7 @@ impl BanshoEffect {
     /// Width and height of the picture, pixels. It cannot change after the component was added to an entity.
     #[must_use]
     pub fn pixels(self, width: u32, height: u32) -> Self {
-        Self { pixels: UVec2::new(width, height), ..self }
+        Self { pixels: UVec2::new(width, height).max(UVec2::ONE), ..self }
     }
 
     /// Exposure of the picture. By default billboards have that of the camera, since they also light the scene; rain and skies have their own.
@@ -156,10 +156,7 @@ impl BanshoEffect {
 
     /// Changes the effect before its next picture, for example `effect.change(|live| live.extinguish("flame_sheet"))`. Changes are made in the order of
     /// these calls. An error is logged and changes nothing.
-    pub fn change(
-        &mut self,
-        change: impl FnOnce(&mut LiveEffect) -> Result<(), EffectError> + Send + Sync + 'static,
-    ) {
+    pub fn change(&mut self, change: impl FnOnce(&mut LiveEffect) -> Result<(), EffectError> + Send + Sync + 'static) {
         self.task.push_change(Box::new(change));
     }
 
@@ -176,6 +173,11 @@ impl BanshoEffect {
     /// The picture, premultiplied linear sRGB in half floats; `None` before the plugin has seen the component.
     pub fn image(&self) -> Option<&Handle<Image>> {
         self.children.as_ref().map(|children| &children.image)
+    }
+
+    /// Whether the effect could not be opened or drawn. The error was logged.
+    pub fn has_failed(&self) -> bool {
+        self.task.has_failed()
     }
 
     /// Whether a picture is shown.

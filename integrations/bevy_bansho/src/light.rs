@@ -54,7 +54,8 @@ mod tests {
 
     #[test]
     fn candela_become_lumens() {
-        let at = |x: f64, intensity| Light { emitter: Emitter::Point { position: DVec3::X * x, radius: 0.1 }, intensity };
+        let at =
+            |x: f64, intensity| Light { emitter: Emitter::Point { position: DVec3::X * x, radius: 0.1 }, intensity };
         let white = bansho::base::color::acescg_from_srgb([100.0; 3]);
         let merged = PlacedLight::merged(&[at(0.0, white), at(1.0, white)]).unwrap();
         let mut light = PointLight { shadow_maps_enabled: true, ..default() };

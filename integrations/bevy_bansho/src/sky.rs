@@ -4,6 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use bevy::{
     asset::RenderAssetUsages,
+    math::ops,
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
@@ -16,7 +17,8 @@ const ROWS: u32 = 64;
 /// Direction that a panorama shows at a position in it, from 0 to 1 from the left and from the top. Its middle is at -z.
 fn direction(across: f32, down: f32) -> Vec3 {
     let (longitude, latitude) = (TAU * (across - 0.5), PI * (0.5 - down));
-    Vec3::new(longitude.sin() * latitude.cos(), latitude.sin(), -longitude.cos() * latitude.cos())
+    let ((sin, cos), (up, level)) = (ops::sin_cos(longitude), ops::sin_cos(latitude));
+    Vec3::new(sin * level, up, -cos * level)
 }
 
 /// A sphere of radius 1 around the origin, whose triangles face inward.

@@ -105,7 +105,7 @@ pub(crate) fn draw(
 impl Surroundings<'_, '_> {
     /// The wind in the coordinates of an effect, which may move: a torch that is carried leans back.
     fn wind_at(&self, effect: &mut BanshoEffect, position: Vec3) -> Option<Wind> {
-        let last_position = effect.last_position.replace(position)?;
+        let last_position = effect.last_position.replace(position).unwrap_or(position);
         let wind = self.wind.as_deref()?;
         let velocity = (position - last_position) / self.time.delta_secs();
         // A jump, or no time passed.
@@ -114,7 +114,12 @@ impl Surroundings<'_, '_> {
     }
 
     /// The view of an effect, the transform that its surface is relative to, and the exposure value of its camera.
-    fn view(&self, entity: Entity, effect: &BanshoEffect, own: &GlobalTransform) -> Option<(View, GlobalTransform, f32)> {
+    fn view(
+        &self,
+        entity: Entity,
+        effect: &BanshoEffect,
+        own: &GlobalTransform,
+    ) -> Option<(View, GlobalTransform, f32)> {
         if effect.placement == Placement::Overlay {
             let Ok((Projection::Perspective(projection), exposure)) = self.own_cameras.get(entity) else {
                 error_once!("an overlay must be on the entity of a perspective camera");

@@ -89,6 +89,10 @@ impl EffectTask {
         self.changes.push(change);
     }
 
+    pub(crate) fn has_failed(&self) -> bool {
+        matches!(self.stage, Stage::Failed)
+    }
+
     /// Lets `dt` seconds pass. Takes the picture if it is finished, and begins the next one.
     pub(crate) fn update(&mut self, dt: f64, request: Request) -> Option<Drawn> {
         self.elapsed_s += dt;
@@ -186,9 +190,10 @@ impl Request {
         let exposure_ev100 = self.exposure_ev100.filter(|exposure_ev100| *exposure_ev100 != plan.exposure_ev100);
         let camera = live.set_camera(camera);
         let exposure = exposure_ev100.map_or(Ok(()), |exposure_ev100| live.set_exposure_ev100(exposure_ev100.into()));
-        let wind = self.wind.filter(|wind| Some(*wind) != last_wind).map_or(Ok(()), |wind| {
-            live.set_wind(wind.velocity.as_dvec3().to_array(), wind.gust.into())
-        });
+        let wind = self
+            .wind
+            .filter(|wind| Some(*wind) != last_wind)
+            .map_or(Ok(()), |wind| live.set_wind(wind.velocity.as_dvec3().to_array(), wind.gust.into()));
         [camera, exposure, wind].into_iter().filter_map(Result::err)
     }
 }

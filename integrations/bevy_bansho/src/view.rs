@@ -3,11 +3,14 @@
 //! A billboard and its picture are one perspective projection: the effect's camera is where Bevy's camera is, and its picture plane is the quad. So each
 //! texel of the quad shows what Bevy's camera sees through it, whatever the direction from which it is seen.
 
-use bansho::{CameraParameters, base::camera::Lens};
+use bansho::{
+    CameraParameters,
+    base::{camera::Lens, math},
+};
 use bevy::{
     camera::Exposure,
     ecs::system::SystemParam,
-    math::{DVec3, Vec3Swizzles},
+    math::{DVec3, Vec3Swizzles, ops},
     prelude::*,
 };
 
@@ -83,9 +86,10 @@ impl View {
         let level = Vec3::new(eye.x, 0.0, eye.z).try_normalize().unwrap_or(Vec3::Z);
         let right = Vec3::Y.cross(level);
         let center = right * middle.x + Vec3::Y * middle.y;
-        let elevation = (eye.y - center.y).atan2(eye.xz().length());
+        let elevation = ops::atan2(eye.y - center.y, eye.xz().length());
         let tilt = elevation - elevation.clamp(-UPRIGHT_ELEVATION, UPRIGHT_ELEVATION);
-        let normal = level * tilt.cos() + Vec3::Y * tilt.sin();
+        let (sin, cos) = ops::sin_cos(tilt);
+        let normal = level * cos + Vec3::Y * sin;
         let up = normal.cross(right);
         let eye = center + (eye - center).clamp_length_max((FARTHEST[0] * size.y).max(FARTHEST[1] * size.x));
         let offset = eye - center;
@@ -98,7 +102,7 @@ impl View {
             position: position.as_dvec3(),
             target: (position - normal).as_dvec3(),
             roll_deg: roll_deg(right.as_dvec3(), normal.as_dvec3()),
-            vertical_fov_deg: f64::from(2.0 * (0.5 * size.y / distance).atan()).to_degrees(),
+            vertical_fov_deg: fov_deg(0.5 * size.y / distance),
             shift: shift.as_dvec2().to_array(),
         };
         let rotation = Quat::from_mat3(&Mat3::from_cols(right, up, normal));
@@ -107,7 +111,7 @@ impl View {
 
     /// The overlay of a perspective camera, whose picture has a width of `picture_aspect` heights and covers the view.
     pub(crate) fn overlay(camera: &GlobalTransform, projection: &PerspectiveProjection, picture_aspect: f32) -> Self {
-        let half_height = (0.5 * projection.fov).tan() * (projection.aspect_ratio / picture_aspect).max(1.0);
+        let half_height = ops::tan(0.5 * projection.fov) * (projection.aspect_ratio / picture_aspect).max(1.0);
         let distance = OVERLAY_DISTANCE * projection.near;
         let height = 2.0 * distance * half_height;
         let position = camera.translation().as_dvec3();
@@ -116,7 +120,7 @@ impl View {
             position,
             target: position + camera.forward().as_dvec3(),
             roll_deg: roll_deg(camera.right().as_dvec3(), camera.back().as_dvec3()),
-            vertical_fov_deg: f64::from(2.0 * half_height.atan()).to_degrees(),
+            vertical_fov_deg: fov_deg(half_height),
             shift: [0.0; 2],
         };
         let scale = Vec3::new(height * picture_aspect, height, 1.0);
@@ -138,13 +142,18 @@ impl View {
     }
 }
 
+/// Vertical field of view for the tangent of half of it, degrees.
+fn fov_deg(half_height: f32) -> f64 {
+    2.0 * math::atan(f64::from(half_height)).to_degrees()
+}
+
 /// Rotation about the line of sight by which a camera that looks toward `-back` gets the axis `right`, degrees.
 fn roll_deg(right: DVec3, back: DVec3) -> f64 {
     // As `bansho::CameraParameters` have it: straight up, north is at the top of the picture; straight down, south.
     let reference = if back.y.abs() > 0.999_999 { DVec3::Z * back.y.signum() } else { DVec3::Y };
     let level_right = reference.cross(back).normalize();
     let level_up = back.cross(level_right);
-    right.dot(level_up).atan2(right.dot(level_right)).to_degrees()
+    math::atan2(right.dot(level_up), right.dot(level_right)).to_degrees()
 }
 
 /// The camera for which billboards and skies are drawn.
@@ -180,9 +189,12 @@ mod tests {
         let meters = Rect::new(-0.4, -0.12, 0.6, 1.28);
         for eye in [[0.0, 0.5, 3.0], [2.0, 4.0, -1.0], [-1.0, -0.5, 2.0], [0.3, 6.0, 0.1], [0.0, 5.0, 0.0]] {
             let view = View::billboard(meters, Vec3::from(eye));
-            for (corner, expected) in
-                [([-0.5, 0.5], [0.0, 0.0]), ([0.5, 0.5], [1.0, 0.0]), ([0.5, -0.5], [1.0, 1.0]), ([0.0, 0.0], [0.5, 0.5])]
-            {
+            for (corner, expected) in [
+                ([-0.5, 0.5], [0.0, 0.0]),
+                ([0.5, 0.5], [1.0, 0.0]),
+                ([0.5, -0.5], [1.0, 1.0]),
+                ([0.0, 0.0], [0.5, 0.5]),
+            ] {
                 let point = view.surface.transform_point(Vec3::new(corner[0], corner[1], 0.0)).as_dvec3();
                 let found = seen_at(&view, [500, 700], point);
                 let error = (found[0] - expected[0]).abs().max((found[1] - expected[1]).abs());
@@ -213,7 +225,10 @@ mod tests {
             let clip = clip_from_world.project_point3(Vec3::from(point));
             let expected = [0.5 + 0.5 * f64::from(clip.x), 0.5 - 0.5 * f64::from(clip.y)];
             let found = seen_at(&view, size, DVec3::from(point.map(f64::from)));
-            assert!((found[0] - expected[0]).abs().max((found[1] - expected[1]).abs()) < 1e-5, "{found:?} {expected:?}");
+            assert!(
+                (found[0] - expected[0]).abs().max((found[1] - expected[1]).abs()) < 1e-5,
+                "{found:?} {expected:?}"
+            );
         }
         let corner = view.surface.transform_point(Vec3::new(0.5, 0.5, 0.0));
         let clip = projection.get_clip_from_view().project_point3(corner);
