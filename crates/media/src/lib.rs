@@ -3,7 +3,7 @@
 //! - [`output`]: the sink that takes frames from any thread, and resuming.
 //! - [`film`]: animations that are encoded in this process (APNG, GIF), and films by `ffmpeg`.
 //! - [`format`](mod@format): the list of output formats, and the pixels that each takes.
-//! - [`png`], [`exr`], [`ply`], [`zip`]: encoders of single files.
+//! - [`png`], [`exr`], [`ply`], [`gltf`], [`zip`]: encoders of single files.
 //! - [`imageops`]: flattening, labels and sprite sheets.
 //! - [`files`]: names, reading of regular files only, atomic writing, protection of other files, provenance.
 //! - [`assets`]: a scene's plates, meshes and drawings from files, with limits that no hostile file can exceed.
@@ -19,6 +19,7 @@ pub mod film;
 mod fingerprint;
 pub mod format;
 mod frame_rate;
+pub mod gltf;
 pub mod imageops;
 pub mod output;
 pub mod ply;

@@ -25,6 +25,11 @@ fn every(mut each: impl FnMut(&DropSizeDistribution, &SizeBin)) {
     }
 }
 
+/// The drops of a bin.
+fn drops(cube: &StreakCube, sizes: &DropSizeDistribution, bin: &SizeBin) -> Vec<FallingDrop> {
+    cube.drops(sizes, bin, 1, 0).expect("the cube is the paper's")
+}
+
 /// A streak by its opacity at many points of each pixel.
 fn naive_streak(cube: &StreakCube, drop: &FallingDrop, image: &mut Image<1>) {
     let (streak, pixel, size) = (cube.streak(drop), cube.pixel(), cube.size as i64);
@@ -53,13 +58,13 @@ fn textures(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("24 streak textures");
     group.sample_size(20);
     group.bench_function("drawn", |bencher| {
-        bencher.iter(|| every(|sizes, bin| drop(black_box(cube.draw(&cube.drops(sizes, bin, 1, 0))))));
+        bencher.iter(|| every(|sizes, bin| drop(black_box(cube.draw(&drops(&cube, sizes, bin))))));
     });
     group.bench_function("naive", |bencher| {
         bencher.iter(|| {
             every(|sizes, bin| {
                 let mut image = Image::filled(cube.size, cube.size, [0.0]);
-                cube.drops(sizes, bin, 1, 0).iter().for_each(|drop| naive_streak(&cube, drop, &mut image));
+                drops(&cube, sizes, bin).iter().for_each(|drop| naive_streak(&cube, drop, &mut image));
                 black_box(&image);
             });
         });

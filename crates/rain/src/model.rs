@@ -11,6 +11,7 @@ use bansho_base::{
 
 use super::parameters::{Method, RainParameters};
 use crate::{
+    billboards::texture::{StreakQuantity, StreakTextureError},
     drops::{
         lattice::{Lattice, LatticeMotion},
         shutter_state::{DropClassState, ground_height},
@@ -55,6 +56,16 @@ pub(super) static OPTICS: LazyLock<Optics> = LazyLock::new(|| {
     Optics { scattering: ScatteringTable::new(&phase_function), phase_function }
 });
 
+/// The parameter for which the textures of `method = "textures"` cannot be drawn.
+fn texture_error(error: &StreakTextureError) -> ParameterError {
+    let is_of_rate = matches!(error, StreakTextureError::OutOfRange { quantity: StreakQuantity::MeanDropCount, .. });
+    let (key, allowed) = match is_of_rate {
+        true => ("texture_rates_mm_per_h", "rates that occur in rain, 0.1 to 300"),
+        false => ("diameters_mm", "diameters that occur in rain, 0.1 to 8"),
+    };
+    ParameterError { key, kind: ParameterErrorKind::NotWith { allowed, other: "`method = \"textures\"`" } }
+}
+
 /// A bin of drop sizes, represented by one diameter.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DropClass {
@@ -83,6 +94,8 @@ impl Rain {
             }
         }
         constructions::count("rain");
+        let textures = (parameters.method == Method::Textures).then(|| TextureSet::new(&parameters, seed));
+        let textures = textures.transpose().map_err(|error| texture_error(&error))?;
         let [_, max_rate] = parameters.rate_mm_per_h.bounds();
         let sizes = DropSizeDistribution::marshall_palmer(max_rate);
         let class = |bin: SizeBin| DropClass { bin, max_density: bin.count(&sizes) };
@@ -93,7 +106,7 @@ impl Rain {
             optics: &OPTICS,
             skies: SkyLightingCache::default(),
             classes,
-            textures: (parameters.method == Method::Textures).then(|| TextureSet::new(&parameters, seed)),
+            textures,
             loop_s,
             parameters,
         })

@@ -16,13 +16,13 @@
 //! codes) are converted on the calling thread without any heap allocation, more in the rayon pool of the caller. Both give the same bytes.
 
 pub use bansho_base::color::pixel_formats::f16;
+use bansho_base::host::parallel::prelude::*;
 use bansho_base::{
     color::{AlphaMode, ColorSpace, DisplayCode, LinearTransform, View},
     frame::Frame,
     image::Rect,
 };
 use fearless_simd::Level;
-use rayon::prelude::*;
 
 /// Rows that one parallel task converts.
 const TASK_ROWS: usize = 16;

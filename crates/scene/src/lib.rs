@@ -1,8 +1,11 @@
 //! The scene file: its text, its parameters, and [`Scene`], which is valid once it is constructed.
+//!
+//! The feature `schema` adds the module `schema`, the JSON schema of scene files.
 
 mod check;
 mod positions;
 pub mod report;
+#[cfg(feature = "schema")]
 pub mod schema;
 mod tables;
 pub mod template;

@@ -4,11 +4,12 @@
 //! spread. A cell is one support radius wide, and a quarter of that along x. Cells are ordered along x, so the near cells of one
 //! row hold one contiguous range of particles: 3 ranges in 2-D, 9 in 3-D.
 
+use bansho_base::host::parallel::{self, prelude::*};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{
     cell_rows::{CELLS_PER_RADIUS_X, CellRows, Keys, RowChunk, SEARCH_WIDTH},
+    error::SphError,
     neighbor_groups::{BATCH, GroupBatch},
     sorting::{Cell, MIN_PARTICLES_PER_TASK, SampleSort},
 };
@@ -44,7 +45,16 @@ pub struct Cells<const D: usize> {
 }
 
 impl<const D: usize> Cells<D> {
-    /// Cells for a support radius, finite and above 0, in the unit of positions.
+    /// Cells for a support radius in the unit of positions.
+    ///
+    /// # Errors
+    /// A radius that is not finite or not above 0.
+    pub fn try_new(support_radius: f32) -> Result<Self, SphError> {
+        let is_valid = support_radius.is_finite() && support_radius > 0.0;
+        if is_valid { Ok(Self::new(support_radius)) } else { Err(SphError::SupportRadius { value: support_radius }) }
+    }
+
+    /// As [`try_new`](Self::try_new) for a radius that is known to be finite and above 0. With any other, sums are meaningless.
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
         const { assert!(D == 2 || D == 3, "particles have two or three dimensions") };
@@ -73,7 +83,7 @@ impl<const D: usize> Cells<D> {
         self.support_radius
     }
 
-    /// Sets the support radius for the next [`Cells::assign`], finite and above 0. Buffers are kept.
+    /// Sets the support radius for the next [`Cells::assign`], finite and above 0: otherwise sums are meaningless. Buffers are kept.
     pub fn set_support_radius(&mut self, support_radius: f32) {
         self.support_radius = support_radius;
     }
@@ -92,6 +102,8 @@ impl<const D: usize> Cells<D> {
 
     /// Sorts particles by cell, then by id, and finds the candidate neighbors of each group. [`Cells::reorder`] and
     /// [`Cells::reorder_all`] then permute other arrays into that order.
+    ///
+    /// Particles at NaN, or farther than 1e12 from the origin, are kept but have no neighbors; ids should be unique, since they decide the order within a cell.
     ///
     /// # Panics
     /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
@@ -186,7 +198,7 @@ impl<const D: usize> Cells<D> {
     /// If there is not one value per particle.
     pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
         let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
-        let threads = rayon::current_num_threads().clamp(1, arrays.len().max(1));
+        let threads = parallel::current_num_threads().clamp(1, arrays.len().max(1));
         let Self { order, scratch, .. } = self;
         scratch.resize_with(threads, Vec::new);
         let arrays_per_thread = arrays.len().div_ceil(threads).max(1);

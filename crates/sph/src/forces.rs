@@ -6,8 +6,7 @@ use crate::{
     neighbor_sums::{Pair, PairTerm},
     sorting::MIN_PARTICLES_PER_TASK,
 };
-use bansho_base::math::simd::Real;
-use rayon::prelude::*;
+use bansho_base::{host::parallel::prelude::*, math::simd::Real};
 
 /// Term `m_j W(|x_i - x_j|)` of the density sum.
 struct DensityTerm<K>(K);
@@ -124,7 +123,11 @@ impl PressureForce {
 /// XSPH weights `w = m / sqrt(rho)` (Monaghan 1989, with the geometric in place of the arithmetic mean of both densities).
 ///
 /// Adding `c / sqrt(rho_i)` times `sum_j w_j (f_j - f_i) W` to each `f_i` smooths a field and conserves `sum m f`.
+///
+/// # Panics
+/// If there is not one mass and density per particle.
 pub fn mixing_weights(masses: &[f32], densities: &[f32], weights: &mut Vec<f32>) {
+    assert_eq!(masses.len(), densities.len(), "one mass and density per particle");
     let weight = |(mass, density): (&f32, &f32)| mass / density.sqrt();
     masses.par_iter().zip(densities).with_min_len(MIN_PARTICLES_PER_TASK).map(weight).collect_into_vec(weights);
 }

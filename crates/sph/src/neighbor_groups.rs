@@ -3,9 +3,11 @@
 //! The batch operations loop over arrays instead of calling `map`: its closures do not vectorize.
 
 use super::cell_rows::{CellRows, RowChunk};
-use bansho_base::math::simd::{HalfLanes, Real};
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::simd::{HalfLanes, Real},
+};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Groups per task of the thread pool.

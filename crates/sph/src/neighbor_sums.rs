@@ -4,6 +4,7 @@
 //! its own, so there are no horizontal sums. A sum depends on the neighbors alone, not on threads.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math,
     math::{
         random::{murmur3, uniform},
@@ -17,7 +18,6 @@ use super::{
 };
 use crate::neighbor_groups::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 /// Particles closer than this fraction of the support radius count as coincident.
 const COINCIDENCE_RADIUS: f32 = 1e-6;

@@ -1,9 +1,13 @@
 //! Particles as structure of arrays, and their time integration.
 
+use bansho_base::host::parallel::prelude::*;
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
-use super::{cells::Cells, sorting::MIN_PARTICLES_PER_TASK};
+use super::{
+    cells::Cells,
+    error::{ParticleArray, SphError},
+    sorting::MIN_PARTICLES_PER_TASK,
+};
 
 /// Particles in `D` dimensions as structure of arrays.
 ///
@@ -29,6 +33,37 @@ impl<const D: usize> Default for Particles<D> {
 }
 
 impl<const D: usize> Particles<D> {
+    /// Checks that all arrays have one value per particle, that positions and velocities are finite, and that masses are finite and above 0.
+    ///
+    /// # Errors
+    /// The first array of another length, else the first bad value.
+    ///
+    /// ```
+    /// use bansho_sph::{ParticleArray, Particles, SphError};
+    ///
+    /// let mut particles = Particles::<2>::default();
+    /// particles.push([0.0, f32::INFINITY], [0.0, 0.0], 1.0, 7);
+    /// let error = particles.check();
+    /// assert_eq!(error, Err(SphError::Value { array: ParticleArray::Position(1), index: 0, value: f32::INFINITY }));
+    /// ```
+    pub fn check(&self) -> Result<(), SphError> {
+        let expected = self.len();
+        let positions = self.positions.iter().enumerate().map(|(axis, values)| (ParticleArray::Position(axis), values));
+        let velocities =
+            self.velocities.iter().enumerate().map(|(axis, values)| (ParticleArray::Velocity(axis), values));
+        let arrays: Vec<_> = positions.chain(velocities).chain([(ParticleArray::Mass, &self.masses)]).collect();
+        if let Some((array, values)) = arrays.iter().find(|(_, values)| values.len() != expected) {
+            return Err(SphError::Length { array: *array, expected, found: values.len() });
+        }
+        for (array, values) in arrays {
+            let least = if array == ParticleArray::Mass { f32::MIN_POSITIVE } else { f32::MIN };
+            if let Some(index) = values.iter().position(|value| !(least..=f32::MAX).contains(value)) {
+                return Err(SphError::Value { array, index, value: values[index] });
+            }
+        }
+        Ok(())
+    }
+
     /// Number of particles.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -51,7 +86,7 @@ impl<const D: usize> Particles<D> {
         self.ids.push(id);
     }
 
-    /// Keeps the particles whose mask is set, in their order. Use [`retain`] with the same mask on other arrays.
+    /// Keeps the particles whose mask is set, in their order; particles beyond the end of the mask are removed. Use [`retain`] with the same mask on other arrays.
     pub fn retain(&mut self, keep: &[bool]) {
         self.positions.iter_mut().chain(&mut self.velocities).for_each(|values| retain(values, keep));
         retain(&mut self.masses, keep);
@@ -61,6 +96,9 @@ impl<const D: usize> Particles<D> {
     /// Sorts by cell, then by id.
     ///
     /// Other arrays are permuted into the same order by [`Cells::reorder`].
+    ///
+    /// # Panics
+    /// If the arrays differ in length ([`check`](Self::check) tells), or there are more than 2^27 particles.
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
         cells.reorder_all(self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]));
@@ -94,7 +132,7 @@ fn advance(positions: &mut [f32], velocities: &mut [f32], accelerations: &[f32],
     }
 }
 
-/// Keeps the entries of `values` whose mask is set.
+/// Keeps the entries of `values` whose mask is set; entries beyond the end of the mask are removed.
 pub fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
     let mut mask = keep.iter();
     values.retain(|_| mask.next().copied().unwrap_or(false));

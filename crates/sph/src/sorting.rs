@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use bansho_base::host::parallel::{self, prelude::*};
 
 /// Minimum number of particles per task of the thread pool.
 pub(super) const MIN_PARTICLES_PER_TASK: usize = 4096;
@@ -56,7 +56,7 @@ impl SampleSort {
     ) {
         let all = (0..ids.len()).into_par_iter().with_min_len(MIN_PARTICLES_PER_TASK);
         all.map(|index| Entry { key: key(index), particle: index as u32 }).collect_into_vec(&mut self.entries);
-        let count = rayon::current_num_threads().min(ids.len() / MIN_PARTICLES_PER_TASK).max(1);
+        let count = parallel::current_num_threads().min(ids.len() / MIN_PARTICLES_PER_TASK).max(1);
         self.ranges.resize_with(count, KeyRange::default);
         let starts = self.starts_of_ranges();
         let Self { entries, ranges, .. } = self;

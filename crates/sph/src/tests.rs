@@ -417,3 +417,43 @@ fn only_what_is_kept_stays() {
     assert_eq!((particles.len(), particles.ids.as_slice()), (2, [1000, 1003].as_slice()));
     assert_eq!(particles.masses, [masses[0], masses[3]]);
 }
+
+#[test]
+fn radii_and_particles_that_make_no_sense_are_named() {
+    for value in [0.0, -0.1, f32::NAN, f32::INFINITY] {
+        let Err(SphError::SupportRadius { value: found }) = Cells::<3>::try_new(value) else {
+            panic!("a radius of {value} must be refused")
+        };
+        assert!(found == value || found.is_nan());
+    }
+    assert_eq!(Cells::<2>::try_new(0.25).map(|cells| cells.support_radius()), Ok(0.25));
+    let good = cloud::<3>(20, 1.0);
+    assert_eq!(good.check(), Ok(()));
+    let with = |change: fn(&mut Particles<3>)| {
+        let mut particles = good.clone();
+        change(&mut particles);
+        particles.check().unwrap_err().to_string()
+    };
+    assert_eq!(
+        with(|p| p.velocities[2][3] = f32::INFINITY),
+        "`velocities[2]` has the value inf at index 3; allowed: finite numbers"
+    );
+    assert_eq!(
+        with(|p| p.positions[0][5] = f32::NAN),
+        "`positions[0]` has the value NaN at index 5; allowed: finite numbers"
+    );
+    for mass in [0.0, -1.0, f32::NAN] {
+        let mut particles = good.clone();
+        particles.masses[7] = mass;
+        let error = particles.check().unwrap_err();
+        assert!(matches!(error, SphError::Value { array: ParticleArray::Mass, index: 7, .. }), "{error}");
+    }
+    assert_eq!(with(|p| p.masses.truncate(4)), "`masses` has 4 values for 20 ids; allowed: one for each");
+    assert_eq!(with(|p| p.positions[1].push(0.0)), "`positions[1]` has 21 values for 20 ids; allowed: one for each");
+}
+
+#[test]
+#[should_panic(expected = "one mass and density per particle")]
+fn mixing_weights_need_a_density_for_each_mass() {
+    mixing_weights(&[1.0, 1.0], &[1.0], &mut Vec::new());
+}

@@ -4,7 +4,10 @@ use std::{ops::Range, sync::OnceLock};
 
 use bansho_base::{
     camera::Camera,
-    host::observer::{Cancelled, Observer, check},
+    host::{
+        observer::{Cancelled, Observer, check},
+        parallel,
+    },
     image::Rect,
     math::{self, DVec2, DVec3, MulAdd},
     phenomenon::{
@@ -78,7 +81,7 @@ impl<'a> PreparedAurora<'a> {
         let sources = aurora.sources(view, &field);
         check(observer)?;
         let charts = ChartBuilder { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
-        let (sharp, soft) = rayon::join(|| charts.sharp(&sources), || charts.soft(&sources));
+        let (sharp, soft) = parallel::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
         let rendering = &aurora.simulation().parameters().rendering;
         let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);

@@ -1,10 +1,9 @@
 //! The shape as a function of time.
 
 use bansho_base::{
-    host::assets::Assets,
+    host::{assets::Assets, parallel::prelude::*},
     math::{self, DVec2},
 };
-use rayon::prelude::*;
 
 use super::{
     Correspondence, FRAME_S, GapLight, MorphingParameters, Shape, ShapeError, ShapeErrorKind, ShapeParameters, Sheet,

@@ -1,8 +1,7 @@
 //! Distributes the energy flux of the sheets to the particles.
 
-use bansho_base::{math::random::Key, noise::LANES};
+use bansho_base::{host::parallel::prelude::*, math::random::Key, noise::LANES};
 use fearless_simd::Level;
-use rayon::prelude::*;
 
 use super::AuroraParticles;
 use crate::{

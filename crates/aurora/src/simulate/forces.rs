@@ -1,12 +1,12 @@
 //! Forces and time integration (thesis, 2.3.1 to 2.3.3).
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{self, MulAdd},
     parameters::Auto,
 };
 use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, compute_densities};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{AuroraParticles, neighbor_cells::NeighborCells};
 use crate::{

@@ -4,10 +4,9 @@
 //! Cells are as wide as the smoothing length h and aligned with the grid of the field. The sums of a particle are in the order of cells and of
 //! particles within them, whatever the number of threads.
 
-use bansho_base::math::simd::Real;
+use bansho_base::{host::parallel::prelude::*, math::simd::Real};
 use bansho_sph::{CubicSpline, KernelShape, Poly6, SmoothingKernel, Spiky};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// Squared distance, in support radii, below which two particles coincide and do not repel each other.
 const COINCIDENCE: f32 = 1e-12;

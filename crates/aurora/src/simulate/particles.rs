@@ -1,8 +1,7 @@
 //! Particles as structure of arrays.
 
-use bansho_base::math::DVec2;
+use bansho_base::{host::parallel::prelude::*, math::DVec2};
 use bansho_sph::{self, Cells};
-use rayon::prelude::*;
 
 /// Particles, each of which represents many precipitating electrons; one entry per particle in every array.
 ///

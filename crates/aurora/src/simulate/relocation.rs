@@ -1,10 +1,12 @@
 //! Relocation: births and deaths when the in-between shape is updated (thesis, 2.3.4 and table 3.3).
 
-use bansho_base::math::{
-    DVec2,
-    random::{Key, Purpose, uniform},
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::{
+        DVec2,
+        random::{Key, Purpose, uniform},
+    },
 };
-use rayon::prelude::*;
 
 use super::AuroraParticles;
 use crate::{

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    host::parallel,
     math::{DVec2, random::Key},
     phenomenon::SnapshotError,
 };
@@ -215,7 +216,7 @@ impl AuroraSimulation {
         let Self { targets, repulsion, integrator, state, target, energy_flux, decay, .. } = self;
         let before = state.arc_map.clone();
         // The sheets do not depend on the particles and are computed in parallel.
-        let (_, (arc_map, refined, rays)) = rayon::join(
+        let (_, (arc_map, refined, rays)) = parallel::join(
             || advance(state, target, repulsion, integrator, targets.parameters.particles.fade_s),
             || {
                 let mut arc_map = targets.transfer_arc_map(&before, time);

@@ -1,7 +1,7 @@
 //! An open effect: its time, its pictures, its data.
 
 use bansho_base::{frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved};
-use bansho_render::Shot;
+use bansho_render::{PhenomenonLight, Shot};
 
 use super::{EffectError, Picture, pool::Pool};
 
@@ -147,9 +147,15 @@ impl LiveEffect {
         Ok(())
     }
 
-    /// The particles of its phenomena with their attributes, at the current time.
+    /// The particles of its phenomena with their attributes, at the middle of the current exposure: see [`Shot::particles`].
     pub fn particles(&self) -> PointCloud {
-        self.shot.particles()
+        self.pool.run(|| self.shot.particles())
+    }
+
+    /// The lights with which its phenomena light others, at the middle of the current exposure, such as a point light that follows a flame: see
+    /// [`Shot::lights`].
+    pub fn lights(&self) -> Vec<PhenomenonLight> {
+        self.pool.run(|| self.shot.lights())
     }
 
     /// The shot that is drawn, for what this interface does not offer.

@@ -1,10 +1,11 @@
-//! Interfaces to the host program: assets, memory, progress and cancellation, text for terminals, and scratch memory.
+//! Interfaces to the host program: assets, memory, progress and cancellation, text for terminals, parallel work, and scratch memory.
 
 pub mod assets;
 pub mod constructions;
 pub mod memory;
 pub mod observer;
 pub mod once;
+pub mod parallel;
 pub mod plural;
 pub mod printable;
 pub mod scratch_pool;

@@ -58,6 +58,9 @@ pub(crate) struct FlipbookArgs {
     /// settings), `encoded` for those that blend encoded values (most user interfaces, three.js directly to the canvas). [default: linear]
     #[arg(long, value_name = "CONVENTION", value_parser = values::alpha_parser())]
     alpha: Option<AlphaConvention>,
+    /// Also write NAME.gltf: the lights of the flames as animated point lights, which engines and Blender import.
+    #[arg(long)]
+    gltf: bool,
     /// View transform of .png.
     #[arg(long, default_value = "display", value_parser = values::view_parser())]
     view: View,
@@ -82,6 +85,7 @@ impl FlipbookArgs {
             view: self.view,
             bits: self.bits,
             alpha: self.alpha,
+            gltf: self.gltf,
             out: self.out.clone(),
             overwrite: self.output.overwrite,
             ..Flipbook::new(scene, self.grid)

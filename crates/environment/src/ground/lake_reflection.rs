@@ -1,11 +1,11 @@
 //! Reflection in waves too short to be resolved: an anisotropic blur of the mirrored picture.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     image::Image,
     math::{self, DVec2, MulAdd},
     phenomenon::strip::View,
 };
-use rayon::prelude::*;
 
 type Pixel = [f32; 4];
 

@@ -3,6 +3,7 @@
 use bansho_base::{
     camera::{Camera, Lens},
     color::{black_body, luminance},
+    host::parallel::prelude::*,
     math::{
         self, DVec2, DVec3, MulAdd,
         random::{Key, Purpose, direction, uniform},
@@ -10,7 +11,6 @@ use bansho_base::{
     phenomenon::strip::View,
     world::sky::Night,
 };
-use rayon::prelude::*;
 
 /// Logarithm (base 10) of the number of stars in the whole sky that are brighter than magnitude -1, 0, 1 ... 9 (Allen's
 /// Astrophysical Quantities, 4th edition, table 19.9, rounded).

@@ -1,7 +1,10 @@
 //! The pixels of a frame: what each shows of the obstacles, antialiased, with motion blur.
 
 use bansho_base::{
-    host::observer::{Cancelled, Observer, check},
+    host::{
+        observer::{Cancelled, Observer, check},
+        parallel::prelude::*,
+    },
     image::{Image, Rect},
     math::{DVec2, DVec3},
     phenomenon::{
@@ -10,7 +13,6 @@ use bansho_base::{
         surroundings::Surroundings,
     },
 };
-use rayon::prelude::*;
 
 use super::{
     model::Solids,

@@ -17,7 +17,7 @@ use super::{
     parameters::{ColorParameters, Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
-    texture::{FractalLayers, PaperLayer, PaperSum, TextureSource},
+    texture::{FilterCache, FractalLayers, PaperLayer, PaperSum, TextureSource},
 };
 
 /// A flame sheet with all its instances, ready to be drawn at any time.
@@ -28,6 +28,8 @@ pub struct FlameSheet {
     pub(super) clock: Clock,
     /// Computed when the sheet is first drawn: a scene may contain thousands of sheets, and each is constructed to check its parameters.
     pub(super) tables: OnceLock<Arc<Tables>>,
+    /// Filtered textures of recent frames.
+    pub(super) filter_cache: FilterCache,
     pub(super) flames: Vec<FlameInstance>,
 }
 
@@ -51,7 +53,14 @@ impl FlameSheet {
         ColorRamp::check(&parameters.texture)?;
         soot_field::check(&parameters)?;
         let flames = flames(&parameters, name, seed, &clock);
-        Ok(Self { name: name.to_owned(), parameters, clock, tables: OnceLock::new(), flames })
+        Ok(Self {
+            name: name.to_owned(),
+            parameters,
+            clock,
+            tables: OnceLock::new(),
+            filter_cache: FilterCache::default(),
+            flames,
+        })
     }
 
     /// Its parameters.

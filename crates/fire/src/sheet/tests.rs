@@ -284,7 +284,8 @@ fn curves_that_do_not_go_together_name_the_parameter() {
 fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
     with_wind([0.5, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
-        let (samples, _) = sheet.samples(flame, &flame.texture_source.filtered(1e4), view, surroundings.wind, 1);
+        let (samples, _) =
+            sheet.samples(flame, &flame.texture_source.filtered(1e4, &sheet.filter_cache), view, surroundings.wind, 1);
         let (shape, ramp) = (sheet.shape(), sheet.ramp());
         let context = DrawContext {
             shape,
@@ -341,7 +342,13 @@ fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
     let view = View::new(camera, Shutter { open: 4.0, close: 4.0 }, 4.04, size, 0);
     with_wind([0.25, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
-        let (samples, _) = sheet.samples(flame, &flame.texture_source.filtered(270.0), &view, surroundings.wind, 1);
+        let (samples, _) = sheet.samples(
+            flame,
+            &flame.texture_source.filtered(270.0, &sheet.filter_cache),
+            &view,
+            surroundings.wind,
+            1,
+        );
         let (shape, ramp) = (sheet.shape(), sheet.ramp());
         let context = DrawContext {
             shape,

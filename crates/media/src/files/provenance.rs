@@ -9,6 +9,7 @@
 //! | MOV | a tag that begins with `bansho:` | `moov`, which is written last |
 //! | WebM | a tag that begins with `BANSHO:` | before or after the frames |
 //! | JSON | `"program"`, second after `"format"` | start |
+//! | glTF | `"generator"` of `"asset"`, the first key | start |
 //! | PLY | a comment that begins with `Bansho:` | header |
 //! | SVG | a comment that begins with `bansho:` | after the first tag |
 //! | CSV | a comment that begins with `bansho:` | first line |
@@ -73,7 +74,7 @@ fn has_mark(path: &Path) -> io::Result<bool> {
         head if head.starts_with(b"<svg") => in_svg(head),
         head if head.starts_with(b"# ") => starts_with_prefix(&head[2..]),
         head if head.starts_with(&SNAPSHOT_MAGIC) => true,
-        head => in_json(head),
+        head => in_json(head) || in_gltf(head),
     })
 }
 
@@ -177,6 +178,11 @@ fn in_svg(head: &[u8]) -> bool {
     rest.strip_prefix(b"<!-- ").is_some_and(starts_with_prefix)
 }
 
+fn in_gltf(head: &[u8]) -> bool {
+    let mut bytes = head.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
+    b"{\"asset\":{\"generator\":\"Bansho".iter().all(|&byte| bytes.next() == Some(byte))
+}
+
 fn in_json(head: &[u8]) -> bool {
     let mut bytes = head.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
     let mut follows = |text: &[u8]| text.iter().all(|&byte| bytes.next() == Some(byte));
@@ -199,6 +205,7 @@ mod tests {
     use crate::{
         files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
         format::PictureFormat,
+        gltf,
         output::sink::{FrameSlot, Picture, Sink, SinkOptions},
         ply, testing,
     };
@@ -282,6 +289,8 @@ mod tests {
         for other in ["<svg/><!-- by hand --><!-- bansho:version=1 -->", "<svg", "# ", "x\n# bansho:version=1"] {
             assert!(!is_marked_with(other.as_bytes()), "{other}");
         }
+        assert!(is_marked_with(&gltf::encode(&[], &[])));
+        assert!(!is_marked_with(b"{\"asset\":{\"version\":\"2.0\",\"generator\":\"by hand\"}}"));
         let json = |text: &str| is_marked_with(text.as_bytes());
         assert!(json(&format!("{{\n  \"format\": 12,\n  \"program\": \"{PROGRAM}\"\n}}")));
         assert!(json("{\"format\":1,\"program\":\"Bansho 9\",\"size\":"), "cut off");

@@ -2,11 +2,11 @@
 
 use bansho_base::{
     camera::Camera,
+    host::parallel::prelude::*,
     image::Rect,
     math::{DVec2, DVec3},
     phenomenon::strip::View,
 };
-use rayon::prelude::*;
 
 /// Tile side for light that varies slowly, pixels.
 pub(crate) const COARSE_TILE: usize = 32;

@@ -113,7 +113,7 @@ mod tests {
             let speed = cube.terminal_velocity.speed(diameter_mm);
             let drop = FallingDrop { diameter_mm, speed, position: [1.0, 3.9, 0.5] };
             let mut lit = Image::filled(cube.size, cube.size, [0.0]);
-            cube.draw_speckled_over(&[drop], 0.5, 1, &mut lit);
+            cube.draw_speckled_over(&[drop], 0.5, 1, &mut lit).unwrap();
             let rows = (0.2 / cube.pixel()) as usize..((0.05 + 0.5 * speed) / cube.pixel()) as usize;
             let column: Vec<f64> = rows.map(|y| lit.row(y).iter().map(|[value]| f64::from(*value)).sum()).collect();
             let mean = column.iter().sum::<f64>() / column.len() as f64;

@@ -1,11 +1,11 @@
 //! Projection of drops into streaks: which drops of which cells are visible, and how each is lit.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{DVec3, random::Purpose, simd::LANES},
     phenomenon::surroundings::{Emitter, Light},
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},

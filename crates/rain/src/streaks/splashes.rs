@@ -6,6 +6,7 @@
 use std::f64::consts::TAU;
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{
         self, DVec3,
         random::{self, Purpose, uniform},
@@ -14,7 +15,6 @@ use bansho_base::{
     world::gravity::STANDARD_GRAVITY,
 };
 use fearless_simd::dispatch;
-use rayon::prelude::*;
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},

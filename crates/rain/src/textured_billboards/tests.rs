@@ -28,7 +28,7 @@ fn paper(rate: f64) -> RainParameters {
 
 #[test]
 fn the_papers_set_is_24_textures_in_6_291_456_bytes() {
-    let set = TextureSet::new(&paper(20.0), 1);
+    let set = TextureSet::new(&paper(20.0), 1).unwrap();
     assert_eq!((set.count(), set.bytes()), (24, 6_291_456));
     // Where two streaks cross, over: 1 - (1 - a)^2 at most of the largest drop; a single one has the paper's opacity.
     let (single, scale) = (paper_opacity(2.0, 6.575), f64::from(255.0 * set.opacity_of_code()));
@@ -43,7 +43,7 @@ fn the_papers_set_is_24_textures_in_6_291_456_bytes() {
 
 #[test]
 fn mipmaps_keep_the_mean_of_a_texture() {
-    let set = TextureSet::new(&paper(20.0), 1);
+    let set = TextureSet::new(&paper(20.0), 1).unwrap();
     for texture in set.of_rate(20.0) {
         let mean = |level: usize, side: usize| {
             let at = |index: usize| {
@@ -74,7 +74,7 @@ fn billboards_fall_and_return_to_the_top() {
 
 #[test]
 fn a_billboard_faces_the_camera_and_is_lit_by_the_inverse_square() {
-    let set = TextureSet::new(&paper(20.0), 1);
+    let set = TextureSet::new(&paper(20.0), 1).unwrap();
     let view = view_at(1.0, 1.0 / 30.0, [64, 36]);
     let light = lamp([1.0, 2.0, -3.0], 100.0);
     for center in [DVec3::new(2.0, 1.0, -3.0), DVec3::new(-1.5, 2.5, -4.0), DVec3::new(0.3, 0.5, 2.0)] {

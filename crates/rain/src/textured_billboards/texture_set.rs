@@ -4,7 +4,7 @@ use bansho_base::{image::Image, math};
 
 use crate::{
     RainParameters,
-    billboards::texture::StreakCube,
+    billboards::texture::{StreakCube, StreakTextureError},
     drops::{
         size_distribution::{DropSizeDistribution, SizeBin},
         terminal_velocity::{FallAir, TerminalVelocity},
@@ -36,7 +36,10 @@ pub(crate) struct Texture {
 
 impl TextureSet {
     /// Draws the textures of some rain.
-    pub fn new(parameters: &RainParameters, seed: u64) -> Self {
+    ///
+    /// # Errors
+    /// Diameters or rates that do not occur in rain.
+    pub fn new(parameters: &RainParameters, seed: u64) -> Result<Self, StreakTextureError> {
         let terminal_velocity = TerminalVelocity { law: parameters.terminal_velocity, air: FallAir::default() };
         let cube =
             StreakCube { exposure: EXPOSURE, terminal_velocity, opacity: parameters.opacity, ..StreakCube::default() };
@@ -46,13 +49,13 @@ impl TextureSet {
             .iter()
             .map(|rate| {
                 let sizes = DropSizeDistribution::marshall_palmer(*rate);
-                bins.iter().map(|bin| cube.draw(&cube.drops(&sizes, bin, seed, 0))).collect()
+                bins.iter().map(|bin| cube.draw(&cube.drops(&sizes, bin, seed, 0)?)).collect()
             })
-            .collect();
+            .collect::<Result<_, StreakTextureError>>()?;
         let values = pictures.iter().flatten().flat_map(|picture| picture.pixels().as_flattened());
         let scale = values.copied().fold(f32::MIN_POSITIVE, f32::max);
         let textures = pictures.iter().map(|row| row.iter().map(|picture| Texture::new(picture, scale)).collect());
-        Self { rates: parameters.texture_rates_mm_per_h.clone(), textures: textures.collect(), scale }
+        Ok(Self { rates: parameters.texture_rates_mm_per_h.clone(), textures: textures.collect(), scale })
     }
 
     /// Number of textures.

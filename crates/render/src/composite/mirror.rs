@@ -5,7 +5,10 @@
 
 use bansho_base::{
     camera::{Camera, Lens},
-    host::observer::{self, Cancelled, Observer},
+    host::{
+        observer::{self, Cancelled, Observer},
+        parallel::prelude::*,
+    },
     image::Image,
     math::{DVec2, DVec3},
     phenomenon::{LevelMirror, strip::View, surroundings::Backdrop},
@@ -13,7 +16,6 @@ use bansho_base::{
 };
 
 use super::plate::PlateFrame;
-use rayon::prelude::*;
 
 /// Distance between samples of a ray, pixels.
 const STRIDE: f64 = 1.0;

@@ -3,7 +3,10 @@
 use bansho_base::{
     camera::{Camera, Lens},
     color,
-    host::assets::{Assets, Encoding, Picture},
+    host::{
+        assets::{Assets, Encoding, Picture},
+        parallel::prelude::*,
+    },
     image::Image,
     math::DVec2,
     parameters::BuildError,
@@ -11,7 +14,6 @@ use bansho_base::{
 
 use crate::plan::Plan;
 use bansho_scene::{DepthKind, PlatePictures};
-use rayon::prelude::*;
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]

@@ -4,6 +4,7 @@ use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     host::{
         observer::{self, Cancelled, Observer},
+        parallel::prelude::*,
         scratch_pool::ScratchPool,
     },
     image::{Image, Rect},
@@ -24,7 +25,6 @@ use super::{
 use crate::{compiled::ActiveRun, plan::Plan};
 use bansho_scene::PLATE_LAYER;
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 /// Rows of a strip: few enough that the planes of a strip of 1920 pixels fit in the L2 cache of a core.
 pub(crate) const STRIP_ROWS: usize = 8;
@@ -63,11 +63,21 @@ pub(crate) struct Composition<'a> {
     pub(crate) hiding: &'a HidingDepth,
     /// What is behind the slices.
     pub(crate) background: Background<'a>,
+    /// Scratch memory, which frames reuse.
+    pub(crate) scratches: &'a StripScratches,
+}
+
+/// Scratch memory of all threads.
+pub(crate) type StripScratches = ScratchPool<StripScratch, fn() -> StripScratch>;
+
+/// Scratch memory of all threads, before any is needed.
+pub(crate) fn scratches() -> StripScratches {
+    ScratchPool::new(StripScratch::default)
 }
 
 /// Scratch memory of one thread.
 #[derive(Default)]
-struct StripScratch {
+pub(crate) struct StripScratch {
     strip: Strip,
     accumulator: Accumulator,
     /// What partly covered pixels show without the opaque surfaces.
@@ -207,8 +217,9 @@ pub(crate) fn draw_frame(
     let level = Level::new();
     let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, recycled);
     let strip_pixels = STRIP_ROWS * window.width;
-    let scratches = ScratchPool::new(StripScratch::default);
-    let planes: Vec<Vec<Vec<f32>>> = beauty
+    let scratches = composition.scratches;
+    let has_channels = composition.outputs.layers || composition.outputs.aovs;
+    let strips = beauty
         .pixels_mut()
         .par_chunks_mut(strip_pixels)
         .zip(depth.par_chunks_mut(strip_pixels))
@@ -226,10 +237,15 @@ pub(crate) fn draw_frame(
                 composition.accumulate(level, rect, scratch);
                 composition.background.trace(rect, &mut scratch.bent);
                 finish_strip(composition, level, scratch, strip, beauty, depth);
-                Ok(channel_planes(composition, scratch))
+                Ok(if has_channels { channel_planes(composition, scratch) } else { Vec::new() })
             })
-        })
-        .collect::<Result<_, Cancelled>>()?;
+        });
+    let planes: Vec<Vec<Vec<f32>>> = if has_channels {
+        strips.collect::<Result<_, Cancelled>>()?
+    } else {
+        strips.try_for_each(|planes| planes.map(|_| ()))?;
+        Vec::new()
+    };
     let opaque = composition.plate.color.is_some() && composition.view.overscan == 0;
     let content = composition.content();
     Ok(Frame {

@@ -8,7 +8,10 @@ use std::sync::Arc;
 use bansho_base::{
     frame::{Channel, Frame, PhenomenonMetadata},
     geometry::point_cloud::PointCloud,
-    host::observer::{self, Cancelled, Observer, Stage, StageGuard},
+    host::{
+        observer::{self, Cancelled, Observer, Stage, StageGuard},
+        parallel::prelude::*,
+    },
     image::Rect,
     math::DVec3,
     parameters::BuildError,
@@ -19,7 +22,6 @@ use bansho_base::{
     },
     world::wind::{FixedWind, Wind, WindParameters},
 };
-use rayon::prelude::*;
 
 use crate::{
     compiled::{ActiveRun, BuiltPhenomenon, CompiledScene},
@@ -31,7 +33,7 @@ use crate::{
         plate_cache::PlateCache,
         refraction,
         slices::{self, Slice},
-        strips::{self, Composition, Outputs},
+        strips::{self, Composition, Outputs, StripScratches},
     },
     context::ShotContext,
     plan::Plan,
@@ -65,7 +67,7 @@ pub struct PhenomenonLight {
 
 /// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
 ///
-/// It runs on the CPU, in the rayon pool of the caller. The same scene and plan give the same bytes with any number of threads.
+/// It runs on the CPU, in the rayon pool of the caller, or on its thread (see [`bansho_base::host::parallel`]). The same scene and plan give the same bytes with any number of threads.
 pub struct Shot {
     context: ShotContext,
     runs: Vec<ActiveRun>,
@@ -79,6 +81,7 @@ pub struct Shot {
     frame: Option<Frame>,
     /// A frame whose memory the next one reuses.
     recycled: Option<Frame>,
+    scratches: StripScratches,
 }
 
 /// Duration over which a wind that was edited takes the place of the one before, s.
@@ -96,6 +99,7 @@ impl Shot {
             has_earlier_state: false,
             frame: None,
             recycled: None,
+            scratches: strips::scratches(),
         }
     }
 
@@ -378,6 +382,7 @@ impl Shot {
             plate,
             hiding: &HidingDepth::new(&prepared, plate),
             background: Background::plate(plate),
+            scratches: &self.scratches,
         };
         let header = self.context.header(self.number, self.time);
         let mut frame = if is_refracted {
@@ -433,6 +438,7 @@ impl Shot {
             plate: mirrored,
             hiding: &HidingDepth::new(&prepared, mirrored),
             background: Background::plate(mirrored),
+            scratches: &self.scratches,
         };
         let mut image =
             strips::draw_frame(&composition, self.context.header(self.number, self.time), None, observer)?.beauty;

@@ -1,7 +1,6 @@
 //! The ionization table: ion pairs by energy and altitude for a spectrum.
 
-use bansho_base::math::lerp;
-use rayon::prelude::*;
+use bansho_base::{host::parallel::prelude::*, math::lerp};
 
 use super::{
     energy_grid::{self, NODES, node_energy_ev},

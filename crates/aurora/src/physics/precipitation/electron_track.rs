@@ -1,10 +1,10 @@
 //! Electron tracks as sequences of collisions whose mean is the ionization profile of Fang et al. (2010).
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math,
     math::random::{Key, Purpose, normal_pair, uniform, uniform_f64},
 };
-use rayon::prelude::*;
 
 use super::{
     COLLISION_EV,

@@ -2,8 +2,11 @@
 
 use std::sync::{Arc, LazyLock, OnceLock};
 
-use bansho_base::{host::once::get_or_compute, math, math::random::Key};
-use rayon::prelude::*;
+use bansho_base::{
+    host::{once::get_or_compute, parallel::prelude::*},
+    math,
+    math::random::Key,
+};
 
 use super::{
     Deposition,

@@ -6,12 +6,14 @@
 
 use std::{f64::consts::LN_2, ops::Range};
 
-use bansho_base::math::{
-    self, approximations,
-    simd::{FourLanes, Real},
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::{
+        self, approximations,
+        simd::{FourLanes, Real},
+    },
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 use crate::render::project::{
     chart::{BLOCK_COLUMNS, Chart, ChartProjection},

@@ -1,11 +1,11 @@
 //! Light sources: particles for prompt light, afterglow cells for green and red.
 
 use bansho_base::{
+    host::parallel::{self, prelude::*},
     math::{self, MulAdd, simd::LANES},
     parameters::Auto,
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::source_bins::{FieldLineSource, REACH};
 use crate::{
@@ -210,7 +210,7 @@ impl Sources {
         let cell_spreads =
             [with(Emitter::OxygenGreen, afterglow.green.cell_km()), with(Emitter::OxygenRed, afterglow.red.cell_km())];
         let blocks = [afterglow.green.block(cell_spreads[0]), afterglow.red.block(cell_spreads[1])];
-        let ((green_w, green), red) = rayon::join(
+        let ((green_w, green), red) = parallel::join(
             || afterglow.green.distribute_to_particles(inputs.particles, min_power, blocks[0]),
             || afterglow.red.bright_blocks(MIN_RELATIVE_POWER, blocks[1]),
         );

@@ -7,14 +7,13 @@
 use std::ops::Range;
 
 use bansho_base::{
-    host::scratch_pool::ScratchPool,
+    host::{parallel::prelude::*, scratch_pool::ScratchPool},
     math::{
         approximations,
         simd::{FourLanes, HalfLanes, Real},
     },
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS};
 use crate::{

@@ -2,12 +2,11 @@
 //! chart.
 
 use bansho_base::{
-    host::scratch_pool::ScratchPool,
+    host::{parallel::prelude::*, scratch_pool::ScratchPool},
     math,
     math::simd::{FourLanes, HalfLanes, Real},
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 use super::attenuation::EmitterColors;
 use crate::{

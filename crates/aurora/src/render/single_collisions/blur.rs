@@ -5,12 +5,12 @@
 
 use bansho_base::{
     camera::Camera,
+    host::parallel::prelude::*,
     math,
     math::simd::{FourLanes, Real},
     phenomenon::strip::View,
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 use crate::{
     parameters::BlurParameters,

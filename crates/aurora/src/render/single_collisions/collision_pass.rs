@@ -8,12 +8,14 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use bansho_base::math::{
-    random::{Key, Purpose, uniform, uniform_f64},
-    simd::{FourLanes, Lanes, Real},
+use bansho_base::{
+    host::parallel::{self, prelude::*},
+    math::{
+        random::{Key, Purpose, uniform, uniform_f64},
+        simd::{FourLanes, Lanes, Real},
+    },
 };
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 use super::{
     collision_block::{COLLISION_BLOCK_COLUMNS, CollisionBlock},
@@ -138,7 +140,7 @@ impl CollisionRenderer {
         blocks.sort_by_key(|(count, _)| *count);
         let blocks = Mutex::new(blocks);
         let next = || blocks.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        (0..rayon::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
+        (0..parallel::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
             let mut scratch = None;
             while let Some((_, block)) = next() {
                 let scratch = scratch.get_or_insert_with(|| CollisionScratch::new(chart));

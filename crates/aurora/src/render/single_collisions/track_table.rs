@@ -1,6 +1,6 @@
 //! Electron tracks by energy, arranged in SIMD batches.
 
-use rayon::prelude::*;
+use bansho_base::host::parallel::prelude::*;
 
 use super::rasterize::SPLAT_LANES;
 use crate::{

@@ -1,7 +1,6 @@
 //! A sparse map of power that relaxes toward the power of the particles.
 
-use bansho_base::math;
-use rayon::prelude::*;
+use bansho_base::{host::parallel::prelude::*, math};
 
 use crate::{
     physics::precipitation::energy_grid::{NODES, node_coordinate, node_energy_ev},

@@ -5,6 +5,7 @@
 
 mod map;
 
+use bansho_base::host::parallel;
 use map::DecayFactors;
 pub use map::{AfterglowCell, AfterglowMap};
 
@@ -51,7 +52,7 @@ impl Afterglow {
 
     /// Advances both maps by one step.
     pub(crate) fn step(&mut self, particles: &AuroraParticles, decay: &AfterglowDecay) {
-        rayon::join(|| self.green.step(particles, &decay.green), || self.red.step(particles, &decay.red));
+        parallel::join(|| self.green.step(particles, &decay.green), || self.red.step(particles, &decay.red));
     }
 
     /// Sets the maps to the steady state of `particles`.

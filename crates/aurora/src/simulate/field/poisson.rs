@@ -3,9 +3,8 @@
 
 use std::{f64::consts::PI, sync::Arc};
 
-use bansho_base::math;
+use bansho_base::{host::parallel::prelude::*, math};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{grid::Grid2, sine_transform::SineTransform};
 

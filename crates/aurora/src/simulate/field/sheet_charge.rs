@@ -1,10 +1,12 @@
 //! Charge on the sheets: scattered particles (thesis, 2.2.3) and their charge as on conductors.
 
-use bansho_base::math::{
-    DVec2,
-    random::{Key, Purpose, uniform},
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::{
+        DVec2,
+        random::{Key, Purpose, uniform},
+    },
 };
-use rayon::prelude::*;
 
 use super::Grid2;
 use crate::simulate::sheets::{nodes::split, refined_shape::RefinedShape};

@@ -4,6 +4,7 @@
 //! km^2/s^2. Constants are given in cells and frames.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{
         self, DVec2, MulAdd,
         random::{Key, Purpose},
@@ -12,7 +13,6 @@ use bansho_base::{
     parameters::Auto,
 };
 use fearless_simd::Level;
-use rayon::prelude::*;
 
 use super::{
     Grid2, PoissonSolver, gauss_seidel_sweep,

@@ -1,7 +1,7 @@
 //! Parameters of streak textures that are out of range.
 
 use bansho_base::host::plural::counted;
-use bansho_rain::drops::terminal_velocity::NoTerminalVelocity;
+use bansho_rain::{billboards::texture::StreakTextureError, drops::terminal_velocity::NoTerminalVelocity};
 
 /// A parameter that is a list of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -103,6 +103,9 @@ pub enum StreaksError {
         /// Mean number of drops.
         drops: f64,
     },
+    /// A drop or a bin for which no texture can be drawn.
+    #[error(transparent)]
+    Texture(#[from] StreakTextureError),
     /// The paper's formula has no velocity for a diameter.
     #[error("{0}; the measured velocities (gunn_kinzer) cover all diameters")]
     Velocity(NoTerminalVelocity),

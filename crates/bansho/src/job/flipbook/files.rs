@@ -74,6 +74,8 @@ pub(crate) struct Files {
     pub(crate) bits: BitDepth,
     /// Convention of the straight alpha of PNG sheets.
     pub(crate) alpha: AlphaConvention,
+    /// Whether the lights are also written as glTF.
+    pub(crate) gltf: bool,
     /// Which existing files may be overwritten.
     pub(crate) overwrite: OverwritePolicy,
 }
@@ -101,7 +103,8 @@ impl Files {
     /// All files, the JSON last.
     pub(crate) fn paths(&self) -> Vec<PathBuf> {
         let sheets: &[&str] = if self.is_linear() { &["color", "motion"] } else { &["color", "alpha", "motion"] };
-        sheets.iter().map(|sheet| self.sheet_path(sheet)).chain([self.path(".json")]).collect()
+        let lights = self.gltf.then(|| self.path(".gltf"));
+        sheets.iter().map(|sheet| self.sheet_path(sheet)).chain(lights).chain([self.path(".json")]).collect()
     }
 
     /// The tile of a frame.
@@ -134,6 +137,10 @@ impl Files {
             self.write_linear(sheet, tiles, &finished)?;
         } else {
             self.write_display(sheet, tiles, scale, &finished)?;
+        }
+        if self.gltf {
+            let bytes = lights::encode_gltf(drawn.lights, plan.fps().frame_s(), plan.loop_s().is_some());
+            self.write_file(self.path(".gltf"), &bytes, &finished)?;
         }
         let text = format!("{:#}\n", self.description(plan, sheet, drawn, scale));
         self.write_file(self.path(".json"), text.as_bytes(), &finished)?;
@@ -257,6 +264,9 @@ impl Files {
         description["blend"] = self.blend();
         description["motion"] = self.motion(scale);
         description["lights"] = lights::meaning();
+        if self.gltf {
+            description["lights"]["file"] = json!(name(&self.path(".gltf")));
+        }
         description["frames"] = drawn.numbers.iter().enumerate().map(frame).collect();
         description
     }

@@ -6,8 +6,9 @@ use bansho_base::{
     host::observer::Observer,
     image::Rect,
     math::DVec3,
-    phenomenon::surroundings::{Emitter, Light},
+    phenomenon::surroundings::{Emitter, Light, SrgbLight},
 };
+use bansho_media::gltf::{self, AnimatedLight, LightKey};
 use bansho_render::{Plan, RenderError, Shot};
 use serde_json::{Value, json};
 
@@ -126,6 +127,36 @@ fn describe_light(
     })
 }
 
+/// The lights of all frames, `frame_s` (s) apart, as glTF: one for each phenomenon that shines in any of them. In a loop the first frame is also the last key.
+pub(crate) fn encode_gltf(frames: &[Vec<FlameLight>], frame_s: f64, is_loop: bool) -> Vec<u8> {
+    let mut names: Vec<&str> = Vec::new();
+    for light in frames.iter().flatten() {
+        if !names.contains(&light.phenomenon.as_str()) {
+            names.push(&light.phenomenon);
+        }
+    }
+    let frames: Vec<&Vec<FlameLight>> = frames.iter().chain(frames.first().filter(|_| is_loop)).collect();
+    let times: Vec<f32> = (0..frames.len()).map(|index| (index as f64 * frame_s) as f32).collect();
+    let lights = names.into_iter().map(|name| AnimatedLight { name: name.to_owned(), keys: light_keys(name, &frames) });
+    gltf::encode(&lights.collect::<Vec<_>>(), &times)
+}
+
+/// The keys of the light of one phenomenon. Where it is dark, the light stays where it was last, and its color.
+fn light_keys(name: &str, frames: &[&Vec<FlameLight>]) -> Vec<LightKey> {
+    let key = |frame: &&Vec<FlameLight>| {
+        let FlameLight { position, light, .. } = frame.iter().find(|light| light.phenomenon == name)?;
+        let SrgbLight { color, intensity } = light.srgb();
+        Some(LightKey { position: position.as_vec3().to_array(), color, intensity })
+    };
+    let keys: Vec<Option<LightKey>> = frames.iter().map(key).collect();
+    let Some(mut last) = keys.iter().copied().flatten().next() else { return Vec::new() };
+    let or_dark = |key: Option<LightKey>| {
+        last = key.unwrap_or(LightKey { intensity: 0.0, ..last });
+        last
+    };
+    keys.into_iter().map(or_dark).collect()
+}
+
 /// Rounded to a multiple of 1 / `steps`, without a negative zero.
 fn rounded(value: f64, steps: f64) -> f64 {
     (value * steps).round() / steps + 0.0
@@ -139,6 +170,20 @@ fn significant(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_light_that_goes_out_stays_dark_where_it_was() {
+        let light = |height: f64, strength: f32| {
+            let position = DVec3::new(0.0, height, 0.0);
+            let light = Light { emitter: Emitter::Point { position, radius: 0.1 }, intensity: [strength; 3] };
+            FlameLight { phenomenon: "fire".to_owned(), position, radius: 0.1, light }
+        };
+        let frames = [vec![], vec![light(1.0, 4.0)], vec![], vec![light(2.0, 8.0)]];
+        let keys = light_keys("fire", &frames.iter().collect::<Vec<_>>());
+        let found: Vec<(f32, f32)> = keys.iter().map(|key| (key.position[1], key.intensity.round())).collect();
+        assert_eq!(found, [(1.0, 0.0), (1.0, 4.0), (1.0, 0.0), (2.0, 8.0)]);
+        assert!(light_keys("other", &frames.iter().collect::<Vec<_>>()).is_empty());
+    }
 
     #[test]
     fn numbers_have_six_digits() {

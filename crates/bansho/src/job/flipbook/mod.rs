@@ -66,6 +66,8 @@ pub struct Flipbook {
     pub bits: BitDepth,
     /// Convention of the straight alpha of PNG sheets. `None` is [`AlphaConvention::Linear`], since engines blend sprites in linear light.
     pub alpha: Option<AlphaConvention>,
+    /// Whether the lights of the flames are also written as glTF, `DIR/NAME.gltf`.
+    pub gltf: bool,
     /// The output: `DIR/NAME.png` for `NAME_color.png` and so on. `None` is `out/STEM/STEM.png`.
     pub out: Option<PathBuf>,
     /// Whether files that Bansho did not make may be overwritten. Files that the scene is read from never are.
@@ -96,6 +98,7 @@ impl Flipbook {
             view: View::DISPLAY,
             bits: BitDepth::Eight,
             alpha: None,
+            gltf: false,
             out: None,
             overwrite: false,
         }
@@ -159,7 +162,8 @@ impl Flipbook {
         }
         let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
         let base = path.with_extension("");
-        let files = Files { base, kind: pattern.kind(), view: self.view, bits: self.bits, alpha, overwrite };
+        let (kind, view, bits, gltf) = (pattern.kind(), self.view, self.bits, self.gltf);
+        let files = Files { base, kind, view, bits, alpha, gltf, overwrite };
         files.paths().iter().try_for_each(|path| outputs::check_writable(path))?;
         Ok(files)
     }

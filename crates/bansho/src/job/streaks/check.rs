@@ -3,9 +3,13 @@
 use super::Streaks;
 use crate::job::error::{MAX_DROPS, StreakList, StreaksError};
 use bansho_rain::{
+    billboards::texture::{StreakQuantity, StreakTextureError},
     drops::size_distribution::{DropSizeDistribution, SizeBin},
     opacity_law::OpacityLaw,
 };
+
+/// Smallest side of a texture, pixels.
+const MIN_TEXTURE_SIZE: usize = 8;
 
 /// Checks all parameters.
 ///
@@ -15,15 +19,16 @@ pub(crate) fn check(streaks: &Streaks) -> Result<(), StreaksError> {
     check_list(StreakList::RainRates, &streaks.rates)?;
     check_list(StreakList::DropDiameters, &streaks.diameters)?;
     let cube = &streaks.cube;
-    if !(1e-6..=10.0).contains(&cube.exposure) {
-        return Err(StreaksError::Exposure(cube.exposure));
-    }
-    if !(8..=4096).contains(&cube.size) {
+    // A smaller texture is of no use in a file.
+    if cube.size < MIN_TEXTURE_SIZE {
         return Err(StreaksError::TextureSize(cube.size));
     }
-    if !(1e-3..=100.0).contains(&cube.edge) {
-        return Err(StreaksError::CubeSize(cube.edge));
-    }
+    cube.check().map_err(|error| match error {
+        StreakTextureError::OutOfRange { quantity: StreakQuantity::Exposure, value } => StreaksError::Exposure(value),
+        StreakTextureError::OutOfRange { quantity: StreakQuantity::Size, .. } => StreaksError::TextureSize(cube.size),
+        StreakTextureError::OutOfRange { quantity: StreakQuantity::Edge, value } => StreaksError::CubeSize(value),
+        other => other.into(),
+    })?;
     if !(1..=1000).contains(&streaks.variants) {
         return Err(StreaksError::Variants(streaks.variants));
     }

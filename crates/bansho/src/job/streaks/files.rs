@@ -1,9 +1,6 @@
 //! Writes the pictures of streak textures.
 
-use std::{
-    f64::consts::PI,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use bansho_base::{
     camera::CameraHeader,
@@ -17,11 +14,11 @@ use bansho_media::{
     files::{atomic, overwrite_policy::OverwritePolicy},
     png::{self, MeasuredImage, PngEffort},
 };
-use bansho_rain::lighting::drop_phase_function::DropPhaseFunction;
+use bansho_rain::{billboards::texture::lit_radiance, lighting::drop_phase_function::DropPhaseFunction};
 use bansho_render::display::BitDepth;
 
 use super::{StreakFormat, Streaks, Texture};
-use crate::job::error::JobError;
+use crate::job::error::{JobError, StreaksError};
 
 /// Version of the program, which is part of the fingerprint.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -36,11 +33,9 @@ pub(crate) struct DistantLight {
 }
 
 impl DistantLight {
-    pub(crate) fn new(toward: [f64; 3], phase_function: &DropPhaseFunction) -> Self {
-        let toward = DVec3::from(toward).normalize();
-        // The light travels along `-toward`, and is scattered to the viewer along z.
-        let phase = phase_function.phase(-toward.z as f32);
-        Self { toward, radiance: phase.map(|phase| phase / (4.0 * PI) as f32) }
+    pub(crate) fn new(toward: [f64; 3], phase_function: &DropPhaseFunction) -> Result<Self, StreaksError> {
+        let radiance = lit_radiance(toward, phase_function).map_err(|_| StreaksError::LightDirection)?;
+        Ok(Self { toward: DVec3::from(toward).normalize(), radiance })
     }
 }
 

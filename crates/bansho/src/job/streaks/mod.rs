@@ -10,13 +10,13 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use bansho_base::host::observer;
+use bansho_base::{host::observer, image::Image};
 use bansho_media::{
     MediaError,
     files::overwrite_policy::{InputFiles, OverwritePolicy},
 };
 use bansho_rain::{
-    billboards::texture::StreakCube,
+    billboards::texture::{FallingDrop, StreakCube},
     drops::{
         size_distribution::{DropSizeDistribution, SizeBin},
         terminal_velocity::{FallAir, TerminalVelocity, VelocityLaw, fixed_point_velocity},
@@ -120,7 +120,7 @@ impl Streaks {
             }
         }
         let cube = StreakCube { terminal_velocity: TerminalVelocity { law: self.law, air }, ..self.cube };
-        let light = self.light.map(|toward| DistantLight::new(toward, &DropPhaseFunction::new()));
+        let light = self.light.map(|toward| DistantLight::new(toward, &DropPhaseFunction::new())).transpose()?;
         let folder = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join("streaks"));
         let overwrite = OverwritePolicy::new(InputFiles::default(), self.overwrite);
         let writer =
@@ -222,21 +222,27 @@ impl PreparedStreaks {
     }
 
     fn write_texture(&self, texture: &Texture, observer: &dyn JobObserver) -> Result<Entry, JobError> {
-        let drops = self.cube.drops(texture.sizes, &texture.bin, self.streaks.seed, texture.variant);
-        let mut image = self.cube.draw(&[]);
+        let drops = self
+            .cube
+            .drops(texture.sizes, &texture.bin, self.streaks.seed, texture.variant)
+            .map_err(StreaksError::from)?;
+        let mut image = self.cube.draw(&[]).map_err(StreaksError::from)?;
         for drops in drops.chunks(DROPS_PER_CHECK) {
             check_cancelled(observer)?;
-            self.cube.draw_over(drops, &mut image);
+            self.cube.draw_over(drops, &mut image).map_err(StreaksError::from)?;
         }
         check_cancelled(observer)?;
-        let speckled = (self.streaks.oscillation > 0.0).then(|| {
-            let mut brightness = self.cube.draw(&[]);
-            self.cube.draw_speckled_over(&drops, self.streaks.oscillation, self.streaks.seed, &mut brightness);
-            brightness
-        });
+        let speckled = (self.streaks.oscillation > 0.0).then(|| self.speckled(&drops)).transpose()?;
         let file = self.writer.name(texture);
         let written = self.writer.write(&file, &image, speckled.as_ref())?;
         Ok(Entry::new(texture, &self.cube, file, drops, &image, written))
+    }
+
+    /// The brightness of oscillating drops.
+    fn speckled(&self, drops: &[FallingDrop]) -> Result<Image<1>, StreaksError> {
+        let mut brightness = self.cube.draw(&[])?;
+        self.cube.draw_speckled_over(drops, self.streaks.oscillation, self.streaks.seed, &mut brightness)?;
+        Ok(brightness)
     }
 }
 

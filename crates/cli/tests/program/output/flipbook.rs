@@ -128,6 +128,23 @@ fn every_frame_states_the_light_of_its_flame() {
     }
     let [least, most] = [f64::min, f64::max].map(|choose| intensities.iter().copied().reduce(choose).unwrap());
     assert!(most > 1.001 * least, "the light flickers: {intensities:?}");
+    assert!(!folder.path("fire.gltf").exists());
+    // The same as glTF; in a loop the first frame comes again at the end.
+    let looped = ["flipbook", "scene.toml", "--grid", "3x2", "--loop", "1.5", "--gltf", "--out", "loop.png"];
+    folder.succeed(&looped);
+    let (about, gltf) = (description(&folder, "loop.json"), description(&folder, "loop.gltf"));
+    assert_eq!(about["lights"]["file"], "loop.gltf");
+    assert_eq!(gltf["nodes"][0]["name"], "left log");
+    assert_eq!(gltf["animations"][0]["channels"].as_array().unwrap().len(), 3);
+    let counts: Vec<u64> =
+        gltf["accessors"].as_array().unwrap().iter().map(|accessor| accessor["count"].as_u64().unwrap()).collect();
+    assert_eq!(counts, [7; 4]);
+    assert_eq!(gltf["accessors"][0]["max"], serde_json::json!([1.5]));
+    let first = &about["frames"][0]["lights"][0];
+    let place = numbers(&gltf["nodes"][0]["translation"]);
+    assert!(numbers(&first["position_m"]).iter().zip(&place).all(|(a, b)| (a - b).abs() < 1e-5), "{place:?}");
+    // It may be written again, as it bears the mark.
+    folder.succeed(&looped);
     // The scene has no other phenomenon that shines.
     let rain = "bansho = 2\n[picture]\nsize = [48, 32]\n[[rain]]\n[[light]]\nposition = [0.0, 2.0, 0.0]\n";
     folder.write("rain.toml", rain);

@@ -4,12 +4,12 @@
 //! sum of sprites, like the optical depth.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     image::{Image, Rect},
     phenomenon::strip::{Strip, View},
     world::air::Air,
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::{aovs::DEFLECTION, gas::Gas};
 use crate::particles::{

@@ -5,11 +5,11 @@
 use std::ops::Range;
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::DVec3,
     phenomenon::strip::{DepthInterval, View},
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use crate::particles::{
     parameters::{RenderingParameters, SpriteStyle},

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use bansho_base::{
     color,
+    host::parallel::prelude::*,
     math::DVec3,
     phenomenon::surroundings::{Emitter, Light},
 };
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::gas::{Gas, PARTICLES_PER_TASK};
 use crate::particles::parameters::RenderingParameters;

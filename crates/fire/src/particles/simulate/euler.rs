@@ -7,10 +7,10 @@
 //! oldest: [`EulerStep::remove_oldest`]. It states neither k, rho_0, d, m nor the time step; see [`DerivedConstants`].
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{DVec3, Vec3, random::Key},
     phenomenon::surroundings::Surroundings,
 };
-use rayon::prelude::*;
 
 use crate::particles::{
     parameters::FlameParticlesParameters,

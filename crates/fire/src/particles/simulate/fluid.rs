@@ -1,11 +1,10 @@
 //! The gas as a fluid: density, pressure force, and sums over neighbors.
 
-use bansho_base::math::simd::Real;
+use bansho_base::{host::parallel::prelude::*, math::simd::Real};
 use bansho_sph::{
     Cells, KernelShape, Pair, PairTerm, Poly6, PressureForce, SmoothingKernel, StateEquation, compute_densities,
     max_stable_step, mixing_weights, substep_count,
 };
-use rayon::prelude::*;
 
 use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
 use crate::particles::parameters::{FluidParameters, NegativePressure};

@@ -7,10 +7,10 @@
 use std::sync::Arc;
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{Vec3, random::Key},
     phenomenon::surroundings::Surroundings,
 };
-use rayon::prelude::*;
 
 use crate::particles::{
     parameters::{FlameParticlesParameters, GasModel},

@@ -5,9 +5,11 @@
 
 use std::ops::Range;
 
-use bansho_base::math::simd::{LANES, Lanes};
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::simd::{LANES, Lanes},
+};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use rayon::prelude::*;
 
 use crate::particles::simulate::forces::external_forces::BurnerForces;
 

@@ -1,8 +1,7 @@
 //! Particles as a structure of arrays.
 
-use bansho_base::math::DVec3;
+use bansho_base::{host::parallel::prelude::*, math::DVec3};
 use bansho_sph::{Cells, retain};
-use rayon::prelude::*;
 
 /// Number of `f32` columns.
 pub(crate) const FLOAT_COLUMNS: usize = 21;

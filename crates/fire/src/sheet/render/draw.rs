@@ -112,8 +112,14 @@ impl<S: Simd> RowBand<S> {
     /// Empty rows with capacity for a group of columns.
     #[inline(always)]
     fn new(context: &DrawContext) -> Self {
-        let allocate = || Vec::with_capacity(GROUP_COLUMNS / LANES * context.samples.len());
-        Self { first: allocate(), delta: allocate(), next: allocate() }
+        let length = GROUP_COLUMNS / LANES * context.samples.len();
+        // A band of one row has no next row to interpolate to.
+        let interpolated = if context.row_band > 1 { length } else { 0 };
+        Self {
+            first: Vec::with_capacity(length),
+            delta: Vec::with_capacity(interpolated),
+            next: Vec::with_capacity(interpolated),
+        }
     }
 
     /// Discards both rows, for a band that does not follow the previous one.
@@ -126,7 +132,11 @@ impl<S: Simd> RowBand<S> {
     /// Advances to the band that starts at `row`.
     #[inline(always)]
     fn advance(&mut self, simd: S, context: &DrawContext, columns: &Range<usize>, row: usize) {
-        std::mem::swap(&mut self.first, &mut self.next);
+        if context.row_band > 1 {
+            std::mem::swap(&mut self.first, &mut self.next);
+        } else {
+            self.first.clear();
+        }
         if self.first.is_empty() {
             add_sheet_samples(simd, context, columns, row, &mut self.first);
         }

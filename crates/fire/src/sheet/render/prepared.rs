@@ -88,7 +88,7 @@ impl FlameSheet {
         match self.parameters.method {
             _ if self.is_out(view.shutter.middle()) => {}
             SheetMethod::Texture => {
-                let texture = flame.texture_source.filtered(scale * quad.size.y);
+                let texture = flame.texture_source.filtered(scale * quad.size.y, &self.filter_cache);
                 let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);
                 if !samples.is_empty() {
                     commands.push(DrawCommand { flame, depth, rect, item: DrawItem::Sheet(self.content(), samples) });

@@ -28,8 +28,8 @@ impl FlameSheet {
     /// Texture layers and fluctuations of a flame's smoke; `None` if it has none.
     pub(crate) fn smoke_layers(&self, flame: &FlameInstance) -> Option<(FractalLayers, FlameWaves)> {
         let smoke = &self.parameters.smoke;
-        let shape = ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
         (smoke.optical_depth > 0.0).then(|| {
+            let shape = ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
             let layers = FractalLayers::new([1.0, 0.35], smoke.speed, flame.key, &self.clock);
             (layers, FlameWaves::new(&shape, flame.key, &self.clock))
         })
@@ -58,7 +58,7 @@ impl FlameSheet {
         let warp = WarpState::new(&self.parameters, self.shape(), &waves, &self.clock, time, across);
         let pixel_to_sheet = PixelToSheet::new(&view.camera, &quad)?;
         let scale = pixels_per_meter(&view.camera, &quad);
-        let source = FilteredTexture::fractal(layers, scale * plume.y);
+        let source = FilteredTexture::fractal(layers, scale * plume.y, &self.filter_cache);
         let [low, high] = warp.center_range;
         let rect = bounds(&view.camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size);
         let state = SheetState {

@@ -3,7 +3,7 @@
 mod fractal;
 mod paper;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use bansho_base::math::{
     self,
@@ -106,8 +106,10 @@ fn filter(texels: &mut [f32], spacing: usize, amount: f32) {
 
 #[inline(always)]
 fn filter_rows(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
+    let mut wrapped = Vec::with_capacity(COLUMNS + 2 * spacing);
     for (row, filtered) in before.chunks_exact(COLUMNS).zip(texels.chunks_exact_mut(COLUMNS)) {
-        let wrapped = [&row[COLUMNS - spacing..], row, &row[..spacing]].concat();
+        wrapped.clear();
+        [&row[COLUMNS - spacing..], row, &row[..spacing]].iter().for_each(|part| wrapped.extend_from_slice(part));
         blend(row, [&wrapped[2 * spacing..], &wrapped], amount, filtered);
     }
 }
@@ -218,18 +220,50 @@ impl TextureSource {
         }
     }
 
-    /// This texture with its table low-pass filtered (as a mip level) for a sheet `height_pixels` tall.
-    pub(crate) fn filtered(&self, height_pixels: f64) -> FilteredTexture {
+    /// This texture with its table low-pass filtered (as a mip level) for a sheet `height_pixels` tall. Filtered fractals are taken from `cache`.
+    pub(crate) fn filtered(&self, height_pixels: f64, cache: &FilterCache) -> FilteredTexture {
         let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
         match self {
-            Self::Fractal(layers) if level > 0.0 => {
-                FilteredTexture::Fractal(*layers, Arc::new(FRACTAL.filtered(level)))
-            }
+            Self::Fractal(layers) if level > 0.0 => FilteredTexture::Fractal(*layers, cache.filtered_fractal(level)),
             Self::Fractal(layers) => FilteredTexture::Fractal(*layers, FRACTAL.clone()),
             Self::Paper(layer) if level > 0.0 => FilteredTexture::Paper(Arc::new(layer.filtered(level))),
             Self::Paper(layer) => FilteredTexture::Paper(layer.clone()),
             Self::Exact(sum) => FilteredTexture::Exact(*sum),
         }
+    }
+}
+
+/// Fractal tables that were filtered for recent frames: while the camera stands still, the level is the same in every frame.
+#[derive(Debug, Default)]
+pub(crate) struct FilterCache {
+    /// Levels and tables, the newest last.
+    recent: Mutex<Vec<(f32, Arc<TextureTable>)>>,
+}
+
+impl FilterCache {
+    /// Number of tables kept: those of a few instances, in the picture and in a mirror.
+    const CAPACITY: usize = 4;
+
+    fn filtered_fractal(&self, level: f32) -> Arc<TextureTable> {
+        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = recent().iter().find(|(known, _)| *known == level).map(|(_, table)| table.clone());
+        known.unwrap_or_else(|| {
+            // Computed without the lock, so that no thread waits.
+            let table = Arc::new(FRACTAL.filtered(level));
+            let mut recent = recent();
+            if recent.len() >= Self::CAPACITY {
+                recent.remove(0);
+            }
+            recent.push((level, table.clone()));
+            table
+        })
+    }
+}
+
+impl Clone for FilterCache {
+    /// An empty cache.
+    fn clone(&self) -> Self {
+        Self::default()
     }
 }
 
@@ -245,8 +279,8 @@ pub(crate) enum FilteredTexture {
 
 impl FilteredTexture {
     /// Fractal layers filtered for a sheet `height_pixels` tall.
-    pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64) -> Self {
-        TextureSource::Fractal(layers).filtered(height_pixels)
+    pub(crate) fn fractal(layers: FractalLayers, height_pixels: f64, cache: &FilterCache) -> Self {
+        TextureSource::Fractal(layers).filtered(height_pixels, cache)
     }
 
     /// T0 after `scroll` sheet heights.

@@ -4,10 +4,9 @@ mod any_lens;
 mod perspective;
 
 use any_lens::AnyLensProjector;
-use bansho_base::phenomenon::strip::View;
+use bansho_base::{host::parallel::prelude::*, phenomenon::strip::View};
 use fearless_simd::{Level, dispatch};
 use perspective::PerspectiveProjector;
-use rayon::prelude::*;
 
 use crate::particles::render::{
     buffer_pool::PooledVec,

@@ -342,7 +342,7 @@ pub(crate) struct ColumnExtents {
 
 impl ColumnExtents {
     pub(crate) fn new(grid: &Grid, layers: usize) -> Self {
-        use rayon::prelude::*;
+        use bansho_base::host::parallel::prelude::*;
         let columns = grid.cells.columns;
         let extent = |index: usize| {
             let (row, layer) = (index / layers, index % layers);

@@ -4,9 +4,8 @@
 //! compressed, they change by many noise cells within one support radius, which would alias. There detail is faded out, so that only the smooth sum is
 //! drawn.
 
-use bansho_base::math::simd::LANES;
+use bansho_base::{host::parallel::prelude::*, math::simd::LANES};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use crate::particles::render::{
     resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU},

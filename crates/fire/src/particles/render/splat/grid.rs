@@ -1,8 +1,7 @@
 //! A grid of cells over the picture, with several values per cell.
 
-use bansho_base::image::Rect;
+use bansho_base::{host::parallel::prelude::*, image::Rect};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use super::spline;
 use crate::particles::render::buffer_pool::{BufferPool, PooledVec};

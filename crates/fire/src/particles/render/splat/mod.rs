@@ -6,9 +6,8 @@
 
 use std::ops::Range;
 
-use bansho_base::{image::Rect, math::simd::LANES};
+use bansho_base::{host::parallel::prelude::*, image::Rect, math::simd::LANES};
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
 
 use crate::particles::render::{
     buffer_pool::{BufferPool, PooledVec},

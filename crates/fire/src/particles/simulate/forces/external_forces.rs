@@ -2,6 +2,7 @@
 //! time.
 
 use bansho_base::{
+    host::parallel::prelude::*,
     math::{
         DVec3, Vec3,
         random::Key,
@@ -11,7 +12,6 @@ use bansho_base::{
     world::gravity::STANDARD_GRAVITY,
 };
 use fearless_simd::{Simd, prelude::*};
-use rayon::prelude::*;
 
 use super::{
     entrainment_axis::{PlumeAxis, plume_axes},
