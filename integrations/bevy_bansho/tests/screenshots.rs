@@ -88,11 +88,13 @@ fn run_until(app: &mut App, seconds: f64) -> (f64, Image) {
     app.cleanup();
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0)));
     let mut effects = app.world_mut().query::<&BanshoEffect>();
+    let mut times = Vec::new();
     loop {
         app.update();
         thread::sleep(Duration::from_millis(2));
         let effect = effects.single(app.world()).unwrap();
         assert!(!effect.has_failed(), "the error is in the log");
+        times.push(effect.drawing_time());
         if effect.is_shown() && effect.time_s() >= seconds {
             break;
         }
@@ -107,7 +109,9 @@ fn run_until(app: &mut App, seconds: f64) -> (f64, Image) {
         same = if now == time_s { same + 1 } else { 0 };
         time_s = now;
     }
-    println!("the task takes {:?} a picture", effects.single(app.world()).unwrap().drawing_time());
+    times.retain(|time| *time > Duration::ZERO);
+    times.sort();
+    println!("the task takes {:?} a picture (median of {} updates)", times[times.len() / 2], times.len());
     (time_s, capture(app))
 }
 
