@@ -20,7 +20,7 @@ const MAX_OWED_S: f64 = 0.25;
 pub(crate) type Change = Box<dyn FnOnce(&mut LiveEffect) -> Result<(), EffectError> + Send + Sync>;
 
 /// What the next picture is drawn with.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Request {
     /// Camera, and the surface that shows the picture.
     pub(crate) view: View,
@@ -67,6 +67,8 @@ type EffectResult = Result<Finished, EffectError>;
 enum Stage {
     Described(Box<Effect>),
     Busy(Task<EffectResult>),
+    /// Nothing has changed since the last picture, not even the time.
+    Idle(Box<Finished>),
     Failed,
 }
 
@@ -75,6 +77,8 @@ pub(crate) struct EffectTask {
     stage: Stage,
     /// Time since the last picture was begun, s.
     elapsed_s: f64,
+    /// With what it was drawn.
+    last_request: Option<Request>,
     changes: Vec<Change>,
     /// Problems that were logged already.
     logged: HashSet<String>,
@@ -82,7 +86,8 @@ pub(crate) struct EffectTask {
 
 impl EffectTask {
     pub(crate) fn new(effect: Effect) -> Self {
-        Self { stage: Stage::Described(Box::new(effect)), elapsed_s: 0.0, changes: Vec::new(), logged: HashSet::new() }
+        let stage = Stage::Described(Box::new(effect));
+        Self { stage, elapsed_s: 0.0, last_request: None, changes: Vec::new(), logged: HashSet::new() }
     }
 
     pub(crate) fn push_change(&mut self, change: Change) {
@@ -96,28 +101,26 @@ impl EffectTask {
     /// Lets `dt` seconds pass. Takes the picture if it is finished, and begins the next one.
     pub(crate) fn update(&mut self, dt: f64, request: Request) -> Option<Drawn> {
         self.elapsed_s += dt;
-        match std::mem::replace(&mut self.stage, Stage::Failed) {
-            Stage::Described(effect) => {
-                self.stage = Stage::Busy(open(*effect, request));
-                None
-            }
+        let (stage, drawn) = match std::mem::replace(&mut self.stage, Stage::Failed) {
+            Stage::Described(effect) => (Stage::Busy(open(*effect, request)), None),
             Stage::Busy(mut task) => match check_ready(&mut task) {
                 Some(result) => self.finish(result, request),
-                None => {
-                    self.stage = Stage::Busy(task);
-                    None
-                }
+                None => (Stage::Busy(task), None),
             },
-            Stage::Failed => None,
-        }
+            Stage::Idle(finished) => (self.begin(*finished, request), None),
+            Stage::Failed => (Stage::Failed, None),
+        };
+        self.stage = stage;
+        drawn
     }
 
-    fn finish(&mut self, result: EffectResult, request: Request) -> Option<Drawn> {
+    /// Takes what a task returned, and begins the next picture.
+    fn finish(&mut self, result: EffectResult, request: Request) -> (Stage, Option<Drawn>) {
         let mut finished = match result {
             Ok(finished) => finished,
             Err(problem) => {
                 error!("this effect is not drawn any more: {problem}");
-                return None;
+                return (Stage::Failed, None);
             }
         };
         for problem in finished.problems.drain(..).map(|problem| problem.to_string()) {
@@ -127,10 +130,18 @@ impl EffectTask {
         }
         let drawn = finished.drawn.take();
         // Its time begins when it is open.
-        let passed_s = if drawn.is_some() { self.elapsed_s + finished.owed_s.min(MAX_OWED_S) } else { 0.0 };
-        self.elapsed_s = 0.0;
-        self.stage = Stage::Busy(draw(finished, passed_s, request, std::mem::take(&mut self.changes)));
-        drawn
+        self.elapsed_s = if drawn.is_some() { self.elapsed_s + finished.owed_s.min(MAX_OWED_S) } else { 0.0 };
+        (self.begin(finished, request), drawn)
+    }
+
+    /// Begins the next picture if anything is different in it.
+    fn begin(&mut self, finished: Finished, request: Request) -> Stage {
+        if self.elapsed_s == 0.0 && self.changes.is_empty() && self.last_request == Some(request) {
+            return Stage::Idle(Box::new(finished));
+        }
+        self.last_request = Some(request);
+        let (passed_s, changes) = (std::mem::take(&mut self.elapsed_s), std::mem::take(&mut self.changes));
+        Stage::Busy(draw(finished, passed_s, request, changes))
     }
 }
 
