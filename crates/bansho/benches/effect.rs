@@ -76,36 +76,60 @@ fn effects(c: &mut Criterion) {
     });
     group.finish();
 
-    let mut group = c.benchmark_group("a changed parameter");
+    let mut group = c.benchmark_group("a changed parameter and its picture");
     let mut live = Effect::new(torch()).size(SIZE, SIZE).pool(pool(1)).open().expect("it opens");
     let mut width = 0.4;
     group.bench_function("live", |b| {
         b.iter(|| {
             width = 0.4 + (width - 0.4 + 1e-4) % 0.1;
             live.set_parameters("flame_sheet", FlameSheetParameters { width, ..torch() }).expect("it is possible");
+            let picture = live.picture().expect("nothing stops it");
+            picture.write_rgba16f(&mut texture).expect("the buffer has the length of the picture");
         });
     });
-    group.bench_function("naive: printed, parsed and built", |b| {
+    group.bench_function("naive: printed, parsed, built and drawn", |b| {
         b.iter(|| {
             width = 0.4 + (width - 0.4 + 1e-4) % 0.1;
             let parameters = FlameSheetParameters { width, ..torch() };
             let text = SceneBuilder::new().phenomenon("flame_sheet", &parameters).to_toml();
             let compiled = compile_scene("scene", &text, Arc::new(MemoryAssets::default())).expect("it is valid");
-            let plan = Plan::new(&compiled, &PlanOptions::default()).expect("the size is possible");
+            let options = PlanOptions { size: Some([SIZE, SIZE]), ..Default::default() };
+            let plan = Plan::new(&compiled, &options).expect("the size is possible");
             let mut shot = Shot::open(compiled, Arc::new(plan));
-            shot.advance(0, &Unobserved).expect("nothing stops it");
-            black_box(&shot);
+            let frame = bansho::draw(&mut shot, 0, &Unobserved).expect("nothing stops it");
+            naive_rgba16f(frame.beauty.pixels(), &mut texture);
         });
     });
     group.finish();
 
     let mut group = c.benchmark_group("rain 256x256");
     for threads in [1, 2] {
-        let mut live =
-            Effect::new(RainParameters::default()).size(SIZE, SIZE).pool(pool(threads)).open().expect("it opens");
-        let mut number = 0;
-        group.bench_function(format!("{threads} threads"), |b| b.iter(|| frame(&mut live, &mut number, &mut texture)));
+        let open = || Effect::new(RainParameters::default()).size(SIZE, SIZE).pool(pool(threads)).open();
+        let mut live = open().expect("it opens");
+        group.bench_function(format!("calm, {threads} threads"), |b| {
+            b.iter(|| {
+                let picture = live.advance(DT).expect("the time is possible");
+                picture.write_rgba16f(&mut texture).expect("the buffer has the length of the picture");
+            });
+        });
+        let (mut live, mut number) = (open().expect("it opens"), 0);
+        group.bench_function(format!("gusts, {threads} threads"), |b| {
+            b.iter(|| frame(&mut live, &mut number, &mut texture));
+        });
     }
+    // Light of lamps that is scattered anew for each frame, as when the camera moves.
+    let mut live = Effect::new(RainParameters::default()).size(SIZE, SIZE).pool(pool(1)).open().expect("it opens");
+    let mut camera = live.shot().plan().camera.clone();
+    let mut x = 0.0;
+    group.bench_function("naive: light of lamps scattered again, 1 thread", |b| {
+        b.iter(|| {
+            x = (x + 1e-4) % 0.1;
+            camera.position = [x, 1.6, 0.0].into();
+            live.set_camera(camera.clone()).expect("the camera is possible");
+            let picture = live.advance(DT).expect("the time is possible");
+            picture.write_rgba16f(&mut texture).expect("the buffer has the length of the picture");
+        });
+    });
     group.finish();
 }
 

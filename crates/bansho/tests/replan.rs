@@ -56,3 +56,34 @@ fn gas_burns_on_when_its_flame_is_changed_also_where_it_would_burn_in_longer() {
     shot.replan(finer.clone(), plan(&finer));
     assert!(shot.is_exact() && shot.particles().positions.is_empty());
 }
+
+/// The light of all pixels at frame `number`.
+fn light(shot: &mut Shot, number: i64) -> Vec<f32> {
+    let frame = bansho::draw(shot, number, &Unobserved).unwrap();
+    frame.beauty.pixels().iter().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+}
+
+fn difference(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum()
+}
+
+#[test]
+fn a_wind_that_is_edited_during_playback_does_not_jump_and_what_is_drawn_again_is_exact() {
+    let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
+    let text = "bansho = 2\n[picture]\nsize = [48, 64]\nfps = 60\n[wind]\nvelocity = [0.5, 0, 0]\ngust = 0.8\n[[flame_sheet]]\n";
+    let before = build(text, &assets, None);
+    let after = build(&text.replace("0.5", "0.6"), &assets, Some(&before));
+    let mut shot = Shot::open(before.clone(), plan(&before));
+    let played = [3600, 3601].map(|number| light(&mut shot, number));
+    shot.replan(after.clone(), plan(&after));
+    let next = light(&mut shot, 3602);
+    assert!(!shot.is_exact());
+    let usual = difference(&played[0], &played[1]);
+    let edited = difference(&played[1], &next);
+    assert!(edited < 1.5 * usual, "{edited} after {usual}");
+    // The scene itself has had another wind for a minute, which has carried other gusts there.
+    let mut exact = Shot::open(after.clone(), plan(&after));
+    let expected = light(&mut exact, 3602);
+    assert!(difference(&expected, &next) > 1.5 * usual);
+    assert_eq!(light(&mut shot, 3602), expected, "a frame that is drawn again is that of a render");
+}

@@ -22,6 +22,7 @@ use crate::{
         drop_lighting::ScatteringTable,
         drop_phase_function::DropPhaseFunction,
         extinction::{ExtinctionEfficiency, RainExtinction, extinction},
+        in_scattering::LampScatteringCache,
         sky::SkyLightingCache,
     },
     textured_billboards::TextureSet,
@@ -38,6 +39,8 @@ pub struct Rain {
     pub(super) key: Key,
     pub(super) optics: &'static Optics,
     pub(super) skies: SkyLightingCache,
+    /// Scattered light of lamps that was computed already.
+    pub(super) lamp_scattering: LampScatteringCache,
     pub(super) classes: Vec<DropClass>,
     /// With `method = "textures"`: those of all rates and diameters.
     pub(super) textures: Option<TextureSet>,
@@ -105,6 +108,7 @@ impl Rain {
             key: Key::new(seed, name),
             optics: &OPTICS,
             skies: SkyLightingCache::default(),
+            lamp_scattering: LampScatteringCache::default(),
             classes,
             textures,
             loop_s,

@@ -6,7 +6,7 @@ use bansho_base::{
     camera::{Camera, upright_quad::right_facing},
     host::{constructions, once::get_or_compute},
     math::{self, DVec2, DVec3, random::Key},
-    parameters::{ParameterError, ParameterErrorKind, animated::Animated},
+    parameters::{ParameterError, ParameterErrorKind},
 };
 
 use super::{
@@ -93,11 +93,13 @@ impl FlameSheet {
 
     /// Takes the tables of `previous`, if its parameters give the same: a program changes position, flow and luminance far more often than shape and colors.
     pub(super) fn share_tables(&mut self, previous: &Self) {
-        let same_tables = |FlameSheetParameters { shape, texture, color, stage, method, soot_field, .. }| {
-            let luminance = Animated::from(0.0);
-            (shape, texture, ColorParameters { luminance, ..color }, stage, method, soot_field)
-        };
-        if same_tables(self.parameters.clone()) == same_tables(previous.parameters.clone()) {
+        let (own, other) = (&self.parameters, &previous.parameters);
+        let is_same_color =
+            ColorParameters { luminance: own.color.luminance.clone(), ..other.color.clone() } == own.color;
+        if (&own.shape, &own.texture, own.stage) == (&other.shape, &other.texture, other.stage)
+            && (own.method, &own.soot_field) == (other.method, &other.soot_field)
+            && is_same_color
+        {
             self.tables.clone_from(&previous.tables);
         }
     }

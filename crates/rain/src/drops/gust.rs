@@ -1,6 +1,6 @@
 //! Displacement and velocity of drops by gusts, on top of the mean wind that carries all drops alike.
 
-use bansho_base::{math::DVec3, world::wind::Wind};
+use bansho_base::{host::parallel::prelude::*, math::DVec3, world::wind::Wind};
 
 /// Memory of a drop's horizontal displacement, s. The weight of a past gust decreases linearly to 0 over this time, in
 /// which a drop falls through the visible region.
@@ -43,7 +43,7 @@ impl GustField {
             let [displacement, velocity] = displacement_and_rate(wind, point, t).map(|vector| vector * response);
             [soft_limited(displacement, MAX_DISPLACEMENT_RATIO * spacing), velocity]
         };
-        Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).map(node).collect() })
+        Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).into_par_iter().map(node).collect() })
     }
 
     /// A box that contains every point whose displaced position is in the box between two corners.

@@ -4,6 +4,7 @@
 pub(crate) mod drop_lighting;
 pub mod drop_phase_function;
 pub mod extinction;
+pub(crate) mod in_scattering;
 pub(crate) mod single_scattering;
 pub(crate) mod sky;
 pub(crate) mod tiles;

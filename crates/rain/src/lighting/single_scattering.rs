@@ -4,20 +4,22 @@
 use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
+    host::once::get_or_compute,
     image::Rect,
-    math::{self, DVec2, DVec3, MulAdd},
-    phenomenon::{
-        strip::{DepthInterval, Strip, View},
-        surroundings::{Emitter, Light},
-    },
+    math::{self, DVec2, MulAdd},
+    phenomenon::strip::{DepthInterval, Strip, View},
 };
 use fearless_simd::{Level, dispatch};
 
 use super::{
     drop_lighting::DropLighting,
     extinction::RainExtinction,
+    in_scattering::{
+        ExtinctionProfile, HALO_RADIUS, InScatterIntegrator, InScattering, LampHalo, LampScattering,
+        LampScatteringCache, ray_distance,
+    },
     sky::SkyLighting,
-    tiles::{FINE_TILE, FINEST_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
+    tiles::{FINE_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
 };
 use crate::drops::shutter_state::ShutterState;
 
@@ -26,79 +28,10 @@ const FIRST_DISTANCE: f64 = 0.5;
 const DISTANCE_RATIO: f64 = 1.25;
 /// Ratio of successive distances beyond the range of lamps.
 const FAR_DISTANCE_RATIO: f64 = 2.0;
-/// Angle subtended at a lamp by one sample of the equiangular quadrature, radians.
-const SAMPLE_ANGLE: f64 = 0.15;
 /// Optical depth beyond which light of lamps is neglected: the transmittance is below 1e-17.
 const MAX_OPTICAL_DEPTH: f32 = 40.0;
 /// Depth of the medium, m: it has none.
 const NO_DEPTH: [f32; FINE_TILE] = [f32::INFINITY; FINE_TILE];
-/// Smallest distance of a ray from a lamp, m.
-const MIN_LAMP_DISTANCE: f64 = 0.02;
-
-/// Extinction coefficient as a function of the distance from the camera.
-#[derive(Clone, Copy)]
-struct ExtinctionProfile<'a> {
-    shutter_state: &'a ShutterState,
-    extinction: RainExtinction,
-}
-
-impl ExtinctionProfile<'_> {
-    fn at(&self, distance: f64) -> f64 {
-        self.extinction.all - self.extinction.streaks * f64::from(self.shutter_state.streak_weight(distance as f32))
-    }
-}
-
-/// In-scattered radiance accumulated from the camera up to each distance, at each corner of a grid.
-struct InScattering(Vec<Vec<[f32; 3]>>);
-
-impl InScattering {
-    fn new(directions: &[Vec<[f32; 3]>], distances: usize) -> Self {
-        Self((0..distances).map(|k| directions.iter().map(|sums| sums[k]).collect()).collect())
-    }
-
-    fn add(&mut self, other: &Self) {
-        for (sum, more) in self.0.iter_mut().flatten().zip(other.0.iter().flatten()) {
-            (0..3).for_each(|c| sum[c] += more[c]);
-        }
-    }
-}
-
-/// A lamp in the picture. The light scattered around it falls as 1/h with the distance h of the ray from the lamp, and
-/// its cone has an edge; neither survives linear interpolation between grid corners. Near the lamp a finer grid is
-/// used, and the factor 1/h is divided out before interpolation.
-struct LampHalo {
-    /// Vector from the camera to the lamp, m.
-    offset: DVec3,
-    /// Its position in the picture.
-    pixel: DVec2,
-    /// The pixels near it.
-    rect: Rect,
-    /// Its in-scattering at the corners of the picture's grid.
-    in_scattering: InScattering,
-    /// A finer grid over the pixels near it, its in-scattering there, and the distances of the rays from the lamp, m.
-    fine_tiles: TileGrid,
-    fine_in_scattering: InScattering,
-    ray_distance: Vec<f32>,
-}
-
-/// Radius around a lamp with the finer grid, pixels.
-const HALO_RADIUS: f64 = 72.0;
-/// Largest number of lamps with a finer grid.
-const MAX_HALOS: usize = 8;
-
-/// The pixels of a picture near a lamp.
-fn halo_rect(lamp: DVec2, size: [usize; 2]) -> Rect {
-    let [left, top] = [lamp.x - HALO_RADIUS, lamp.y - HALO_RADIUS].map(|side| side.max(0.0) as usize);
-    let [right, bottom] = [lamp.x + HALO_RADIUS, lamp.y + HALO_RADIUS].map(|side| side.max(0.0) as usize);
-    let rect = Rect { x: left, y: top, width: right - left, height: bottom - top };
-    rect.intersection(&Rect::from_size(size[0], size[1]))
-}
-
-/// Distance of a ray from the camera to the point at `offset` from the camera, m.
-fn ray_distance(offset: DVec3, direction: DVec3) -> f32 {
-    (offset - direction * offset.dot(direction)).length().max(MIN_LAMP_DISTANCE) as f32
-}
-
 /// A position between two stored distances.
 #[derive(Clone, Copy)]
 struct Bracket {
@@ -142,10 +75,8 @@ pub(crate) struct SingleScattering<'a> {
     distances: Vec<f64>,
     /// Optical depth up to each distance.
     depths: Vec<f32>,
-    /// In-scattering of all lamps and fires, if there are any.
-    in_scattering: Option<InScattering>,
-    /// Lamps in the picture.
-    halos: Vec<LampHalo>,
+    /// Light of lamps and fires that is scattered toward the camera.
+    lamps: Arc<LampScattering>,
     /// Range of the light of lamps, and end of the medium in front of a plate, m.
     end: f64,
     ground: f64,
@@ -162,6 +93,7 @@ impl<'a> SingleScattering<'a> {
         extinction: RainExtinction,
         end: f64,
         farthest: f64,
+        cache: &LampScatteringCache,
     ) -> Option<Self> {
         if end <= 0.0 || extinction.all <= 0.0 {
             return None;
@@ -183,26 +115,8 @@ impl<'a> SingleScattering<'a> {
         let integrator =
             InScatterIntegrator { lighting, extinction: profile, eye, distances: &distances, depths: &depths, end };
         let tiles = &sky.fine.tiles;
-        let (visible, others) = integrator.split_lights(view);
-        let halos: Vec<LampHalo> =
-            visible.into_iter().map(|(light, pixel)| integrator.halo(&light, pixel, tiles, view)).collect();
-        let in_scattering = (!lighting.lights.is_empty()).then(|| {
-            let radiance = tiles.map(|_, direction| integrator.accumulate(direction, &others));
-            let mut in_scattering = InScattering::new(&radiance, distances.len());
-            halos.iter().for_each(|halo| in_scattering.add(&halo.in_scattering));
-            in_scattering
-        });
-        Some(Self {
-            level: Level::new(),
-            view,
-            sky,
-            distances,
-            depths,
-            in_scattering,
-            halos,
-            end,
-            ground: shutter_state.ground,
-        })
+        let lamps = cache.scattering(&integrator, tiles, view);
+        Some(Self { level: Level::new(), view, sky, distances, depths, lamps, end, ground: shutter_state.ground })
     }
 
     /// The grid at whose corners in-scattering is stored.
@@ -239,7 +153,7 @@ impl<'a> SingleScattering<'a> {
         let [near, far] = segment.depths;
         let transmittance = math::approximations::exp(near - far);
         let opacities = segment.depths.map(|depth| 1.0 - math::approximations::exp(-depth));
-        let lit = match &self.in_scattering {
+        let lit = match &self.lamps.in_scattering {
             Some(in_scattering) => {
                 lerp_color(segment.in_scattered(in_scattering, index), segment.in_scattered(in_scattering, below), down)
             }
@@ -283,22 +197,51 @@ impl<'a> SingleScattering<'a> {
         Some(correction)
     }
 
+    /// The correction of a pixel near a lamp, faded toward the edge of its halo; 0 where there is none.
+    fn faded_correction(
+        &self,
+        halo: &LampHalo,
+        x: usize,
+        y: usize,
+        slice: &DepthInterval,
+        plate: Option<f64>,
+    ) -> [f32; 3] {
+        let distance = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
+        let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
+        if fade <= 0.0 {
+            return [0.0; 3];
+        }
+        self.halo_correction(halo, x, y, slice, plate).map_or([0.0; 3], |light| light.map(|value| fade * value))
+    }
+
     /// Adds the corrections near lamps to a row of tiles.
     fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
-        for halo in &self.halos {
+        for halo in &self.lamps.halos {
             let rect = halo.rect.intersection(&rows);
+            if rect.is_empty() {
+                continue;
+            }
+            let cached = (!strip.has_plate()).then(|| halo.corrections.rows(slice, halo.rect.height));
             for y in rect.y..rect.bottom() {
+                let row = cached.as_ref().map(|rows| {
+                    let columns = halo.rect.x..halo.rect.right();
+                    let compute = || columns.map(|x| self.faded_correction(halo, x, y, slice, None)).collect();
+                    get_or_compute(&rows[y - halo.rect.y], compute)
+                });
                 for x in rect.x..rect.right() {
-                    let distance = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
                     let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                    let plate = strip.has_plate().then(|| f64::from(strip.plate_depth(index)));
-                    let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
-                    let Some(light) = self.halo_correction(halo, x, y, slice, plate).filter(|_| fade > 0.0) else {
-                        continue;
+                    let light = match row {
+                        Some(row) => row[x - halo.rect.x],
+                        None => {
+                            let plate = Some(f64::from(strip.plate_depth(index)));
+                            self.faded_correction(halo, x, y, slice, plate)
+                        }
                     };
+                    if light == [0.0; 3] {
+                        continue;
+                    }
                     // The medium in front of it is contained in the strip's transmittance too; its effect is small.
-                    (0..3)
-                        .for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + fade * light[c]).max(0.0));
+                    (0..3).for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + light[c]).max(0.0));
                 }
             }
         }
@@ -401,107 +344,4 @@ impl<'a> SingleScattering<'a> {
 #[inline(always)]
 fn composite_pixel(strip: &mut Strip, index: usize, [red, green, blue, transmittance]: [f32; 4]) {
     strip.add_row_behind(index, [&[red], &[green], &[blue]], Some(&[1.0 - transmittance]), &[f32::INFINITY]);
-}
-
-/// Integrates single scattering of lamps along lines of sight.
-struct InScatterIntegrator<'a> {
-    lighting: &'a DropLighting<'a>,
-    extinction: ExtinctionProfile<'a>,
-    eye: DVec3,
-    distances: &'a [f64],
-    depths: &'a [f32],
-    /// Light from beyond it is neglected, m.
-    end: f64,
-}
-
-impl InScatterIntegrator<'_> {
-    /// Lamps in and near the picture with their pixels, and all other lights.
-    fn split_lights(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
-        let (mut visible, mut others) = (Vec::new(), Vec::new());
-        for light in self.lighting.lights {
-            let projection = match light.emitter {
-                Emitter::Point { position, .. } | Emitter::Spot { position, .. } => view.camera.project(position),
-                Emitter::Directional { .. } => None,
-            };
-            let near = |pixel: DVec2| {
-                (0..2).all(|axis| (-HALO_RADIUS..view.size[axis] as f64 + HALO_RADIUS).contains(&pixel[axis]))
-            };
-            match projection.map(|projection| projection.pixel).filter(|pixel| near(*pixel)) {
-                Some(pixel) if visible.len() < MAX_HALOS => visible.push((*light, pixel)),
-                _ => others.push(*light),
-            }
-        }
-        (visible, others)
-    }
-
-    fn halo(&self, light: &Light, pixel: DVec2, tiles: &TileGrid, view: &View) -> LampHalo {
-        let offset = match light.emitter {
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position - self.eye,
-            Emitter::Directional { toward } => toward,
-        };
-        let rect = halo_rect(pixel, view.size);
-        let fine_tiles = TileGrid::over(view, FINEST_TILE, rect);
-        let [in_scattering, fine_in_scattering] = [tiles, &fine_tiles].map(|tiles| {
-            let radiance = tiles.map(|_, direction| self.accumulate(direction, std::slice::from_ref(light)));
-            InScattering::new(&radiance, self.distances.len())
-        });
-        let ray_distance = fine_tiles.directions.iter().map(|direction| ray_distance(offset, *direction)).collect();
-        LampHalo { offset, pixel, rect, in_scattering, fine_tiles, fine_in_scattering, ray_distance }
-    }
-
-    /// Light of some lamps scattered toward the camera up to each distance.
-    fn accumulate(&self, direction: DVec3, lights: &[Light]) -> Vec<[f32; 3]> {
-        let mut sums = vec![[0.0; 3]; self.distances.len()];
-        if direction == DVec3::ZERO {
-            return sums;
-        }
-        for light in lights {
-            let mut sum = [0.0_f32; 3];
-            for k in 0..self.distances.len() - 1 {
-                let in_range = self.distances[k] < self.end;
-                let radiance = if in_range { self.segment(light, direction, k) } else { [0.0; 3] };
-                for c in 0..3 {
-                    sum[c] += radiance[c];
-                    sums[k + 1][c] += sum[c];
-                }
-            }
-        }
-        sums
-    }
-
-    /// Light of one lamp scattered between two distances: `integral of beta E p / (4 pi) e^-tau ds`.
-    fn segment(&self, light: &Light, direction: DVec3, k: usize) -> [f32; 3] {
-        let [from, to] = [self.distances[k], self.distances[k + 1]];
-        let position = match light.emitter {
-            Emitter::Directional { .. } => return self.sample(light, direction, 0.5 * (from + to), to - from, k),
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position,
-        };
-        // Equiangular sampling (Kulla & Fajardo 2012): steps of equal angle at the lamp. There ds / r^2 is the angle's
-        // step over the smallest distance h, so the integrand has no peak near the lamp.
-        let nearest = (position - self.eye).dot(direction);
-        let h = (position - self.eye - direction * nearest).length().max(MIN_LAMP_DISTANCE);
-        let [first, last] = [from, to].map(|s| math::atan((s - nearest) / h));
-        let samples = ((last - first) / SAMPLE_ANGLE).ceil().max(1.0);
-        let step = (last - first) / samples;
-        (0..samples as usize).fold([0.0; 3], |sum: [f32; 3], index| {
-            let offset = h * math::tan(first + step * (index as f64 + 0.5));
-            let length = step * (h * h + offset * offset) / h;
-            let radiance = self.sample(light, direction, nearest + offset, length, k);
-            std::array::from_fn(|c| sum[c] + radiance[c])
-        })
-    }
-
-    /// Light scattered within `length` of the line around a distance.
-    fn sample(&self, light: &Light, direction: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
-        let point = self.eye + direction * at;
-        let extinction = self.extinction.at(at);
-        if extinction <= 0.0 || point.y < self.extinction.shutter_state.ground {
-            return [0.0; 3];
-        }
-        let radiance = self.lighting.radiance(light, point, direction);
-        let t = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
-        let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * t;
-        let scale = math::approximations::exp(-depth) * (extinction * length) as f32;
-        radiance.map(|value| value * scale)
-    }
 }

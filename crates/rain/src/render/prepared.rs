@@ -98,8 +98,16 @@ impl<'a> PreparedRain<'a> {
             Method::Textures => (&unlit, rain.skies.for_view(&rain.optics.phase_function, view, Sky::DARK)),
             Method::Billboards | Method::Drops => (&lighting, sky_lighting.clone()),
         };
-        let single_scattering =
-            SingleScattering::new(&shutter_state, lighting, sky_lighting, view, extinction, end, farthest);
+        let single_scattering = SingleScattering::new(
+            &shutter_state,
+            lighting,
+            sky_lighting,
+            view,
+            extinction,
+            end,
+            farthest,
+            &rain.lamp_scattering,
+        );
         let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
         Self {
             view,

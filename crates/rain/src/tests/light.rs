@@ -132,3 +132,30 @@ fn the_airlight_is_single_scattering_along_each_line_of_sight() {
         assert!((through - math::exp(-beta * end)).abs() < 2e-3, "{through}");
     }
 }
+
+#[test]
+fn light_of_lamps_is_scattered_once_while_nothing_changes_and_anew_when_anything_does() {
+    let calm = wind([0.0; 3], 0.0);
+    let surroundings = |intensity: f32| {
+        let others = Publication { lights: vec![lamp([0.5, 2.5, -6.0], intensity)], ..Publication::default() };
+        Surroundings { others, ..Surroundings::from_wind(&calm) }
+    };
+    let radiance = |rain: &crate::Rain, t: f64, shift: f64, intensity: f32| {
+        let mut view = view_at(t, 1.0 / 60.0, SIZE);
+        view.camera.position.x += shift;
+        draw(rain, &view, &surroundings(intensity)).radiance
+    };
+    let fresh = || rain(RainParameters::default(), 1);
+    let used = fresh();
+    for (t, shift, intensity) in
+        [(1.0, 0.0, 300.0), (2.0, 0.0, 300.0), (2.0, 0.0, 500.0), (2.0, 0.3, 300.0), (1.0, 0.0, 300.0)]
+    {
+        assert_eq!(
+            radiance(&used, t, shift, intensity),
+            radiance(&fresh(), t, shift, intensity),
+            "{t} {shift} {intensity}"
+        );
+    }
+    assert_ne!(radiance(&used, 1.0, 0.0, 300.0), radiance(&used, 1.0, 0.0, 500.0));
+    assert_eq!(used.lamp_scattering.len(), 2, "of a picture and of its mirror");
+}
