@@ -187,7 +187,7 @@ fn draw(state: Finished, passed_s: f64, request: Request, changes: Vec<Change>) 
             error!("the picture is not shown: {error}");
         }
         let pixels = bytes_of(&halves);
-        let lights = live.shot().lights().into_iter().map(|light| light.light).collect();
+        let lights = live.lights().into_iter().map(|light| light.light).collect();
         let drawn = Drawn { pixels, lights, view: request.view, time_s, drawing_time: begin.elapsed() };
         Ok(Finished { live, halves, wind: request.wind.or(wind), drawn: Some(drawn), owed_s, problems })
     })
