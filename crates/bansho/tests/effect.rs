@@ -420,6 +420,39 @@ fn a_scene_can_be_built_and_shown() {
 }
 
 #[test]
+fn size_lights_and_time_change_without_a_new_effect() {
+    let mut live = Effect::new(torch()).size(SIZE, SIZE).open().unwrap();
+    let drawn = live.at(2.0).unwrap().frame().beauty.clone();
+    assert_eq!(live.advance(0.0).unwrap().frame().beauty, drawn);
+    live.set_wind([0.0, 0.0, 0.0], 0.3).unwrap();
+    assert_eq!((live.wind(), live.camera().shutter_s), (([0.0; 3], 0.3), None));
+    live.set_size(SIZE / 2, SIZE).unwrap();
+    assert_eq!(live.picture().unwrap().size(), [SIZE / 2, SIZE]);
+    assert!(matches!(live.set_size(0, 5), Err(EffectError::Plan(_))));
+    live.set_size(SIZE, SIZE).unwrap();
+    assert_eq!(live.picture().unwrap().frame().beauty, drawn, "a wind that is what it was changes nothing");
+    // The light of what is not drawn goes on.
+    let intensity = |live: &LiveEffect| live.lights().iter().map(|light| light.light.intensity[0]).sum::<f32>();
+    let before = intensity(&live);
+    assert_eq!(live.advance_undrawn(0.4).unwrap(), 0.0);
+    assert!(intensity(&live) != before && intensity(&live) > 0.2 * before);
+    assert_eq!(live.time(), 2.4);
+
+    // A lamp that moves lights the drops anew.
+    let lamp =
+        bansho::LightParameters { position: [0.5, 2.5, -4.0].into(), intensity: 500.0.into(), ..Default::default() };
+    let open = |lamp: &bansho::LightParameters| {
+        Effect::new(RainParameters::default()).light(lamp.clone()).exposure_ev100(2.0).size(SIZE, SIZE).open().unwrap()
+    };
+    let moved = bansho::LightParameters { position: [-0.5, 2.5, -4.0].into(), ..lamp.clone() };
+    let mut live = open(&lamp);
+    live.change_scene(|scene| scene.lights = vec![moved.clone()]).unwrap();
+    assert_eq!(live.at(0.5).unwrap().frame().beauty, open(&moved).at(0.5).unwrap().frame().beauty);
+    let wrong = live.change_scene(|scene| scene.lights[0].intensity = f64::NAN.into());
+    assert!(wrong.unwrap_err().to_string().contains("light.0.intensity: NaN"));
+}
+
+#[test]
 fn a_live_wind_goes_on_after_other_random_numbers() {
     let camera =
         CameraParameters { position: [0.0, 0.6, 6.0].into(), target: [0.0, 0.6, 0.0].into(), ..Default::default() };

@@ -114,6 +114,12 @@ impl Plan {
         })
     }
 
+    /// The same shot of another scene, with the camera of this one, as when a program changes lights while it runs.
+    #[must_use]
+    pub fn of_scene(&self, scene: Arc<Scene>) -> Self {
+        Self { scene, ..self.clone() }
+    }
+
     /// The same shot in another size, without crop and overscan.
     #[must_use]
     pub fn at_size(&self, size: [usize; 2]) -> Self {

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use bansho_base::{
     camera::CameraParameters,
     color::MAX_EV100,
+    image::Rect,
     math::DVec3,
-    parameters::{Parameters, Reader},
+    parameters::{Parameter, Parameters, Range, Reader},
     phenomenon::kind::{CheckedParameters, Describe},
     world::wind::WindParameters,
 };
@@ -37,7 +38,7 @@ impl LiveEffect {
         Ok(())
     }
 
-    /// Sets the camera, from the next picture on.
+    /// Sets the camera, from the next picture on: all of its parameters, the exposure time too. Begin with those of [`camera`](Self::camera).
     ///
     /// # Errors
     /// A value that is out of range or not finite.
@@ -58,15 +59,44 @@ impl LiveEffect {
     /// It is not a number within -40 to 40.
     pub fn set_exposure_ev100(&mut self, exposure_ev100: f64) -> Result<(), EffectError> {
         let mut reader = Reader::new();
-        let limits = bansho_base::parameters::Range::new(-MAX_EV100, MAX_EV100);
+        let limits = Range::new(-MAX_EV100, MAX_EV100);
         reader.within("exposure_ev100", |reader| {
-            bansho_base::parameters::Parameter::check(&exposure_ev100, &limits, "EV", reader);
+            Parameter::check(&exposure_ev100, &limits, "EV", reader);
         });
         checked(reader)?;
         self.recycle();
         let mut plan = self.shot.plan().clone();
         Arc::make_mut(&mut plan).exposure_ev100 = exposure_ev100 as f32;
         self.shot.replace_plan(plan);
+        Ok(())
+    }
+
+    /// Sets width and height of the picture, pixels, from the next picture on.
+    ///
+    /// # Errors
+    /// A size that is not possible; the last one stays.
+    pub fn set_size(&mut self, width: usize, height: usize) -> Result<(), EffectError> {
+        let crop = Rect::from_size(width, height);
+        let plan = self.shot.plan().cropped([width, height], crop)?;
+        self.recycle();
+        self.shot.replace_plan(Arc::new(plan));
+        Ok(())
+    }
+
+    /// Changes what surrounds the phenomena: lights, sky, ground, air, obstacles. What is equal is not built again, and simulations keep their state. Wind,
+    /// camera and phenomena have calls of their own, which are faster and do not jump.
+    ///
+    /// # Errors
+    /// Values that are out of range, not finite or contradict each other; assets that cannot be read. The effect is then unchanged.
+    pub fn change_scene(&mut self, change: impl FnOnce(&mut Scene)) -> Result<(), EffectError> {
+        let mut scene = Scene::clone(self.scene());
+        change(&mut scene);
+        scene.check()?;
+        let compiled = self.shot.compiled();
+        let assets = compiled.assets().clone();
+        let compiled = self.pool.run(|| CompiledScene::build(Arc::new(scene), assets, Some(compiled)))?;
+        self.recycle();
+        self.shot.replace_scene(Arc::new(compiled));
         Ok(())
     }
 
@@ -114,8 +144,8 @@ impl LiveEffect {
     /// There is no phenomenon of that name, it does not burn, or the flow is not within 0 to 1.
     pub fn set_flow(&mut self, name: &str, flow: f64) -> Result<(), EffectError> {
         let mut reader = Reader::new();
-        let limits = bansho_base::parameters::Range::new(0.0, 1.0);
-        reader.within("flow", |reader| bansho_base::parameters::Parameter::check(&flow, &limits, "", reader));
+        let limits = Range::new(0.0, 1.0);
+        reader.within("flow", |reader| Parameter::check(&flow, &limits, "", reader));
         checked(reader)?;
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
@@ -131,13 +161,12 @@ impl LiveEffect {
     pub fn move_to(&mut self, name: &str, position: impl Into<[f64; 3]>, seconds: f64) -> Result<(), EffectError> {
         let position = position.into();
         let mut reader = Reader::new();
-        let (anywhere, durations) =
-            (bansho_base::parameters::Range::default(), bansho_base::parameters::Range::new(0.0, 3600.0));
+        let (anywhere, durations) = (Range::default(), Range::new(0.0, 3600.0));
         reader.within("position", |reader| {
-            bansho_base::parameters::Parameter::check(&position, &anywhere, "m", reader);
+            Parameter::check(&position, &anywhere, "m", reader);
         });
         reader.within("seconds", |reader| {
-            bansho_base::parameters::Parameter::check(&seconds, &durations, "s", reader);
+            Parameter::check(&seconds, &durations, "s", reader);
         });
         checked(reader)?;
         let (index, instance) = self.instance(name)?;

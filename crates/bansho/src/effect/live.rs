@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use bansho_base::{frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved};
+use bansho_base::{
+    camera::CameraParameters, frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved,
+};
 use bansho_render::{PhenomenonLight, Shot};
 
 use super::{EffectError, Picture, pool::Pool};
@@ -66,13 +68,30 @@ impl LiveEffect {
     /// `dt` is not a number from 0 to [`MAX_ADVANCE_S`] (for effects without simulations from minus that), the preroll is not complete, or a picture
     /// of the plate cannot be read.
     pub fn advance(&mut self, dt: f64) -> Result<Picture<'_>, EffectError> {
-        let min = if self.is_simulated() { 0.0 } else { -MAX_ADVANCE_S };
-        if !(min..=MAX_ADVANCE_S).contains(&dt) {
-            return Err(EffectError::Time { name: "dt", value: dt, min, max: MAX_ADVANCE_S });
-        }
+        self.check_step(dt)?;
         let max_steps = self.max_steps;
         self.go_to(self.time() + dt, max_steps)?;
         self.picture()
+    }
+
+    /// As [`advance`](Self::advance), without drawing: for what is not seen, but whose [lights](Self::lights) are. Returns the time that is owed, s.
+    ///
+    /// # Errors
+    /// As for [`advance`](Self::advance).
+    pub fn advance_undrawn(&mut self, dt: f64) -> Result<f64, EffectError> {
+        self.check_step(dt)?;
+        let max_steps = self.max_steps;
+        self.go_to(self.time() + dt, max_steps)?;
+        Ok(self.owed_s)
+    }
+
+    /// Whether a time step is possible.
+    fn check_step(&self, dt: f64) -> Result<(), EffectError> {
+        let min = if self.is_simulated() { 0.0 } else { -MAX_ADVANCE_S };
+        if (min..=MAX_ADVANCE_S).contains(&dt) {
+            return Ok(());
+        }
+        Err(EffectError::Time { name: "dt", value: dt, min, max: MAX_ADVANCE_S })
     }
 
     /// Goes to `seconds` and draws the picture: that of `bansho render` at that time, to the bit, if nothing was changed live. Effects without simulations
@@ -96,6 +115,10 @@ impl LiveEffect {
         }
         if self.shot.is_past(time) {
             return Err(EffectError::Backward { time, reached: self.time() });
+        }
+        if time == self.time() && self.owed_s == 0.0 && self.frame.is_some() {
+            // The picture of this time is there already.
+            return Ok(());
         }
         self.recycle();
         let shot = &mut self.shot;
@@ -131,6 +154,22 @@ impl LiveEffect {
         if let Some(frame) = self.frame.take() {
             self.shot.recycle(frame);
         }
+    }
+
+    /// The camera that it is seen by.
+    pub fn camera(&self) -> &CameraParameters {
+        &self.shot.plan().camera
+    }
+
+    /// The exposure value at ISO 100.
+    pub fn exposure_ev100(&self) -> f64 {
+        f64::from(self.shot.plan().exposure_ev100)
+    }
+
+    /// The mean wind at the current time, m/s, and its turbulence intensity.
+    pub fn wind(&self) -> ([f64; 3], f64) {
+        let wind = self.shot.wind();
+        (wind.mean(self.time()).to_array(), wind.gust(self.time()))
     }
 
     /// Whether anything in it is simulated in steps. Everything else is computed for any time directly.

@@ -48,7 +48,7 @@ crate::parameters! {
         fisheye_fov_deg: f64 = 180.0, limits(Range::new(1.0, 360.0)), unit("degrees");
         /// Near clipping distance: nothing nearer is drawn.
         near: f64 = 0.05, limits(Range::new(1e-4, 1e4)), unit("m");
-        /// Shift of the principal point to the right and up, in picture heights.
+        /// Lens shift: how much farther to the right and up the picture looks without turning, in picture heights. The principal point moves the other way.
         shift: [f64; 2] = [0.0, 0.0], limits(Range::new(-10.0, 10.0)), unit("picture heights");
         /// Exposure time; half a frame if omitted.
         shutter_s: Option<f64> = None, limits(Range::new(0.0, 10.0)), unit("s");

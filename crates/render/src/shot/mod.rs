@@ -233,7 +233,7 @@ impl Shot {
 
     /// Continues with a scene of which a program has changed parameters, as [`replan`](Self::replan) does, but compares nothing but what was built.
     pub fn replace_scene(&mut self, compiled: Arc<CompiledScene>) {
-        let plan = self.context.plan.clone();
+        let plan = Arc::new(self.context.plan.of_scene(compiled.scene().clone()));
         self.continue_with(compiled, plan, false);
     }
 
@@ -246,6 +246,11 @@ impl Shot {
     /// The scene that is drawn.
     pub fn compiled(&self) -> &Arc<CompiledScene> {
         &self.context.compiled
+    }
+
+    /// The wind, with its changes during the shot.
+    pub fn wind(&self) -> &Wind {
+        &self.context.wind
     }
 
     /// The plan that is followed.

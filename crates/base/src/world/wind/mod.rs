@@ -80,6 +80,11 @@ impl Wind {
         if self.loop_s.is_some() {
             return Err(FixedWind);
         }
+        let is_planned =
+            self.parameters.velocity.constant() == Some(velocity.to_array()) && self.parameters.gust == gust;
+        if self.live.is_none() && is_planned {
+            return Ok(());
+        }
         let planned = LiveState {
             velocity: self.planned_mean(t),
             gust: self.parameters.gust,
@@ -132,6 +137,11 @@ impl Wind {
         self.live.as_ref()?.at(t)
     }
 
+    /// Turbulence intensity at time `t`.
+    pub fn gust(&self, t: f64) -> f64 {
+        self.live_at(t).map_or(self.parameters.gust, |live| live.gust)
+    }
+
     /// Size of the gusts, m; `None` if there are never any.
     pub fn gust_length(&self) -> Option<f64> {
         let [low, high] = self.parameters.velocity.bounds();
@@ -143,8 +153,7 @@ impl Wind {
     /// Velocity at a point at time `t`, including gusts, m/s.
     pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
         let mean = self.mean(t);
-        let intensity = self.live_at(t).map_or(self.parameters.gust, |live| live.gust);
-        let strength = intensity * mean.length();
+        let strength = self.gust(t) * mean.length();
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
         let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
         let (drift, noise_time) = match self.loop_s {
@@ -214,6 +223,15 @@ mod tests {
         let point = DVec3::new(0.3, 1.0, -2.0);
         assert!((wind.at(point, 0.7) - wind.at(point, 4.7)).length() < 1e-4);
         assert!((wind.at(point, 0.7) - wind.at(point, 2.7)).length() > 1e-3);
+    }
+
+    #[test]
+    fn a_wind_that_is_set_to_what_it_is_stays_planned() {
+        let mut wind = wind(None);
+        wind.change(3.0, DVec3::X * 4.0, 0.25, 0.2).unwrap();
+        assert!(wind.is_planned());
+        wind.change(3.0, DVec3::X * 4.0, 0.3, 0.2).unwrap();
+        assert!(!wind.is_planned() && wind.gust(3.1) > 0.25 && wind.gust(9.0) == 0.3);
     }
 
     #[test]
