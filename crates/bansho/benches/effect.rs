@@ -119,12 +119,12 @@ fn effects(c: &mut Criterion) {
     }
     // Light of lamps that is scattered anew for each frame, as when the camera moves.
     let mut live = Effect::new(RainParameters::default()).size(SIZE, SIZE).pool(pool(1)).open().expect("it opens");
-    let mut camera = live.shot().plan().camera.clone();
-    let mut x = 0.0;
+    let mut camera = live.camera().clone();
+    let ([x, y, z], mut shift) = (camera.position.at(0.0), 0.0);
     group.bench_function("naive: light of lamps scattered again, 1 thread", |b| {
         b.iter(|| {
-            x = (x + 1e-4) % 0.1;
-            camera.position = [x, 1.6, 0.0].into();
+            shift = (shift + 1e-4) % 0.1;
+            camera.position = [x + shift, y, z].into();
             live.set_camera(camera.clone()).expect("the camera is possible");
             let picture = live.advance(DT).expect("the time is possible");
             picture.write_rgba16f(&mut texture).expect("the buffer has the length of the picture");
