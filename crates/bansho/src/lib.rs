@@ -190,6 +190,7 @@ pub use bansho_render::{
 pub use bansho_scene::{
     LightParameters, LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,
 };
+#[doc(inline)]
 pub use effect::{Effect, EffectError, LiveEffect, Picture};
 pub use kinds::{KINDS, parse_scene};
 pub use scene_builder::SceneBuilder;

@@ -34,7 +34,6 @@ fn a_frame_allocates_little_and_a_change_does_not_print_its_parameters() {
         let change = count(&mut live, |live| {
             live.set_parameters("flame_sheet", FlameSheetParameters { width: 0.41, ..torch() }).unwrap();
         });
-        println!("{frame} allocations a frame, {change} a change of a parameter");
         assert!(frame <= 50, "{frame} allocations a frame");
         // Printing and parsing the scene took 1,200.
         assert!(change <= 300, "{change} allocations a change");

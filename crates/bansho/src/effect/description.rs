@@ -186,7 +186,7 @@ impl Effect {
         Self { implied_backdrop: is_visible, ..self }
     }
 
-    /// Whether phenomena write their arbitrary output variables, such as `rain.streak_opacity`; see [`Picture::channel`](super::Picture::channel).
+    /// Whether phenomena write their arbitrary output variables, such as `rain.streak_opacity`; see [`Picture::write_channel32f`](super::Picture::write_channel32f).
     #[must_use]
     pub fn aovs(mut self, aovs: bool) -> Self {
         self.plan.aovs = aovs;

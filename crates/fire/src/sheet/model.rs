@@ -88,7 +88,8 @@ impl FlameSheet {
                 soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
             })
         };
-        &*get_or_compute(&self.tables, compute)
+        let tables: &Arc<Tables> = get_or_compute(&self.tables, compute);
+        tables
     }
 
     /// Takes the tables of `previous`, if its parameters give the same: a program changes position, flow and luminance far more often than shape and colors.
