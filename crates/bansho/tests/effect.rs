@@ -109,9 +109,6 @@ fn a_wind_that_changes_every_frame_moves_no_frame_more_than_constant_wind() {
         for quantile in [0.5, 0.9, 0.99, 1.0] {
             let [constant, changing] =
                 movements.each_ref().map(|series| series[((series.len() - 1) as f64 * quantile) as usize]);
-            println!(
-                "{name}: movement at quantile {quantile}: {constant:.3} in constant wind, {changing:.3} in changing wind"
-            );
             assert!(changing < 1.5 * constant, "{name}, quantile {quantile}: {changing} {constant}");
         }
     }
@@ -127,7 +124,6 @@ fn the_issue_of_a_wind_from_half_a_meter_to_a_little_more_after_a_minute() {
     live.set_wind([0.52, 0.0, 0.0], 0.8).unwrap();
     let c = light_of(&mut live, 0.017);
     let (without, with) = (movement(&a, &b), movement(&b, &c));
-    println!("without a change {without:.3}, with a change {with:.3}");
     assert!(with < 1.3 * without, "{with} {without}");
 }
 
@@ -207,7 +203,6 @@ fn five_seconds_after_a_step_the_wind_acts_as_a_constant_wind_does() {
             constant.at(6.0).unwrap();
             mean_center(&mut constant)
         });
-        println!("{name}: lean {calm:.2} at 0.5 m/s, {stepped:.2} after the step, {constant:.2} at 3 m/s");
         assert!(constant > 1.5 * calm && (stepped - constant).abs() < 0.1 * constant.abs(), "{name}");
     }
 }
@@ -230,9 +225,6 @@ fn flames_are_lit_put_out_and_moved_without_a_jump() {
         live.extinguish(name).unwrap();
         let dying = [&burning[119..], &series(&mut live, 180)].concat();
         let (usual, largest) = (largest_change(&burning) / full, largest_change(&dying) / full);
-        println!(
-            "{name}: the light of a frame changes by up to {usual:.2} while it burns, {largest:.2} while it goes out"
-        );
         assert!(largest < usual.max(0.35), "{name}: {largest} {usual}");
         assert!(dying[180] < 1e-3 * full, "{name}: {} of {full}", dying[180]);
         live.ignite(name).unwrap();
