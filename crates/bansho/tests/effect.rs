@@ -77,7 +77,11 @@ fn an_effect_of_structs_is_the_scene_of_a_file() {
 /// The wind of a game: it changes a little every frame.
 fn game_wind(frame: u32) -> [f64; 3] {
     let t = f64::from(frame) / 60.0;
-    [0.5 + 0.3 * (0.9 * t).sin() + 0.02 * f64::from(frame % 3), 0.0, 0.2 * (0.7 * t).cos()]
+    [
+        0.5 + 0.3 * bansho::base::math::sin(0.9 * t) + 0.02 * f64::from(frame % 3),
+        0.0,
+        0.2 * bansho::base::math::cos(0.7 * t),
+    ]
 }
 
 #[test]
