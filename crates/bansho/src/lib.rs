@@ -6,7 +6,7 @@
 //! ```
 //! use bansho::{Effect, FlameSheetParameters, f16};
 //!
-//! let mut torch = Effect::new(FlameSheetParameters { width: 0.4, ..Default::default() }).size(64, 64).open()?;
+//! let mut torch = Effect::new(FlameSheetParameters::default()).size(64, 64).open()?;
 //! let mut texture = vec![f16::ZERO; 64 * 64 * 4];
 //! for frame in 0..3 {
 //!     torch.set_wind([0.5, 0.0, 0.1 * f64::from(frame)], 0.8)?; // m/s, turbulence intensity
@@ -23,7 +23,7 @@
 //! let mut aurora = Effect::new(AuroraParameters::default()).backdrop(true).size(64, 36).open()?;
 //! let mut pixels = vec![0; 64 * 36 * 4];
 //! aurora.at(2.0)?.write_rgba8(&View::DISPLAY, AlphaMode::Straight(AlphaConvention::Encoded), &mut pixels)?;
-//! assert!(pixels.iter().any(|code| *code > 100)); // sRGB codes, row after row from the top
+//! assert!(pixels.iter().any(|code| *code > 100)); // sRGB codes and straight alpha, as PNG has them, row after row from the top
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -169,6 +169,7 @@ pub use bansho_base::{
     },
     image::{Image, Rect},
     parameters::animated::Animated,
+    phenomenon::surroundings::{Emitter, Light, SrgbLight},
     world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
 };
 #[doc(inline)]

@@ -449,6 +449,33 @@ fn size_lights_and_time_change_without_a_new_effect() {
 }
 
 #[test]
+fn what_is_set_live_holds_from_the_beginning_after_a_restart_and_new_simulations_catch_up() {
+    let mut live = Effect::new(torch()).size(SIZE, SIZE).open().unwrap();
+    live.at(5.0).unwrap();
+    live.extinguish("flame_sheet").unwrap();
+    let started = live.shot().compiled().clone();
+    for _ in 0..5 {
+        live.advance(0.01).unwrap();
+        live.extinguish("flame_sheet").unwrap();
+    }
+    assert!(Arc::ptr_eq(live.shot().compiled(), &started), "what is set already is not set again");
+    assert_eq!(live.parameters::<FlameSheetParameters>("flame_sheet").unwrap().flow.constant(), Some(0.0));
+    live.restart().unwrap();
+    let frame = live.advance(1.0).unwrap().frame();
+    assert!(frame.beauty.pixels().iter().all(|pixel| *pixel == [0.0; 4]));
+
+    let gas = FlameParticlesParameters { particles: 200, preroll_s: 0.2.into(), ..Default::default() };
+    let mut live = Effect::new(gas.clone()).max_steps(5).size(8, 8).open().unwrap();
+    live.at(0.5).unwrap();
+    // Steps of another length have no use for the state.
+    live.set_parameters("flame_particles", FlameParticlesParameters { step_s: 0.01.into(), ..gas.clone() }).unwrap();
+    assert_eq!(live.advance(0.01).unwrap().time_s(), 0.51);
+    assert!(live.particles().positions.len() > 50);
+    live.change_scene(|scene| scene.instances.push(bansho::scene::Instance::new("second", gas.clone()))).unwrap();
+    assert_eq!(live.advance(0.01).unwrap().time_s(), 0.52);
+}
+
+#[test]
 fn a_live_wind_goes_on_after_other_random_numbers() {
     let camera =
         CameraParameters { position: [0.0, 0.6, 6.0].into(), target: [0.0, 0.6, 0.0].into(), ..Default::default() };

@@ -5,14 +5,15 @@ use std::sync::Arc;
 use bansho_base::{
     camera::CameraParameters,
     color::MAX_EV100,
+    host::observer::Unobserved,
     image::Rect,
     math::DVec3,
-    parameters::{Parameter, Parameters, Range, Reader},
+    parameters::{Auto, Parameter, Parameters, Range, Reader},
     phenomenon::kind::{CheckedParameters, Describe},
     world::wind::WindParameters,
 };
 use bansho_render::CompiledScene;
-use bansho_scene::{Instance, ParameterProblems, Scene};
+use bansho_scene::{Instance, LightParameters, ParameterProblems, Scene};
 
 use super::{EffectError, LiveEffect};
 
@@ -24,7 +25,7 @@ const IGNITION_S: f64 = 0.5;
 impl LiveEffect {
     /// Sets the mean wind, m/s (x to the right, y up, z toward the viewer of a camera that is not rotated), and its turbulence intensity: the standard
     /// deviation of the speed divided by the mean speed. It takes 0.25 s to reach them. May be called every frame: gusts, sparks, drops and waves go on
-    /// from where they are.
+    /// from where they are. A wind that changes in every frame is followed with a lag of about 0.25 s.
     ///
     /// # Errors
     /// A component beyond 100 m/s, an intensity that is not within 0 to 2, or NaN: the last wind stays. The effect is a seamless loop.
@@ -83,31 +84,56 @@ impl LiveEffect {
         Ok(())
     }
 
-    /// Changes what surrounds the phenomena: lights, sky, ground, air, obstacles. What is equal is not built again, and simulations keep their state. Wind,
-    /// camera and phenomena have calls of their own, which are faster and do not jump.
+    /// Sets the lamps of the scene, which replace all others. May be called every frame.
+    ///
+    /// # Errors
+    /// As for [`change_scene`](Self::change_scene).
+    pub fn set_lights(&mut self, lights: Vec<LightParameters>) -> Result<(), EffectError> {
+        if self.scene().lights == lights {
+            return Ok(());
+        }
+        self.change_scene(|scene| scene.lights = lights)
+    }
+
+    /// Changes what surrounds the phenomena: lights, sky, ground, air, obstacles, camera. What is equal is not built again, and simulations keep their state
+    /// where they can; those that are new, or whose state is of no use any more, are simulated up to the current time. Wind and the parameters of
+    /// phenomena jump here; they have calls of their own. The size stays: see [`set_size`](Self::set_size).
     ///
     /// # Errors
     /// Values that are out of range, not finite or contradict each other; assets that cannot be read. The effect is then unchanged.
     pub fn change_scene(&mut self, change: impl FnOnce(&mut Scene)) -> Result<(), EffectError> {
-        let mut scene = Scene::clone(self.scene());
+        let before = self.scene().clone();
+        let mut scene = Scene::clone(&before);
         change(&mut scene);
         scene.check()?;
         let compiled = self.shot.compiled();
         let assets = compiled.assets().clone();
         let compiled = self.pool.run(|| CompiledScene::build(Arc::new(scene), assets, Some(compiled)))?;
-        self.recycle();
-        self.shot.replace_scene(Arc::new(compiled));
+        let scene = compiled.scene().clone();
+        self.replace_scene(compiled)?;
+        let mut plan = self.shot.plan().clone();
+        if scene.camera != before.camera {
+            Arc::make_mut(&mut plan).camera = scene.camera.clone();
+        }
+        if let Auto::Set(exposure_ev100) = scene.picture.exposure_ev100
+            && scene.picture.exposure_ev100 != before.picture.exposure_ev100
+        {
+            Arc::make_mut(&mut plan).exposure_ev100 = exposure_ev100 as f32;
+        }
+        self.shot.replace_plan(plan);
         Ok(())
     }
 
-    /// The current parameters of the phenomenon `name`; `None` if there is none of that name and kind. Values that were changed live are keyframed.
+    /// The parameters of the phenomenon `name` that were set last; `None` if there is none of that name and kind.
     pub fn parameters<P: Describe>(&self, name: &str) -> Option<&P> {
-        let instance = self.scene().instances.iter().find(|instance| instance.name == name)?;
-        instance.parameters.as_any().downcast_ref()
+        let index = self.scene().instances.iter().position(|instance| instance.name == name)?;
+        self.target(index).as_any().downcast_ref()
     }
 
-    /// Sets the parameters of the phenomenon `name`. Only that phenomenon is built again, from the one before where parts of it are the same; simulations keep
-    /// their state. Values that can be keyframed reach the new value within 0.25 s, others jump.
+    /// Sets the parameters of the phenomenon `name`: begin with those of [`parameters`](Self::parameters), since defaults would light a flame that is out. Only
+    /// that phenomenon is built again, from the one before where parts of it are the same. A simulation keeps its state, unless its time step or the number
+    /// of its burners changes; then it is simulated anew, up to the current time. Values that can be keyframed reach the new value within
+    /// 0.25 s, others change at once. Does nothing if the parameters are the same.
     ///
     /// # Errors
     /// There is no phenomenon of that name and kind, a value is out of range or not finite, values contradict each other. The effect is then
@@ -122,7 +148,7 @@ impl LiveEffect {
         self.replace(index, changed.parameters, TRANSITION_S)
     }
 
-    /// Lights the flame `name`, which grows to its full size within half a second.
+    /// Lights the flame `name`, which grows to full gas flow within half a second; of a particle flame, all burners.
     ///
     /// # Errors
     /// There is no phenomenon of that name, or it does not burn.
@@ -150,7 +176,7 @@ impl LiveEffect {
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
         let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: "gas flow" };
-        let changed = instance.parameters.with_flow(flow).ok_or_else(not_changeable)?;
+        let changed = self.target(index).with_flow(flow).ok_or_else(not_changeable)?;
         self.replace(index, changed, IGNITION_S)
     }
 
@@ -172,7 +198,7 @@ impl LiveEffect {
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
         let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: "position" };
-        let changed = instance.parameters.with_position(position).ok_or_else(not_changeable)?;
+        let changed = self.target(index).with_position(position).ok_or_else(not_changeable)?;
         self.replace(index, changed, seconds)
     }
 
@@ -185,8 +211,30 @@ impl LiveEffect {
         let compiled = self.shot.compiled();
         let assets = compiled.assets().clone();
         let compiled = self.pool.run(|| CompiledScene::build(scene, assets, Some(compiled)))?;
+        self.replace_scene(compiled)
+    }
+
+    /// Goes on with another scene. Simulations that cannot continue their state are simulated anew, up to the current time.
+    fn replace_scene(&mut self, compiled: CompiledScene) -> Result<(), EffectError> {
+        let is_in_preroll = self.shot.preroll_steps_left() > 0;
         self.recycle();
         self.shot.replace_scene(Arc::new(compiled));
+        if !is_in_preroll {
+            let (time, shot) = (self.time(), &mut self.shot);
+            self.pool.run(|| shot.advance_to(time, u64::MAX, &Unobserved))?;
+        }
+        Ok(())
+    }
+
+    /// Makes what was set live hold from the beginning, instead of from when it was set.
+    pub(super) fn hold_from_the_beginning(&mut self) -> Result<(), EffectError> {
+        for (index, parameters) in std::mem::take(&mut self.targets) {
+            let instance = Instance { parameters, ..self.scene().instances[index].clone() };
+            let (compiled, revision) = (self.shot.compiled(), self.revision + 1);
+            let compiled = self.pool.run(|| compiled.with_instance(index, instance, revision))?;
+            self.revision = revision;
+            self.shot.replace_scene(Arc::new(compiled));
+        }
         Ok(())
     }
 
@@ -204,24 +252,31 @@ impl LiveEffect {
         })
     }
 
-    /// Replaces the parameters of the phenomenon at `index`; keyframed values continue those before.
+    /// The parameters of the phenomenon at `index` that were set last.
+    fn target(&self, index: usize) -> &Arc<dyn CheckedParameters> {
+        self.targets.get(&index).unwrap_or(&self.scene().instances[index].parameters)
+    }
+
+    /// Replaces the parameters of the phenomenon at `index`; keyframed values continue those before. Does nothing if they are the ones that were set last.
     fn replace(
         &mut self,
         index: usize,
-        parameters: Arc<dyn CheckedParameters>,
+        target: Arc<dyn CheckedParameters>,
         transition_s: f64,
     ) -> Result<(), EffectError> {
+        if target.equals(self.target(index).as_ref()) {
+            return Ok(());
+        }
         let before = &self.scene().instances[index];
         // What is drawn already stays as it was.
         let now = self.shot.plan().shutter_at(self.time()).close;
-        let parameters = parameters.continuing(before.parameters.as_ref(), now, transition_s).unwrap_or(parameters);
-        let instance = Instance { parameters, ..before.clone() };
+        let continuing = target.continuing(before.parameters.as_ref(), now, transition_s);
+        let instance = Instance { parameters: continuing.unwrap_or_else(|| target.clone()), ..before.clone() };
         let (compiled, revision) = (self.shot.compiled(), self.revision + 1);
         let compiled = self.pool.run(|| compiled.with_instance(index, instance, revision))?;
         self.revision = revision;
-        self.recycle();
-        self.shot.replace_scene(Arc::new(compiled));
-        Ok(())
+        self.targets.insert(index, target);
+        self.replace_scene(compiled)
     }
 }
 

@@ -150,7 +150,7 @@ impl Effect {
         self.change(|builder| builder.obstacle(&parameters), |scene| scene.obstacles.push(parameters.clone()))
     }
 
-    /// Width and height of the picture, pixels: 1 to 16384 each.
+    /// Width and height of the picture, pixels: 1 to 16384 each. Without this call it has the size of the scene, 1280 x 720 by default.
     #[must_use]
     pub fn size(self, width: usize, height: usize) -> Self {
         Self { size: Some([width, height]), ..self }
@@ -162,7 +162,7 @@ impl Effect {
         Self { seed: Some(seed), ..self }
     }
 
-    /// Makes it a seamless loop of this length, s. The wind of a loop is fixed.
+    /// Makes it a seamless loop of this length, s, rounded to whole frames of the scene, of which 30 are a second by default. The wind of a loop is fixed.
     #[must_use]
     pub fn looping(self, seconds: f64) -> Self {
         Self { loop_s: Some(seconds), ..self }
@@ -174,13 +174,14 @@ impl Effect {
         Self { exposure_ev100: Some(exposure_ev100), ..self }
     }
 
-    /// Exposure time of a picture, s; 0 for no motion blur. Without one it is half a frame of the scene, 1/60 s by default.
+    /// Exposure time of a picture, s; 0 for no motion blur. Without one it is half the frame interval of the scene, 1/60 s by default.
     #[must_use]
     pub fn shutter(self, seconds: f64) -> Self {
         Self { shutter_s: Some(seconds), ..self }
     }
 
-    /// Whether the sky, ground and lamps that a kind of phenomenon implies are visible, such as the street lamps of rain. They light it in any case.
+    /// Whether the sky, ground and lamps that a kind of phenomenon implies are visible, such as the street lamps of rain. They light it in any case, unless
+    /// the effect has a [`light`](Self::light) or a [`sky`](Self::sky) of its own.
     #[must_use]
     pub fn backdrop(self, is_visible: bool) -> Self {
         Self { implied_backdrop: is_visible, ..self }
@@ -206,7 +207,8 @@ impl Effect {
         Self { assets, ..self }
     }
 
-    /// Most simulation steps that one call of [`LiveEffect::advance`] takes; what is left is owed. 60 by default.
+    /// Most simulation steps of all phenomena together that one call of [`LiveEffect::advance`] takes, at least 1; what is left is owed. 60 by default. A
+    /// particle flame takes about 120 steps a second.
     #[must_use]
     pub fn max_steps(self, steps: u64) -> Self {
         Self { max_steps: steps.max(1), ..self }

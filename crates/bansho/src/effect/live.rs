@@ -1,15 +1,16 @@
 //! An open effect: its time, its pictures, its data.
 
-use std::fmt;
+use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters, frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved,
+    phenomenon::kind::CheckedParameters,
 };
 use bansho_render::{PhenomenonLight, Shot};
 
 use super::{EffectError, Picture, pool::Pool};
 
-/// Longest time step, and largest time before and after time 0, s: a year of frames is a mistake of the caller.
+/// Longest time step, s: more is a mistake of the caller.
 pub const MAX_ADVANCE_S: f64 = 86_400.0;
 /// Largest time, s. In double precision a time of this size is still exact to a nanosecond.
 const MAX_TIME_S: f64 = 4e6;
@@ -25,6 +26,8 @@ pub struct LiveEffect {
     owed_s: f64,
     /// Number of changes of parameters so far.
     pub(super) revision: u64,
+    /// Parameters that the program has set, by the index of the phenomenon, before they were made to continue earlier ones.
+    pub(super) targets: BTreeMap<usize, Arc<dyn CheckedParameters>>,
 }
 
 impl fmt::Debug for LiveEffect {
@@ -35,7 +38,7 @@ impl fmt::Debug for LiveEffect {
 
 impl LiveEffect {
     pub(super) fn new(shot: Shot, max_steps: u64, pool: Pool) -> Self {
-        Self { shot, pool, max_steps, frame: None, owed_s: 0.0, revision: 0 }
+        Self { shot, pool, max_steps, frame: None, owed_s: 0.0, revision: 0, targets: BTreeMap::new() }
     }
 
     /// Time of the current picture, at which its shutter opens, s. It begins at 0.
@@ -52,7 +55,7 @@ impl LiveEffect {
     /// [`Effect::preroll_in_pieces`](super::Effect::preroll_in_pieces).
     ///
     /// # Errors
-    /// None in practice: nothing is read and nothing can stop it.
+    /// None at present: nothing is read and nothing can stop it.
     pub fn preroll(&mut self, max_steps: u64) -> Result<u64, EffectError> {
         let time = self.time();
         let shot = &mut self.shot;
@@ -156,7 +159,7 @@ impl LiveEffect {
         }
     }
 
-    /// The camera that it is seen by.
+    /// The current camera.
     pub fn camera(&self) -> &CameraParameters {
         &self.shot.plan().camera
     }
@@ -177,12 +180,13 @@ impl LiveEffect {
         self.shot.compiled().is_stepped()
     }
 
-    /// Begins again at time 0 with the same random numbers, as opening it again would, but builds nothing: simulations run their preroll, live wind
-    /// is forgotten, changed parameters stay.
+    /// Begins again at time 0 with the same random numbers, as opening it with the current parameters would: simulations run their preroll, and what was set
+    /// live holds from the beginning, without the transitions of the past. The live wind is forgotten; set it again.
     ///
     /// # Errors
-    /// As for [`preroll`](Self::preroll).
+    /// Assets that cannot be read any more.
     pub fn restart(&mut self) -> Result<(), EffectError> {
+        self.hold_from_the_beginning()?;
         self.recycle();
         let shot = &mut self.shot;
         self.pool.run(|| {
@@ -199,8 +203,13 @@ impl LiveEffect {
         self.pool.run(|| self.shot.particles())
     }
 
-    /// The lights with which its phenomena light others, at the middle of the current exposure, such as a point light that follows a flame: see
-    /// [`Shot::lights`].
+    /// Time that the last call was asked for but simulations did not reach within their steps, s.
+    pub fn owed_s(&self) -> f64 {
+        self.owed_s
+    }
+
+    /// The lights with which its phenomena light others, at the middle of the current exposure: a few point lights along each flame, the light of an aurora.
+    /// [`Light::merge_points`](crate::Light::merge_points) makes one of several points. Intensities are physical, not exposed. See [`Shot::lights`].
     pub fn lights(&self) -> Vec<PhenomenonLight> {
         self.pool.run(|| self.shot.lights())
     }

@@ -43,9 +43,9 @@ impl<'a> Picture<'a> {
         [self.frame.beauty.width(), self.frame.beauty.height()]
     }
 
-    /// Bounding rectangle of the pixels that are not empty: only these need to be uploaded.
+    /// Rectangle outside of which every pixel that is written is 0. A texture that still holds the picture before needs the union with its rectangle.
     pub fn content(&self) -> Rect {
-        self.frame.content
+        pixels::nonzero_rect(self.frame)
     }
 
     /// Writes premultiplied linear sRGB as half floats, what engines blend (`Rgba16Float`): see [`pixels::write_rgba16f`].

@@ -44,6 +44,9 @@ pub trait CheckedParameters: Send + Sync {
     /// Reports every value that is out of range or not finite: see [`Parameters::check_values`].
     fn check_values(&self, reader: &mut Reader);
 
+    /// Whether other parameters are of the same kind and equal.
+    fn equals(&self, other: &dyn CheckedParameters) -> bool;
+
     /// The parameters themselves, of the type that implements [`Describe`].
     fn as_any(&self) -> &dyn Any;
 
@@ -95,7 +98,7 @@ pub struct PhenomenonKind {
 pub(crate) const COMMON_KEYS: [&str; 2] = ["name", "enabled"];
 
 /// Makes a [`PhenomenonKind`] from a parameter table and a constructor.
-pub trait Describe: Parameter + Parameters + Clone + Send + Sync + 'static {
+pub trait Describe: Parameter + Parameters + Clone + PartialEq + Send + Sync + 'static {
     /// The table's name in scene files.
     const KEY: &'static str;
     /// See [`PhenomenonKind::in_the_sky`].
@@ -182,6 +185,10 @@ impl<P: Describe> CheckedParameters for Described<P> {
 
     fn check_values(&self, reader: &mut Reader) {
         self.0.check_values(reader);
+    }
+
+    fn equals(&self, other: &dyn CheckedParameters) -> bool {
+        other.as_any().downcast_ref::<P>().is_some_and(|other| *other == self.0)
     }
 
     fn as_any(&self) -> &dyn Any {

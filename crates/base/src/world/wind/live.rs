@@ -70,8 +70,10 @@ impl LiveWind {
 
     /// From `time` on the wind changes linearly to `velocity` and `gust`, which it has `transition_s` later. What was to blow after `time` is dropped.
     pub(super) fn change(&mut self, time: f64, velocity: DVec3, gust: f64, transition_s: f64) {
-        let goes_on = self.keys.back().is_some_and(|last| (last.velocity, last.gust) == (velocity, gust));
-        let Some(now) = self.at(time).filter(|_| !goes_on) else { return };
+        // The last two keys are the beginning and the end of the last transition.
+        let started = self.keys.len().checked_sub(2).map_or(f64::NEG_INFINITY, |index| self.keys[index].time);
+        let is_last = self.keys.back().is_some_and(|last| (last.velocity, last.gust) == (velocity, gust));
+        let Some(now) = self.at(time).filter(|_| !is_last || time < started) else { return };
         self.keys.retain(|key| key.time < time);
         let LiveState { velocity: before, gust: gust_before, travel } = now;
         self.keys.push_back(WindKey { time, velocity: before, gust: gust_before, travel });
@@ -157,6 +159,15 @@ mod tests {
         // Before its memory it has a constant velocity of the same distance.
         let long_ago = folding.at(100.0).unwrap();
         assert!((long_ago.travel.x - 100.0 * long_ago.velocity.x).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_change_at_an_earlier_time_replaces_what_followed() {
+        let mut wind = start();
+        wind.change(20.0, DVec3::X * 3.0, 0.8, 0.5);
+        wind.change(15.0, DVec3::X * 3.0, 0.8, 0.5);
+        assert_eq!(wind.at(15.5).unwrap().velocity, DVec3::X * 3.0);
+        assert!(wind.at(9.0).is_none());
     }
 
     #[test]

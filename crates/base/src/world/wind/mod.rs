@@ -90,7 +90,13 @@ impl Wind {
             gust: self.parameters.gust,
             travel: self.planned_travel(0.0, t),
         };
-        self.live.get_or_insert_with(|| LiveWind::new(t, planned)).change(t, velocity, gust, transition_s);
+        // A program may have gone back to before the first change.
+        if self.live_at(t).is_none() {
+            self.live = Some(LiveWind::new(t, planned));
+        }
+        if let Some(live) = &mut self.live {
+            live.change(t, velocity, gust, transition_s);
+        }
         Ok(())
     }
 
@@ -223,6 +229,18 @@ mod tests {
         let point = DVec3::new(0.3, 1.0, -2.0);
         assert!((wind.at(point, 0.7) - wind.at(point, 4.7)).length() < 1e-4);
         assert!((wind.at(point, 0.7) - wind.at(point, 2.7)).length() > 1e-3);
+    }
+
+    #[test]
+    fn a_change_before_the_first_one_is_heard() {
+        let mut wind = wind(None);
+        wind.change(30.0, DVec3::X, 0.25, 0.2).unwrap();
+        wind.change(10.0, DVec3::X * 2.0, 0.25, 0.2).unwrap();
+        assert_eq!(
+            (wind.mean(9.0), wind.mean(20.0), wind.mean(40.0)),
+            (DVec3::X * 4.0, DVec3::X * 2.0, DVec3::X * 2.0)
+        );
+        assert!((wind.travel(0.0, 10.2) - DVec3::X * (40.0 + 0.6)).length() < 1e-9);
     }
 
     #[test]
