@@ -476,6 +476,48 @@ fn what_is_set_live_holds_from_the_beginning_after_a_restart_and_new_simulations
 }
 
 #[test]
+fn a_loop_of_simulations_repeats() {
+    let gas = FlameParticlesParameters { particles: 200, preroll_s: 0.2.into(), ..Default::default() };
+    let mut live = Effect::new(gas).looping(1.0).size(16, 16).open().unwrap();
+    let times = [0.2, 0.7, 0.95];
+    let turn =
+        |live: &mut LiveEffect, start: f64| times.map(|time| live.at(start + time).unwrap().frame().beauty.clone());
+    let first = turn(&mut live, 0.0);
+    assert_eq!(turn(&mut live, 1.0), first);
+    assert_eq!(turn(&mut live, 2.0), first);
+    assert_ne!(first[0], first[1]);
+    live.set_flow("flame_particles", 0.5).unwrap();
+    assert_ne!(turn(&mut live, 3.0), first);
+    assert!(matches!(live.change_scene(|scene| scene.loop_s = Some(0.0)), Err(EffectError::FixedLoop)));
+}
+
+#[test]
+fn a_shorter_exposure_does_not_stop_a_simulation() {
+    let gas = FlameParticlesParameters { particles: 200, preroll_s: 0.2.into(), ..Default::default() };
+    let mut live = Effect::new(gas).size(8, 8).open().unwrap();
+    live.at(1.0).unwrap();
+    live.set_camera(CameraParameters { shutter_s: Some(0.0), ..live.camera().clone() }).unwrap();
+    for _ in 0..5 {
+        live.advance(1.0 / 144.0).unwrap();
+    }
+    assert!((live.time() - 1.0 - 5.0 / 144.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_flame_that_is_ahead_of_its_time_does_not_jump_when_its_speed_changes() {
+    for phase_s in [10.0, -10.0] {
+        let sheet = |speed: f64| FlameSheetParameters { phase_s, speed: speed.into(), ..torch() };
+        let mut live = Effect::new(sheet(1.1)).size(SIZE, SIZE).open().unwrap();
+        live.at(15.0).unwrap();
+        let frames: Vec<Vec<f32>> = (0..20).map(|_| light_of(&mut live, 1.0 / 60.0)).collect();
+        let usual = frames.windows(2).map(|pair| movement(&pair[0], &pair[1])).fold(0.0, f64::max);
+        live.set_parameters("flame_sheet", sheet(1.4)).unwrap();
+        let jump = movement(&frames[19], &light_of(&mut live, 1.0 / 60.0));
+        assert!(jump < 1.5 * usual && jump < 0.5, "{jump} {usual}");
+    }
+}
+
+#[test]
 fn a_live_wind_goes_on_after_other_random_numbers() {
     let camera =
         CameraParameters { position: [0.0, 0.6, 6.0].into(), target: [0.0, 0.6, 0.0].into(), ..Default::default() };

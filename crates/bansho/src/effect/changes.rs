@@ -105,6 +105,9 @@ impl LiveEffect {
         let before = self.scene().clone();
         let mut scene = Scene::clone(&before);
         change(&mut scene);
+        if scene.loop_s != before.loop_s {
+            return Err(EffectError::FixedLoop);
+        }
         scene.check()?;
         let compiled = self.shot.compiled();
         let assets = compiled.assets().clone();
@@ -133,7 +136,7 @@ impl LiveEffect {
     /// Sets the parameters of the phenomenon `name`: begin with those of [`parameters`](Self::parameters), since defaults would light a flame that is out. Only
     /// that phenomenon is built again, from the one before where parts of it are the same. A simulation keeps its state, unless its time step or the number
     /// of its burners changes; then it is simulated anew, up to the current time. Values that can be keyframed reach the new value within
-    /// 0.25 s, others change at once. Does nothing if the parameters are the same.
+    /// 0.25 s, others, and all in a seamless loop, change at once. Does nothing if the parameters are the same.
     ///
     /// # Errors
     /// There is no phenomenon of that name and kind, a value is out of range or not finite, values contradict each other. The effect is then
@@ -270,7 +273,9 @@ impl LiveEffect {
         let before = &self.scene().instances[index];
         // What is drawn already stays as it was.
         let now = self.shot.plan().shutter_at(self.time()).close;
-        let continuing = target.continuing(before.parameters.as_ref(), now, transition_s);
+        // In a loop, a value that changes at one time would have to change back.
+        let is_loop = self.scene().loop_s.is_some();
+        let continuing = if is_loop { None } else { target.continuing(before.parameters.as_ref(), now, transition_s) };
         let instance = Instance { parameters: continuing.unwrap_or_else(|| target.clone()), ..before.clone() };
         let (compiled, revision) = (self.shot.compiled(), self.revision + 1);
         let compiled = self.pool.run(|| compiled.with_instance(index, instance, revision))?;

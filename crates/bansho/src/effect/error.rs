@@ -72,9 +72,12 @@ pub enum EffectError {
         /// What it lacks.
         what: &'static str,
     },
-    /// The wind of a seamless loop is fixed.
+    /// The wind cannot be changed.
     #[error(transparent)]
-    FixedWind(#[from] bansho_base::world::wind::FixedWind),
+    Wind(#[from] bansho_base::world::wind::WindChangeError),
+    /// The length of a loop cannot be changed while it runs.
+    #[error("the length of a loop cannot be changed while it runs; allowed: another effect")]
+    FixedLoop,
     /// The simulations have not been run up to time 0 yet; see [`Effect::preroll_in_pieces`](super::Effect::preroll_in_pieces).
     #[error("{steps} steps of the preroll are left; call `preroll` until none is")]
     Preroll {

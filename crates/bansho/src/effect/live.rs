@@ -24,6 +24,8 @@ pub struct LiveEffect {
     frame: Option<Frame>,
     /// Time that the last call could not simulate, s.
     owed_s: f64,
+    /// In a loop of simulations: their state at the beginning of the loop.
+    loop_start_state: Option<Vec<u8>>,
     /// Number of changes of parameters so far.
     pub(super) revision: u64,
     /// Parameters that the program has set, by the index of the phenomenon, before they were made to continue earlier ones.
@@ -38,10 +40,19 @@ impl fmt::Debug for LiveEffect {
 
 impl LiveEffect {
     pub(super) fn new(shot: Shot, max_steps: u64, pool: Pool) -> Self {
-        Self { shot, pool, max_steps, frame: None, owed_s: 0.0, revision: 0, targets: BTreeMap::new() }
+        Self {
+            shot,
+            pool,
+            max_steps,
+            frame: None,
+            owed_s: 0.0,
+            loop_start_state: None,
+            revision: 0,
+            targets: BTreeMap::new(),
+        }
     }
 
-    /// Time of the current picture, at which its shutter opens, s. It begins at 0.
+    /// Time of the current picture, at which its shutter opens, s. It begins at 0; in a loop of simulations it is the time within the loop.
     pub fn time(&self) -> f64 {
         self.shot.time()
     }
@@ -116,7 +127,11 @@ impl LiveEffect {
         if steps > 0 {
             return Err(EffectError::Preroll { steps });
         }
-        if self.shot.is_past(time) {
+        let loop_s = self.shot.plan().loop_s().filter(|_| self.is_simulated());
+        let time = loop_s.map_or(time, |seconds| time.rem_euclid(seconds));
+        if loop_s.is_some() {
+            self.begin_turn(time)?;
+        } else if self.is_simulated() && time < self.time() {
             return Err(EffectError::Backward { time, reached: self.time() });
         }
         if time == self.time() && self.owed_s == 0.0 && self.frame.is_some() {
@@ -126,6 +141,31 @@ impl LiveEffect {
         self.recycle();
         let shot = &mut self.shot;
         self.owed_s = self.pool.run(|| shot.advance_to(time, max_steps, &Unobserved))?;
+        Ok(())
+    }
+
+    /// In a loop of simulations: begins the next turn if `time` is before the time that was reached, from the state at the beginning of the loop.
+    fn begin_turn(&mut self, time: f64) -> Result<(), EffectError> {
+        if time >= self.time() {
+            if self.loop_start_state.is_none() && self.time() == 0.0 {
+                self.loop_start_state = Some(self.shot.snapshot());
+            }
+            return Ok(());
+        }
+        // After a change of parameters the state at the beginning is another.
+        let is_restored = self.loop_start_state.take().filter(|state| self.shot.restore(state).is_ok());
+        match is_restored {
+            Some(state) => self.loop_start_state = Some(state),
+            None => {
+                let shot = &mut self.shot;
+                self.pool.run(|| {
+                    shot.restart();
+                    shot.advance_to(0.0, u64::MAX, &Unobserved)
+                })?;
+                self.loop_start_state = Some(self.shot.snapshot());
+            }
+        }
+        self.pool.run(|| self.shot.advance_to(0.0, u64::MAX, &Unobserved))?;
         Ok(())
     }
 

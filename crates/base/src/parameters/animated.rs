@@ -127,17 +127,20 @@ impl<T: Animate> Animated<T> {
         }
         let (oldest, value) = (t - KEY_MEMORY_S, *value);
         let mut keys: Vec<(f64, T)> = Vec::new();
-        let earlier = before.linear_keys(oldest, t);
-        if earlier.last().is_some_and(|(time, last)| *time <= t && *last == value) {
+        let stated = before.keys();
+        if stated.last().is_some_and(|(time, last)| *time <= t && *last == value) {
             *self = before.clone();
             return;
         }
-        if earlier.first().is_some_and(|(time, _)| *time < oldest) && oldest > 0.0 {
+        let is_folded = oldest > 0.0 && stated.first().is_some_and(|(time, _)| *time < oldest);
+        let since = if is_folded { oldest } else { f64::NEG_INFINITY };
+        let earlier = before.linear_keys(oldest, t);
+        if is_folded {
             let integral = before.integral(0.0, oldest);
             let mean = T::from_components(|component| integral.component(component) / oldest);
             keys.extend([(oldest - FOLD_S, mean), (oldest, before.at(oldest))]);
         }
-        keys.extend(earlier.into_iter().filter(|(time, _)| *time > oldest && *time < t));
+        keys.extend(earlier.into_iter().filter(|(time, _)| *time > since && *time < t));
         keys.extend([(t, before.at(t)), (t + transition_s.max(FOLD_S), value)]);
         if let Ok(continued) = Self::keyed(keys, Interpolation::Linear) {
             *self = continued;
@@ -289,6 +292,30 @@ mod tests {
         let same = speed.clone();
         speed.continue_after(&same, now, dt);
         assert_eq!(speed, same);
+    }
+
+    #[test]
+    fn a_curve_that_a_program_changes_keeps_its_integral_whatever_its_interpolation() {
+        for interpolation in [Interpolation::Linear, Interpolation::Step, Interpolation::Monotone] {
+            let before = Animated::keyed(vec![(0.0, 1.0), (10.0, 5.0)], interpolation).unwrap();
+            for t in [5.0, 60.0] {
+                let mut changed = Animated::from(2.0);
+                changed.continue_after(&before, t, 0.25);
+                let [kept, expected] = [&changed, &before].map(|value| value.integral(0.0, t));
+                assert!((kept - expected).abs() < 0.11, "{interpolation:?} {t}: {kept} {expected}");
+                assert_eq!(changed.at(t + 1.0), 2.0);
+            }
+        }
+        // What is still to come does not come any more.
+        let steps = Animated::keyed(vec![(0.0, 5.0), (60.0, 9.0)], Interpolation::Step).unwrap();
+        let mut held = Animated::from(5.0);
+        held.continue_after(&steps, 50.0, 0.25);
+        assert_eq!(held.at(70.0), 5.0);
+        // Keys before time 0 stay while they are recent.
+        let early = Animated::keyed(vec![(-60.0, 0.0), (60.0, 10.0)], Interpolation::Linear).unwrap();
+        let mut changed = Animated::from(1.0);
+        changed.continue_after(&early, 5.0, 0.25);
+        assert!((changed.at(0.0) - early.at(0.0)).abs() < 1e-9);
     }
 
     #[test]

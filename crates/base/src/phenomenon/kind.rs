@@ -126,6 +126,11 @@ pub trait Describe: Parameter + Parameters + Clone + PartialEq + Send + Sync + '
         None
     }
 
+    /// Makes keyframed values continue those of `before` at time `t` (s): see [`Parameter::continue_from`].
+    fn continue_live(&mut self, before: &Self, t: f64, transition_s: f64) {
+        self.continue_from(before, t, transition_s);
+    }
+
     /// The same parameters with another gas flow, as a fraction of full flow: 0 puts a flame out. `None` for what does not burn.
     fn with_flow(&self, _flow: f64) -> Option<Self> {
         None
@@ -202,7 +207,7 @@ impl<P: Describe> CheckedParameters for Described<P> {
         transition_s: f64,
     ) -> Option<Arc<dyn CheckedParameters>> {
         let mut parameters = self.0.clone();
-        parameters.continue_from(before.as_any().downcast_ref::<P>()?, t, transition_s);
+        parameters.continue_live(before.as_any().downcast_ref::<P>()?, t, transition_s);
         Some(Arc::new(Self(parameters)))
     }
 

@@ -20,6 +20,9 @@ use super::{
     texture::{FilterCache, FractalLayers, PaperLayer, PaperSum, TextureSource},
 };
 
+/// Fraction of full gas flow below which nothing is drawn: such a flame is less than a hundredth of its height.
+const MIN_FLOW: f64 = 1e-5;
+
 /// A flame sheet with all its instances, ready to be drawn at any time.
 #[derive(Clone, Debug)]
 pub struct FlameSheet {
@@ -186,16 +189,14 @@ impl FlameSheet {
 
     /// Whether nothing burns at `t`.
     pub(crate) fn is_out(&self, t: f64) -> bool {
-        /// Below this fraction of full flow a flame is less than a hundredth of its height.
-        const LEAST_FLOW: f64 = 1e-5;
-        self.flow_at(t) < LEAST_FLOW
+        self.flow_at(t) < MIN_FLOW
     }
 
     /// Height at `t` as a fraction of that at full flow: the power 2/5 of the heat release rate (Heskestad 1983).
     pub(crate) fn height_fraction(&self, t: f64) -> f64 {
         match self.flow_at(t) {
             1.0 => 1.0,
-            flow => math::pow(flow, 0.4),
+            flow => math::pow(flow.max(MIN_FLOW), 0.4),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::{any::Any, sync::Arc};
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
-    parameters::BuildError,
+    parameters::{BuildError, Parameter},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
         editor_hints::{EditorHints, PositionHandles, StageView},
@@ -44,6 +44,15 @@ impl Describe for FlameSheetParameters {
         let highest = self.color.luminance.bounds()[1].max(f64::MIN_POSITIVE);
         let is_gray = !matches!(self.stage, Stage::Colored | Stage::Flame);
         Some(StageView { size_m: [self.width, self.height], white_luminance: is_gray.then_some(highest) })
+    }
+
+    /// The speed is a function of each flame's own time. The key is at the latest of these, so that no texture has passed it already.
+    fn continue_live(&mut self, before: &Self, t: f64, transition_s: f64) {
+        let mut speed = self.speed.clone();
+        self.continue_from(before, t, transition_s);
+        let ahead = self.instances.iter().map(|instance| instance.phase_s).reduce(f64::max).unwrap_or(0.0);
+        speed.continue_after(&before.speed, t + self.phase_s + ahead, transition_s);
+        self.speed = speed;
     }
 
     fn with_flow(&self, flow: f64) -> Option<Self> {

@@ -23,7 +23,7 @@ const CLIPPED_LUMINANCE: f32 = 2.0;
 pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<ElevationProfile> {
     let path = plan.scene.plate.image.as_ref()?;
     let picture = compiled.assets().picture(&path.0, plan.scene.picture.first_frame).ok()?;
-    let camera = plan.scene.camera.at(0.0, plan.size);
+    let camera = plan.camera.at(0.0, plan.size);
     let [width, height] = [picture.color.width(), picture.color.height()];
     let mapping = PlateMapping::new(plan, [width, height]);
     let view = plan.view_transform();

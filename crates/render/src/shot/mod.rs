@@ -20,7 +20,7 @@ use bansho_base::{
         strip::{Shutter, View},
         surroundings::{Light, Publication, Surroundings},
     },
-    world::wind::{FixedWind, Wind, WindParameters},
+    world::wind::{Wind, WindChangeError, WindParameters},
 };
 
 use crate::{
@@ -167,8 +167,8 @@ impl Shot {
     /// restarts or [advances](Self::advance) to a frame that is not later.
     ///
     /// # Errors
-    /// The scene is a seamless loop, whose wind is fixed.
-    pub fn change_wind(&mut self, velocity: DVec3, gust: f64, transition_s: f64) -> Result<(), FixedWind> {
+    /// The scene is a seamless loop, whose wind is fixed, or a number is not finite.
+    pub fn change_wind(&mut self, velocity: DVec3, gust: f64, transition_s: f64) -> Result<(), WindChangeError> {
         let close = self.context.plan.shutter_at(self.time).close;
         self.context.wind.change(close, velocity, gust, transition_s)?;
         self.has_earlier_state |= !self.context.wind.is_planned();
@@ -239,7 +239,9 @@ impl Shot {
 
     /// Continues with another plan of the same scene, such as one with another camera. Nothing is compared.
     pub fn replace_plan(&mut self, plan: Arc<Plan>) {
-        self.context.plan = plan;
+        let wind = self.context.wind.clone();
+        self.context = ShotContext::new(self.context.compiled.clone(), plan);
+        self.context.wind = wind;
         self.frame = None;
     }
 
@@ -284,10 +286,10 @@ impl Shot {
         let (old, new) = (self.context.compiled.scene(), compiled.scene());
         let is_same_wind =
             WindParameters { velocity: new.wind.velocity.clone(), gust: new.wind.gust, ..old.wind.clone() } == new.wind;
-        if !is_same_wind || old.loop_s.is_some() || new.loop_s.is_some() {
+        if old.loop_s.is_some() || new.loop_s.is_some() {
             return compiled.wind().clone();
         }
-        let mut wind = if old.seed == new.seed {
+        let mut wind = if old.seed == new.seed && is_same_wind {
             self.context.wind.clone()
         } else {
             let mut reseeded = compiled.wind().clone();

@@ -46,10 +46,16 @@ pub struct Wind {
     live: Option<LiveWind>,
 }
 
-/// Error: the wind of a seamless loop is fixed.
+/// Why the wind cannot be changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the wind of a seamless loop cannot be changed while it runs")]
-pub struct FixedWind;
+pub enum WindChangeError {
+    /// The wind of a seamless loop is fixed.
+    #[error("the wind of a seamless loop cannot be changed while it runs")]
+    Loop,
+    /// A time, a component of the velocity or the turbulence intensity is infinite or not a number.
+    #[error("a wind of numbers that are not finite; allowed: finite numbers")]
+    NotFinite,
+}
 
 impl Wind {
     /// The wind with these parameters; in a loop it is periodic with `loop_s` seconds.
@@ -75,10 +81,13 @@ impl Wind {
     /// within `transition_s`. What has blown before stays, so gusts do not jump.
     ///
     /// # Errors
-    /// The wind is that of a seamless loop.
-    pub fn change(&mut self, t: f64, velocity: DVec3, gust: f64, transition_s: f64) -> Result<(), FixedWind> {
+    /// The wind is that of a seamless loop, or a number is not finite.
+    pub fn change(&mut self, t: f64, velocity: DVec3, gust: f64, transition_s: f64) -> Result<(), WindChangeError> {
         if self.loop_s.is_some() {
-            return Err(FixedWind);
+            return Err(WindChangeError::Loop);
+        }
+        if !(velocity.is_finite() && [t, gust, transition_s].iter().all(|number| number.is_finite())) {
+            return Err(WindChangeError::NotFinite);
         }
         let is_planned =
             self.parameters.velocity.constant() == Some(velocity.to_array()) && self.parameters.gust == gust;
@@ -95,7 +104,7 @@ impl Wind {
             self.live = Some(LiveWind::new(t, planned));
         }
         if let Some(live) = &mut self.live {
-            live.change(t, velocity, gust, transition_s);
+            live.change(t, velocity, gust, transition_s.max(0.0));
         }
         Ok(())
     }
@@ -120,8 +129,12 @@ impl Wind {
         if self.live.is_none() {
             return self.planned_travel(from, to);
         }
-        let since_zero = |t| self.live_at(t).map_or_else(|| self.planned_travel(0.0, t), |live| live.travel);
-        since_zero(to) - since_zero(from)
+        self.travel_since_zero(to) - self.travel_since_zero(from)
+    }
+
+    /// Displacement by the mean wind since time 0 of the planned wind, m.
+    fn travel_since_zero(&self, t: f64) -> DVec3 {
+        self.live_at(t).map_or_else(|| self.planned_travel(0.0, t), |live| live.travel)
     }
 
     /// Mean velocity at time `t` without [changes](Self::change) during the shot, m/s.
@@ -163,7 +176,7 @@ impl Wind {
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
         let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
         let (drift, noise_time) = match self.loop_s {
-            None => (self.travel(0.0, t), t / gust_period_s),
+            None => (self.travel_since_zero(t), t / gust_period_s),
             Some(seconds) => (DVec3::ZERO, t / seconds * f64::from(loop_cells(seconds, *gust_period_s))),
         };
         let noise_position = (point - drift) / *gust_length + self.origin;
@@ -236,6 +249,7 @@ mod tests {
         let mut wind = wind(None);
         wind.change(30.0, DVec3::X, 0.25, 0.2).unwrap();
         wind.change(10.0, DVec3::X * 2.0, 0.25, 0.2).unwrap();
+        assert_eq!(wind.change(10.0, DVec3::X * f64::NAN, 0.25, 0.2), Err(WindChangeError::NotFinite));
         assert_eq!(
             (wind.mean(9.0), wind.mean(20.0), wind.mean(40.0)),
             (DVec3::X * 4.0, DVec3::X * 2.0, DVec3::X * 2.0)
