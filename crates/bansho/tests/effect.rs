@@ -468,7 +468,7 @@ fn what_is_set_live_holds_from_the_beginning_after_a_restart_and_new_simulations
     let mut live = Effect::new(gas.clone()).max_steps(5).size(8, 8).open().unwrap();
     live.at(0.5).unwrap();
     // Steps of another length have no use for the state.
-    live.set_parameters("flame_particles", FlameParticlesParameters { step_s: 0.01.into(), ..gas.clone() }).unwrap();
+    live.set_parameters("flame_particles", FlameParticlesParameters { step_s: 0.01, ..gas.clone() }).unwrap();
     assert_eq!(live.advance(0.01).unwrap().time_s(), 0.51);
     assert!(live.particles().positions.len() > 50);
     live.change_scene(|scene| scene.instances.push(bansho::scene::Instance::new("second", gas.clone()))).unwrap();

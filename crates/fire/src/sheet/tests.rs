@@ -5,6 +5,7 @@ use bansho_base::{
     host::observer::Unobserved,
     image::Rect,
     math::{
+        self,
         curve::{Curve, Interpolation},
         random::{Key, Purpose, uniform},
         simd::{LANES, Lanes, ramp},
@@ -380,4 +381,22 @@ fn a_squeezed_texture_looks_as_if_supersampled() {
     let wrong = |content: &[f32]| minification.iter().map(|&index| (content[index] - wanted[index]).abs()).sum::<f32>();
     let (before, after) = (wrong(&plain), wrong(&filtered));
     assert!(minification.len() > 100 && after < 0.7 * before, "{} pixels: {before} {after}", minification.len());
+}
+
+#[test]
+fn the_height_follows_the_gas_flow_to_the_power_of_two_fifths() {
+    let of_flow = |flow: f64| sheet(FlameSheetParameters { flow: flow.into(), ..Default::default() }, None);
+    let still = Wind::new(WindParameters::default(), 1, None);
+    let warp = |sheet: &FlameSheet| sheet.evaluate_at(&sheet.flames[0], math::DVec3::X, &still, 1.0).1;
+    let full = of_flow(1.0);
+    for flow in [0.5, 0.2, 0.05] {
+        let weak = of_flow(flow);
+        let fraction = weak.height_fraction(1.0);
+        assert!((fraction - math::pow(flow, 0.4)).abs() < 1e-12);
+        // What a full flame shows at a height, a weak one shows that much lower.
+        let [high, low] = [(&full, 1.0), (&weak, fraction)]
+            .map(|(sheet, factor)| warp(sheet).unwarp_at([0.5, 0.4 * factor as f32])[1]);
+        assert!((high - low).abs() < 1e-5, "{high} {low}");
+    }
+    assert!(of_flow(0.0).is_out(1.0) && !full.is_out(1.0));
 }
