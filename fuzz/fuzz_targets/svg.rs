@@ -6,7 +6,7 @@ use bansho_media::assets::svg::decode_drawing;
 libfuzzer_sys::fuzz_target!(|text: &str| {
     if let Ok(drawing) = decode_drawing(text) {
         assert!(!drawing.strokes.is_empty());
-        assert!(drawing.low.is_finite() && drawing.high.is_finite());
+        assert!(drawing.min.is_finite() && drawing.max.is_finite());
         let points = || drawing.strokes.iter().flat_map(|stroke| &stroke.points);
         assert!(points().all(|point| point.is_finite()) && points().count() <= 1_000_000);
     }
