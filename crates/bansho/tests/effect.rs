@@ -473,6 +473,14 @@ fn what_is_set_live_holds_from_the_beginning_after_a_restart_and_new_simulations
     assert!(live.particles().positions.len() > 50);
     live.change_scene(|scene| scene.instances.push(bansho::scene::Instance::new("second", gas.clone()))).unwrap();
     assert_eq!(live.advance(0.01).unwrap().time_s(), 0.52);
+    // What is not there any more is not set again.
+    live.extinguish("second").unwrap();
+    live.change_scene(|scene| scene.instances.truncate(1)).unwrap();
+    live.restart().unwrap();
+    assert!(matches!(live.ignite("second"), Err(EffectError::UnknownName { .. })));
+    live.extinguish("flame_particles").unwrap();
+    live.change_scene(|scene| scene.instances.clear()).unwrap();
+    live.restart().unwrap();
 }
 
 #[test]

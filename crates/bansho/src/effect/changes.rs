@@ -1,4 +1,5 @@
-//! Changes of an effect while it runs. Nothing jumps: keyframed values get a key at the present time, and reach the new value within a moment.
+//! Changes of an effect while it runs. Wind and values that can be keyframed do not jump: they get a key at the current time, and reach the new value within
+//! a moment.
 
 use std::sync::Arc;
 
@@ -113,6 +114,17 @@ impl LiveEffect {
         let assets = compiled.assets().clone();
         let compiled = self.pool.run(|| CompiledScene::build(Arc::new(scene), assets, Some(compiled)))?;
         let scene = compiled.scene().clone();
+        let is_kept = |name: &str| {
+            let of_name = |scene: &Scene| {
+                scene
+                    .instances
+                    .iter()
+                    .find(|instance| instance.name == name)
+                    .map(|instance| instance.parameters.clone())
+            };
+            of_name(&before).zip(of_name(&scene)).is_some_and(|(before, after)| Arc::ptr_eq(&before, &after))
+        };
+        self.targets.retain(|name, _| is_kept(name));
         self.replace_scene(compiled)?;
         let mut plan = self.shot.plan().clone();
         if scene.camera != before.camera {
@@ -129,8 +141,8 @@ impl LiveEffect {
 
     /// The parameters of the phenomenon `name` that were set last; `None` if there is none of that name and kind.
     pub fn parameters<P: Describe>(&self, name: &str) -> Option<&P> {
-        let index = self.scene().instances.iter().position(|instance| instance.name == name)?;
-        self.target(index).as_any().downcast_ref()
+        let (_, instance) = self.instance(name).ok()?;
+        self.target(instance).as_any().downcast_ref()
     }
 
     /// Sets the parameters of the phenomenon `name`: begin with those of [`parameters`](Self::parameters), since defaults would light a flame that is out. Only
@@ -179,7 +191,7 @@ impl LiveEffect {
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
         let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: "gas flow" };
-        let changed = self.target(index).with_flow(flow).ok_or_else(not_changeable)?;
+        let changed = self.target(instance).with_flow(flow).ok_or_else(not_changeable)?;
         self.replace(index, changed, IGNITION_S)
     }
 
@@ -201,7 +213,7 @@ impl LiveEffect {
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
         let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: "position" };
-        let changed = self.target(index).with_position(position).ok_or_else(not_changeable)?;
+        let changed = self.target(instance).with_position(position).ok_or_else(not_changeable)?;
         self.replace(index, changed, seconds)
     }
 
@@ -231,8 +243,9 @@ impl LiveEffect {
 
     /// Makes what was set live hold from the beginning, instead of from when it was set.
     pub(super) fn hold_from_the_beginning(&mut self) -> Result<(), EffectError> {
-        for (index, parameters) in std::mem::take(&mut self.targets) {
-            let instance = Instance { parameters, ..self.scene().instances[index].clone() };
+        for (name, parameters) in std::mem::take(&mut self.targets) {
+            let Ok((index, before)) = self.instance(&name) else { continue };
+            let instance = Instance { parameters, ..before.clone() };
             let (compiled, revision) = (self.shot.compiled(), self.revision + 1);
             let compiled = self.pool.run(|| compiled.with_instance(index, instance, revision))?;
             self.revision = revision;
@@ -255,9 +268,9 @@ impl LiveEffect {
         })
     }
 
-    /// The parameters of the phenomenon at `index` that were set last.
-    fn target(&self, index: usize) -> &Arc<dyn CheckedParameters> {
-        self.targets.get(&index).unwrap_or(&self.scene().instances[index].parameters)
+    /// The parameters of a phenomenon that were set last.
+    fn target<'a>(&'a self, instance: &'a Instance) -> &'a Arc<dyn CheckedParameters> {
+        self.targets.get(&instance.name).unwrap_or(&instance.parameters)
     }
 
     /// Replaces the parameters of the phenomenon at `index`; keyframed values continue those before. Does nothing if they are the ones that were set last.
@@ -267,10 +280,10 @@ impl LiveEffect {
         target: Arc<dyn CheckedParameters>,
         transition_s: f64,
     ) -> Result<(), EffectError> {
-        if target.equals(self.target(index).as_ref()) {
+        let before = &self.scene().instances[index];
+        if target.equals(self.target(before).as_ref()) {
             return Ok(());
         }
-        let before = &self.scene().instances[index];
         // What is drawn already stays as it was.
         let now = self.shot.plan().shutter_at(self.time()).close;
         // In a loop, a value that changes at one time would have to change back.
@@ -280,7 +293,7 @@ impl LiveEffect {
         let (compiled, revision) = (self.shot.compiled(), self.revision + 1);
         let compiled = self.pool.run(|| compiled.with_instance(index, instance, revision))?;
         self.revision = revision;
-        self.targets.insert(index, target);
+        self.targets.insert(compiled.scene().instances[index].name.clone(), target);
         self.replace_scene(compiled)
     }
 }

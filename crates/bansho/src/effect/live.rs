@@ -28,8 +28,8 @@ pub struct LiveEffect {
     loop_start_state: Option<Vec<u8>>,
     /// Number of changes of parameters so far.
     pub(super) revision: u64,
-    /// Parameters that the program has set, by the index of the phenomenon, before they were made to continue earlier ones.
-    pub(super) targets: BTreeMap<usize, Arc<dyn CheckedParameters>>,
+    /// Parameters that the program has set, by the name of the phenomenon, before they were made to continue earlier ones.
+    pub(super) targets: BTreeMap<String, Arc<dyn CheckedParameters>>,
 }
 
 impl fmt::Debug for LiveEffect {
