@@ -104,8 +104,8 @@ impl CompiledScene {
         Ok(Self { wind, obstacles, built, enabled, scene, assets })
     }
 
-    /// The same scene with another instance at `index`, as a program changes parameters while a shot runs: only that phenomenon is built, from the one
-    /// before where parts of it are the same. The fingerprints of what is built by `revision`, a number of its own for each change, replace those of the
+    /// The same scene with another instance at `index`, as a program changes parameters while a shot runs: only that phenomenon is built, and may
+    /// reuse tables of the one before. The fingerprints of what is built by `revision`, a number of its own for each change, replace those of the
     /// parameters.
     ///
     /// # Errors

@@ -146,7 +146,7 @@ impl LiveEffect {
     }
 
     /// Sets the parameters of the phenomenon `name`: begin with those of [`parameters`](Self::parameters), since defaults would light a flame that is out. Only
-    /// that phenomenon is built again, from the one before where parts of it are the same. A simulation keeps its state, unless its time step or the number
+    /// that phenomenon is rebuilt, and its tables that do not depend on the change are reused. A simulation keeps its state, unless its time step or the number
     /// of its burners changes; then it is simulated anew, up to the current time. Values that can be keyframed reach the new value within
     /// 0.25 s, others, and all in a seamless loop, change at once. Does nothing if the parameters are the same.
     ///
@@ -242,7 +242,7 @@ impl LiveEffect {
     }
 
     /// Makes what was set live hold from the beginning, instead of from when it was set.
-    pub(super) fn hold_from_the_beginning(&mut self) -> Result<(), EffectError> {
+    pub(super) fn apply_targets_from_time_0(&mut self) -> Result<(), EffectError> {
         for (name, parameters) in std::mem::take(&mut self.targets) {
             let Ok((index, before)) = self.instance(&name) else { continue };
             let instance = Instance { parameters, ..before.clone() };

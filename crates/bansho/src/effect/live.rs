@@ -130,7 +130,7 @@ impl LiveEffect {
         let loop_s = self.shot.plan().loop_s().filter(|_| self.is_simulated());
         let time = loop_s.map_or(time, |seconds| time.rem_euclid(seconds));
         if loop_s.is_some() {
-            self.begin_turn(time)?;
+            self.begin_loop_period(time)?;
         } else if self.is_simulated() && time < self.time() {
             return Err(EffectError::Backward { time, reached: self.time() });
         }
@@ -144,8 +144,8 @@ impl LiveEffect {
         Ok(())
     }
 
-    /// In a loop of simulations: begins the next turn if `time` is before the time that was reached, from the state at the beginning of the loop.
-    fn begin_turn(&mut self, time: f64) -> Result<(), EffectError> {
+    /// In a loop of simulations: begins the next period if `time` is before the time that was reached, from the state at the beginning of the loop.
+    fn begin_loop_period(&mut self, time: f64) -> Result<(), EffectError> {
         if time >= self.time() {
             if self.loop_start_state.is_none() && self.time() == 0.0 {
                 self.loop_start_state = Some(self.shot.snapshot());
@@ -226,7 +226,7 @@ impl LiveEffect {
     /// # Errors
     /// Assets that cannot be read any more.
     pub fn restart(&mut self) -> Result<(), EffectError> {
-        self.hold_from_the_beginning()?;
+        self.apply_targets_from_time_0()?;
         self.recycle();
         let shot = &mut self.shot;
         self.pool.run(|| {

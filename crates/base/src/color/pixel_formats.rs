@@ -23,7 +23,10 @@ use super::{
     space::{ACES2065_1_FROM_ACESCG, Matrix3, REC2020_FROM_ACESCG, SRGB_FROM_ACESCG},
     white_balance::WhiteBalance,
 };
-use crate::math::simd::{LANES, Lanes, Real};
+use crate::{
+    color::display::row::is_empty,
+    math::simd::{LANES, Lanes, Real},
+};
 
 /// A color space whose components are proportional to light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -209,16 +212,6 @@ fn half_block<S: Simd>(simd: S, diagonals: &[Lanes<S>; 4], block: &[[f32; 4]; BL
         let clamped = positive.select_lt(largest, positive, largest);
         half_bits(simd, clamped).store_slice(halves);
     }
-}
-
-/// Whether every component is zero, of either sign.
-#[inline(always)]
-fn is_empty(block: &[[f32; 4]; BLOCK]) -> bool {
-    let mut bits = 0;
-    for value in block.as_flattened() {
-        bits |= value.to_bits();
-    }
-    bits << 1 == 0
 }
 
 #[inline(always)]

@@ -306,7 +306,7 @@ mod tests {
                 assert_eq!(changed.at(t + 1.0), 2.0);
             }
         }
-        // What is still to come does not come any more.
+        // Later keys of the earlier value are dropped.
         let steps = Animated::keyed(vec![(0.0, 5.0), (60.0, 9.0)], Interpolation::Step).unwrap();
         let mut held = Animated::from(5.0);
         held.continue_after(&steps, 50.0, 0.25);

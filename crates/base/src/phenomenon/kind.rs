@@ -23,7 +23,7 @@ pub struct BuildContext<'a> {
     pub loop_s: Option<f64>,
     /// Loader of assets.
     pub assets: &'a dyn Assets,
-    /// The phenomenon of the same name before its parameters were changed; what does not depend on the changes can be taken from it.
+    /// The phenomenon of the same name before its parameters were changed; tables that do not depend on the changes can be reused.
     pub previous: Option<&'a dyn Phenomenon>,
 }
 

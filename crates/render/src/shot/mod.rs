@@ -1,5 +1,7 @@
 //! A shot: the runs of all phenomena of a compiled scene, and the last frame.
 
+mod continuing;
+mod data;
 mod snapshot;
 pub(crate) mod stepping;
 
@@ -7,7 +9,6 @@ use std::sync::Arc;
 
 use bansho_base::{
     frame::{Channel, Frame, PhenomenonMetadata},
-    geometry::point_cloud::PointCloud,
     host::{
         observer::{self, Cancelled, Observer, Stage, StageGuard},
         parallel::prelude::*,
@@ -18,13 +19,13 @@ use bansho_base::{
     phenomenon::{
         LevelMirror, Prepared, SnapshotError,
         strip::{Shutter, View},
-        surroundings::{Light, Publication, Surroundings},
+        surroundings::{Publication, Surroundings},
     },
-    world::wind::{Wind, WindChangeError, WindParameters},
+    world::wind::{Wind, WindChangeError},
 };
 
 use crate::{
-    compiled::{ActiveRun, BuiltPhenomenon, CompiledScene},
+    compiled::{ActiveRun, CompiledScene},
     composite::{
         background::Background,
         hiding::HidingDepth,
@@ -38,6 +39,8 @@ use crate::{
     context::ShotContext,
     plan::Plan,
 };
+
+pub use data::PhenomenonLight;
 
 /// Why a frame cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -54,15 +57,6 @@ pub enum RenderError {
     /// The snapshot belongs to another scene, seed or version.
     #[error("the snapshot belongs to another scene, seed or version")]
     ForeignSnapshot,
-}
-
-/// A light with which a phenomenon lights the others.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhenomenonLight {
-    /// Name of the phenomenon in the scene.
-    pub phenomenon: String,
-    /// The light: geometry in m, world coordinates with y up; intensity in ACEScg, candela for points.
-    pub light: Light,
 }
 
 /// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
@@ -83,9 +77,6 @@ pub struct Shot {
     recycled: Option<Frame>,
     scratches: StripScratches,
 }
-
-/// Duration over which a wind that was edited takes the place of the one before, s.
-const WIND_TRANSITION_S: f64 = 0.25;
 
 impl Shot {
     /// A shot of `compiled` in its initial state. Builds nothing.
@@ -224,27 +215,6 @@ impl Shot {
         self.recycled = Some(frame);
     }
 
-    /// Continues with another scene or plan, as an editor does during playback. Simulations keep their state where the edited phenomenon can
-    /// restore it; the others restart.
-    pub fn replan(&mut self, compiled: Arc<CompiledScene>, plan: Arc<Plan>) {
-        let is_same_scene = self.context.compiled.state_fingerprint() == compiled.state_fingerprint();
-        self.continue_with(compiled, plan, is_same_scene);
-    }
-
-    /// Continues with a scene of which a program has changed parameters, as [`replan`](Self::replan) does, but compares nothing but what was built.
-    pub fn replace_scene(&mut self, compiled: Arc<CompiledScene>) {
-        let plan = Arc::new(self.context.plan.of_scene(compiled.scene().clone()));
-        self.continue_with(compiled, plan, false);
-    }
-
-    /// Continues with another plan of the same scene, such as one with another camera. Nothing is compared.
-    pub fn replace_plan(&mut self, plan: Arc<Plan>) {
-        let wind = self.context.wind.clone();
-        self.context = ShotContext::new(self.context.compiled.clone(), plan);
-        self.context.wind = wind;
-        self.frame = None;
-    }
-
     /// The scene that is drawn.
     pub fn compiled(&self) -> &Arc<CompiledScene> {
         &self.context.compiled
@@ -260,88 +230,10 @@ impl Shot {
         &self.context.plan
     }
 
-    fn continue_with(&mut self, compiled: Arc<CompiledScene>, plan: Arc<Plan>, is_same_scene: bool) {
-        let mut old: Vec<Option<ActiveRun>> = std::mem::take(&mut self.runs).into_iter().map(Some).collect();
-        let kept: Vec<Option<ActiveRun>> =
-            compiled.enabled().iter().map(|built| take_equal_run(&mut old, built)).collect();
-        let loop_s = compiled.scene().loop_s;
-        let kept_or_restored = |(built, run): (&BuiltPhenomenon, Option<ActiveRun>)| {
-            run.unwrap_or_else(|| restored_from_namesake(&old, ActiveRun::start(built, loop_s)))
-        };
-        self.runs = compiled.enabled().iter().zip(kept).map(kept_or_restored).collect();
-        let has_stepped = self.runs.iter().any(|run| run.steps_taken > 0);
-        self.has_earlier_state = has_stepped && (self.has_earlier_state || !is_same_scene);
-        if self.context.plan.scene.plate != plan.scene.plate {
-            self.plates = PlateCache::default();
-        }
-        let wind = self.wind_after_edit(&compiled);
-        self.has_earlier_state |= !wind.is_planned();
-        self.context = ShotContext::new(compiled, plan);
-        self.context.wind = wind;
-        self.frame = None;
-    }
-
-    /// The wind with which the shot continues in another scene: a changed wind blows from now on, as if it had been changed live, so that nothing jumps.
-    fn wind_after_edit(&self, compiled: &CompiledScene) -> Wind {
-        let (old, new) = (self.context.compiled.scene(), compiled.scene());
-        let is_same_wind =
-            WindParameters { velocity: new.wind.velocity.clone(), gust: new.wind.gust, ..old.wind.clone() } == new.wind;
-        if old.loop_s.is_some() || new.loop_s.is_some() {
-            return compiled.wind().clone();
-        }
-        let mut wind = if old.seed == new.seed && is_same_wind {
-            self.context.wind.clone()
-        } else {
-            let mut reseeded = compiled.wind().clone();
-            reseeded.take_changes(&self.context.wind);
-            reseeded
-        };
-        if old.wind != new.wind {
-            let close = self.context.plan.shutter_at(self.time).close;
-            let velocity = DVec3::from(new.wind.velocity.at(close));
-            if wind.change(close, velocity, new.wind.gust, WIND_TRANSITION_S).is_err() {
-                return compiled.wind().clone();
-            }
-        }
-        wind
-    }
-
     /// Whether the state is the one to which the scene leads from its initial state. After [`replan`](Self::replan) it may differ until the
     /// simulations restart.
     pub fn is_exact(&self) -> bool {
         !self.has_earlier_state
-    }
-
-    /// The particles of all phenomena, at the middle of the exposure of the frame that the shot was advanced to: the gas of particle flames, the electrons of
-    /// simulated auroras, and the drops of rain that the camera sees as streaks. The phenomena follow each other in the order of the scene.
-    ///
-    /// Positions are in m and velocities in m/s, world coordinates with y up. The other [quantities](PointCloud::quantities) state their name and unit
-    /// themselves ([`Quantity`](bansho_base::geometry::point_cloud::Quantity)); they are 0 for particles that lack one.
-    pub fn particles(&self) -> PointCloud {
-        let mut all = PointCloud::default();
-        self.point_clouds().into_iter().for_each(|(_, cloud)| all.extend(&cloud));
-        all
-    }
-
-    /// The [particles](Self::particles) of each phenomenon that can have any, with its name in the scene. They may be none at this frame.
-    pub fn point_clouds(&self) -> Vec<(String, PointCloud)> {
-        let view = self.context.plan.view_at(self.time);
-        let publications = self.publications(view.shutter);
-        let surroundings = self.surroundings(&view, &publications, None);
-        let each = self.runs.iter().zip(&surroundings);
-        each.filter_map(|(run, surroundings)| Some((run.info().name.to_owned(), run.run.export(&view, surroundings)?)))
-            .collect()
-    }
-
-    /// The lights with which phenomena light each other, at the frame that the shot was advanced to: of each flame the points that approximate its emission,
-    /// of an aurora a directional light. Lamps and the sky of the scene are not among them. The phenomena follow each other in the order of the scene.
-    pub fn lights(&self) -> Vec<PhenomenonLight> {
-        let publications = self.publications(self.context.plan.shutter_at(self.time));
-        let of_run = |(run, publication): (&ActiveRun, Publication)| {
-            let phenomenon = run.info().name.to_owned();
-            publication.lights.into_iter().map(move |light| PhenomenonLight { phenomenon: phenomenon.clone(), light })
-        };
-        self.runs.iter().zip(publications).flat_map(of_run).collect()
     }
 
     /// The state of all simulations, for [`restore`](Self::restore).
@@ -491,26 +383,6 @@ impl Shot {
         let of_phenomenon = |index| stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
         (0..self.runs.len()).map(of_phenomenon).collect()
     }
-}
-
-/// Takes the run of an equal phenomenon, one with the same fingerprint, out of `old`.
-fn take_equal_run(old: &mut [Option<ActiveRun>], built: &BuiltPhenomenon) -> Option<ActiveRun> {
-    let is_equal = |run: &Option<ActiveRun>| run.as_ref().is_some_and(|run| run.built.fingerprint == built.fingerprint);
-    let run = old.iter_mut().find(|run| is_equal(run))?.take()?;
-    Some(ActiveRun { built: built.clone(), ..run })
-}
-
-/// `run`, which is in its initial state, with the state of the run in `old` whose phenomenon has the same name, at the same time. Unchanged
-/// where it cannot restore that state.
-fn restored_from_namesake(old: &[Option<ActiveRun>], mut run: ActiveRun) -> ActiveRun {
-    let namesake = old.iter().flatten().find(|old| old.info().name == run.info().name);
-    let steps = namesake.and_then(|old| run.stepping?.steps_for(&old.stepping?, old.steps_taken));
-    if let (Some(steps), Some(state)) = (steps, namesake.and_then(|old| old.as_stepped()).map(|old| old.snapshot()))
-        && run.run.as_stepped_mut().is_some_and(|stepped| stepped.restore(&state).is_ok())
-    {
-        run.steps_taken = steps;
-    }
-    run
 }
 
 /// Slices of depth, and the prepared phenomena to which their members refer.

@@ -184,7 +184,7 @@ fn convert<C: DisplayCode, V: DisplayTransform, K: PixelEncoding>(
 
 /// Whether every component is zero, of either sign.
 #[inline(always)]
-fn is_empty(block: &[[f32; 4]; BLOCK]) -> bool {
+pub(in crate::color) fn is_empty<const N: usize>(block: &[[f32; 4]; N]) -> bool {
     let mut bits = 0;
     for value in block.as_flattened() {
         bits |= value.to_bits();

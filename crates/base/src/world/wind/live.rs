@@ -68,7 +68,7 @@ impl LiveWind {
         Some(LiveState { velocity: last.velocity, gust: last.gust, travel })
     }
 
-    /// From `time` on the wind changes linearly to `velocity` and `gust`, which it has `transition_s` later. What was to blow after `time` is dropped.
+    /// From `time` on the wind changes linearly to `velocity` and `gust`, which it has `transition_s` later. Keys after `time` are dropped.
     pub(super) fn change(&mut self, time: f64, velocity: DVec3, gust: f64, transition_s: f64) {
         // The last two keys are the beginning and the end of the last transition.
         let started = self.keys.len().checked_sub(2).map_or(f64::NEG_INFINITY, |index| self.keys[index].time);

@@ -142,7 +142,7 @@ impl Wind {
         DVec3::from(self.parameters.velocity.at(t))
     }
 
-    /// Displacement by the mean wind from one time to another without [changes](Self::change) during the shot, m. It also knows the future.
+    /// Displacement by the mean wind from one time to another without [changes](Self::change) during the shot, m. Future keys are included.
     pub fn planned_travel(&self, from: f64, to: f64) -> DVec3 {
         DVec3::from(self.parameters.velocity.integral(from, to))
     }
