@@ -58,6 +58,12 @@ struct PressureTerm<K>(K);
 impl<K: SmoothingKernel<D>, const D: usize> PairTerm<D, 2, D> for PressureTerm<K> {
     const DIRECTED: bool = true;
 
+    /// Without pressure: most gas that is as thin as at rest or thinner, unless negative pressure is allowed.
+    #[inline(always)]
+    fn is_inert([pressure, _volume]: &[f32; 2]) -> bool {
+        *pressure == 0.0
+    }
+
     #[inline(always)]
     fn add<R: Real>(&self, pair: &Pair<R, D>, own: &[R; 2], other: &[R; 2], sums: &mut [R; D]) {
         let factor = (own[0] + other[0]) * other[1] * self.0.gradient_factor(pair.distance_squared);

@@ -40,6 +40,11 @@ pub trait PairTerm<const D: usize, const IN: usize, const OUT: usize>: Sync {
     /// distance 0.
     const DIRECTED: bool;
 
+    /// Whether a particle with these values is inert: the term between two inert particles is exactly 0, so that such pairs are skipped.
+    fn is_inert(_values: &[f32; IN]) -> bool {
+        false
+    }
+
     /// Adds the contribution of a neighbor with the values `other` to the sums of a particle with the values `own`.
     ///
     /// Implementations are `#[inline(always)]` and loop over arrays instead of calling `map`, whose closures do not vectorize. The
@@ -111,7 +116,11 @@ fn sum_batch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     let first = batch.particles().start;
     for group in &batch.groups {
         let candidates = &batch.candidates[group.candidates.clone()];
-        let (sums, coincident) = sum_group(simd, term, inputs, group.particles.start, candidates);
+        let (sums, coincident) = if is_group_inert::<T, D, IN, OUT>(inputs, group) {
+            sum_group::<S, T, D, IN, OUT, true>(simd, term, inputs, group.particles.start, candidates)
+        } else {
+            sum_group::<S, T, D, IN, OUT, false>(simd, term, inputs, group.particles.start, candidates)
+        };
         let mut lanes = [[0.0; BATCH]; OUT];
         for k in 0..OUT {
             sums[k].store_slice(&mut lanes[k]);
@@ -126,10 +135,27 @@ fn sum_batch<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
     }
 }
 
-/// Sums for the eight particles from `first` on over all candidates; for directed terms also the number of candidates that coincide
-/// with each, itself included.
+/// Whether all particles of a group are inert.
 #[inline(always)]
-fn sum_group<S: Simd, T, const D: usize, const IN: usize, const OUT: usize>(
+fn is_group_inert<T, const D: usize, const IN: usize, const OUT: usize>(
+    inputs: &SumInputs<'_, D, IN>,
+    group: &Group,
+) -> bool
+where
+    T: PairTerm<D, IN, OUT>,
+{
+    for particle in group.particles.clone() {
+        if !T::is_inert(&values_at(&inputs.fields, particle)) {
+            return false;
+        }
+    }
+    true
+}
+
+/// Sums for the eight particles from `first` on over all candidates, without the inert ones if `SKIP_INERT`; for directed terms also the number of
+/// candidates that coincide with each, itself included.
+#[inline(always)]
+fn sum_group<S: Simd, T, const D: usize, const IN: usize, const OUT: usize, const SKIP_INERT: bool>(
     simd: S,
     term: &T,
     inputs: &SumInputs<'_, D, IN>,
@@ -147,9 +173,14 @@ where
     let none = HalfLanes::splat(simd, 0.0);
     let (max_squared, min_squared, one) =
         (none.broadcast(support * support), none.broadcast(coincidence_distance_squared(support)), none.broadcast(1.0));
-    let (mut sums, mut coincident) = ([none; OUT], none);
+    // Each particle coincides with itself, but is skipped if it is inert.
+    let (mut sums, mut coincident) = ([none; OUT], if SKIP_INERT { one } else { none });
     for candidate in candidates {
         let candidate = *candidate as usize;
+        let values = values_at(&fields, candidate);
+        if SKIP_INERT && T::is_inert(&values) {
+            continue;
+        }
         let offset = subtract(&position, &splat_all(simd, values_at(&positions, candidate)));
         let length_squared = length_squared(&offset);
         let mut distance_squared = length_squared.simd_min(max_squared);
@@ -157,7 +188,7 @@ where
             coincident += length_squared.select_lt(min_squared, one, none);
             distance_squared = distance_squared.simd_max(min_squared);
         }
-        let other = splat_all(simd, values_at(&fields, candidate));
+        let other = splat_all(simd, values);
         term.add(&Pair { offset, distance_squared }, &own, &other, &mut sums);
     }
     (sums, coincident)
