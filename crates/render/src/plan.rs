@@ -75,6 +75,8 @@ pub struct Plan {
     pub layers: bool,
     /// Whether phenomena write their AOVs.
     pub aovs: bool,
+    /// Whether frames have the depth of each pixel; of what has layers or AOVs it is always kept.
+    pub depth: bool,
     /// Whether frames carry the phenomena's metadata.
     pub metadata: bool,
     /// The view transform of display formats, without the camera's white balance.
@@ -107,6 +109,7 @@ impl Plan {
             layers: options.layers,
             aovs: options.aovs,
             metadata: options.metadata,
+            depth: true,
             display: options.display,
             fingerprint_frames: true,
             camera: scene.camera.clone(),

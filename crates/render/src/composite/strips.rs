@@ -38,16 +38,19 @@ pub(crate) struct Outputs {
     pub(crate) layers: bool,
     /// Whether AOVs are written.
     pub(crate) aovs: bool,
+    /// Whether the depth of each pixel is needed.
+    pub(crate) depth: bool,
 }
 
 impl Outputs {
     /// As the plan requests.
     pub(crate) fn of_plan(plan: &Plan) -> Self {
-        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs }
+        let depth = plan.depth || plan.layers || plan.aovs;
+        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs, depth }
     }
 
     /// Absolute radiance without layers and AOVs.
-    pub(crate) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false };
+    pub(crate) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false, depth: false };
 }
 
 /// A frame that is ready to be composited.
@@ -178,30 +181,43 @@ impl Composition<'_> {
 /// The memory of a frame.
 struct FrameMemory {
     beauty: Image<4>,
-    depth: Vec<f32>,
+    depth: Option<Vec<f32>>,
     /// Pixels that still contain an earlier frame; all others are empty.
     stale: Rect,
 }
 
 impl FrameMemory {
     /// Takes the memory of a recycled frame of the same size: page faults of new memory cost more than drawing a sparse frame.
-    fn new(window: Rect, recycled: Option<Frame>) -> Self {
+    fn new(window: Rect, has_depth: bool, recycled: Option<Frame>) -> Self {
         let (width, height) = (window.width, window.height);
-        let fits = |frame: &Frame| frame.beauty.width() == width && frame.beauty.height() == height;
-        if let Some(Frame { beauty, depth: Some(depth), content, .. }) = recycled.filter(fits) {
+        let fits = |frame: &Frame| {
+            frame.beauty.width() == width && frame.beauty.height() == height && frame.depth.is_some() == has_depth
+        };
+        if let Some(Frame { beauty, depth, content, .. }) = recycled.filter(fits) {
             return Self { beauty, depth, stale: content };
         }
-        let depth = vec![f32::INFINITY; width * height];
+        let depth = has_depth.then(|| vec![f32::INFINITY; width * height]);
         Self { beauty: Image::filled(width, height, [0.0; 4]), depth, stale: Rect::default() }
     }
 }
 
-/// Clears the stale pixels in the rows from `first` on.
-fn clear(stale: Rect, first: usize, width: usize, beauty: &mut [[f32; 4]], depth: &mut [f32]) {
-    for (row, (beauty, depth)) in beauty.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
-        if (stale.y..stale.bottom()).contains(&(first + row)) {
-            beauty[stale.x..stale.right()].fill([0.0; 4]);
-            depth[stale.x..stale.right()].fill(f32::INFINITY);
+/// The pixels of a strip in a frame, row by row.
+struct StripPixels<'a> {
+    beauty: &'a mut [[f32; 4]],
+    /// Empty where the frame has no depth.
+    depth: &'a mut [f32],
+}
+
+impl StripPixels<'_> {
+    /// Clears the stale pixels; the strip begins with row `first` of the frame, which is `width` pixels wide.
+    fn clear(&mut self, stale: Rect, first: usize, width: usize) {
+        let columns = stale.x..stale.right();
+        let is_stale = |row: usize| (stale.y..stale.bottom()).contains(&(first + row));
+        for (_, beauty) in self.beauty.chunks_mut(width).enumerate().filter(|(row, _)| is_stale(*row)) {
+            beauty[columns.clone()].fill([0.0; 4]);
+        }
+        for (_, depth) in self.depth.chunks_mut(width).enumerate().filter(|(row, _)| is_stale(*row)) {
+            depth[columns.clone()].fill(f32::INFINITY);
         }
     }
 }
@@ -215,31 +231,29 @@ pub(crate) fn draw_frame(
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
     let level = Level::new();
-    let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, recycled);
+    let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, composition.outputs.depth, recycled);
     let strip_pixels = STRIP_ROWS * window.width;
+    let mut depth_strips = depth.iter_mut().flat_map(|depth| depth.chunks_mut(strip_pixels));
+    let beauty_strips = beauty.pixels_mut().chunks_mut(strip_pixels);
+    let pixels: Vec<StripPixels> =
+        beauty_strips.map(|beauty| StripPixels { beauty, depth: depth_strips.next().unwrap_or_default() }).collect();
     let scratches = composition.scratches;
     let has_channels = composition.outputs.layers || composition.outputs.aovs;
-    let strips = beauty
-        .pixels_mut()
-        .par_chunks_mut(strip_pixels)
-        .zip(depth.par_chunks_mut(strip_pixels))
-        .enumerate()
-        .with_max_len(1)
-        .map(|(index, (beauty, depth))| {
-            observer::check(observer)?;
-            clear(stale, index * STRIP_ROWS, window.width, beauty, depth);
-            let strip = composition.strip_rect(index);
-            let rect = composition.nonempty_rect(strip);
-            if rect.is_empty() {
-                return Ok(Vec::new());
-            }
-            scratches.with(|scratch| {
-                composition.accumulate(level, rect, scratch);
-                composition.background.trace(rect, &mut scratch.bent);
-                finish_strip(composition, level, scratch, strip, beauty, depth);
-                Ok(if has_channels { channel_planes(composition, scratch) } else { Vec::new() })
-            })
-        });
+    let strips = pixels.into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
+        observer::check(observer)?;
+        pixels.clear(stale, index * STRIP_ROWS, window.width);
+        let strip = composition.strip_rect(index);
+        let rect = composition.nonempty_rect(strip);
+        if rect.is_empty() {
+            return Ok(Vec::new());
+        }
+        scratches.with(|scratch| {
+            composition.accumulate(level, rect, scratch);
+            composition.background.trace(rect, &mut scratch.bent);
+            finish_strip(composition, level, scratch, strip, &mut pixels);
+            Ok(if has_channels { channel_planes(composition, scratch) } else { Vec::new() })
+        })
+    });
     let planes: Vec<Vec<Vec<f32>>> = if has_channels {
         strips.collect::<Result<_, Cancelled>>()?
     } else {
@@ -248,15 +262,7 @@ pub(crate) fn draw_frame(
     };
     let opaque = composition.plate.color.is_some() && composition.view.overscan == 0;
     let content = composition.content();
-    Ok(Frame {
-        header,
-        beauty,
-        depth: Some(depth),
-        channels: channels(composition, planes),
-        opaque,
-        content,
-        metadata: Vec::new(),
-    })
+    Ok(Frame { header, beauty, depth, channels: channels(composition, planes), opaque, content, metadata: Vec::new() })
 }
 
 /// Exposes a strip, computes its alpha, and composites the background behind it.
@@ -265,22 +271,20 @@ fn finish_strip(
     level: Level,
     scratch: &mut StripScratch,
     strip: Rect,
-    beauty: &mut [[f32; 4]],
-    depth: &mut [f32],
+    pixels: &mut StripPixels,
 ) {
     let (exposure, background) = (composition.outputs.exposure, &composition.background);
     let StripScratch { accumulator, bent, row: buffer, .. } = scratch;
     let rect = accumulator.rect;
     for row in 0..rect.height {
-        let pixels = row * rect.width..(row + 1) * rect.width;
+        let accumulated = row * rect.width..(row + 1) * rect.width;
         let first = (rect.y - strip.y + row) * strip.width + rect.x - strip.x;
-        let (out, depth) = (&mut beauty[first..][..rect.width], &mut depth[first..][..rect.width]);
-        depth.copy_from_slice(&accumulator.depth[pixels.clone()]);
-        let color = accumulator.color.each_ref().map(|plane| &plane[pixels.clone()]);
+        let out = &mut pixels.beauty[first..][..rect.width];
+        let color = accumulator.color.each_ref().map(|plane| &plane[accumulated.clone()]);
         match accumulator.transmittance() {
             None => dispatch!(level, _simd => expose_row(exposure, color, out)),
             Some(planes) => {
-                let transmittance = planes.each_ref().map(|plane| &plane[pixels.clone()]);
+                let transmittance = planes.each_ref().map(|plane| &plane[accumulated.clone()]);
                 dispatch!(level, _simd => expose_absorbed_row(exposure, color, transmittance, out));
             }
         }
@@ -288,13 +292,16 @@ fn finish_strip(
             match accumulator.transmittance() {
                 None => dispatch!(level, _simd => composite_background(colors, out)),
                 Some(planes) => {
-                    let transmittance = planes.each_ref().map(|plane| &plane[pixels.clone()]);
+                    let transmittance = planes.each_ref().map(|plane| &plane[accumulated.clone()]);
                     dispatch!(level, _simd => composite_absorbed_background(transmittance, colors, out));
                 }
             }
         }
-        if let Some(depths) = background.depth_row(rect, row, composition.view.size[0]) {
-            depth.iter_mut().zip(depths).for_each(|(depth, farther)| *depth = depth.min(*farther));
+        if let Some(depth) = pixels.depth.get_mut(first..first + rect.width) {
+            depth.copy_from_slice(&accumulator.depth[accumulated]);
+            if let Some(depths) = background.depth_row(rect, row, composition.view.size[0]) {
+                depth.iter_mut().zip(depths).for_each(|(depth, farther)| *depth = depth.min(*farther));
+            }
         }
     }
 }

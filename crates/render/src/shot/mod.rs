@@ -280,8 +280,10 @@ impl Shot {
             return Ok(None);
         }
         let is_refracted = has_background && prepared.iter().any(|prepared| prepared.deflection().is_some());
+        let outputs = Outputs::of_plan(&self.context.plan);
         let composition = Composition {
-            outputs: Outputs::of_plan(&self.context.plan),
+            // What is nearer than refracting air is not refracted.
+            outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
             view,
             runs: &self.runs,
             prepared: &prepared,

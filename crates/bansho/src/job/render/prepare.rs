@@ -123,7 +123,9 @@ impl Job {
         self.check_metadata(kind)?;
         let alpha = alpha_convention(self.alpha, self.view, AlphaConvention::Encoded)?;
         let compiled = self.scene.compile(scene.with_options(&self.scene_options())?, &self.scene.assets())?;
-        let plan = Arc::new(Plan::new(&compiled, &self.plan_options(kind))?);
+        let mut plan = Plan::new(&compiled, &self.plan_options(kind))?;
+        plan.depth = kind.is_scene_linear();
+        let plan = Arc::new(plan);
         let frames = self.selected_frames(&plan)?;
         plates::check(&self.scene, &compiled, &frames)?;
         let files = if self.contact_sheet.is_some() { 1 } else { frames.len() };
