@@ -5,8 +5,6 @@ use bansho_base::{
     host::observer::{Observer, check},
 };
 
-use rayon::ScopeFifo;
-
 use super::{
     frame_source::FrameSource,
     in_flight::{CompletionGuard, InFlightFrames, StopOnFailure},
@@ -14,24 +12,10 @@ use super::{
 };
 use crate::job::{error::JobError, observer::JobObserver};
 
-/// What remains to be done for a frame once its memory has been given back, such as compressing and writing its display pixels.
-pub(crate) type RemainingWork<'a> = Box<dyn FnOnce(&dyn Observer) -> Result<(), JobError> + Send + 'a>;
-
 /// What drawn frames go to.
 pub(crate) trait FrameSink: Sync {
-    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight). The frame's memory is
-    /// then given to the next one, while the remaining work is done.
-    fn finish(
-        &self,
-        index: usize,
-        frame: &mut Frame,
-        observer: &dyn Observer,
-    ) -> Result<Option<RemainingWork<'_>>, JobError>;
-
-    /// Whether it is so quick with a frame that the next one may wait for its memory.
-    fn gives_memory_back_early(&self) -> bool {
-        false
-    }
+    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError>;
 
     /// How many frames may be in flight at once.
     fn max_in_flight(&self) -> usize;
@@ -39,8 +23,6 @@ pub(crate) trait FrameSink: Sync {
 
 /// Bytes of frames that may be in flight at once, unless two frames alone are larger.
 const MAX_BYTES_IN_FLIGHT: usize = 1 << 30;
-/// Bytes of a frame above which the next one waits for its memory, if that is given back early.
-const MAX_BYTES_OF_TWO_BUFFERS: usize = 1 << 28;
 
 /// Draws the frames `numbers` in order. A frame is drawn while earlier ones are still being compressed and written.
 ///
@@ -57,19 +39,26 @@ pub(crate) fn draw_frames(
 ) -> Result<(), JobError> {
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let (mut last, mut waits_for_memory) = (None, false);
+    let mut last = None;
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
-            if let Some(recycled) = in_flight.take_recycled(waits_for_memory) {
+            if let Some(recycled) = in_flight.take_recycled() {
                 shot.recycle(recycled);
             }
-            let frame = draw(shot, last, number, snapshots, &stop_on_failure, observer)?;
+            let mut frame = draw(shot, last, number, snapshots, &stop_on_failure, observer)?;
             last = Some(number);
-            waits_for_memory = sink.gives_memory_back_early() && byte_count(&frame) > MAX_BYTES_OF_TWO_BUFFERS;
             in_flight.submit(index, in_flight_limit(&frame, sink));
-            let completion = CompletionGuard { in_flight: &in_flight, index };
-            let stop_on_failure = &stop_on_failure;
-            scope.spawn_fifo(move |scope| finish(scope, frame, sink, completion, stop_on_failure));
+            let (in_flight, stop_on_failure) = (&in_flight, &stop_on_failure);
+            scope.spawn_fifo(move |_| {
+                let _completion = CompletionGuard { in_flight, index };
+                if stop_on_failure.cancelled() {
+                    return;
+                }
+                match sink.finish(index, &mut frame, stop_on_failure) {
+                    Ok(()) => in_flight.recycle(frame),
+                    Err(error) => in_flight.fail(error),
+                }
+            });
         }
         Ok(())
     });
@@ -96,44 +85,12 @@ fn draw(
     shot.read().ok_or(JobError::Cancelled)
 }
 
-/// Gives a frame to the sink, then its memory back. The remaining work becomes a task of its own, so that whoever waits for the memory does not
-/// have to wait for it.
-fn finish<'scope>(
-    scope: &ScopeFifo<'scope>,
-    mut frame: Frame,
-    sink: &'scope dyn FrameSink,
-    completion: CompletionGuard<'scope>,
-    stop_on_failure: &'scope StopOnFailure<'scope>,
-) {
-    let in_flight = completion.in_flight;
-    if stop_on_failure.cancelled() {
-        return;
-    }
-    match sink.finish(completion.index, &mut frame, stop_on_failure) {
-        Ok(remaining) => {
-            in_flight.recycle(frame);
-            let Some(remaining) = remaining else { return };
-            scope.spawn_fifo(move |_| {
-                let _completion = completion;
-                if let Err(error) = remaining(stop_on_failure) {
-                    in_flight.fail(error);
-                }
-            });
-        }
-        Err(error) => in_flight.fail(error),
-    }
-}
-
-/// Bytes of the pixels of a frame.
-fn byte_count(frame: &Frame) -> usize {
-    let planes = 4 + usize::from(frame.depth.is_some()) + frame.channels.len();
-    frame.beauty.width() * frame.beauty.height() * size_of::<f32>() * planes
-}
-
 /// How many frames of this size may be in flight: one for each thread and one more, as far as memory allows.
 fn in_flight_limit(frame: &Frame, sink: &dyn FrameSink) -> usize {
+    let pixels = frame.beauty.width() * frame.beauty.height();
+    let bytes = pixels * size_of::<f32>() * (5 + frame.channels.len());
     let max = (rayon::current_num_threads() + 1).min(sink.max_in_flight()).max(2);
-    (MAX_BYTES_IN_FLIGHT / byte_count(frame).max(1)).clamp(2, max)
+    (MAX_BYTES_IN_FLIGHT / bytes.max(1)).clamp(2, max)
 }
 
 #[cfg(test)]
@@ -226,77 +183,5 @@ mod tests {
         let result = in_pool(2, || run(&numbers, &FunctionSink { each, max_in_flight: 8 }, &observer));
         assert!(matches!(result, Err(JobError::Cancelled)), "{result:?}");
         assert!((10..100).contains(&finished.into_inner()));
-    }
-
-    /// Writes frames slowly; their memory has been given back by then.
-    struct SlowWriter {
-        memory_in_use: AtomicUsize,
-        written: AtomicUsize,
-    }
-
-    impl FrameSink for SlowWriter {
-        fn finish(
-            &self,
-            _index: usize,
-            _frame: &mut Frame,
-            _observer: &dyn Observer,
-        ) -> Result<Option<RemainingWork<'_>>, JobError> {
-            self.memory_in_use.fetch_add(1, Ordering::Relaxed);
-            thread::sleep(Duration::from_millis(2));
-            self.memory_in_use.fetch_sub(1, Ordering::Relaxed);
-            Ok(Some(Box::new(|_| {
-                thread::sleep(Duration::from_millis(3));
-                if self.written.fetch_add(1, Ordering::Relaxed) == 20 {
-                    Err(OptionError::NoFrames.into())
-                } else {
-                    Ok(())
-                }
-            })))
-        }
-
-        fn gives_memory_back_early(&self) -> bool {
-            true
-        }
-
-        fn max_in_flight(&self) -> usize {
-            4
-        }
-    }
-
-    #[test]
-    fn remaining_work_is_done_for_every_frame_and_its_failure_stops_the_work() {
-        for threads in [1, 2, 5] {
-            for (count, is_failure) in [(20, false), (60, true)] {
-                let sink = SlowWriter { memory_in_use: AtomicUsize::new(0), written: AtomicUsize::new(0) };
-                let numbers: Vec<i64> = (0..count).collect();
-                let result = in_pool(threads, || run(&numbers, &sink, &RecordingObserver::default()));
-                assert_eq!(result.is_err(), is_failure, "{result:?}");
-                let written = sink.written.into_inner();
-                assert!(written == 20 || is_failure && (21..30).contains(&written), "{written}");
-                assert_eq!(sink.memory_in_use.into_inner(), 0);
-            }
-        }
-    }
-
-    #[test]
-    fn the_memory_of_a_frame_is_waited_for_until_no_frame_has_it() {
-        let in_flight = InFlightFrames::default();
-        assert!(in_flight.take_recycled(true).is_none(), "no frame is unfinished");
-        let mut source = CountingSource::new();
-        source.advance(3, &RecordingObserver::default()).unwrap();
-        source.draw(&RecordingObserver::default()).unwrap();
-        let frame = source.read().unwrap();
-        in_flight.submit(0, 2);
-        assert!(in_flight.take_recycled(false).is_none());
-        thread::scope(|scope| {
-            scope.spawn(|| {
-                thread::sleep(Duration::from_millis(20));
-                in_flight.recycle(frame);
-            });
-            assert_eq!(in_flight.take_recycled(true).map(|frame| frame.header.number), Some(3));
-        });
-        // A frame that is never given back, as after a panic, is not waited for once it counts as finished.
-        drop(CompletionGuard { in_flight: &in_flight, index: 0 });
-        assert!(in_flight.take_recycled(true).is_none());
     }
 }

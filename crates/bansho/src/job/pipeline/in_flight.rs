@@ -51,36 +51,21 @@ impl InFlightFrames {
                 return;
             }
             drop(state);
-            self.work_or_wait();
+            if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                let state = self.lock();
+                drop(self.completed.wait_timeout(state, IDLE_WAIT));
+            }
         }
     }
 
-    /// Executes a task of the pool, or if there is none waits for a frame.
-    fn work_or_wait(&self) {
-        if rayon::yield_now() != Some(rayon::Yield::Executed) {
-            let state = self.lock();
-            drop(self.completed.wait_timeout(state, IDLE_WAIT));
-        }
-    }
-
-    /// Keeps a frame that is no longer needed, whose memory the next one reuses.
+    /// Keeps a finished frame, whose memory the next one reuses.
     pub(crate) fn recycle(&self, frame: Frame) {
         self.lock().recycled = Some(frame);
-        self.completed.notify_all();
     }
 
-    /// A frame whose memory was given back, if there is one. If `waits`, it waits as long as a frame is unfinished and none was given back, and
-    /// executes tasks of the pool in the meantime.
-    pub(crate) fn take_recycled(&self, waits: bool) -> Option<Frame> {
-        loop {
-            let mut state = self.lock();
-            let recycled = state.recycled.take();
-            if recycled.is_some() || !waits || state.unfinished.is_empty() || self.has_failed() {
-                return recycled;
-            }
-            drop(state);
-            self.work_or_wait();
-        }
+    /// A finished frame to reuse, if there is one.
+    pub(crate) fn take_recycled(&self) -> Option<Frame> {
+        self.lock().recycled.take()
     }
 
     /// Keeps the first failure, and cancels the remaining work.

@@ -26,7 +26,7 @@ use crate::job::{
     checks::finished_files::FinishedFiles,
     error::JobError,
     observer::{FrameDone, JobObserver},
-    pipeline::draw_frames::{FrameSink, RemainingWork},
+    pipeline::draw_frames::FrameSink,
 };
 
 /// How the pictures of a job are written.
@@ -83,24 +83,35 @@ impl Format {
         Ok(Sink::open(self.pattern.clone(), options)?)
     }
 
-    /// Display values of a frame, or `None` where scene-linear light is written. Before the picture it writes the metadata, so that every existing
-    /// picture has its metadata.
-    fn convert(
+    /// Writes a frame to the sink, as display values or as scene-linear light.
+    pub(crate) fn write(
         &self,
         sink: &Sink,
+        index: usize,
         frame: &mut Frame,
         observer: &dyn Observer,
-    ) -> Result<Option<DisplayImage>, JobError> {
+    ) -> Result<(), JobError> {
         frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
         if self.metadata {
+            // Before the picture, so that every existing picture has its metadata.
             metadata::write(frame, &sink.path(frame.header.number), &self.overwrite)?;
         }
-        // Over black, premultiplied light is unchanged.
-        frame.opaque |= sink.picture_format() == PictureFormat::OpaqueDisplay;
-        Ok(match sink.picture_format() {
+        let slot = FrameSlot { index, number: frame.header.number };
+        let display = match sink.picture_format() {
             PictureFormat::Frame => None,
-            PictureFormat::Display | PictureFormat::OpaqueDisplay => Some(self.to_display(frame, observer)),
-        })
+            PictureFormat::Display => Some(self.to_display(frame, observer)),
+            PictureFormat::OpaqueDisplay => {
+                // Over black, premultiplied light is unchanged.
+                frame.opaque = true;
+                Some(self.to_display(frame, observer))
+            }
+        };
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        let picture = match &display {
+            Some(picture) => Picture::Display(picture, &frame.header.fingerprint),
+            None => Picture::Linear(frame),
+        };
+        Ok(sink.write(slot, picture)?)
     }
 
     /// The view transform.
@@ -120,40 +131,15 @@ pub(crate) struct FileWriter<'a> {
     pub(crate) finished: &'a FinishedFiles,
 }
 
-impl FileWriter<'_> {
-    /// Encodes and writes a picture.
-    fn write(&self, slot: FrameSlot, picture: Picture, observer: &dyn Observer) -> Result<(), JobError> {
-        let writing = StageGuard::begin(observer, Stage::Write);
-        self.sink.write(slot, picture)?;
-        drop(writing);
-        let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
-        let path = self.sink.kind().is_sequence().then(|| self.sink.path(slot.number));
-        path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
-        self.observer.frame_done(&FrameDone { number: slot.number, path, drawn });
-        Ok(())
-    }
-}
-
 impl FrameSink for FileWriter<'_> {
-    fn finish(
-        &self,
-        index: usize,
-        frame: &mut Frame,
-        observer: &dyn Observer,
-    ) -> Result<Option<RemainingWork<'_>>, JobError> {
-        let slot = FrameSlot { index, number: frame.header.number };
-        let display = self.format.convert(&self.sink, frame, observer)?;
-        let fingerprint = frame.header.fingerprint;
-        match display {
-            Some(picture) => {
-                Ok(Some(Box::new(move |observer| self.write(slot, Picture::Display(&picture, &fingerprint), observer))))
-            }
-            None => self.write(slot, Picture::Linear(frame), observer).map(|()| None),
-        }
-    }
-
-    fn gives_memory_back_early(&self) -> bool {
-        self.sink.picture_format() != PictureFormat::Frame
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
+        let number = frame.header.number;
+        self.format.write(&self.sink, index, frame, observer)?;
+        let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
+        let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
+        path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
+        self.observer.frame_done(&FrameDone { number, path, drawn });
+        Ok(())
     }
 
     fn max_in_flight(&self) -> usize {
