@@ -214,7 +214,7 @@ pub(crate) fn draw_frame(
     observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, recycled);
     let strip_pixels = STRIP_ROWS * window.width;
     let scratches = composition.scratches;
