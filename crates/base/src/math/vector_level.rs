@@ -109,6 +109,12 @@ impl VectorLevel {
         Self::ALL.into_iter().filter(|level| level.level().is_some()).collect()
     }
 
+    /// The level that kernels are dispatched to now: see [`level`].
+    #[must_use]
+    pub fn selected() -> Self {
+        Self::of(level())
+    }
+
     /// What `fearless_simd::dispatch!` takes; `None` where the machine lacks the instructions, or where the program is compiled for wider ones only.
     #[must_use]
     pub fn level(self) -> Option<Level> {

@@ -3,7 +3,7 @@
 use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     host::{
-        observer::{self, Cancelled, Observer},
+        observer::{self, Cancelled, Observer, PartGuard, Stage, StagePart},
         parallel::prelude::*,
         scratch_pool::ScratchPool,
     },
@@ -54,6 +54,9 @@ impl Outputs {
 #[derive(Clone, Copy)]
 pub(crate) struct Composition<'a> {
     pub(crate) outputs: Outputs,
+    /// Whether it is the reflection in a mirror.
+    pub(crate) is_mirrored: bool,
+    pub(crate) observer: &'a dyn Observer,
     pub(crate) view: &'a View,
     pub(crate) runs: &'a [ActiveRun],
     pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
@@ -88,7 +91,7 @@ pub(crate) struct StripScratch {
     row: Vec<[f32; 4]>,
 }
 
-impl Composition<'_> {
+impl<'a> Composition<'a> {
     /// The rectangle of the strip with this index.
     fn strip_rect(&self, index: usize) -> Rect {
         let window = self.view.window;
@@ -116,6 +119,12 @@ impl Composition<'_> {
         let all = strips.map(|index| self.nonempty_rect(self.strip_rect(index)));
         let bounds = all.fold(Rect::default(), |all, rect| all.union(&rect));
         Rect { x: bounds.x.saturating_sub(window.x), y: bounds.y.saturating_sub(window.y), ..bounds }
+    }
+
+    /// Begins the drawing of a phenomenon or, without a name, compositing.
+    fn begin_part(&self, phenomenon: Option<&'a str>) -> PartGuard<'a> {
+        let part = StagePart { stage: Stage::Draw, phenomenon, is_mirrored: self.is_mirrored };
+        PartGuard::begin(self.observer, part)
     }
 
     fn layer_count(&self) -> usize {
@@ -168,7 +177,10 @@ impl Composition<'_> {
                     Some(image) => strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
                     None => strip.reset(drawn, None, aov_count),
                 }
-                prepared.draw(&slice.interval, strip);
+                {
+                    let _part = self.begin_part(Some(self.runs[member].info().name));
+                    prepared.draw(&slice.interval, strip);
+                }
                 accumulator.add_behind(level, strip, member, self.runs[member].info().aovs);
             }
         }
@@ -211,7 +223,6 @@ pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
     recycled: Option<Frame>,
-    observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
     let level = bansho_base::math::simd::level();
@@ -226,7 +237,8 @@ pub(crate) fn draw_frame(
         .enumerate()
         .with_max_len(1)
         .map(|(index, (beauty, depth))| {
-            observer::check(observer)?;
+            observer::check(composition.observer)?;
+            let _part = composition.begin_part(None);
             clear(stale, index * STRIP_ROWS, window.width, beauty, depth);
             let strip = composition.strip_rect(index);
             let rect = composition.nonempty_rect(strip);

@@ -11,7 +11,7 @@ use std::{
 
 use bansho_base::{
     frame::Frame,
-    host::observer::{Observer, Stage},
+    host::observer::{Observer, Stage, StagePart},
 };
 
 use crate::job::{error::JobError, observer::JobObserver};
@@ -111,6 +111,14 @@ impl Observer for StopOnFailure<'_> {
 
     fn end(&self, stage: Stage) {
         self.observer.end(stage);
+    }
+
+    fn begin_part(&self, part: StagePart) {
+        self.observer.begin_part(part);
+    }
+
+    fn end_part(&self, part: StagePart) {
+        self.observer.end_part(part);
     }
 
     fn cancelled(&self) -> bool {
