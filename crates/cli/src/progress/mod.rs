@@ -60,6 +60,11 @@ impl ProgressReporter {
         Self { display: Arc::new(display), stats: stats.then(Stats::new), since: Instant::now() }
     }
 
+    /// Tells the estimated peak memory of the job, bytes, for the statistics.
+    pub(crate) fn set_estimated_memory(&self, bytes: f64) {
+        self.stats.iter().for_each(|stats| stats.set_estimated_memory(bytes));
+    }
+
     /// Reports the result, and the statistics of a job with `threads` threads.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ mod parts;
 use std::{
     fmt::Write,
     fs,
+    sync::OnceLock,
     time::{Duration, Instant},
 };
 
@@ -21,11 +22,12 @@ use serde_json::{Value, json};
 pub(crate) struct Stats {
     since: Instant,
     times: StageTimes,
+    estimated_memory_mib: OnceLock<u64>,
 }
 
 impl Stats {
     pub(crate) fn new() -> Self {
-        Self { since: Instant::now(), times: StageTimes::default() }
+        Self { since: Instant::now(), times: StageTimes::default(), estimated_memory_mib: OnceLock::new() }
     }
 
     pub(crate) fn begin(&self, stage: Stage) {
@@ -44,6 +46,11 @@ impl Stats {
         self.times.end_part(part, self.now());
     }
 
+    /// The memory that the job was expected to take, bytes.
+    pub(crate) fn set_estimated_memory(&self, bytes: f64) {
+        self.estimated_memory_mib.get_or_init(|| (bytes / f64::from(1 << 20)).round() as u64);
+    }
+
     fn now(&self) -> Duration {
         self.since.elapsed()
     }
@@ -58,6 +65,7 @@ impl Stats {
             elapsed_s,
             cpu_s: cpu_seconds(),
             peak_memory_mib: peak_mebibytes(),
+            estimated_memory_mib: self.estimated_memory_mib.get().copied(),
         }
     }
 }
@@ -72,6 +80,8 @@ pub(crate) struct StatsReport<'a> {
     cpu_s: Option<f64>,
     /// Peak memory of the process, MiB; `None` where there is no `/proc`.
     peak_memory_mib: Option<u64>,
+    /// What was expected before the job; `None` if nothing was.
+    estimated_memory_mib: Option<u64>,
 }
 
 impl StatsReport<'_> {
@@ -96,6 +106,9 @@ impl StatsReport<'_> {
         if let Some(mebibytes) = self.peak_memory_mib {
             let _ = write!(table, ", peak memory {mebibytes} MiB");
         }
+        if let Some(mebibytes) = self.estimated_memory_mib {
+            let _ = write!(table, " (estimated: {mebibytes})");
+        }
         let _ = write!(table, ", {}", VectorLevel::selected());
         table + &parts::table(self.times)
     }
@@ -112,6 +125,7 @@ impl StatsReport<'_> {
             "elapsed_s": self.elapsed_s,
             "cpu_s": self.cpu_s,
             "peak_memory_mib": self.peak_memory_mib,
+            "estimated_memory_mib": self.estimated_memory_mib,
             "stages_s": stages,
             "parts": parts::json(self.times),
         })

@@ -58,7 +58,8 @@ pub(crate) struct Composition<'a> {
     pub(crate) is_mirrored: bool,
     pub(crate) observer: &'a dyn Observer,
     pub(crate) view: &'a View,
-    pub(crate) runs: &'a [ActiveRun],
+    /// The phenomena, to which members of slices refer.
+    pub(crate) runs: &'a [&'a ActiveRun],
     pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
     pub(crate) slices: &'a [Slice],
     pub(crate) plate: &'a PlateFrame,
@@ -461,4 +462,37 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
         }
     }
     channels
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::{random::Key, random::Purpose, simd::VectorLevel};
+
+    use super::*;
+
+    /// A plane of random numbers in [0, 1).
+    fn plane(id: u64) -> Vec<f32> {
+        let key = Key::new(3, "composite");
+        (0..17).flat_map(|step| key.uniforms(id, step, Purpose(0))).collect()
+    }
+
+    #[test]
+    fn rows_are_composited_to_the_same_bits_at_every_vector_level() {
+        let planes: [Vec<f32>; 6] = std::array::from_fn(|id| plane(id as u64));
+        let [red, green, blue, through_red, through_green, through_blue] = planes.each_ref().map(Vec::as_slice);
+        let (color, transmittance) = ([red, green, blue], [through_red, through_green, through_blue]);
+        let background: Vec<[f32; 4]> = (0..red.len()).map(|i| [blue[i], red[i], through_red[i], green[i]]).collect();
+        let composited = |level: Level| {
+            let mut rows = [vec![[0.0; 4]; red.len()], vec![[0.0; 4]; red.len()]];
+            let [clear, absorbed] = &mut rows;
+            dispatch!(level, _simd => expose_row(0.37, color, clear));
+            dispatch!(level, _simd => composite_background(&background, clear));
+            dispatch!(level, _simd => expose_absorbed_row(0.37, color, transmittance, absorbed));
+            dispatch!(level, _simd => composite_absorbed_background(transmittance, &background, absorbed));
+            rows.map(|row| row.into_flattened().into_iter().map(f32::to_bits).collect::<Vec<_>>())
+        };
+        let levels: Vec<Level> = VectorLevel::available().into_iter().filter_map(VectorLevel::level).collect();
+        let narrowest = composited(levels[0]);
+        assert!(levels.iter().all(|level| composited(*level) == narrowest));
+    }
 }

@@ -268,6 +268,7 @@ impl Shot {
         let reflection = self.reflection(view, mirrored, &publications, observer)?;
         let surroundings = self.surroundings(view, &publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.runs.len()).collect();
+        let runs: Vec<&ActiveRun> = self.runs.iter().collect();
         let PreparedSlices { slices, prepared } = self.prepare(&all, view, &surroundings, false, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
@@ -285,7 +286,7 @@ impl Shot {
             is_mirrored: false,
             observer,
             view,
-            runs: &self.runs,
+            runs: &runs,
             prepared: &prepared,
             slices: &slices,
             plate,
@@ -341,13 +342,14 @@ impl Shot {
         let view = view.mirrored(mirror.height);
         let surroundings = self.surroundings(&view, publications, None);
         let others: Vec<usize> = (0..self.runs.len()).filter(|&index| index != mirror_index).collect();
+        let runs: Vec<&ActiveRun> = others.iter().map(|&index| &self.runs[index]).collect();
         let PreparedSlices { slices, prepared } = self.prepare(&others, &view, &surroundings, true, observer)?;
         let composition = Composition {
             outputs: Outputs::RADIANCE,
             is_mirrored: true,
             observer,
             view: &view,
-            runs: &self.runs,
+            runs: &runs,
             prepared: &prepared,
             slices: &slices,
             plate: mirrored,

@@ -5,6 +5,7 @@ use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
 use crate::job::{
     error::{JobError, OptionError},
+    pipeline::draw_frames::max_frames_with_pixels,
     scene_file::SceneFile,
 };
 
@@ -12,6 +13,8 @@ use crate::job::{
 const MIN_CHECKED_PIXELS: f64 = 4e6;
 /// Bytes of a pixel of a frame: color, alpha and depth in single precision.
 const FRAME_BYTES: f64 = 20.0;
+/// Bytes of the process without a picture.
+const PROCESS_BYTES: f64 = 1.2e7;
 const GIB: f64 = (1 << 30) as f64;
 
 /// What the memory of a job depends on in addition to its plan.
@@ -41,13 +44,17 @@ impl BytesPerPixel {
         let frame = FRAME_BYTES + 4.0 * channels as f64;
         // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
         let written = match request.display {
-            Some(BitDepth::Eight) => 3.0 * 4.0,
-            Some(BitDepth::Sixteen) => 3.0 * 8.0,
+            Some(BitDepth::Eight) => 4.0 + 3.0 + 4.0,
+            Some(BitDepth::Sixteen) => 8.0 + 6.0 + 8.0,
             None => 12.0 + 3.0 * channels as f64,
         };
-        // Two frames are written while a third is drawn. A sheet keeps the pixels of all, and is laid out and encoded as a whole.
-        let (drawn, encoded) = (request.frames.min(3) as f64, request.frames.min(2).max(request.tiles) as f64);
-        let drawn = drawn * frame + encoded * written;
+        // One frame is written while another one is drawn, in the memory of the former where it is large and its pixels are no longer needed
+        // (`draw_frames`). A sheet keeps the pixels of all, and is laid out and encoded as a whole.
+        let window = plan.window();
+        let max_with_pixels =
+            max_frames_with_pixels(window.width * window.height * frame as usize, request.display.is_none());
+        let (drawn, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
+        let drawn = drawn as f64 * frame + encoded as f64 * written;
         let plate = if plan.scene().has_plate() { FRAME_BYTES } else { 0.0 };
         // The mirrored picture, its blurred version, and the plate in it.
         let has_mirror = compiled.phenomena().any(|phenomenon| phenomenon.info().mirror.is_some());
@@ -58,6 +65,17 @@ impl BytesPerPixel {
     fn total(&self, drawn_pixels: f64, whole_pixels: f64) -> f64 {
         self.drawn * drawn_pixels + self.whole * whole_pixels
     }
+}
+
+/// Memory of a job, bytes: what its pictures take, its phenomena, and the process. Within a quarter of the measured peak for frames that take longer to
+/// draw than to write.
+pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> f64 {
+    let window = plan.window();
+    let (drawn, whole) =
+        (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
+    let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
+    let phenomena: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
+    per_pixel.total(drawn, whole) + phenomena + PROCESS_BYTES
 }
 
 /// Number of channels of the layers and AOVs of a plan.
@@ -90,7 +108,7 @@ pub(crate) fn check(
     }
     let channels = channel_count(compiled, plan);
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channels);
-    let bytes = per_pixel.total(drawn, whole);
+    let bytes = estimated_bytes(compiled, plan, request);
     if memory::can_allocate(bytes) {
         return Ok(());
     }
