@@ -5,7 +5,6 @@ use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
 use crate::job::{
     error::{JobError, OptionError},
-    pipeline::draw_frames::max_frames_with_pixels,
     scene_file::SceneFile,
 };
 
@@ -13,9 +12,16 @@ use crate::job::{
 const MIN_CHECKED_PIXELS: f64 = 4e6;
 /// Bytes of a pixel of a frame: color, alpha and depth in single precision.
 const FRAME_BYTES: f64 = 20.0;
+/// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
+const MAX_BYTES_OF_PIXELS: usize = 1 << 27;
 /// Bytes of the process without a picture.
 const PROCESS_BYTES: f64 = 1.2e7;
 const GIB: f64 = (1 << 30) as f64;
+
+/// Of how many frames of `bytes` bytes the pixels may be in memory at once. Where a frame is written from its pixels, another one is drawn meanwhile.
+pub(crate) fn max_frames_with_pixels(bytes: usize, writes_pixels: bool) -> usize {
+    (MAX_BYTES_OF_PIXELS / bytes.max(1)).max(1 + usize::from(writes_pixels))
+}
 
 /// What the memory of a job depends on in addition to its plan.
 #[derive(Clone, Copy)]
@@ -137,4 +143,17 @@ pub(crate) fn check(
         return Err(error.into());
     }
     Err(scene.error_at("picture.size", ProblemKind::Conflict(error.to_string())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_frames_are_in_memory_once_or_twice_where_they_are_written_from_their_pixels() {
+        let frame = |width: usize, height: usize| width * height * FRAME_BYTES as usize;
+        assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(4096, 4096), writes)), [1, 2]);
+        assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(1280, 720), writes)), [7, 7]);
+        assert_eq!(max_frames_with_pixels(0, false), MAX_BYTES_OF_PIXELS);
+    }
 }

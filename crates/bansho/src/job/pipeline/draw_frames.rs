@@ -10,7 +10,7 @@ use super::{
     in_flight::{CompletionGuard, InFlightFrames, StopOnFailure},
     snapshots::Snapshots,
 };
-use crate::job::{error::JobError, observer::JobObserver};
+use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observer::JobObserver};
 
 /// What remains to be done for a frame without its pixels, such as compressing its display image.
 pub(crate) type RemainingWork<'a> = Box<dyn FnOnce() -> Result<(), JobError> + Send + 'a>;
@@ -37,9 +37,6 @@ pub(crate) trait FrameSink: Sync {
 
 /// Bytes of frames that may be in flight at once, unless two frames alone are larger.
 const MAX_BYTES_IN_FLIGHT: usize = 1 << 30;
-
-/// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
-const MAX_BYTES_OF_PIXELS: usize = 1 << 27;
 
 /// Draws the frames `numbers` in order. A frame is drawn while earlier ones are still being compressed and written.
 ///
@@ -125,11 +122,6 @@ fn draw(
 fn in_flight_limit(frame: &Frame, sink: &dyn FrameSink) -> usize {
     let max = (rayon::current_num_threads() + 1).min(sink.max_in_flight()).max(2);
     (MAX_BYTES_IN_FLIGHT / bytes_of(frame).max(1)).clamp(2, max)
-}
-
-/// Of how many frames of `bytes` bytes the pixels may be in memory at once. Where a frame is written from its pixels, another one is drawn meanwhile.
-pub(crate) fn max_frames_with_pixels(bytes: usize, writes_pixels: bool) -> usize {
-    (MAX_BYTES_OF_PIXELS / bytes.max(1)).max(1 + usize::from(writes_pixels))
 }
 
 /// Bytes of the pixels of a frame: color, alpha, depth and channels in single precision.

@@ -144,3 +144,24 @@ impl Observer for StopOnFailure<'_> {
         self.in_flight.has_failed() || self.observer.cancelled()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::testing::{blank, plan};
+
+    #[test]
+    fn the_pixels_of_a_frame_are_free_before_it_is_finished() {
+        let in_flight = InFlightFrames::default();
+        in_flight.submit(0, 2);
+        in_flight.recycle(0, blank(&plan(), 0));
+        // Would wait forever for pixels that are in use.
+        in_flight.wait_for_pixels(1);
+        assert!(in_flight.take_recycled().is_some());
+        assert_eq!(in_flight.lock().unfinished, BTreeSet::from([0]));
+        in_flight.submit(1, 2);
+        // Also those of a frame that failed before it was recycled.
+        drop(CompletionGuard { in_flight: &in_flight, index: 1 });
+        in_flight.wait_for_pixels(1);
+    }
+}
