@@ -21,7 +21,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// `None` where the arguments are those of criterion.
+    /// `None` where the arguments are those of criterion, or where `cargo test` only wants to see it start.
     pub(crate) fn parse(arguments: impl Iterator<Item = String>) -> Result<Option<Self>, String> {
         let mut parsed = Self {
             scenes: Vec::new(),
@@ -33,13 +33,13 @@ impl Arguments {
             check: None,
             record: None,
         };
-        let mut arguments = arguments;
+        let (mut arguments, mut is_bench) = (arguments, false);
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
             match argument.as_str() {
                 "--noplot" | "--test" | "--list" => return Ok(None),
-                // Given by cargo.
-                "--bench" => {}
+                // Given by `cargo bench`.
+                "--bench" => is_bench = true,
                 "--frames" => parsed.frames = number(&value()?)?,
                 "--size" => {
                     let value = value()?;
@@ -55,7 +55,7 @@ impl Arguments {
                 scene => parsed.scenes.push(scene.to_owned()),
             }
         }
-        Ok(Some(parsed))
+        Ok(is_bench.then_some(parsed))
     }
 
     /// The files of the scenes in alphabetical order.

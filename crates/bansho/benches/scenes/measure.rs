@@ -80,17 +80,16 @@ pub(crate) fn scene(file: &Path, arguments: &Arguments) -> Result<SceneTimes, St
     let (plan, plan_ms) = timed(|| Plan::new(&compiled, &options));
     let plan = plan.map_err(|error| in_scene(&error))?;
     let first = plan.frames().start;
-    let panning = moving(&plan, first + 2 * arguments.frames + 2);
+    let panning = moving(&plan, first + 2 * arguments.frames + 3);
     let mut shot = Shot::open(compiled, Arc::new(plan));
     let (advanced, preroll_ms) = timed(|| shot.advance(first, &bansho::Unobserved));
     advanced.map_err(|error| in_scene(&error))?;
     let (drawn, first_frame_ms) = timed(|| frame(&mut shot, first, &PartObserver::default()));
     drawn.map_err(|error| in_scene(&error))?;
-    let mut measure = |start| frames(&mut shot, start, arguments.frames).map_err(|error| in_scene(&error));
-    let still = measure(first + 1)?;
+    let count = arguments.frames;
+    let still = frames(&mut shot, first + 1, count).map_err(|error| in_scene(&error))?;
     shot.replace_plan(Arc::new(panning));
-    let mut measure = |start| frames(&mut shot, start, arguments.frames).map_err(|error| in_scene(&error));
-    let pan = measure(first + 1 + arguments.frames)?;
+    let pan = frames(&mut shot, first + count + 2, count).map_err(|error| in_scene(&error))?;
     Ok(SceneTimes { name, size, compile_ms, plan_ms, preroll_ms, first_frame_ms, still, pan })
 }
 
@@ -102,11 +101,12 @@ fn moving(plan: &Plan, end: i64) -> Plan {
     moving
 }
 
-/// Measures `count` frames from `start` on. One more is drawn before them: a camera that begins to move fills caches again.
+/// Measures `count` frames after frame `start`, which is drawn before them: a camera that begins to move fills caches again.
 fn frames(shot: &mut Shot, start: i64, count: i64) -> Result<FrameTimes, bansho::RenderError> {
     let observer = PartObserver::default();
     let (mut totals, mut views) = (Vec::new(), Vec::new());
-    for number in start..start + count {
+    frame(shot, start, &bansho::Unobserved)?;
+    for number in start + 1..=start + count {
         let (view_ms, total_ms) = timed(|| frame(shot, number, &observer));
         totals.push(total_ms);
         views.push(view_ms?);
