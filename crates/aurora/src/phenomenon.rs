@@ -70,6 +70,11 @@ impl Phenomenon for Aurora {
         PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
+    fn memory_bytes(&self, _pixels: f64) -> f64 {
+        // Measured: charts and tables, and the state and the sources of each particle.
+        4e7 + 480.0 * self.parameters.particles.count as f64
+    }
+
     fn luminance(&self) -> f64 {
         if self.parameters.stage == Stage::Light {
             OBLIQUE_LUMINANCE_FACTOR * self.max_column_luminance

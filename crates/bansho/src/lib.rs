@@ -165,7 +165,7 @@ pub use bansho_base::{
     geometry::point_cloud::PointCloud,
     host::{
         assets::{Assets, MemoryAssets},
-        observer::{Cancelled, Observer, Stage, Unobserved},
+        observer::{Cancelled, Observer, Stage, StagePart, Unobserved},
     },
     image::{Image, Rect},
     parameters::animated::Animated,

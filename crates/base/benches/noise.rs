@@ -9,7 +9,7 @@ use bansho_base::{
     noise::{Coordinate, Dimension, Fractal, LANES, Noise},
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 const POINTS: usize = 1024;
 const DETAILED: Fractal = Fractal { octaves: 4, lacunarity: 2, gain: 0.5 };
@@ -71,7 +71,7 @@ fn rows<const N: usize>(criterion: &mut Criterion, table: Option<&PermutationTab
 where
     [f32; N]: Dimension<Cells = [u32; N]>,
 {
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let noise = Noise::<N>::new(7, DETAILED, [0; N]).expect("valid octaves");
     let origin: [Coordinate; N] = std::array::from_fn(|axis| Coordinate::from_f64(1.7 + axis as f64 * 3.3));
     let along: Vec<f32> = (0..POINTS).map(|i| i as f32 * 0.011).collect();
@@ -116,7 +116,7 @@ where
 }
 
 fn exponentials(criterion: &mut Criterion) {
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let x: Vec<f32> = (0..POINTS).map(|i| i as f32 * 0.02 - 10.0).collect();
     let mut out = vec![0.0; POINTS];
     let mut group = criterion.benchmark_group("exp");

@@ -7,7 +7,6 @@ use bansho_base::color::{
     ColorSpace, LinearTransform, SRGB_FROM_ACESCG, WhiteBalance, black_body, luminance, pixel_formats::f16,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
-use fearless_simd::Level;
 
 const SIZE: usize = 256;
 
@@ -37,7 +36,7 @@ fn naive_rgba16f(pixels: &[[f32; 4]], out: &mut [[f16; 4]]) {
 
 fn pixel_formats(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("pixels_256x256");
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let mut halves = vec![[f16::ZERO; 4]; SIZE * SIZE];
     let mut singles = vec![[0.0; 4]; SIZE * SIZE];
     let transform = LinearTransform::new(ColorSpace::LinearSrgb, None);

@@ -73,7 +73,7 @@ fn naive_view(rgb: [f64; 3]) -> [f64; 3] {
 fn view(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("view_1920x1080");
     group.sample_size(20);
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let mut out = vec![[0_u8; 4]; WIDTH * HEIGHT];
     for (name, lit) in [("flame_30_percent", 0.3), ("full", 1.0)] {
         let pixels = picture(lit);

@@ -136,7 +136,7 @@ fn texture_sum(criterion: &mut Criterion) {
     let mut values = vec![0.0_f32; SIZE[0] * SIZE[1]];
     let mut group = criterion.benchmark_group("texture sum 1920x1080");
     group.bench_function("row and column functions", |bencher| {
-        let level = fearless_simd::Level::new();
+        let level = bansho_base::math::simd::level();
         bencher.iter(|| {
             let texture = PaperTexture::new(&p, &q, OCTAVES);
             fearless_simd::dispatch!(level, _simd => fill_rows(&texture, &mut values));

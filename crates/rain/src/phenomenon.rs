@@ -45,6 +45,11 @@ impl Phenomenon for Rain {
         PhenomenonInfo { aovs: AOVS, strengthened_by, ..PhenomenonInfo::new(&self.name) }
     }
 
+    fn memory_bytes(&self, _pixels: f64) -> f64 {
+        // Measured: streak textures, cells and tiles.
+        3e7
+    }
+
     /// Rain emits no light.
     fn luminance(&self) -> f64 {
         0.0

@@ -7,7 +7,7 @@ use bansho_base::{
     math::{DVec3, simd::LANES},
     phenomenon::{strip::View, surroundings::Surroundings},
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use crate::{
     Rain,
@@ -99,7 +99,7 @@ impl Rain {
     pub fn drops(&self, view: &View, surroundings: &Surroundings) -> Vec<Raindrop> {
         let shutter_state = ShutterState::new(self, view, surroundings);
         let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let chunks = map_cell_chunks(&shutter_state, &[bounds], 0.5 * CELL_SIZE, |cells| {
             let mut drops = Vec::new();
             for (visible, class) in cells {

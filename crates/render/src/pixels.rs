@@ -22,7 +22,6 @@ use bansho_base::{
     frame::Frame,
     image::Rect,
 };
-use fearless_simd::Level;
 
 /// Rows that one parallel task converts.
 const TASK_ROWS: usize = 16;
@@ -110,7 +109,7 @@ pub fn nonzero_rect(frame: &Frame) -> Rect {
 /// ```
 pub fn write_rgba16f(frame: &Frame, pixels: &mut [f16]) -> Result<(), BufferLengthError> {
     check_length(frame, 4, pixels)?;
-    let (level, transform) = (Level::new(), transform(frame, ColorSpace::LinearSrgb));
+    let (level, transform) = (bansho_base::math::simd::level(), transform(frame, ColorSpace::LinearSrgb));
     convert(frame, SERIAL_LIGHT, Background::Fill([f16::ZERO; 4]), pixels.as_chunks_mut().0, |_, light, out| {
         transform.rgba16f_row(level, light, out);
     });
@@ -127,7 +126,7 @@ pub fn write_rgba16f(frame: &Frame, pixels: &mut [f16]) -> Result<(), BufferLeng
 /// The buffer does not have that length; nothing is written.
 pub fn write_rgba32f(frame: &Frame, space: ColorSpace, pixels: &mut [f32]) -> Result<(), BufferLengthError> {
     check_length(frame, 4, pixels)?;
-    let (level, transform) = (Level::new(), transform(frame, space));
+    let (level, transform) = (bansho_base::math::simd::level(), transform(frame, space));
     convert(frame, SERIAL_LIGHT, Background::Fill([0.0; 4]), pixels.as_chunks_mut().0, |_, light, out| {
         transform.rgba32f_row(level, light, out);
     });
@@ -201,7 +200,8 @@ pub(crate) fn write_codes<C: DisplayCode + Send + Sync>(
     pixels: &mut [[C; 4]],
 ) {
     let alpha = (!frame.opaque).then_some(alpha);
-    let (level, view) = (Level::new(), view.with_white_balance(frame.header.white_balance_k.map(f64::from)));
+    let (level, view) =
+        (bansho_base::math::simd::level(), view.with_white_balance(frame.header.white_balance_k.map(f64::from)));
     let ([x0, y0], left) = (frame.header.data_origin, nonzero_rect(frame).x);
     convert(frame, SERIAL_CODES, background, pixels, |y, light, out| {
         view.display_row_with_mode(level, light, y0 + y as i64, x0 + left as i64, alpha, out);

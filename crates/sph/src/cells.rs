@@ -5,7 +5,7 @@
 //! row hold one contiguous range of particles: 3 ranges in 2-D, 9 in 3-D.
 
 use bansho_base::host::parallel::{self, prelude::*};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::{
     cell_rows::{CELLS_PER_RADIUS_X, CellRows, Keys, RowChunk, SEARCH_WIDTH},
@@ -116,7 +116,7 @@ impl<const D: usize> Cells<D> {
         axes.enumerate().for_each(|(c, ((cells, component), bounds))| {
             let along = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
             let (scale, max_coordinate) = (scale * along as f32, (MAX_CELL_COORDINATE * along) as f32);
-            dispatch!(Level::new(), _simd => *bounds = cell_coordinates(component, scale, max_coordinate, cells));
+            dispatch!(bansho_base::math::simd::level(), _simd => *bounds = cell_coordinates(component, scale, max_coordinate, cells));
         });
         self.order.clear();
         self.occupied.clear();

@@ -7,7 +7,7 @@ use bansho_base::{
     host::parallel::prelude::*,
     math::simd::{HalfLanes, Real},
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 use std::ops::Range;
 
 /// Groups per task of the thread pool.
@@ -122,7 +122,7 @@ impl GroupBatch {
         rows: CellRows<D>,
         chunks: &[RowChunk],
     ) {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         batches.resize_with(chunks.len().div_ceil(GROUPS_PER_TASK), Self::default);
         batches.par_iter_mut().with_max_len(1).zip(chunks.par_chunks(GROUPS_PER_TASK)).for_each(|(batch, chunks)| {
             dispatch!(level, simd => batch.find(simd, &positions, support_radius * support_radius, rows, chunks));

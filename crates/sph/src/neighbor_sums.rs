@@ -17,7 +17,7 @@ use super::{
     neighbor_groups::{Group, GroupBatch},
 };
 use crate::neighbor_groups::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at};
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 /// Particles closer than this fraction of the support radius count as coincident.
 const COINCIDENCE_RADIUS: f32 = 1e-6;
@@ -70,7 +70,7 @@ impl<const D: usize> Cells<D> {
         T: PairTerm<D, IN, OUT>,
     {
         assert!(fields.iter().all(|field| field.len() == self.len()), "one value per particle");
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let results = results.map(|values| {
             values.resize(self.len(), 0.0);
             values.as_mut_slice()

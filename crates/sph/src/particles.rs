@@ -1,7 +1,7 @@
 //! Particles as structure of arrays, and their time integration.
 
 use bansho_base::host::parallel::prelude::*;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::{
     cells::Cells,
@@ -110,7 +110,7 @@ impl<const D: usize> Particles<D> {
     /// # Panics
     /// If there is not one acceleration per particle.
     pub fn advance(&mut self, accelerations: &[Vec<f32>; D], seconds: f32) {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         for c in 0..D {
             assert_eq!(accelerations[c].len(), self.len(), "one acceleration per particle");
             let positions = self.positions[c].par_chunks_mut(MIN_PARTICLES_PER_TASK);

@@ -53,6 +53,7 @@ def _numbers() -> list[Case]:
         *[_render(f"crop {text!r}", [f"--crop={text}"], words="allowed|outside") for text in crops],
         *[_render(f"loop {text!r}", ["--loop", text], words="allowed") for text in loops],
         *[_render(f"threads {text!r}", [f"--threads={text}"], words="threads") for text in ("0", "-1", "1025", "99999999999999999999", "many")],
+        *[_render(f"vector level {text!r}", [f"--vector-level={text}"], words="vector level.*allowed: ") for text in ("", "AVX2", "mmx", "simd128", "-1")],
         *[_render(f"seed {text!r}", ["--seed", text], words="allowed: a whole number") for text in ("-1", "18446744073709551616", "1.5", "")],
         *[_render(f"contact sheet of {text}", [f"--contact-sheet={text}"], words="contact-sheet") for text in ("0", "4097", "18446744073709551615", "-1")],
         *[_render(f"snapshot every {text}", ["--snapshots", "states", f"--snapshot-every={text}"], words="allowed|snapshot") for text in ("0", "-1", "99999999999999999999")],

@@ -4,7 +4,7 @@ use bansho_base::{
     math::{self, DVec2, DVec3},
     phenomenon::surroundings::{Emitter, Light},
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use crate::{
     Aurora,
@@ -35,7 +35,7 @@ impl Aurora {
     /// particle has the color of its own electron energy; particles below the horizon are skipped.
     pub(crate) fn directional_light(&self) -> Option<Light> {
         let (emission, particles) = (self.simulation().emission(), self.simulation().particles());
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let stride = particles.len().div_ceil(MAX_SAMPLED_PARTICLES).max(1);
         let (mut direction_sum, mut sum) = (DVec3::ZERO, DVec3::ZERO);
         for index in (0..particles.len()).step_by(stride) {

@@ -97,7 +97,7 @@ impl<'a> PreparedAurora<'a> {
         Ok(Self {
             aurora,
             view,
-            level: Level::new(),
+            level: bansho_base::math::simd::level(),
             cameras,
             horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
             observer_radius: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,

@@ -1,7 +1,6 @@
 //! Distributes the energy flux of the sheets to the particles.
 
 use bansho_base::{host::parallel::prelude::*, math::random::Key, noise::LANES};
-use fearless_simd::Level;
 
 use super::AuroraParticles;
 use crate::{
@@ -148,7 +147,7 @@ impl EnergyFlux {
         time: f64,
     ) -> WeightedChunk<'a> {
         let mut weighted = WeightedChunk { counts: NodeValues::new(layout), weights: vec![0.0; chunk.fades.len()] };
-        let (level, energy) = (Level::new(), self.parameters.energy_ev.at(time));
+        let (level, energy) = (bansho_base::math::simd::level(), self.parameters.energy_ev.at(time));
         let side_scale = 1.0 / self.parameters.half_thickness_km();
         for first in (0..chunk.fades.len()).step_by(LANES) {
             let count = LANES.min(chunk.fades.len() - first);

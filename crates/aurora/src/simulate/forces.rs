@@ -6,7 +6,7 @@ use bansho_base::{
     parameters::Auto,
 };
 use bansho_sph::{Cells, KernelShape, PressureForce, StateEquation, compute_densities};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::{AuroraParticles, neighbor_cells::NeighborCells};
 use crate::{
@@ -155,7 +155,7 @@ impl Repulsion {
     ) -> f64 {
         self.cells.set_support_radius(support_km as f32);
         particles.sort(&mut self.cells);
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         dispatch!(level, _simd => particle_masses(&particles.fades, &mut self.masses));
         if let Some(cells) = &mut self.neighbor_cells {
             cells.assign(&particles.positions, &self.masses, support_km as f32);
@@ -233,7 +233,7 @@ impl Integrator {
         let positions = xs.par_chunks_mut(TASK).zip(zs.par_chunks_mut(TASK));
         let speeds = us.par_chunks_mut(TASK).zip(ws.par_chunks_mut(TASK));
         let repulsion = repulsion[0].par_chunks(TASK).zip(repulsion[1].par_chunks(TASK));
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         positions.zip(speeds).zip(repulsion).with_max_len(1).for_each(|((positions, speeds), repulsion)| {
             dispatch!(level, _simd => self.advance_chunk(positions, speeds, repulsion, field));
         });

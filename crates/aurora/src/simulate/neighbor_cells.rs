@@ -6,7 +6,7 @@
 
 use bansho_base::{host::parallel::prelude::*, math::simd::Real};
 use bansho_sph::{CubicSpline, KernelShape, Poly6, SmoothingKernel, Spiky};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 /// Squared distance, in support radii, below which two particles coincide and do not repel each other.
 const COINCIDENCE: f32 = 1e-12;
@@ -143,7 +143,7 @@ impl NeighborCells {
 
     /// Sums of all particles, in sorted order; `own` and `others` are sorted too.
     fn sum<T: CellTerm>(&self, term: &T, own: &[f32], others: [&[f32]; 2]) -> Vec<[f32; 2]> {
-        let (columns, level) = (self.size[0], Level::new());
+        let (columns, level) = (self.size[0], bansho_base::math::simd::level());
         let of_cell = |cell: usize| {
             let mut sums = [Vec::new(), Vec::new()];
             dispatch!(level, _simd => self.sum_cell(term, cell, columns, own, others, &mut sums));

@@ -8,7 +8,7 @@ use bansho_media::imageops::sprite_sheet::SheetLayout;
 use super::{
     error::{JobError, OptionError, SheetKind},
     observer::{FrameDone, JobObserver},
-    pipeline::draw_frames::FrameSink,
+    pipeline::draw_frames::{FrameSink, RemainingWork},
 };
 
 /// Maximum number of tiles of a sheet.
@@ -50,7 +50,12 @@ impl<'a, T, M: Fn(&mut Frame, &dyn Observer) -> T> TileCollector<'a, T, M> {
 }
 
 impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for TileCollector<'_, T, M> {
-    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish<'w>(
+        &'w self,
+        index: usize,
+        frame: &mut Frame,
+        observer: &'w dyn Observer,
+    ) -> Result<Option<RemainingWork<'w>>, JobError> {
         let number = frame.header.number;
         let tile = (self.make_tile)(frame, observer);
         let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
@@ -58,7 +63,7 @@ impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for TileCo
         let drawn = tiles.iter().flatten().count();
         drop(tiles);
         self.observer.frame_done(&FrameDone { number, path: None, drawn });
-        Ok(())
+        Ok(None)
     }
 
     fn max_in_flight(&self) -> usize {

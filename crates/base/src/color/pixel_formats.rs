@@ -69,12 +69,11 @@ const BLOCK: usize = 16;
 /// The white balance of a camera followed by a conversion from ACEScg to another linear space, for rows of premultiplied pixels.
 ///
 /// ```
-/// use bansho_base::color::{ColorSpace, LinearTransform, pixel_formats::f16};
-/// use fearless_simd::Level;
+/// use bansho_base::{color::{ColorSpace, LinearTransform, pixel_formats::f16}, math::simd};
 ///
 /// let to_srgb = LinearTransform::new(ColorSpace::LinearSrgb, None);
 /// let mut halves = [[f16::ZERO; 4]; 1];
-/// to_srgb.rgba16f_row(Level::new(), &[[1.0, 1.0, 1.0, 0.5]], &mut halves);
+/// to_srgb.rgba16f_row(simd::level(), &[[1.0, 1.0, 1.0, 0.5]], &mut halves);
 /// assert_eq!(halves[0].map(f16::to_f32), [1.0, 1.0, 1.0, 0.5]);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -248,18 +247,10 @@ fn single_vector<S: Simd>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::{
-        View, acescg_from_srgb, acescg_from_xyz, decode_srgb, srgb_from_acescg, white_balance::chromaticity,
+    use crate::{
+        color::{View, acescg_from_srgb, acescg_from_xyz, decode_srgb, srgb_from_acescg, white_balance::chromaticity},
+        math::simd,
     };
-
-    /// Every vector level of this machine.
-    fn levels() -> Vec<Level> {
-        let widest = Level::new();
-        let mut levels = vec![Level::baseline(), widest];
-        #[cfg(target_arch = "x86_64")]
-        levels.extend([widest.as_sse4_2().map(Level::Sse4_2), widest.as_avx2().map(Level::Avx2)].into_iter().flatten());
-        levels
-    }
 
     fn halves(transform: &LinearTransform, level: Level, pixels: &[[f32; 4]]) -> Vec<[u16; 4]> {
         let mut out = vec![[f16::NAN; 4]; pixels.len()];
@@ -337,7 +328,7 @@ mod tests {
         let copy = LinearTransform::new(ColorSpace::AcesCg, None);
         let numbers: Vec<f32> = numbers().collect();
         let pixels: Vec<[f32; 4]> = numbers.chunks_exact(3).map(|n| [n[0], n[1], n[2], n[0]]).collect();
-        for level in levels() {
+        for level in simd::available_levels() {
             for (pixel, half) in pixels.iter().zip(halves(&copy, level, &pixels)) {
                 for c in 0..4 {
                     let limit = if c == 3 { 1.0 } else { MAX_HALF };
@@ -361,7 +352,7 @@ mod tests {
                     pixels.into_iter().map(|pixel| pixel.map(bits)).collect()
                 };
                 let whole = bits(singles(&transform, Level::baseline(), &pixels));
-                for level in levels() {
+                for level in simd::available_levels() {
                     assert_eq!(halves(&transform, level, &pixels), expected, "{space:?} {kelvin:?} {level:?}");
                     assert_eq!(bits(singles(&transform, level, &pixels)), whole, "{space:?} {kelvin:?} {level:?}");
                     for length in 0..40 {
@@ -378,9 +369,9 @@ mod tests {
         let to_srgb = LinearTransform::new(ColorSpace::LinearSrgb, None);
         let convert = |srgb: [f32; 3], alpha: f32| {
             let [r, g, b] = acescg_from_srgb(srgb);
-            halves(&to_srgb, Level::new(), &[[r, g, b, alpha]])[0].map(|bits| f16::from_bits(bits).to_f32())
+            halves(&to_srgb, simd::level(), &[[r, g, b, alpha]])[0].map(|bits| f16::from_bits(bits).to_f32())
         };
-        assert_eq!(halves(&to_srgb, Level::new(), &[[1.0; 4]]), [[f16::ONE.to_bits(); 4]]);
+        assert_eq!(halves(&to_srgb, simd::level(), &[[1.0; 4]]), [[f16::ONE.to_bits(); 4]]);
         for (color, alpha) in
             [([1.0, 0.0, 0.0], 0.5), ([0.0, 1.0, 0.0], 0.0), ([0.0, 0.0, 1.0], 1.0), ([0.25; 3], 0.25)]
         {
@@ -389,11 +380,12 @@ mod tests {
             assert_eq!(a, alpha);
         }
         // Green of AP1 lies outside sRGB: its red and blue would be negative.
-        let [r, g, b, a] = halves(&to_srgb, Level::new(), &[[0.0, 1.0, 0.0, 0.0]])[0];
+        let [r, g, b, a] = halves(&to_srgb, simd::level(), &[[0.0, 1.0, 0.0, 0.0]])[0];
         assert_eq!([r, b, a], [0; 3]);
         assert!((f16::from_bits(g).to_f32() - srgb_from_acescg([0.0, 1.0, 0.0])[1]).abs() < 1e-3);
         for space in [ColorSpace::LinearSrgb, ColorSpace::LinearRec2020, ColorSpace::AcesCg, ColorSpace::Aces2065_1] {
-            let [white] = singles(&LinearTransform::new(space, None), Level::new(), &[[1.0, 1.0, 1.0, 0.5]])[..] else {
+            let [white] = singles(&LinearTransform::new(space, None), simd::level(), &[[1.0, 1.0, 1.0, 0.5]])[..]
+            else {
                 panic!("one pixel in, one pixel out")
             };
             assert!(white[..3].iter().all(|v| (v - 1.0).abs() < 1e-6) && white[3] == 0.5, "{space:?}: {white:?}");
@@ -413,7 +405,7 @@ mod tests {
         ];
         let (largest, one) = (f16::MAX.to_bits(), f16::ONE.to_bits());
         let bright = [largest, largest, largest, one];
-        for level in levels() {
+        for level in simd::available_levels() {
             let to_srgb = LinearTransform::new(ColorSpace::LinearSrgb, None);
             assert_eq!(halves(&to_srgb, level, &pixels), [[0; 4], [0; 4], bright, bright, [0; 4], [0; 4]]);
             for kelvin in [1500.0, 20_000.0] {
@@ -425,21 +417,21 @@ mod tests {
         // A component that is no number is missing, and no more than that.
         let to_srgb = LinearTransform::new(ColorSpace::LinearSrgb, None);
         assert_eq!(
-            halves(&to_srgb, Level::new(), &[[nan, 0.5, nan, 0.5]]),
-            halves(&to_srgb, Level::new(), &[[0.0, 0.5, 0.0, 0.5]])
+            halves(&to_srgb, simd::level(), &[[nan, 0.5, nan, 0.5]]),
+            halves(&to_srgb, simd::level(), &[[0.0, 0.5, 0.0, 0.5]])
         );
     }
 
     #[test]
     fn single_floats_are_not_clamped_and_alpha_does_not_mix_with_color() {
         let pixels = [[0.0, 1.0, 0.0, f32::INFINITY], [f32::INFINITY, 0.0, 0.0, 0.25], [-2.0, 0.5, 1e6, f32::NAN]];
-        for level in levels() {
+        for level in simd::available_levels() {
             let out = singles(&LinearTransform::new(ColorSpace::LinearSrgb, None), level, &pixels);
             assert!(out[0][0] < 0.0 && out[0][1] > 1.0 && out[0][3] == f32::INFINITY, "{:?}", out[0]);
             assert_eq!((out[1][0], out[1][3]), (f32::INFINITY, 0.25));
             assert!(out[2][3].is_nan() && out[2][..3].iter().all(|v| v.is_finite()), "{:?}", out[2]);
         }
-        let copied = singles(&LinearTransform::new(ColorSpace::AcesCg, None), Level::new(), &pixels);
+        let copied = singles(&LinearTransform::new(ColorSpace::AcesCg, None), simd::level(), &pixels);
         assert!(copied.as_flattened().iter().zip(pixels.as_flattened()).all(|(a, b)| a.to_bits() == b.to_bits()));
     }
 
@@ -449,7 +441,7 @@ mod tests {
             let view = View::STANDARD.with_white_balance(kelvin);
             let transform = LinearTransform::new(ColorSpace::LinearSrgb, kelvin);
             let pixels: Vec<[f32; 4]> = visible_pixels().map(|pixel| pixel.map(|v| v * 0.5)).collect();
-            for (pixel, single) in pixels.iter().zip(singles(&transform, Level::new(), &pixels)) {
+            for (pixel, single) in pixels.iter().zip(singles(&transform, simd::level(), &pixels)) {
                 let [r, g, b, alpha] = *pixel;
                 assert_eq!(alpha, single[3]);
                 let inside = single[..3].iter().all(|v| (0.0..=1.0).contains(v));
@@ -466,7 +458,7 @@ mod tests {
             let [r, g, b] = acescg_from_xyz([x / y, 1.0, (1.0 - x - y) / y]);
             for space in [ColorSpace::LinearSrgb, ColorSpace::LinearRec2020, ColorSpace::AcesCg] {
                 let transform = LinearTransform::new(space, Some(kelvin));
-                let [white] = singles(&transform, Level::new(), &[[r, g, b, 1.0]])[..] else { panic!("one pixel") };
+                let [white] = singles(&transform, simd::level(), &[[r, g, b, 1.0]])[..] else { panic!("one pixel") };
                 assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-4), "{space:?} {kelvin}: {white:?}");
             }
         }
@@ -476,7 +468,7 @@ mod tests {
     fn blending_after_the_conversion_is_compositing_before_it() {
         let to_srgb = LinearTransform::new(ColorSpace::LinearSrgb, None);
         let pixels: Vec<[f32; 4]> = visible_pixels().collect();
-        let written = halves(&to_srgb, Level::new(), &pixels);
+        let written = halves(&to_srgb, simd::level(), &pixels);
         for background in [0.0, 1.0, decode_srgb(0.5)] {
             for (pixel, half) in pixels.iter().zip(&written) {
                 let [r, g, b, a] = half.map(|bits| f16::from_bits(bits).to_f32());

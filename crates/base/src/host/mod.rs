@@ -9,3 +9,4 @@ pub mod parallel;
 pub mod plural;
 pub mod printable;
 pub mod scratch_pool;
+pub mod stage_times;

@@ -34,6 +34,17 @@ impl Stage {
     }
 }
 
+/// The work of one phenomenon in a stage, or what the renderer does there for all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct StagePart<'a> {
+    /// What is done: [`Stage::Advance`], [`Stage::Prepare`] or [`Stage::Draw`].
+    pub stage: Stage,
+    /// Name of the phenomenon; `None` for compositing: accumulation, exposure, plate, refraction.
+    pub phenomenon: Option<&'a str>,
+    /// Whether it is done for the reflection in a mirror. The reflection is drawn within [`Stage::Prepare`].
+    pub is_mirrored: bool,
+}
+
 /// Error: the observer asked to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
@@ -46,6 +57,13 @@ pub trait Observer: Send + Sync {
 
     /// Work of this kind ends on this thread.
     fn end(&self, _stage: Stage) {}
+
+    /// This part of a stage begins on this thread: at a step, at the preparation of a frame, and for each strip of a picture. Parts are nested where
+    /// compositing calls a phenomenon, and where a thread that waits for parallel work takes on other work.
+    fn begin_part(&self, _part: StagePart) {}
+
+    /// This part of a stage ends on this thread.
+    fn end_part(&self, _part: StagePart) {}
 
     /// Whether to stop; queried at least once per strip of a picture and per simulation step.
     fn cancelled(&self) -> bool {
@@ -76,6 +94,26 @@ impl<'a> StageGuard<'a> {
 impl Drop for StageGuard<'_> {
     fn drop(&mut self) {
         self.observer.end(self.stage);
+    }
+}
+
+/// RAII guard: the part of a stage lasts from its construction until it is dropped.
+pub struct PartGuard<'a> {
+    observer: &'a dyn Observer,
+    part: StagePart<'a>,
+}
+
+impl<'a> PartGuard<'a> {
+    /// Begins `part`.
+    pub fn begin(observer: &'a dyn Observer, part: StagePart<'a>) -> Self {
+        observer.begin_part(part);
+        Self { observer, part }
+    }
+}
+
+impl Drop for PartGuard<'_> {
+    fn drop(&mut self) {
+        self.observer.end_part(self.part);
     }
 }
 

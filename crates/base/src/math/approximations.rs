@@ -251,13 +251,12 @@ mod tests {
         fn all(x: &[f32; 16]) -> [[f32; 16]; 5] {
             [x.map(exp2), x.map(exp), x.map(log2), x.map(sin_turns), x.map(cos_turns)]
         }
-        let level = fearless_simd::Level::new();
-        for start in 0..4000_u32 {
+        for (start, level) in (0..4000_u32).zip(crate::math::simd::available_levels().cycle()) {
             let x: [f32; 16] =
                 std::array::from_fn(|i| f32::from_bits((start * 16 + i as u32).wrapping_mul(0x9e37_79b9)));
             let vector = fearless_simd::dispatch!(level, _simd => all(&x)).map(|row| row.map(canonical));
             let scalar = all(&x);
-            assert_eq!(vector, scalar.map(|row| row.map(canonical)));
+            assert_eq!(vector, scalar.map(|row| row.map(canonical)), "{level:?}");
         }
     }
 

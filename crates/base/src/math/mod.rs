@@ -10,6 +10,7 @@ pub mod curve;
 pub mod f32;
 pub mod random;
 pub mod simd;
+mod vector_level;
 
 pub use glam::{
     Affine3A, DAffine3, DMat2, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, EulerRot, IVec2, IVec3, Mat2, Mat3, Mat4,

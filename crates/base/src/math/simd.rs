@@ -10,6 +10,10 @@ use std::ops::{Add, Div, Mul, Sub};
 use super::approximations::ROUNDING_MAGIC;
 use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*, u32x16};
 
+#[cfg(test)]
+pub(crate) use super::vector_level::available_levels;
+pub use super::vector_level::{VectorLevel, VectorLevelError, level, set_vector_level};
+
 /// Lanes of a vector, whatever the width of the processor's registers.
 pub const LANES: usize = 16;
 

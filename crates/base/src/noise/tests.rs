@@ -1,5 +1,8 @@
 use super::*;
-use crate::math::random::{Key, Purpose};
+use crate::math::{
+    random::{Key, Purpose},
+    simd,
+};
 
 const DETAILED: Fractal = Fractal { octaves: 6, lacunarity: 2, gain: 0.6 };
 
@@ -60,15 +63,16 @@ fn stated_variances_are_those_of_the_formula() {
 
 #[test]
 fn vector_rows_and_lanes_give_the_bytes_of_single_points() {
-    let level = Level::new();
     let noise = noise::<3>(5, DETAILED, [0, 7, 12]);
     let along: Vec<f32> = (0..67).map(|i| i as f32 * 0.37 - 9.0).collect();
     let origin = point([1e6 + 0.3, -4.7, 1e9 + 0.25]);
-    let mut row = vec![0.0; 67];
-    noise.row(level, origin, &along, &mut row);
-    for (distance, value) in along.iter().zip(&row) {
-        let single = noise.at([origin[0].offset_by(*distance), origin[1], origin[2]]);
-        assert_eq!(single.to_bits(), value.to_bits());
+    for level in simd::available_levels() {
+        let mut row = vec![0.0; 67];
+        noise.row(level, origin, &along, &mut row);
+        for (distance, value) in along.iter().zip(&row) {
+            let single = noise.at([origin[0].offset_by(*distance), origin[1], origin[2]]);
+            assert_eq!(single.to_bits(), value.to_bits(), "{level:?}");
+        }
     }
 }
 
@@ -76,8 +80,8 @@ fn assert_lanes<const N: usize>(periods: [u32; N])
 where
     [f32; N]: Dimension<Cells = [u32; N]>,
 {
-    let (level, noise) = (Level::new(), noise::<N>(6, DETAILED, periods));
-    for start in 0..500 {
+    let noise = noise::<N>(6, DETAILED, periods);
+    for (start, level) in (0..500).zip(simd::available_levels().cycle()) {
         let points: [[Coordinate; N]; LANES] = std::array::from_fn(|lane| random_point(start * 16 + lane as u64));
         let cells = std::array::from_fn(|axis| std::array::from_fn(|lane| points[lane][axis].cell));
         let fractions = std::array::from_fn(|axis| std::array::from_fn(|lane| points[lane][axis].fraction));

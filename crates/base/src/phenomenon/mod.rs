@@ -157,6 +157,12 @@ pub trait Phenomenon: Send + Sync {
     /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is determined once per shot.
     fn luminance(&self) -> f64;
 
+    /// Memory of the phenomenon, a run of it and a prepared frame of `pixels` pixels, bytes, to a factor of one and a half: for the check before a job. Small
+    /// amounts are left out.
+    fn memory_bytes(&self, _pixels: f64) -> f64 {
+        0.0
+    }
+
     /// A note for the user about how it will look among the other phenomena.
     fn remark(&self, _neighbors: &OtherPhenomena) -> Option<Remark> {
         None

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bansho::base::math::simd::VectorLevel;
 use clap::Args;
 
 /// `--progress`
@@ -10,7 +11,7 @@ pub(crate) enum ProgressKind {
     /// A bar on stderr with frame rate and remaining time, if stderr is a terminal; then one line.
     #[default]
     Bar,
-    /// One JSON object a line on stdout: start, frame, done, error.
+    /// One JSON object a line on stdout: start, frame, stats with `--stats`, done, error.
     Json,
     /// Only warnings and errors.
     None,
@@ -25,9 +26,12 @@ pub(crate) struct WorkArgs {
     /// How progress is reported.
     #[arg(long, value_enum, default_value_t, help_heading = "Work")]
     pub(crate) progress: ProgressKind,
-    /// Print the time of each stage at the end.
+    /// Print the time of each stage and of each phenomenon at the end.
     #[arg(long, help_heading = "Work")]
     pub(crate) stats: bool,
+    /// Vector instructions to use, for tests and measurements: the pictures are the same. [default: the widest that this machine has]
+    #[arg(long, value_name = "LEVEL", help_heading = "Work")]
+    pub(crate) vector_level: Option<VectorLevel>,
 }
 
 /// Options for existing files.

@@ -12,7 +12,7 @@ pub(crate) mod streaks;
 pub(crate) mod studio;
 pub(crate) mod upgrade;
 
-use bansho::job::JobError;
+use bansho::{base::math::simd::set_vector_level, job::JobError};
 
 use crate::{
     args::WorkArgs,
@@ -25,6 +25,7 @@ fn run_job(
     args: &WorkArgs,
     job: impl FnOnce(&ProgressReporter) -> Result<JobResult, JobError> + Send,
 ) -> anyhow::Result<()> {
+    set_vector_level(args.vector_level)?;
     let reporter = ProgressReporter::new(args.progress, args.stats);
     interrupt::set_grace_period(reporter.forced_exit_message());
     // 0 is one thread for each core.

@@ -46,7 +46,7 @@ impl Json {
     }
 
     /// Writes an event. After an error the job continues, so that the pictures are not lost.
-    fn write(&self, event: &Value) {
+    pub(super) fn write(&self, event: &Value) {
         if let Err(error) = print(&format!("{event}\n")) {
             self.error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }

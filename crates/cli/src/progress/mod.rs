@@ -6,7 +6,7 @@ mod json;
 use std::{io, path::PathBuf, sync::Arc, time::Instant};
 
 use bansho::{
-    Observer, Stage,
+    Observer, Stage, StagePart,
     job::{FrameDone, JobError, JobObserver, JobStarted, Warning},
 };
 
@@ -60,6 +60,11 @@ impl ProgressReporter {
         Self { display: Arc::new(display), stats: stats.then(Stats::new), since: Instant::now() }
     }
 
+    /// Tells the estimated peak memory of the job, bytes, for the statistics.
+    pub(crate) fn set_estimated_memory(&self, bytes: f64) {
+        self.stats.iter().for_each(|stats| stats.set_estimated_memory(bytes));
+    }
+
     /// Reports the result, and the statistics of a job with `threads` threads.
     ///
     /// # Errors
@@ -67,13 +72,17 @@ impl ProgressReporter {
     pub(crate) fn finish(&self, result: Result<JobResult, JobError>, threads: usize) -> anyhow::Result<()> {
         let seconds = self.since.elapsed().as_secs_f64();
         let result = result.map_err(|error| self.fail(error))?;
+        let stats = self.stats.as_ref().map(|stats| stats.report(result.drawn, threads));
         match &*self.display {
             Display::Bar(bar) => bar.done(&result, seconds),
-            Display::Json(json) => json.done(&result, seconds),
+            Display::Json(json) => {
+                stats.iter().for_each(|stats| json.write(&stats.json()));
+                json.done(&result, seconds);
+            }
             Display::None => {}
         }
-        if let Some(stats) = &self.stats {
-            print_error_lines(&stats.table(result.drawn, threads));
+        if let Some(stats) = stats {
+            print_error_lines(&stats.tables());
         }
         match &*self.display {
             Display::Json(json) => json.take_error().map_or(Ok(()), |error| Err(ProgressError(error).into())),
@@ -117,6 +126,14 @@ impl Observer for ProgressReporter {
 
     fn end(&self, stage: Stage) {
         self.stats.iter().for_each(|stats| stats.end(stage));
+    }
+
+    fn begin_part(&self, part: StagePart) {
+        self.stats.iter().for_each(|stats| stats.begin_part(part));
+    }
+
+    fn end_part(&self, part: StagePart) {
+        self.stats.iter().for_each(|stats| stats.end_part(part));
     }
 
     fn cancelled(&self) -> bool {

@@ -1,5 +1,7 @@
 //! Everything but rendering.
 
+use serde_json::Value;
+
 use crate::support::{FLAME, Folder};
 
 #[test]
@@ -125,7 +127,7 @@ fn help_and_version_are_no_errors() {
 fn json_progress_is_one_object_a_line() {
     let folder = Folder::with_scene(FLAME);
     let run = folder.succeed(&["render", "scene.toml", "--progress", "json"]);
-    let events: Vec<serde_json::Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let events: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((events[0]["event"].as_str(), events[0]["frames"].as_u64()), (Some("start"), Some(6)));
     let frames: Vec<_> = events.iter().filter(|event| event["event"] == "frame").collect();
     assert_eq!(frames.len(), 6);
@@ -151,6 +153,29 @@ fn nothing_but_the_last_line_is_told_without_a_terminal() {
     assert!(folder.succeed(&["render", "scene.toml", "--progress", "none"]).stderr.is_empty());
     let stats = folder.succeed(&["render", "scene.toml", "--progress", "none", "--stats"]).stderr;
     assert!(["load", "draw", "view", "write", "threads"].iter().all(|word| stats.contains(word)), "{stats}");
+}
+
+#[test]
+fn statistics_tell_phenomena_and_reflections_apart_and_programs_read_them() {
+    let wet = format!("{FLAME}[ground]\nwetness = 1.0\n[[rain]]\nrate_mm_per_h = 20.0\n");
+    let folder = Folder::with_scene(&wet);
+    let run = folder.succeed(&["render", "scene.toml", "--progress", "json", "--stats"]);
+    for row in ["ground", "left log, mirrored", "compositing, mirrored", "compositing", "median of 5 other frames"] {
+        assert!(run.stderr.contains(row), "{row}: {}", run.stderr);
+    }
+    let events: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let [.., stats, done] = &events[..] else { panic!("{}", run.stdout) };
+    assert_eq!((stats["event"].as_str(), done["event"].as_str()), (Some("stats"), Some("done")));
+    assert_eq!((stats["frames"].as_u64(), stats["vector_level"].is_string()), (Some(6), true));
+    let drawn = |mirrored: bool, stage: &str| {
+        let rows = stats["parts"].as_array().unwrap();
+        let rain = |row: &&Value| row["phenomenon"] == "rain" && row["mirrored"] == mirrored;
+        rows.iter().find(rain).unwrap()["median_ms"][stage].as_f64().unwrap()
+    };
+    assert!(drawn(false, "draw") > 0.0 && drawn(true, "draw") > 0.0, "{stats}");
+    assert_eq!(drawn(false, "advance"), 0.0, "rain is a closed form");
+    let plain = folder.succeed(&["render", "scene.toml", "--progress", "json", "--overwrite"]).stdout;
+    assert!(!plain.contains("\"stats\""), "{plain}");
 }
 
 #[cfg(unix)]

@@ -12,7 +12,7 @@ use bansho_base::{
     },
     world::sky::Sky,
 };
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Simd, dispatch};
 
 use super::{
     row_cache::{FAR, SkyCache, SkyRow},
@@ -252,7 +252,7 @@ impl Prepared for PreparedSky<'_> {
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         if let Some(skyline) = self.skyline.filter(|_| slice.contains(self.hills.near)) {
             dispatch!(level, _simd => self.draw_hills(skyline, strip));
         }

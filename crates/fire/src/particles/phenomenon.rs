@@ -108,6 +108,11 @@ impl Phenomenon for FlameParticles {
         PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
+    fn memory_bytes(&self, pixels: f64) -> f64 {
+        // Measured: state and neighbor lists of each particle, and the grids of the picture.
+        480.0 * self.parameters.particles as f64 + 44.0 * pixels
+    }
+
     fn luminance(&self) -> f64 {
         /// Mean luminance of the bright parts, relative to a uniform flame with soot of the highest temperature.
         const BRIGHT_PARTS: f64 = 0.09;

@@ -127,7 +127,7 @@ fn every_valid_parameter_set_stays_within_0_and_1_before_color() {
     let mut content = 0;
     for number in 0..1500 {
         let Ok(sheet) = FlameSheet::new(random_parameters(number), "random", number, None) else { continue };
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         for value in dispatch!(level, simd => field(simd, &sheet, number as f64 * 0.37)).iter().flatten() {
             assert!((0.0..=1.0).contains(value), "set {number}: {value}");
             content += 1;
@@ -183,7 +183,7 @@ fn crops_give_the_same_bytes() {
 #[test]
 fn wide_vectors_give_the_bits_of_narrow_ones() {
     let sheet = sheet(FlameSheetParameters::default(), None);
-    let (wide, narrow) = (Level::new(), Level::baseline());
+    let (wide, narrow) = (bansho_base::math::simd::level(), Level::baseline());
     let (a, b) =
         (dispatch!(wide, simd => field(simd, &sheet, 3.3)), dispatch!(narrow, simd => field(simd, &sheet, 3.3)));
     assert!(a.len() > 100);
@@ -300,7 +300,7 @@ fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
         let rect = Rect::from_size(320, 480);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
-        dispatch!(Level::new(), simd => draw_rows(simd, &context, rect, &mut strip));
+        dispatch!(bansho_base::math::simd::level(), simd => draw_rows(simd, &context, rect, &mut strip));
         strip.radiance[0].clone()
     })
 }
@@ -363,7 +363,7 @@ fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
         let rect = Rect::from_size(size[0], size[1]);
         let mut strip = Strip::default();
         strip.reset(rect, None, 0);
-        dispatch!(Level::new(), simd => draw_rows(simd, &context, rect, &mut strip));
+        dispatch!(bansho_base::math::simd::level(), simd => draw_rows(simd, &context, rect, &mut strip));
         strip.radiance[0].clone()
     })
 }

@@ -116,7 +116,16 @@ impl<'a> SingleScattering<'a> {
             InScatterIntegrator { lighting, extinction: profile, eye, distances: &distances, depths: &depths, end };
         let tiles = &sky.fine.tiles;
         let lamps = cache.scattering(&integrator, tiles, view);
-        Some(Self { level: Level::new(), view, sky, distances, depths, lamps, end, ground: shutter_state.ground })
+        Some(Self {
+            level: bansho_base::math::simd::level(),
+            view,
+            sky,
+            distances,
+            depths,
+            lamps,
+            end,
+            ground: shutter_state.ground,
+        })
     }
 
     /// The grid at whose corners in-scattering is stored.

@@ -111,7 +111,7 @@ impl<'a> PreparedRain<'a> {
         let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
         Self {
             view,
-            level: Level::new(),
+            level: bansho_base::math::simd::level(),
             chunks,
             streaks_end: rain.streaks_end(),
             textured,
@@ -135,7 +135,7 @@ impl<'a> FrameInputs<'a> {
     /// The projection of the selected drops.
     fn projection(&self, selection: DropSelection<'a>) -> StreakProjection<'a> {
         StreakProjection {
-            level: Level::new(),
+            level: bansho_base::math::simd::level(),
             shutter_state: self.shutter_state,
             lighting: self.lighting,
             lights: self.prepared_lights,

@@ -9,7 +9,7 @@ use bansho_base::{
 };
 
 use super::plate::PlateFrame;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 /// The background of some slices, as large as the whole picture.
 #[derive(Clone, Copy)]
@@ -61,7 +61,7 @@ impl<'a> Background<'a> {
         bent.pixels.resize(traced.width * traced.height, BentPixel::default());
         let size = [image.width(), image.height()];
         for (row, pixels) in bent.pixels.chunks_mut(traced.width.max(1)).enumerate() {
-            dispatch!(Level::new(), _simd => air.trace_row(traced.x, traced.y + row, size, self.depth, pixels));
+            dispatch!(bansho_base::math::simd::level(), _simd => air.trace_row(traced.x, traced.y + row, size, self.depth, pixels));
         }
     }
 
@@ -124,7 +124,7 @@ impl BentPixels {
         let to = from + pixels.len();
         out[..from].copy_from_slice(&straight[..from]);
         out[to..].copy_from_slice(&straight[to..]);
-        dispatch!(Level::new(), _simd => read(pixels, values, start + from, width, &mut out[from..to]));
+        dispatch!(bansho_base::math::simd::level(), _simd => read(pixels, values, start + from, width, &mut out[from..to]));
     }
 }
 

@@ -5,7 +5,7 @@
 
 use bansho_base::{
     frame::{Frame, FrameHeader},
-    host::observer::{Cancelled, Observer},
+    host::observer::Cancelled,
     phenomenon::Deflection,
 };
 
@@ -19,7 +19,6 @@ pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
     mut recycled: Option<Frame>,
-    observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let mut layers: Vec<Deflection> =
         composition.prepared.iter().filter_map(|prepared| prepared.deflection()).collect();
@@ -28,7 +27,7 @@ pub(crate) fn draw_frame(
     let (mut slices, far) = composition.slices.split_at(slices_before(composition, farthest));
     let mut drawn = match far {
         [] => None,
-        far => Some(strips::draw_frame(&Composition { slices: far, ..*composition }, header.clone(), None, observer)?),
+        far => Some(strips::draw_frame(&Composition { slices: far, ..*composition }, header.clone(), None)?),
     };
     for (index, layer) in layers.iter().enumerate() {
         let next = layers.get(index + 1).map_or(f64::NEG_INFINITY, |next| next.depth);
@@ -38,11 +37,11 @@ pub(crate) fn draw_frame(
         let background = background.through(*layer, composition.view);
         let group = Composition { slices: group, background, ..*composition };
         let memory = if rest.is_empty() { recycled.take() } else { None };
-        drawn = Some(strips::draw_frame(&group, header.clone(), memory, observer)?);
+        drawn = Some(strips::draw_frame(&group, header.clone(), memory)?);
     }
     match drawn {
         Some(frame) => Ok(frame),
-        None => strips::draw_frame(composition, header, recycled, observer),
+        None => strips::draw_frame(composition, header, recycled),
     }
 }
 

@@ -3,7 +3,7 @@
 use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     host::{
-        observer::{self, Cancelled, Observer},
+        observer::{self, Cancelled, Observer, PartGuard, Stage, StagePart},
         parallel::prelude::*,
         scratch_pool::ScratchPool,
     },
@@ -57,8 +57,12 @@ impl Outputs {
 #[derive(Clone, Copy)]
 pub(crate) struct Composition<'a> {
     pub(crate) outputs: Outputs,
+    /// Whether it is the reflection in a mirror.
+    pub(crate) is_mirrored: bool,
+    pub(crate) observer: &'a dyn Observer,
     pub(crate) view: &'a View,
-    pub(crate) runs: &'a [ActiveRun],
+    /// The phenomena, to which members of slices refer.
+    pub(crate) runs: &'a [&'a ActiveRun],
     pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
     pub(crate) slices: &'a [Slice],
     pub(crate) plate: &'a PlateFrame,
@@ -91,7 +95,7 @@ pub(crate) struct StripScratch {
     row: Vec<[f32; 4]>,
 }
 
-impl Composition<'_> {
+impl<'a> Composition<'a> {
     /// The rectangle of the strip with this index.
     fn strip_rect(&self, index: usize) -> Rect {
         let window = self.view.window;
@@ -119,6 +123,12 @@ impl Composition<'_> {
         let all = strips.map(|index| self.nonempty_rect(self.strip_rect(index)));
         let bounds = all.fold(Rect::default(), |all, rect| all.union(&rect));
         Rect { x: bounds.x.saturating_sub(window.x), y: bounds.y.saturating_sub(window.y), ..bounds }
+    }
+
+    /// Begins the drawing of a phenomenon or, without a name, compositing.
+    fn begin_part(&self, phenomenon: Option<&'a str>) -> PartGuard<'a> {
+        let part = StagePart { stage: Stage::Draw, phenomenon, is_mirrored: self.is_mirrored };
+        PartGuard::begin(self.observer, part)
     }
 
     fn layer_count(&self) -> usize {
@@ -171,7 +181,10 @@ impl Composition<'_> {
                     Some(image) => strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
                     None => strip.reset(drawn, None, aov_count),
                 }
-                prepared.draw(&slice.interval, strip);
+                {
+                    let _part = self.begin_part(Some(self.runs[member].info().name));
+                    prepared.draw(&slice.interval, strip);
+                }
                 accumulator.add_behind(level, strip, member, self.runs[member].info().aovs);
             }
         }
@@ -227,10 +240,9 @@ pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
     recycled: Option<Frame>,
-    observer: &dyn Observer,
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, composition.outputs.depth, recycled);
     let strip_pixels = STRIP_ROWS * window.width;
     let mut depth_strips = depth.iter_mut().flat_map(|depth| depth.chunks_mut(strip_pixels));
@@ -240,7 +252,8 @@ pub(crate) fn draw_frame(
     let scratches = composition.scratches;
     let has_channels = composition.outputs.layers || composition.outputs.aovs;
     let strips = pixels.into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
-        observer::check(observer)?;
+        observer::check(composition.observer)?;
+        let _part = composition.begin_part(None);
         pixels.clear(stale, index * STRIP_ROWS, window.width);
         let strip = composition.strip_rect(index);
         let rect = composition.nonempty_rect(strip);
@@ -456,4 +469,37 @@ fn channel_names(composition: &Composition) -> Vec<Channel> {
         }
     }
     channels
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::{random::Key, random::Purpose, simd::VectorLevel};
+
+    use super::*;
+
+    /// A plane of random numbers in [0, 1).
+    fn plane(id: u64) -> Vec<f32> {
+        let key = Key::new(3, "composite");
+        (0..17).flat_map(|step| key.uniforms(id, step, Purpose(0))).collect()
+    }
+
+    #[test]
+    fn rows_are_composited_to_the_same_bits_at_every_vector_level() {
+        let planes: [Vec<f32>; 6] = std::array::from_fn(|id| plane(id as u64));
+        let [red, green, blue, through_red, through_green, through_blue] = planes.each_ref().map(Vec::as_slice);
+        let (color, transmittance) = ([red, green, blue], [through_red, through_green, through_blue]);
+        let background: Vec<[f32; 4]> = (0..red.len()).map(|i| [blue[i], red[i], through_red[i], green[i]]).collect();
+        let composited = |level: Level| {
+            let mut rows = [vec![[0.0; 4]; red.len()], vec![[0.0; 4]; red.len()]];
+            let [clear, absorbed] = &mut rows;
+            dispatch!(level, _simd => expose_row(0.37, color, clear));
+            dispatch!(level, _simd => composite_background(&background, clear));
+            dispatch!(level, _simd => expose_absorbed_row(0.37, color, transmittance, absorbed));
+            dispatch!(level, _simd => composite_absorbed_background(transmittance, &background, absorbed));
+            rows.map(|row| row.into_flattened().into_iter().map(f32::to_bits).collect::<Vec<_>>())
+        };
+        let levels: Vec<Level> = VectorLevel::available().into_iter().filter_map(VectorLevel::level).collect();
+        let narrowest = composited(levels[0]);
+        assert!(levels.iter().all(|level| composited(*level) == narrowest));
+    }
 }

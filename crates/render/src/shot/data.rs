@@ -2,6 +2,7 @@
 
 use bansho_base::{
     geometry::point_cloud::PointCloud,
+    host::observer::Unobserved,
     phenomenon::surroundings::{Light, Publication},
 };
 
@@ -32,7 +33,7 @@ impl Shot {
     /// The [particles](Self::particles) of each phenomenon that can have any, with its name in the scene. They may be none at this frame.
     pub fn point_clouds(&self) -> Vec<(String, PointCloud)> {
         let view = self.context.plan.view_at(self.time);
-        let publications = self.publications(view.shutter);
+        let publications = self.publications(view.shutter, &Unobserved);
         let surroundings = self.surroundings(&view, &publications, None);
         let each = self.runs.iter().zip(&surroundings);
         each.filter_map(|(run, surroundings)| Some((run.info().name.to_owned(), run.run.export(&view, surroundings)?)))
@@ -42,7 +43,7 @@ impl Shot {
     /// The lights with which phenomena light each other, at the frame that the shot was advanced to: of each flame the points that approximate its emission,
     /// of an aurora a directional light. Lamps and the sky of the scene are not among them. The phenomena follow each other in the order of the scene.
     pub fn lights(&self) -> Vec<PhenomenonLight> {
-        let publications = self.publications(self.context.plan.shutter_at(self.time));
+        let publications = self.publications(self.context.plan.shutter_at(self.time), &Unobserved);
         let of_run = |(run, publication): (&ActiveRun, Publication)| {
             let phenomenon = run.info().name.to_owned();
             publication.lights.into_iter().map(move |light| PhenomenonLight { phenomenon: phenomenon.clone(), light })

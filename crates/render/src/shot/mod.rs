@@ -10,7 +10,7 @@ use std::sync::Arc;
 use bansho_base::{
     frame::{Channel, Frame, PhenomenonMetadata},
     host::{
-        observer::{self, Cancelled, Observer, Stage, StageGuard},
+        observer::{self, Cancelled, Observer, PartGuard, Stage, StageGuard, StagePart},
         parallel::prelude::*,
     },
     image::Rect,
@@ -264,11 +264,12 @@ impl Shot {
         observer: &dyn Observer,
     ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let publications = self.publications(view.shutter);
+        let publications = self.publications(view.shutter, observer);
         let reflection = self.reflection(view, mirrored, &publications, observer)?;
         let surroundings = self.surroundings(view, &publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.runs.len()).collect();
-        let PreparedSlices { slices, prepared } = self.prepare(&all, view, &surroundings, observer)?;
+        let runs: Vec<&ActiveRun> = self.runs.iter().collect();
+        let PreparedSlices { slices, prepared } = self.prepare(&all, view, &surroundings, false, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
@@ -284,8 +285,10 @@ impl Shot {
         let composition = Composition {
             // What is nearer than refracting air is not refracted.
             outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
+            is_mirrored: false,
+            observer,
             view,
-            runs: &self.runs,
+            runs: &runs,
             prepared: &prepared,
             slices: &slices,
             plate,
@@ -295,9 +298,9 @@ impl Shot {
         };
         let header = self.context.header(self.number, self.time);
         let mut frame = if is_refracted {
-            refraction::draw_frame(&composition, header, recycled, observer)?
+            refraction::draw_frame(&composition, header, recycled)?
         } else {
-            strips::draw_frame(&composition, header, recycled, observer)?
+            strips::draw_frame(&composition, header, recycled)?
         };
         if self.context.plan.metadata {
             frame.metadata = self.metadata(&prepared);
@@ -306,8 +309,12 @@ impl Shot {
     }
 
     /// What each phenomenon publishes during `shutter`.
-    fn publications(&self, shutter: Shutter) -> Vec<Publication> {
-        self.runs.par_iter().map(|run| run.run.publish(shutter)).collect()
+    fn publications(&self, shutter: Shutter, observer: &dyn Observer) -> Vec<Publication> {
+        let publish = |run: &ActiveRun| {
+            let _part = begin_preparation(run, false, observer);
+            run.run.publish(shutter)
+        };
+        self.runs.par_iter().map(publish).collect()
     }
 
     /// The metadata of every phenomenon that has any.
@@ -337,11 +344,14 @@ impl Shot {
         let view = view.mirrored(mirror.height);
         let surroundings = self.surroundings(&view, publications, None);
         let others: Vec<usize> = (0..self.runs.len()).filter(|&index| index != mirror_index).collect();
-        let PreparedSlices { slices, prepared } = self.prepare(&others, &view, &surroundings, observer)?;
+        let runs: Vec<&ActiveRun> = others.iter().map(|&index| &self.runs[index]).collect();
+        let PreparedSlices { slices, prepared } = self.prepare(&others, &view, &surroundings, true, observer)?;
         let composition = Composition {
             outputs: Outputs::RADIANCE,
+            is_mirrored: true,
+            observer,
             view: &view,
-            runs: &self.runs,
+            runs: &runs,
             prepared: &prepared,
             slices: &slices,
             plate: mirrored,
@@ -349,8 +359,9 @@ impl Shot {
             background: Background::plate(mirrored),
             scratches: &self.scratches,
         };
-        let mut image =
-            strips::draw_frame(&composition, self.context.header(self.number, self.time), None, observer)?.beauty;
+        let mut image = strips::draw_frame(&composition, self.context.header(self.number, self.time), None)?.beauty;
+        let part = StagePart { stage: Stage::Draw, phenomenon: None, is_mirrored: true };
+        let _part = PartGuard::begin(observer, part);
         let sky = self.context.sky(view.shutter.middle());
         // An invisible sky lights the ground, but is not reflected in still water.
         let is_visible = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
@@ -367,11 +378,22 @@ impl Shot {
         which: &[usize],
         view: &'a View,
         surroundings: &'a [Surroundings<'a>],
+        is_mirrored: bool,
         observer: &dyn Observer,
     ) -> Result<PreparedSlices<'a>, RenderError> {
-        let each = || which.par_iter().map(|&index| (&self.runs[index].run, &surroundings[index]));
-        let intervals: Vec<_> = each().map(|(run, s)| run.depth_intervals(view, s)).collect();
-        let prepared = each().map(|(run, s)| run.prepare(view, s, observer)).collect::<Result<_, _>>()?;
+        let each = || which.par_iter().map(|&index| (&self.runs[index], &surroundings[index]));
+        let intervals: Vec<_> = each()
+            .map(|(run, surroundings)| {
+                let _part = begin_preparation(run, is_mirrored, observer);
+                run.run.depth_intervals(view, surroundings)
+            })
+            .collect();
+        let prepared = each()
+            .map(|(run, surroundings)| {
+                let _part = begin_preparation(run, is_mirrored, observer);
+                run.run.prepare(view, surroundings, observer)
+            })
+            .collect::<Result<_, _>>()?;
         Ok(PreparedSlices { slices: slices::cut(&intervals), prepared })
     }
 
@@ -385,6 +407,12 @@ impl Shot {
         let of_phenomenon = |index| stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
         (0..self.runs.len()).map(of_phenomenon).collect()
     }
+}
+
+/// Begins the preparation of a phenomenon, for the picture or for its reflection.
+fn begin_preparation<'a>(run: &'a ActiveRun, is_mirrored: bool, observer: &'a dyn Observer) -> PartGuard<'a> {
+    let phenomenon = Some(run.info().name);
+    PartGuard::begin(observer, StagePart { stage: Stage::Prepare, phenomenon, is_mirrored })
 }
 
 /// Slices of depth, and the prepared phenomena to which their members refer.

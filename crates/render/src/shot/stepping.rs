@@ -1,7 +1,7 @@
 //! Stepping of simulated phenomena: fixed time steps in an order that does not depend on the frames.
 
 use bansho_base::{
-    host::observer::{self, Cancelled, Observer},
+    host::observer::{self, Cancelled, Observer, PartGuard, Stage, StagePart},
     phenomenon::{
         strip::Shutter,
         surroundings::{Publication, Surroundings},
@@ -61,15 +61,23 @@ pub(crate) fn advance(
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((index, now)) = earliest else { return Ok(taken) };
         observer::check(observer)?;
-        let instant = Shutter { open: now, close: now };
-        let publications: Vec<Publication> = runs.iter().map(|other| other.run.publish(instant)).collect();
-        let surroundings = surroundings(context, &publications, index, instant, None);
-        if let Some(stepped) = runs[index].run.as_stepped_mut() {
-            stepped.step(now, &surroundings);
-        }
-        runs[index].steps_taken += 1;
+        step(context, runs, index, now, observer);
     }
     Ok(max_steps)
+}
+
+/// Steps phenomenon `index` from the time `now`, s.
+fn step(context: &ShotContext, runs: &mut [ActiveRun], index: usize, now: f64, observer: &dyn Observer) {
+    let phenomenon = runs[index].built.phenomenon.clone();
+    let name = Some(phenomenon.info().name);
+    let _part = PartGuard::begin(observer, StagePart { stage: Stage::Advance, phenomenon: name, is_mirrored: false });
+    let instant = Shutter { open: now, close: now };
+    let publications: Vec<Publication> = runs.iter().map(|other| other.run.publish(instant)).collect();
+    let surroundings = surroundings(context, &publications, index, instant, None);
+    if let Some(stepped) = runs[index].run.as_stepped_mut() {
+        stepped.step(now, &surroundings);
+    }
+    runs[index].steps_taken += 1;
 }
 
 /// Time by which the phenomena are behind the states from which `shutter` is drawn, s; 0 once all have been stepped there.

@@ -13,7 +13,7 @@ use bansho_base::{
         simd::{FourLanes, Real},
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 use crate::render::project::{
     chart::{BLOCK_COLUMNS, Chart, ChartProjection},
@@ -209,7 +209,7 @@ impl<'a> SortedSources<'a> {
         field: &FieldLines,
         spread_km: f64,
     ) -> Self {
-        let (projection, level) = (chart.projection(), Level::new());
+        let (projection, level) = (chart.projection(), bansho_base::math::simd::level());
         let bins = DistanceBins::new(spread_km, chart.row_step);
         let shown = VisibleRowTest::new(chart, field);
         let sorted = |(task, sources): (usize, &[FieldLineSource])| {

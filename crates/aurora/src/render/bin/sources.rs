@@ -5,7 +5,7 @@ use bansho_base::{
     math::{self, MulAdd, simd::LANES},
     parameters::Auto,
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::source_bins::{FieldLineSource, REACH};
 use crate::{
@@ -87,7 +87,7 @@ impl SourceBuilder<'_> {
         cells: &[AfterglowCell<ALTITUDES>],
         weights: [EmitterWeights; ALTITUDES],
     ) -> Vec<FieldLineSource> {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let mut sources = vec![FieldLineSource::default(); cells.len()];
         sources.par_chunks_mut(TASK).zip(cells.par_chunks(TASK)).for_each(|(sources, cells)| {
             dispatch!(level, _simd => self.fill_from_cells(sources, cells, weights));
@@ -121,7 +121,7 @@ impl SourceBuilder<'_> {
 
     /// Particles extrapolated by `offset_s` seconds, with the green and the red light of each.
     fn particles(&self, particles: &AuroraParticles, lasting: LastingLight, offset_s: f32) -> Vec<FieldLineSource> {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let mut sources = vec![FieldLineSource::default(); particles.len()];
         sources.par_chunks_mut(TASK).enumerate().for_each(|(task, sources)| {
             dispatch!(level, _simd => self.fill_from_particles(sources, particles, lasting, task * TASK, offset_s));

@@ -13,7 +13,7 @@ use bansho_base::{
         simd::{FourLanes, HalfLanes, Real},
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS};
 use crate::{
@@ -75,7 +75,7 @@ impl ColumnBuffer {
         profiles: &EmissionProfiles,
         sorted_sources: &SortedSources,
     ) -> Self {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let [cotangents, inverse_sines] = chart.row_tables(ROWS * KNOT_ROWS);
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> =

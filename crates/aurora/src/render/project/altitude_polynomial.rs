@@ -230,7 +230,7 @@ fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
 #[cfg(test)]
 mod tests {
     use bansho_base::math::DVec3;
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::dispatch;
 
     use super::*;
     use crate::render::project::field_lines::FieldLines;
@@ -250,7 +250,7 @@ mod tests {
                     let altitudes_km: [f32; LANES] = std::array::from_fn(|i| first_km + 3.0 * i as f32);
                     let offset = |i: usize| distance * 0.01 * (i as f32 / 7.5 - 1.0);
                     let offsets: [f32; LANES] = std::array::from_fn(offset);
-                    let [[rows, brightness], [exact_rows, exact_lights]] = dispatch!(Level::new(), simd => {
+                    let [[rows, brightness], [exact_rows, exact_lights]] = dispatch!(bansho_base::math::simd::level(), simd => {
                         let coordinates = altitudes_km.map(RowPolynomialBasis::altitude_coordinate);
                         let offsets = Lanes::from_slice(simd, &offsets);
                         let found = descents.fit(simd, &line).points(Lanes::from_slice(simd, &coordinates), offsets);

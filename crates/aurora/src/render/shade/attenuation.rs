@@ -85,7 +85,7 @@ fn attenuated_color(
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::dispatch;
 
     use super::*;
 
@@ -97,7 +97,7 @@ mod tests {
         for emitter in EMITTERS {
             let mut light = [0.0; 4];
             light[emitter.index()] = 2.0;
-            let color: [f32; 4] = dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(0.3)).into());
+            let color: [f32; 4] = dispatch!(bansho_base::math::simd::level(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(0.3)).into());
             let expected = emitter.color_per_kilorayleigh();
             assert!(
                 (0..3).all(|c| (f64::from(color[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
@@ -111,7 +111,7 @@ mod tests {
         let transmittance = |emitter: Emitter| {
             let mut light = [0.0; 4];
             light[emitter.index()] = 1.0;
-            let blue = |sine: f32| dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(sine))[2]);
+            let blue = |sine: f32| dispatch!(bansho_base::math::simd::level(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(sine))[2]);
             blue(0.02) / blue(1.0)
         };
         assert!(transmittance(Emitter::NitrogenIon) < 0.5 * transmittance(Emitter::OxygenGreen).abs());

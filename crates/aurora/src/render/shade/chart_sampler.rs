@@ -2,7 +2,7 @@
 
 use bansho_base::math::simd::{FourLanes, HalfLanes, Real};
 #[cfg(test)]
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 use fearless_simd::{Simd, prelude::*};
 
 use crate::{
@@ -48,7 +48,7 @@ impl ChartSampler<'_> {
     #[cfg(test)]
     pub(crate) fn light(&self, longitude: f32, colatitude: f32) -> PerEmitter<f32> {
         let mut light = [[0.0; 4]];
-        dispatch!(Level::new(), simd => self.add(simd, &[longitude], &[colatitude], &mut light));
+        dispatch!(bansho_base::math::simd::level(), simd => self.add(simd, &[longitude], &[colatitude], &mut light));
         light[0]
     }
 

@@ -6,7 +6,7 @@ use bansho_base::{
     math,
     math::simd::{FourLanes, HalfLanes, Real},
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 use super::attenuation::EmitterColors;
 use crate::{
@@ -40,7 +40,7 @@ impl ColumnBuffer {
     /// Replaces brightness by emitter with the attenuated color of this and the soft chart, ACEScg in cd/m^2; the
     /// fourth component is the brightness in kR.
     pub(crate) fn composite(mut self, soft: &Self, field: &FieldLines, emitter_colors: &EmitterColors) -> Self {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let (chart, blocks) = self.blocks(BLOCK_COLUMNS);
         let soft_projection = soft.chart.projection();
         let (mut cosines, mut sines, mut soft_rows) = (Vec::new(), Vec::new(), Vec::new());
@@ -190,7 +190,7 @@ mod tests {
         let expected = |longitude: f32, colatitude: f32, sine: f32| -> PerEmitter<f32> {
             let [a, b] = [&sharp, &soft].map(|picture| picture.sampler().light(longitude, colatitude));
             let both = std::array::from_fn(|i| a[i] + b[i]);
-            dispatch!(Level::new(), simd => emitter_colors.attenuated(simd, &both, EmitterColors::table_coordinate(sine)).into())
+            dispatch!(bansho_base::math::simd::level(), simd => emitter_colors.attenuated(simd, &both, EmitterColors::table_coordinate(sine)).into())
         };
         let samples: Vec<_> = [[20, 10], [160, 100], [300, 60], [90, 180]]
             .map(|[x, y]| {

@@ -10,7 +10,7 @@ use bansho_base::{
     math::simd::{FourLanes, Real},
     phenomenon::strip::View,
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 use crate::{
     parameters::BlurParameters,
@@ -75,7 +75,7 @@ impl BlurKernel {
 impl BlurredImage {
     /// The whole picture of a view.
     pub(crate) fn new(view: &View, field: &FieldLines, samplers: &[ChartSampler; 2], radii: &BlurParameters) -> Self {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let kernel = BlurKernel::new(radii);
         let margin = kernel.reach();
         let [width, height] = view.size.map(|side| side + 2 * margin);

@@ -15,7 +15,7 @@ use bansho_base::{
         simd::{FourLanes, Lanes, Real},
     },
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 use super::{
     collision_block::{COLLISION_BLOCK_COLUMNS, CollisionBlock},
@@ -131,7 +131,7 @@ impl CollisionRenderer {
         sorted_sources: &SortedSources,
         step: u32,
     ) -> ColumnBuffer {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let mut buffer = ColumnBuffer::zeros(chart);
         let (chart, blocks) = buffer.blocks(COLLISION_BLOCK_COLUMNS);
         let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), sorted_sources, step };

@@ -268,7 +268,7 @@ fn inside<S: Simd>(rows: Lanes<S>, end: Lanes<S>, [within, without]: [Lanes<S>; 
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::dispatch;
 
     use super::*;
 
@@ -310,7 +310,7 @@ mod tests {
             let count = SPLAT_LANES - (track % 4) as usize;
             let batch =
                 Batch { rows: &rows, brightness: &brightness, photon_rows: &photon_rows, count, photons: &photons };
-            let column = dispatch!(Level::new(), simd => column_of(simd, &mut rasterizer, &batch));
+            let column = dispatch!(bansho_base::math::simd::level(), simd => column_of(simd, &mut rasterizer, &batch));
             let plainest = bansho_base::dispatch_baseline!(simd => column_of(simd, &mut rasterizer, &batch));
             assert!(column.iter().zip(&plainest).all(|(wide, plain)| wide.0 == plain.0), "the same on all machines");
             let mut expected = [[0.0_f32; 4]; ROWS + 1];

@@ -4,7 +4,7 @@
 use std::{f64::consts::PI, sync::Arc};
 
 use bansho_base::{host::parallel::prelude::*, math};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::{grid::Grid2, sine_transform::SineTransform};
 
@@ -98,7 +98,7 @@ impl PoissonSolver {
         for row in grid.values_mut().chunks_mut(columns) {
             row.chunks_mut(TASK_COLUMNS).zip(&mut blocks).for_each(|(chunk, block)| block.push(chunk));
         }
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         blocks.into_par_iter().enumerate().for_each(|(number, mut block)| {
             let factors: Vec<&[f64]> =
                 self.factors.chunks(columns).map(|row| &row[number * TASK_COLUMNS..][..block[0].len()]).collect();

@@ -12,7 +12,6 @@ use bansho_base::{
     noise::{Coordinate, Fractal, Noise},
     parameters::Auto,
 };
-use fearless_simd::Level;
 
 use super::{
     Grid2, PoissonSolver, gauss_seidel_sweep,
@@ -210,7 +209,7 @@ impl FieldBuilder {
         let scale = potential.spacing() / field.noise_scale_km;
         let columns = potential.size()[0];
         let along: Vec<f32> = (0..columns).map(|column| (column as f64 * scale) as f32).collect();
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let rows = potential.values_mut().par_chunks_mut(columns).enumerate();
         rows.for_each_with(vec![0.0_f32; columns], |values, (row, cells)| {
             let origin = [0.0, row as f64 * scale, time / field.noise_correlation_time_s].map(Coordinate::from_f64);

@@ -29,7 +29,7 @@ impl SineTransform {
     pub(super) fn new(length: usize) -> Self {
         let whole = length + 1;
         let sines = (0..whole).map(|j| math::sin(PI * j as f64 / whole as f64)).collect();
-        Self { fourier: FftPlanner::new().plan_fft_forward(whole), sines, level: Level::new() }
+        Self { fourier: FftPlanner::new().plan_fft_forward(whole), sines, level: bansho_base::math::simd::level() }
     }
 
     pub(super) fn scratch(&self) -> TransformScratch {

@@ -92,7 +92,7 @@ impl RayPattern {
         arc_coordinates: impl Fn(usize, usize) -> Vec<f64>,
         time: f64,
     ) -> RayTable {
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         let node = self.node_km().max(lengths.iter().sum::<f64>() / self.max_nodes);
         let sheet = |(sheet, length): (usize, &f64)| {
             let last = (length / node).max(1.0).ceil();
@@ -249,7 +249,8 @@ mod tests {
         for first in 0..1000 {
             let coordinate = |lane: usize| table.at(0, (first * LANES + lane) as f64 / 16_000.0);
             let coordinates = PatternInputs { noises: std::array::from_fn(coordinate), side: [-1.0; LANES] };
-            let PatternSample { brightness, dimming, hardness } = rays.at(Level::new(), &coordinates, time);
+            let PatternSample { brightness, dimming, hardness } =
+                rays.at(bansho_base::math::simd::level(), &coordinates, time);
             for (all, values) in all.iter_mut().zip([brightness, dimming, hardness]) {
                 all.extend(values.map(f64::from));
             }
@@ -282,7 +283,7 @@ mod tests {
         let table = rays.table(&[300.0], |_, last| evenly(300.0, last), 2.0);
         for first in 0..500 {
             let coordinate = std::array::from_fn(|lane| 0.0371 * (first * LANES + lane) as f64);
-            let [left, ..] = rays.noises(Level::new(), &coordinate, 2.0);
+            let [left, ..] = rays.noises(bansho_base::math::simd::level(), &coordinate, 2.0);
             for lane in 0..LANES {
                 assert!((table.at(0, coordinate[lane] / 300.0)[0] - left[lane]).abs() < 0.01 * rays.deviation * 4.0);
             }

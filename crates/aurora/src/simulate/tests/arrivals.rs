@@ -4,7 +4,6 @@ use bansho_base::{
     math::{approximations, random::Key},
     noise::LANES,
 };
-use fearless_simd::Level;
 
 use super::*;
 use crate::{
@@ -59,7 +58,7 @@ impl Seen {
                 noises: [table.at(projection.sheet, projection.fraction); LANES],
                 side: [projection.side.signum() as f32; LANES],
             };
-            approximations::ln(rays.at(Level::new(), &positions, time).brightness[0])
+            approximations::ln(rays.at(bansho_base::math::simd::level(), &positions, time).brightness[0])
         };
         let rays = positions.iter().map(bright).collect();
         Self { refined, rays }

@@ -10,9 +10,20 @@ use crate::job::{
 
 /// Pictures with fewer pixels than this are not checked.
 const MIN_CHECKED_PIXELS: f64 = 4e6;
-/// Bytes of a pixel of a frame: color, alpha and depth in single precision.
-const FRAME_BYTES: f64 = 20.0;
+/// Bytes of a pixel of a frame: color and alpha in single precision.
+const FRAME_BYTES: f64 = 16.0;
+/// Bytes of the depth of a pixel, which only scene-linear files and refracted light need.
+const DEPTH_BYTES: f64 = 4.0;
+/// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
+const MAX_BYTES_OF_PIXELS: usize = 1 << 27;
+/// Bytes of the process without a picture.
+const PROCESS_BYTES: f64 = 1.2e7;
 const GIB: f64 = (1 << 30) as f64;
+
+/// Of how many frames of `bytes` bytes the pixels may be in memory at once. Where a frame is written from its pixels, another one is drawn meanwhile.
+pub(crate) fn max_frames_with_pixels(bytes: usize, writes_pixels: bool) -> usize {
+    (MAX_BYTES_OF_PIXELS / bytes.max(1)).max(1 + usize::from(writes_pixels))
+}
 
 /// What the memory of a job depends on in addition to its plan.
 #[derive(Clone, Copy)]
@@ -38,17 +49,22 @@ struct BytesPerPixel {
 impl BytesPerPixel {
     /// The memory of a job whose frames have `channels` channels of layers and AOVs.
     fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize) -> Self {
-        let frame = FRAME_BYTES + 4.0 * channels as f64;
+        let depth = if request.display.is_none() { DEPTH_BYTES } else { 0.0 };
+        let frame = FRAME_BYTES + depth + 4.0 * channels as f64;
         // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
         let written = match request.display {
-            Some(BitDepth::Eight) => 3.0 * 4.0,
-            Some(BitDepth::Sixteen) => 3.0 * 8.0,
+            Some(BitDepth::Eight) => 4.0 + 3.0 + 4.0,
+            Some(BitDepth::Sixteen) => 8.0 + 6.0 + 8.0,
             None => 12.0 + 3.0 * channels as f64,
         };
-        // Two frames are written while a third is drawn. A sheet keeps the pixels of all, and is laid out and encoded as a whole.
-        let (drawn, encoded) = (request.frames.min(3) as f64, request.frames.min(2).max(request.tiles) as f64);
-        let drawn = drawn * frame + encoded * written;
-        let plate = if plan.scene().has_plate() { FRAME_BYTES } else { 0.0 };
+        // One frame is written while another one is drawn, in the memory of the former where it is large and its pixels are no longer needed
+        // (`draw_frames`). A sheet keeps the pixels of all, and is laid out and encoded as a whole.
+        let window = plan.window();
+        let max_with_pixels =
+            max_frames_with_pixels(window.width * window.height * frame as usize, request.display.is_none());
+        let (drawn, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
+        let drawn = drawn as f64 * frame + encoded as f64 * written;
+        let plate = if plan.scene().has_plate() { FRAME_BYTES + DEPTH_BYTES } else { 0.0 };
         // The mirrored picture, its blurred version, and the plate in it.
         let has_mirror = compiled.phenomena().any(|phenomenon| phenomenon.info().mirror.is_some());
         let mirror = if has_mirror { 2.0 * FRAME_BYTES + plate } else { 0.0 };
@@ -58,6 +74,17 @@ impl BytesPerPixel {
     fn total(&self, drawn_pixels: f64, whole_pixels: f64) -> f64 {
         self.drawn * drawn_pixels + self.whole * whole_pixels
     }
+}
+
+/// Memory of a job, bytes: what its pictures take, its phenomena, and the process. Within a quarter of the measured peak for frames that take longer to
+/// draw than to write.
+pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> f64 {
+    let window = plan.window();
+    let (drawn, whole) =
+        (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
+    let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
+    let phenomena: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
+    per_pixel.total(drawn, whole) + phenomena + PROCESS_BYTES
 }
 
 /// Number of channels of the layers and AOVs of a plan.
@@ -90,7 +117,7 @@ pub(crate) fn check(
     }
     let channels = channel_count(compiled, plan);
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channels);
-    let bytes = per_pixel.total(drawn, whole);
+    let bytes = estimated_bytes(compiled, plan, request);
     if memory::can_allocate(bytes) {
         return Ok(());
     }
@@ -119,4 +146,17 @@ pub(crate) fn check(
         return Err(error.into());
     }
     Err(scene.error_at("picture.size", ProblemKind::Conflict(error.to_string())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_frames_are_in_memory_once_or_twice_where_they_are_written_from_their_pixels() {
+        let frame = |width: usize, height: usize| width * height * FRAME_BYTES as usize;
+        assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(4096, 4096), writes)), [1, 2]);
+        assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(1280, 720), writes)), [7, 7]);
+        assert_eq!(max_frames_with_pixels(0, false), MAX_BYTES_OF_PIXELS);
+    }
 }

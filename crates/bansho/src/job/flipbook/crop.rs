@@ -18,7 +18,7 @@ use crate::job::{
     error::JobError,
     observer::JobObserver,
     pipeline::{
-        draw_frames::{FrameSink, draw_frames},
+        draw_frames::{FrameSink, RemainingWork, draw_frames},
         snapshots::Snapshots,
     },
 };
@@ -132,11 +132,16 @@ struct LitRegionProbe {
 }
 
 impl FrameSink for LitRegionProbe {
-    fn finish(&self, _index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish<'a>(
+        &'a self,
+        _index: usize,
+        frame: &mut Frame,
+        _observer: &'a dyn Observer,
+    ) -> Result<Option<RemainingWork<'a>>, JobError> {
         let frame_bounds = bounds(frame, &self.view, self.min_alpha);
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);
         *lit = lit.union(&frame_bounds);
-        Ok(())
+        Ok(None)
     }
 
     fn max_in_flight(&self) -> usize {

@@ -10,15 +10,29 @@ use super::{
     in_flight::{CompletionGuard, InFlightFrames, StopOnFailure},
     snapshots::Snapshots,
 };
-use crate::job::{error::JobError, observer::JobObserver};
+use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observer::JobObserver};
+
+/// What remains to be done for a frame without its pixels, such as compressing its display image.
+pub(crate) type RemainingWork<'a> = Box<dyn FnOnce() -> Result<(), JobError> + Send + 'a>;
 
 /// What drawn frames go to.
 pub(crate) trait FrameSink: Sync {
-    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
-    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError>;
+    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight). Its memory is free
+    /// for the next frame while the work that is returned is done.
+    fn finish<'a>(
+        &'a self,
+        index: usize,
+        frame: &mut Frame,
+        observer: &'a dyn Observer,
+    ) -> Result<Option<RemainingWork<'a>>, JobError>;
 
     /// How many frames may be in flight at once.
     fn max_in_flight(&self) -> usize;
+
+    /// Whether frames are written from their pixels, which are then not free for the next frame while this one is written.
+    fn writes_pixels(&self) -> bool {
+        false
+    }
 }
 
 /// Bytes of frames that may be in flight at once, unless two frames alone are larger.
@@ -39,32 +53,51 @@ pub(crate) fn draw_frames(
 ) -> Result<(), JobError> {
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let mut last = None;
+    let (mut last, mut max_with_pixels) = (None, usize::MAX);
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
+            in_flight.wait_for_pixels(max_with_pixels);
             if let Some(recycled) = in_flight.take_recycled() {
                 shot.recycle(recycled);
             }
-            let mut frame = draw(shot, last, number, snapshots, &stop_on_failure, observer)?;
+            let frame = draw(shot, last, number, snapshots, &stop_on_failure, observer)?;
             last = Some(number);
+            max_with_pixels = max_frames_with_pixels(bytes_of(&frame), sink.writes_pixels());
             in_flight.submit(index, in_flight_limit(&frame, sink));
-            let (in_flight, stop_on_failure) = (&in_flight, &stop_on_failure);
-            scope.spawn_fifo(move |_| {
-                let _completion = CompletionGuard { in_flight, index };
-                if stop_on_failure.cancelled() {
-                    return;
-                }
-                match sink.finish(index, &mut frame, stop_on_failure) {
-                    Ok(()) => in_flight.recycle(frame),
-                    Err(error) => in_flight.fail(error),
-                }
-            });
+            spawn_finish(scope, sink, &stop_on_failure, index, frame);
         }
         Ok(())
     });
     // A failed frame also cancels the drawing, whose own error is then `Cancelled`: the first failure is the one to report.
     in_flight.take_error().map_or(drawn, Err)?;
     check(observer).map_err(|_| JobError::Cancelled)
+}
+
+/// Finishes a drawn frame: first what needs its pixels, then what remains, in a task of its own.
+fn spawn_finish<'scope>(
+    scope: &rayon::ScopeFifo<'scope>,
+    sink: &'scope dyn FrameSink,
+    stop_on_failure: &'scope StopOnFailure,
+    index: usize,
+    mut frame: Frame,
+) {
+    let in_flight = stop_on_failure.in_flight;
+    scope.spawn_fifo(move |scope| {
+        let completion = CompletionGuard { in_flight, index };
+        if stop_on_failure.cancelled() {
+            return;
+        }
+        let remaining = sink.finish(index, &mut frame, stop_on_failure);
+        in_flight.recycle(index, frame);
+        match remaining {
+            Ok(None) => {}
+            Ok(Some(remaining)) => scope.spawn_fifo(move |_| {
+                let _completion = completion;
+                remaining().unwrap_or_else(|error| in_flight.fail(error));
+            }),
+            Err(error) => in_flight.fail(error),
+        }
+    });
 }
 
 /// Draws frame `number` after frame `last`. Where it is not the next one, `snapshots` shorten the way to it.
@@ -87,10 +120,14 @@ fn draw(
 
 /// How many frames of this size may be in flight: one for each thread and one more, as far as memory allows.
 fn in_flight_limit(frame: &Frame, sink: &dyn FrameSink) -> usize {
-    let pixels = frame.beauty.width() * frame.beauty.height();
-    let bytes = pixels * size_of::<f32>() * (5 + frame.channels.len());
     let max = (rayon::current_num_threads() + 1).min(sink.max_in_flight()).max(2);
-    (MAX_BYTES_IN_FLIGHT / bytes.max(1)).clamp(2, max)
+    (MAX_BYTES_IN_FLIGHT / bytes_of(frame).max(1)).clamp(2, max)
+}
+
+/// Bytes of the pixels of a frame: color, alpha, depth and channels in single precision.
+fn bytes_of(frame: &Frame) -> usize {
+    let planes = 4 + usize::from(frame.depth.is_some()) + frame.channels.len();
+    frame.beauty.width() * frame.beauty.height() * size_of::<f32>() * planes
 }
 
 #[cfg(test)]

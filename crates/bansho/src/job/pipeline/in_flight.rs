@@ -11,7 +11,7 @@ use std::{
 
 use bansho_base::{
     frame::Frame,
-    host::observer::{Observer, Stage},
+    host::observer::{Observer, Stage, StagePart},
 };
 
 use crate::job::{error::JobError, observer::JobObserver};
@@ -27,6 +27,8 @@ pub(crate) struct InFlightFrames {
 #[derive(Default)]
 struct State {
     unfinished: BTreeSet<usize>,
+    /// Those of them whose pixels are in memory.
+    with_pixels: BTreeSet<usize>,
     error: Option<JobError>,
     recycled: Option<Frame>,
 }
@@ -43,12 +45,22 @@ impl InFlightFrames {
     /// Waits until frame `index` is less than `limit` ahead of the oldest unfinished one, and executes tasks of the pool in the meantime:
     /// in a pool of one thread no other thread does. The distance is counted in indices, so that the window of a video never overflows.
     pub(crate) fn submit(&self, index: usize, limit: usize) {
+        let mut state = self.wait_until(|state| index < state.unfinished.first().copied().unwrap_or(index) + limit);
+        state.unfinished.insert(index);
+        state.with_pixels.insert(index);
+    }
+
+    /// Waits until the pixels of fewer than `max` frames are in memory, so that another one can be drawn, and executes tasks of the pool in the
+    /// meantime.
+    pub(crate) fn wait_for_pixels(&self, max: usize) {
+        drop(self.wait_until(|state| state.with_pixels.len() < max));
+    }
+
+    fn wait_until(&self, is_reached: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
         loop {
-            let mut state = self.lock();
-            let oldest = state.unfinished.first().copied().unwrap_or(index);
-            if index < oldest + limit {
-                state.unfinished.insert(index);
-                return;
+            let state = self.lock();
+            if is_reached(&state) {
+                return state;
             }
             drop(state);
             if rayon::yield_now() != Some(rayon::Yield::Executed) {
@@ -58,9 +70,13 @@ impl InFlightFrames {
         }
     }
 
-    /// Keeps a finished frame, whose memory the next one reuses.
-    pub(crate) fn recycle(&self, frame: Frame) {
-        self.lock().recycled = Some(frame);
+    /// Keeps frame `index`, whose pixels are no longer needed: the next one reuses their memory.
+    pub(crate) fn recycle(&self, index: usize, frame: Frame) {
+        let mut state = self.lock();
+        state.with_pixels.remove(&index);
+        state.recycled = Some(frame);
+        drop(state);
+        self.completed.notify_all();
     }
 
     /// A finished frame to reuse, if there is one.
@@ -93,7 +109,10 @@ pub(crate) struct CompletionGuard<'a> {
 
 impl Drop for CompletionGuard<'_> {
     fn drop(&mut self) {
-        self.in_flight.lock().unfinished.remove(&self.index);
+        let mut state = self.in_flight.lock();
+        state.unfinished.remove(&self.index);
+        state.with_pixels.remove(&self.index);
+        drop(state);
         self.in_flight.completed.notify_all();
     }
 }
@@ -113,7 +132,36 @@ impl Observer for StopOnFailure<'_> {
         self.observer.end(stage);
     }
 
+    fn begin_part(&self, part: StagePart) {
+        self.observer.begin_part(part);
+    }
+
+    fn end_part(&self, part: StagePart) {
+        self.observer.end_part(part);
+    }
+
     fn cancelled(&self) -> bool {
         self.in_flight.has_failed() || self.observer.cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::testing::{blank, plan};
+
+    #[test]
+    fn the_pixels_of_a_frame_are_free_before_it_is_finished() {
+        let in_flight = InFlightFrames::default();
+        in_flight.submit(0, 2);
+        in_flight.recycle(0, blank(&plan(), 0));
+        // Would wait forever for pixels that are in use.
+        in_flight.wait_for_pixels(1);
+        assert!(in_flight.take_recycled().is_some());
+        assert_eq!(in_flight.lock().unfinished, BTreeSet::from([0]));
+        in_flight.submit(1, 2);
+        // Also those of a frame that failed before it was recycled.
+        drop(CompletionGuard { in_flight: &in_flight, index: 1 });
+        in_flight.wait_for_pixels(1);
     }
 }

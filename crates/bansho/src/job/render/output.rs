@@ -26,7 +26,7 @@ use crate::job::{
     checks::finished_files::FinishedFiles,
     error::JobError,
     observer::{FrameDone, JobObserver},
-    pipeline::draw_frames::FrameSink,
+    pipeline::draw_frames::{FrameSink, RemainingWork},
 };
 
 /// How the pictures of a job are written.
@@ -83,14 +83,14 @@ impl Format {
         Ok(Sink::open(self.pattern.clone(), options)?)
     }
 
-    /// Writes a frame to the sink, as display values or as scene-linear light.
-    pub(crate) fn write(
-        &self,
-        sink: &Sink,
+    /// Converts a frame to what the sink takes, display values or scene-linear light. Returns the writing of the former, which needs no frame.
+    pub(crate) fn write<'a>(
+        &'a self,
+        sink: &'a Sink,
         index: usize,
         frame: &mut Frame,
-        observer: &dyn Observer,
-    ) -> Result<(), JobError> {
+        observer: &'a dyn Observer,
+    ) -> Result<Option<RemainingWork<'a>>, JobError> {
         frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
         if self.metadata {
             // Before the picture, so that every existing picture has its metadata.
@@ -98,20 +98,23 @@ impl Format {
         }
         let slot = FrameSlot { index, number: frame.header.number };
         let display = match sink.picture_format() {
-            PictureFormat::Frame => None,
-            PictureFormat::Display => Some(self.to_display(frame, observer)),
+            PictureFormat::Frame => {
+                let _stage = StageGuard::begin(observer, Stage::Write);
+                sink.write(slot, Picture::Linear(frame))?;
+                return Ok(None);
+            }
+            PictureFormat::Display => self.to_display(frame, observer),
             PictureFormat::OpaqueDisplay => {
                 // Over black, premultiplied light is unchanged.
                 frame.opaque = true;
-                Some(self.to_display(frame, observer))
+                self.to_display(frame, observer)
             }
         };
-        let _stage = StageGuard::begin(observer, Stage::Write);
-        let picture = match &display {
-            Some(picture) => Picture::Display(picture, &frame.header.fingerprint),
-            None => Picture::Linear(frame),
-        };
-        Ok(sink.write(slot, picture)?)
+        let fingerprint = frame.header.fingerprint;
+        Ok(Some(Box::new(move || {
+            let _stage = StageGuard::begin(observer, Stage::Write);
+            Ok(sink.write(slot, Picture::Display(&display, &fingerprint))?)
+        })))
     }
 
     /// The view transform.
@@ -132,17 +135,29 @@ pub(crate) struct FileWriter<'a> {
 }
 
 impl FrameSink for FileWriter<'_> {
-    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
+    fn finish<'w>(
+        &'w self,
+        index: usize,
+        frame: &mut Frame,
+        observer: &'w dyn Observer,
+    ) -> Result<Option<RemainingWork<'w>>, JobError> {
         let number = frame.header.number;
-        self.format.write(&self.sink, index, frame, observer)?;
-        let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
-        let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
-        path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
-        self.observer.frame_done(&FrameDone { number, path, drawn });
-        Ok(())
+        let writing = self.format.write(&self.sink, index, frame, observer)?;
+        Ok(Some(Box::new(move || {
+            writing.map_or(Ok(()), |writing| writing())?;
+            let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
+            let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
+            path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
+            self.observer.frame_done(&FrameDone { number, path, drawn });
+            Ok(())
+        })))
     }
 
     fn max_in_flight(&self) -> usize {
         self.max_in_flight
+    }
+
+    fn writes_pixels(&self) -> bool {
+        matches!(self.sink.picture_format(), PictureFormat::Frame)
     }
 }

@@ -51,6 +51,7 @@ pub struct PreparedJob {
     pub(crate) resume: bool,
     pub(crate) snapshots: Snapshots,
     pub(crate) warnings: Vec<Warning>,
+    pub(crate) memory_bytes: f64,
 }
 
 impl PreparedJob {
@@ -67,6 +68,11 @@ impl PreparedJob {
     /// The output files.
     pub fn output(&self) -> &OutputPattern {
         &self.format.pattern
+    }
+
+    /// Estimated peak memory of the process during the job, bytes.
+    pub fn memory_bytes(&self) -> f64 {
+        self.memory_bytes
     }
 
     /// What the user should know before the job begins.
@@ -138,7 +144,8 @@ impl Job {
             .contact_sheet
             .map(|tiles| sheet::nearly_square_layout(tiles, tile, contact_sheet::GUTTER))
             .transpose()?;
-        memory::check(&self.scene, &compiled, &plan, self.memory_request(kind, frames.len()))?;
+        let memory_request = self.memory_request(kind, frames.len());
+        memory::check(&self.scene, &compiled, &plan, memory_request)?;
         let snapshots = SnapshotOptions { folder: self.snapshots.as_deref(), interval: self.snapshot_every };
         let snapshots = snapshots.prepare(&compiled, &plan, &overwrite)?;
         let mut prepared = PreparedJob {
@@ -146,6 +153,7 @@ impl Job {
             format: Format { pattern, view: self.view, bits: self.bits, alpha, metadata: self.metadata, overwrite },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             warnings: Vec::new(),
+            memory_bytes: memory::estimated_bytes(&compiled, &plan, memory_request),
             compiled,
             plan,
             frames,

@@ -197,7 +197,7 @@ fn apply_balance(balance: &WhiteBalance, [r, g, b]: [f32; 3]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::decode_srgb8;
+    use crate::{color::decode_srgb8, math::simd};
 
     /// Every mode of alpha; opaque without.
     const ALPHA_MODES: [Option<AlphaMode>; 5] = [
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn an_8_bit_plate_comes_back_byte_for_byte() {
-        let level = Level::new();
+        let level = simd::level();
         // All combinations of steep and flat codes, and a scatter of others.
         let steep = [0, 1, 2, 3, 5, 10, 11, 40, 127, 128, 200, 239, 250, 253, 254, 255];
         let combined = (0..4096).map(|i| [steep[i % 16], steep[i / 16 % 16], steep[i / 256]]);
@@ -273,16 +273,16 @@ mod tests {
         for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.with_white_balance(Some(4000.0))] {
             for alpha in ALPHA_MODES {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
-                view.display_row_with_mode(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row_with_mode(simd::level(), &pixels, 5, 11, alpha, &mut wide);
                 view.display_row_with_mode(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
                 assert_eq!(wide, narrow);
                 let (mut wide, mut narrow) = (vec![[0_u16; 4]; 4099], vec![[9_u16; 4]; 4099]);
-                view.display_row_with_mode(Level::new(), &pixels, 5, 11, alpha, &mut wide);
+                view.display_row_with_mode(simd::level(), &pixels, 5, 11, alpha, &mut wide);
                 view.display_row_with_mode(Level::baseline(), &pixels, 5, 11, alpha, &mut narrow);
                 assert_eq!(wide, narrow);
             }
             let (mut wide, mut narrow) = (pixels.clone(), pixels.clone());
-            view.to_scene_row(Level::new(), &mut wide);
+            view.to_scene_row(simd::level(), &mut wide);
             view.to_scene_row(Level::baseline(), &mut narrow);
             let bits = |row: &[[f32; 4]]| row.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(&wide), bits(&narrow));
@@ -294,7 +294,7 @@ mod tests {
         let pixels = wild_pixels(1000);
         for view in [View::DISPLAY, View::DISPLAY.with_white_balance(Some(4000.0))] {
             let mut out = vec![[0_u16; 4]; pixels.len()];
-            view.display_row(Level::new(), &pixels, 0, 0, None, &mut out);
+            view.display_row(simd::level(), &pixels, 0, 0, None, &mut out);
             for (pixel, codes) in pixels.iter().zip(&out) {
                 let shown = view.to_display([pixel[0], pixel[1], pixel[2]]);
                 assert!(shown.iter().all(|v| (0.0..=1.0).contains(v)), "{pixel:?} {shown:?}");
@@ -311,11 +311,11 @@ mod tests {
         let pixels = wild_pixels(300);
         for alpha in ALPHA_MODES {
             let mut whole = vec![[0_u8; 4]; 300];
-            View::DISPLAY.display_row_with_mode(Level::new(), &pixels, 40, -20, alpha, &mut whole);
+            View::DISPLAY.display_row_with_mode(simd::level(), &pixels, 40, -20, alpha, &mut whole);
             for (start, end) in [(0, 1), (7, 100), (33, 290), (299, 300)] {
                 let mut part = vec![[0_u8; 4]; end - start];
                 let first = start as i64 - 20;
-                View::DISPLAY.display_row_with_mode(Level::new(), &pixels[start..end], 40, first, alpha, &mut part);
+                View::DISPLAY.display_row_with_mode(simd::level(), &pixels[start..end], 40, first, alpha, &mut part);
                 assert_eq!(part, whole[start..end]);
             }
         }
@@ -328,8 +328,8 @@ mod tests {
         for view in [View::DISPLAY, View::RAW] {
             for alpha in ALPHA_MODES {
                 let (mut opaque, mut one_by_one) = (vec![[0_u16; 4]; 320], vec![[0_u16; 4]; 640]);
-                view.display_row_with_mode(Level::new(), &pixels, 0, 0, alpha, &mut opaque);
-                view.display_row_with_mode(Level::new(), &mixed, 0, 0, alpha, &mut one_by_one);
+                view.display_row_with_mode(simd::level(), &pixels, 0, 0, alpha, &mut opaque);
+                view.display_row_with_mode(simd::level(), &mixed, 0, 0, alpha, &mut one_by_one);
                 let every_other: Vec<[u16; 4]> = one_by_one.iter().step_by(2).copied().collect();
                 assert_eq!(opaque, every_other, "{alpha:?}");
             }
@@ -343,15 +343,15 @@ mod tests {
             for y in 0..50 {
                 let mut out = [[7_u8; 4]; 4];
                 for alpha in [AlphaConvention::Linear, AlphaConvention::Encoded] {
-                    view.display_row(Level::new(), &row, y, 13 * y, Some(alpha), &mut out);
+                    view.display_row(simd::level(), &row, y, 13 * y, Some(alpha), &mut out);
                     assert_eq!(out, [[0; 4], [0, 0, 0, 255], [255; 4], [255; 4]]);
                     let mut wide = [[7_u16; 4]; 4];
-                    view.display_row(Level::new(), &row, y, 13 * y, Some(alpha), &mut wide);
+                    view.display_row(simd::level(), &row, y, 13 * y, Some(alpha), &mut wide);
                     assert_eq!(wide, [[0; 4], [0, 0, 0, 65_535], [65_535; 4], [65_535; 4]]);
                 }
-                view.display_row(Level::new(), &row, y, 13 * y, None, &mut out);
+                view.display_row(simd::level(), &row, y, 13 * y, None, &mut out);
                 assert_eq!(out[0], [0, 0, 0, 255]);
-                view.display_row(Level::new(), &row[..1], y, 13 * y, None, &mut out[3..]);
+                view.display_row(simd::level(), &row[..1], y, 13 * y, None, &mut out[3..]);
                 assert_eq!(out[3], [0, 0, 0, 255]);
             }
         }
@@ -363,7 +363,7 @@ mod tests {
         let shown = View::STANDARD.to_display(acescg_from_srgb([0.9, 0.7, 0.1]));
         assert!(shown.iter().zip([0.9, 0.7, 0.1]).all(|(a, b)| (a - b).abs() < 1e-6), "{shown:?}");
         let mut out = [[0_u16; 4]];
-        View::RAW.display_row(Level::new(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, None, &mut out);
+        View::RAW.display_row(simd::level(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, None, &mut out);
         assert_eq!(out, [[32_768, 16_384, 0, 65_535]]);
     }
 
@@ -379,7 +379,7 @@ mod tests {
                     assert!(shown.iter().all(|value| *value > 0.999_99), "{name} {kelvin:?} {light}: {shown:?}");
                 }
                 let mut codes = vec![[0_u16; 4]; row.len()];
-                view.display_row(Level::new(), &row, 0, 0, Some(AlphaConvention::Linear), &mut codes);
+                view.display_row(simd::level(), &row, 0, 0, Some(AlphaConvention::Linear), &mut codes);
                 assert_eq!(codes, vec![[u16::MAX; 4]; row.len()], "{name} {kelvin:?}");
                 assert_eq!(view.to_display([f32::NAN; 3]), [0.0; 3], "{name} {kelvin:?}");
                 // A component that is no number is missing, and no more than that.

@@ -1,4 +1,4 @@
-//! Interruptions, full disks, too little memory, and any number of threads.
+//! Interruptions, full disks, too little memory, any number of threads, and any vector instructions.
 
 mod completeness;
 mod disk;
@@ -6,3 +6,4 @@ mod interruptions;
 #[cfg(target_os = "linux")]
 mod memory;
 mod threads;
+mod vector_levels;

@@ -8,7 +8,7 @@ use crate::support::{FLAME, Folder};
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// The contents of each scene.
-const SCENES: [(&str, &str); 5] = [
+pub(super) const SCENES: [(&str, &str); 5] = [
     ("a flame sheet", "[[flame_sheet]]\n"),
     ("a particle flame", "[[flame_particles]]\nparticles = 6000\npreroll_s = 0.3\n"),
     ("rain", "[sky]\n[[rain]]\nrate_mm_per_h = 30.0\n"),

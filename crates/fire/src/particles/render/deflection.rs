@@ -9,7 +9,7 @@ use bansho_base::{
     phenomenon::strip::{Strip, View},
     world::air::Air,
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::{aovs::DEFLECTION, gas::Gas};
 use crate::particles::{
@@ -145,7 +145,7 @@ impl HeatHaze {
         let covered = paths.iter().map(|paths| paths.sums.covered().intersection(&window));
         let rect = covered.reduce(|union, covered| union.union(&covered))?;
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
-        let level = Level::new();
+        let level = bansho_base::math::simd::level();
         // Outside its cells a grid contributes nothing.
         let fields = paths.iter().map(|paths| {
             let covered = paths.sums.covered().intersection(&rect);

@@ -9,7 +9,7 @@ use bansho_base::{
     math::DVec3,
     phenomenon::strip::{DepthInterval, View},
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use crate::particles::{
     parameters::{RenderingParameters, SpriteStyle},
@@ -126,7 +126,7 @@ struct LuminousSums {
 
 impl GasStatistics {
     pub(crate) fn new(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Self {
-        let (count, level) = (gas.particles.len(), Level::new());
+        let (count, level) = (gas.particles.len(), bansho_base::math::simd::level());
         let of_task = |task: usize| {
             let mut statistics = Self::default();
             let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);

@@ -8,7 +8,7 @@ use bansho_base::{
     math::DVec3,
     phenomenon::surroundings::{Emitter, Light},
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::gas::{Gas, PARTICLES_PER_TASK};
 use crate::particles::parameters::RenderingParameters;
@@ -73,7 +73,7 @@ pub fn point_lights_of_gas(gas: &Gas, rendering: &RenderingParameters, t: f64) -
 fn slabs(gas: &Gas, rendering: &RenderingParameters, t: f64) -> Vec<Slab> {
     let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     let task_slabs = |range: Range<usize>| {
         let mut slabs = vec![Slab::default(); SLABS + 1];
         dispatch!(level, _simd => add_to_slabs(gas, rendering, t, range.clone(), [low, step], &mut slabs));

@@ -131,7 +131,16 @@ impl<'a> PreparedGas<'a> {
         check(observer)?;
         let mut sparks = spark_emitter(&gas, rendering, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        let prepared = Self { gas, rendering, view, level: Level::new(), layers, mode, sparks, haze: OnceLock::new() };
+        let prepared = Self {
+            gas,
+            rendering,
+            view,
+            level: bansho_base::math::simd::level(),
+            layers,
+            mode,
+            sparks,
+            haze: OnceLock::new(),
+        };
         if view.aovs_requested {
             prepared.haze();
         }

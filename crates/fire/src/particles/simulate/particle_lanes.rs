@@ -9,7 +9,7 @@ use bansho_base::{
     host::parallel::prelude::*,
     math::simd::{LANES, Lanes},
 };
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Simd, dispatch, prelude::*};
 
 use crate::particles::simulate::forces::external_forces::BurnerForces;
 
@@ -36,7 +36,7 @@ pub(crate) fn for_each_burner_batch<S: SharedColumns, const N: usize>(
     inputs: S,
     columns: [&mut Vec<f32>; N],
 ) {
-    let level = Level::new();
+    let level = bansho_base::math::simd::level();
     split_into_tasks(columns).into_par_iter().enumerate().for_each(|(task, mut columns)| {
         let first = task * PARTICLES_PER_TASK;
         let range = first..first + columns[0].len();

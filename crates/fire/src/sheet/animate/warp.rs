@@ -94,7 +94,7 @@ impl WarpState {
         t: f64,
         lean: WindLean,
     ) -> Self {
-        let level = fearless_simd::Level::new();
+        let level = bansho_base::math::simd::level();
         fearless_simd::dispatch!(level, _simd => evaluate_warp(parameters, shape, waves, clock, t, lean))
     }
 

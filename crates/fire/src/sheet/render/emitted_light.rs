@@ -10,7 +10,7 @@ use bansho_base::{
         surroundings::{Emitter, Light},
     },
 };
-use fearless_simd::{Level, Simd, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 
 use super::{
     projection::SheetCoordinates,
@@ -45,7 +45,7 @@ impl FlameSheet {
         let size = self.sheet_size(flame);
         let cell_area = size.x * size.y / (LANES * ROWS) as f64;
         let scale = (cell_area * self.luminance_at(t)) as f32;
-        fearless_simd::dispatch!(Level::new(), simd => row_intensities(simd, self, &state, scale))
+        fearless_simd::dispatch!(bansho_base::math::simd::level(), simd => row_intensities(simd, self, &state, scale))
     }
 
     /// Point lights that represent a flame while the shutter is open.

@@ -66,7 +66,7 @@ impl<'a> PreparedSheet<'a> {
         }
         // A stable sort: at one depth the order is flame, smoke, sparks of each instance.
         commands.sort_by(|a: &DrawCommand, b: &DrawCommand| a.depth.total_cmp(&b.depth));
-        Ok(Self { sheet, view, level: Level::new(), commands })
+        Ok(Self { sheet, view, level: bansho_base::math::simd::level(), commands })
     }
 }
 

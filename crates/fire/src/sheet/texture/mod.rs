@@ -9,7 +9,7 @@ use bansho_base::math::{
     self,
     simd::{Lanes, Real, gather, wrap_split},
 };
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Simd, dispatch};
 use fractal::FRACTAL;
 pub(crate) use fractal::{FractalLayers, fractal_noise};
 pub(crate) use paper::{PaperLayer, PaperSum};
@@ -99,9 +99,9 @@ impl TextureTable {
 /// Blends each texel by `amount` with the binomial mean (1 2 1)/4 of texels `spacing` apart, along rows and columns.
 fn filter(texels: &mut [f32], spacing: usize, amount: f32) {
     let before = texels.to_vec();
-    dispatch!(Level::new(), _simd => filter_rows(&before, texels, spacing, amount));
+    dispatch!(bansho_base::math::simd::level(), _simd => filter_rows(&before, texels, spacing, amount));
     let before = texels.to_vec();
-    dispatch!(Level::new(), _simd => filter_columns(&before, texels, spacing, amount));
+    dispatch!(bansho_base::math::simd::level(), _simd => filter_columns(&before, texels, spacing, amount));
 }
 
 #[inline(always)]

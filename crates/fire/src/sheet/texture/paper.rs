@@ -132,7 +132,7 @@ impl PaperLayer {
         let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_Q * i as f64 / ROWS as f64).collect();
         let texture = PaperTexture::new(&p, &q, octaves);
         let mut texels = vec![0.0; ROWS * COLUMNS];
-        let level = fearless_simd::Level::new();
+        let level = bansho_base::math::simd::level();
         fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
         Self { table: Arc::new(TextureTable::new(&texels)), relative_speed: relative_speed(clock) }
     }

@@ -142,7 +142,7 @@ impl StreakSegment {
 #[cfg(test)]
 mod tests {
     use bansho_base::{image::Rect, phenomenon::strip::Strip};
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::dispatch;
 
     use super::tile::TILE_ROWS;
     use super::{tile::TileBuffer, *};
@@ -166,7 +166,7 @@ mod tests {
             strip.reset(rect, None, 0);
             let mut planes = strip.gray_planes_mut().unwrap();
             let mut buffer = TileBuffer::default();
-            let level = Level::new();
+            let level = bansho_base::math::simd::level();
             dispatch!(level, simd => buffer.load(simd, [0, y], rect, rect, &planes));
             segment.draw(&mut buffer, &mut |[column, row], value| {
                 if (left..size[0]).contains(&column) && row < rect.height {

@@ -5,7 +5,7 @@ mod perspective;
 
 use any_lens::AnyLensProjector;
 use bansho_base::{host::parallel::prelude::*, phenomenon::strip::View};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 use perspective::PerspectiveProjector;
 
 use crate::particles::render::{
@@ -47,7 +47,7 @@ pub(crate) fn project_particles<'a, K: SpriteKind>(
 ) -> Vec<PooledVec<'a, K::Record>> {
     let projector = AnyLensProjector::new(view);
     let perspective = PerspectiveProjector::new(gas, view, &projector.next, projector.shutter_fraction);
-    let (count, level) = (gas.particles.len(), Level::new());
+    let (count, level) = (gas.particles.len(), bansho_base::math::simd::level());
     let of_task = |task: usize| {
         let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
         let mut records = gas.buffers.take(PARTICLES_PER_TASK);

@@ -5,7 +5,7 @@
 //! drawn.
 
 use bansho_base::{host::parallel::prelude::*, math::simd::LANES};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use crate::particles::render::{
     resolve::{ColumnExtents, DETAIL_OFFSET, PLANES, TAU},
@@ -30,7 +30,7 @@ pub(crate) struct Strain {
 impl Strain {
     /// The strain of all cells; `cell` is the size of an undeformed noise cell, pixels.
     pub(crate) fn new(grid: &Grid, extents: &ColumnExtents, layers: usize, cell: f32) -> Self {
-        let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, Level::new());
+        let (columns, rows, level) = (grid.cells.columns, grid.cells.rows, bansho_base::math::simd::level());
         let scale = cell / grid.cells.size as f32;
         let mut values = vec![0.0; rows * layers * columns];
         values.par_chunks_mut(columns).enumerate().for_each(|(index, out)| {

@@ -1,7 +1,7 @@
 //! A grid of cells over the picture, with several values per cell.
 
 use bansho_base::{host::parallel::prelude::*, image::Rect};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use super::spline;
 use crate::particles::render::buffer_pool::{BufferPool, PooledVec};
@@ -174,7 +174,7 @@ impl<'a> Grid<'a> {
     /// The grid of B-spline coefficients: prefiltered along columns and rows, so that the spline interpolates these values.
     pub(crate) fn prefiltered(&self) -> Self {
         let (length, depth) = (self.row_length(), self.depth);
-        let (mut prefiltered, level) = (Self::new(self.cells, depth, self.pool()), Level::new());
+        let (mut prefiltered, level) = (Self::new(self.cells, depth, self.pool()), bansho_base::math::simd::level());
         prefiltered.values_mut().par_chunks_mut(length).enumerate().for_each_init(
             || vec![0.0; length],
             |column_filtered, (row, out)| {
@@ -198,7 +198,7 @@ impl<'a> Grid<'a> {
         let cells = self.cells;
         // Centers of fine cells are at 1/4 and 3/4 between those of coarse cells.
         let quarters = [spline::value(0.75), spline::value(0.25)];
-        let (row_length, level) = (self.row_length(), Level::new());
+        let (row_length, level) = (self.row_length(), bansho_base::math::simd::level());
         self.values_mut().par_chunks_mut(row_length).enumerate().for_each_init(
             || vec![0.0; coarser.row_length()],
             |column, (row, values)| {

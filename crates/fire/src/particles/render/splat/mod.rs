@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use bansho_base::{host::parallel::prelude::*, image::Rect, math::simd::LANES};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::dispatch;
 
 use crate::particles::render::{
     buffer_pool::{BufferPool, PooledVec},
@@ -213,7 +213,7 @@ fn add_sprites<'a, const P: usize>(
     grid: &mut Grid,
 ) {
     let cells = grid.cells;
-    let (row_length, level) = (grid.row_length(), Level::new());
+    let (row_length, level) = (grid.row_length(), bansho_base::math::simd::level());
     let bin = |task: &PooledVec<'a, Sprite<P>>| dispatch!(level, _simd => BinnedSprites::new(settings, task, &cells, &is_on_this_grid));
     let binned: Vec<BinnedSprites<P>> = tasks.par_iter().map(bin).collect();
     grid.values_mut().par_chunks_mut(ROWS_PER_TASK * row_length).enumerate().for_each(|(index, values)| {

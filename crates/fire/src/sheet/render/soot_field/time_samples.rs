@@ -9,7 +9,7 @@ use bansho_base::{
     },
     phenomenon::{strip::View, surroundings::Surroundings},
 };
-use fearless_simd::{Level, Simd, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 
 use super::shade::{SootState, shade_soot};
 use crate::sheet::{
@@ -119,7 +119,7 @@ impl FlameSheet {
         let state = self.soot_state(warp, displacement, [[0.0; 3]; LIGHT_SAMPLES], t);
         let size = self.sheet_size(flame);
         let cell_area = (size.x * size.y / (LANES * ROWS) as f64) as f32;
-        fearless_simd::dispatch!(Level::new(), simd => row_intensities(simd, &tables.plume, &state, cell_area))
+        fearless_simd::dispatch!(bansho_base::math::simd::level(), simd => row_intensities(simd, &tables.plume, &state, cell_area))
     }
 }
 
