@@ -72,10 +72,14 @@ pub(crate) fn available_levels() -> impl Iterator<Item = Level> + Clone {
     VectorLevel::ALL.into_iter().filter_map(VectorLevel::level)
 }
 
-/// The widest instructions of the machine.
+/// The widest instructions of the machine that kernels are compiled for.
 #[expect(clippy::disallowed_methods, reason = "the one place that asks the machine")]
 fn widest() -> Level {
-    Level::new()
+    match Level::new() {
+        #[cfg(all(any(target_arch = "x86", target_arch = "x86_64"), disable_dispatch_sse4_2))]
+        Level::Sse4_2(_) => Level::baseline(),
+        level => level,
+    }
 }
 
 impl VectorLevelError {
@@ -128,6 +132,8 @@ impl VectorLevel {
         let widest = widest();
         match self {
             Self::Sse2 => widest.as_sse2().map(Simd::level),
+            // See `.cargo/config.toml`.
+            Self::Sse4_2 if cfg!(disable_dispatch_sse4_2) => None,
             Self::Sse4_2 => widest.as_sse4_2().map(Simd::level),
             Self::Avx2 => widest.as_avx2().map(Simd::level),
             Self::Avx512 => widest.as_avx512().map(Simd::level),
