@@ -184,6 +184,15 @@ impl Camera {
         self
     }
 
+    /// The same camera with a picture of larger pixels, each `side` times as wide and as high.
+    pub fn with_pixel_size(mut self, side: usize) -> Self {
+        let side = side as f64;
+        self.principal_point /= side;
+        self.focal_pixels /= side;
+        self.size = self.size.map(|pixels| pixels / side);
+        self
+    }
+
     /// The camera reflected at a horizontal mirror at `height`: each of its pixels shows what this camera sees at that pixel in the mirror.
     /// Its frame is left-handed.
     pub fn mirrored(mut self, height: f64) -> Self {
@@ -354,6 +363,17 @@ mod tests {
         let mirrored = camera.mirrored(height);
         assert!((mirrored.project(seen).unwrap().pixel - pixel).length() < 1e-9);
         assert_eq!(mirrored.mirrored(height), camera);
+    }
+
+    #[test]
+    fn larger_pixels_show_the_same_directions() {
+        for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
+            let fine = camera(lens);
+            let coarse = fine.with_pixel_size(4);
+            let pixel = DVec2::new(121.0, 93.0);
+            let [near, far] = [fine.direction(pixel), coarse.direction(pixel / 4.0)].map(Option::unwrap);
+            assert!((near - far).length() < 1e-12 && coarse.size == [80.0, 60.0], "{lens:?}");
+        }
     }
 
     #[test]

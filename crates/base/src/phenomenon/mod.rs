@@ -112,6 +112,38 @@ pub struct LevelMirror {
     pub height: f64,
     /// Points that a plate shows within this height above or below the mirror belong to the mirror, m.
     pub plate_tolerance: f64,
+    /// How sharply it reflects the scene.
+    pub finish: MirrorFinish,
+}
+
+/// How sharply a mirror reflects the scene, which decides the resolution of the picture that is drawn for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MirrorFinish {
+    /// So rough that it reflects only the [backdrop](surroundings::Backdrop) and lights: it needs no picture.
+    Rough,
+    /// Puddles: sharp, unless drops fall into them.
+    Puddles,
+    /// Waves with an r.m.s. slope.
+    Waves(f64),
+}
+
+impl MirrorFinish {
+    /// Side of a pixel of the mirror's picture in pixels of the view, whose camera has this focal length in pixels; `None` if it needs no picture.
+    ///
+    /// Waves of r.m.s. slope s blur the picture with a standard deviation of `2 s f` pixels; half of that need not be resolved. Rings of drops displace
+    /// the picture by more than a pixel.
+    #[must_use]
+    pub fn pixel_size(&self, focal_pixels: f64, is_raining: bool) -> Option<usize> {
+        match *self {
+            Self::Rough => None,
+            Self::Puddles => Some(if is_raining { 2 } else { 1 }),
+            Self::Waves(slope) => Some(match 2.0 * slope * focal_pixels {
+                blur if blur >= 8.0 => 4,
+                blur if blur >= 4.0 => 2,
+                _ => 1,
+            }),
+        }
+    }
 }
 
 impl LevelMirror {

@@ -82,8 +82,12 @@ pub struct View {
     pub next_middle: f64,
     /// Size of the whole picture including overscan, pixels.
     pub size: [usize; 2],
-    /// Overscan on every side, pixels.
+    /// Overscan on every side, pixels of the picture at full resolution.
     pub overscan: usize,
+    /// Size of the whole picture including overscan at full resolution.
+    pub full_size: [usize; 2],
+    /// Side of a pixel of this view in pixels of the picture at full resolution: 1, but more for some mirrored views.
+    pub pixel_size: usize,
     /// The region of the picture that is drawn.
     pub window: Rect,
     /// Height of the horizontal mirror in which the picture is seen, m.
@@ -114,6 +118,8 @@ impl View {
             next_middle,
             size,
             overscan,
+            full_size: size,
+            pixel_size: 1,
             window: Rect::from_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
@@ -152,6 +158,16 @@ impl View {
             view.aovs_requested = false;
         });
         mirrored.with_window(Rect::from_size(self.size[0], self.size[1]))
+    }
+
+    /// The view of the whole picture, at full resolution before, in pixels `side` times as wide and as high.
+    pub fn with_pixel_size(self, side: usize) -> Self {
+        let size = self.full_size.map(|pixels| pixels.div_ceil(side));
+        let coarse = self.with_adjacent_loop_view(|view| {
+            view.camera = view.camera.with_pixel_size(side);
+            (view.size, view.pixel_size) = (size, side);
+        });
+        coarse.with_window(Rect::from_size(size[0], size[1]))
     }
 
     /// Largest motion of the sky in the picture during the exposure, pixels.
@@ -194,8 +210,9 @@ impl View {
 
     /// The camera at time `t`.
     pub fn camera_at(&self, t: f64) -> Camera {
-        let display = self.size.map(|side| side - 2 * self.overscan);
+        let display = self.full_size.map(|side| side - 2 * self.overscan);
         let camera = self.camera_parameters.at(t, display).with_overscan(self.overscan);
+        let camera = if self.pixel_size > 1 { camera.with_pixel_size(self.pixel_size) } else { camera };
         self.mirror.map_or(camera, |height| camera.mirrored(height))
     }
 }

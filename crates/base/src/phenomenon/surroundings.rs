@@ -231,6 +231,26 @@ pub struct Backdrop {
     pub pixel_size: usize,
 }
 
+/// The picture in a phenomenon's own [mirror](crate::phenomenon::PhenomenonInfo::mirror): radiance (ACEScg, cd/m^2) and alpha, at full or reduced
+/// resolution, of the rows of the picture in which the mirror may be seen.
+#[derive(Clone, Debug)]
+pub struct Reflection {
+    /// The pixels, as wide as the whole picture.
+    pub image: Image<4>,
+    /// Side of one of these pixels in pixels of the picture.
+    pub pixel_size: usize,
+    /// Rows of such pixels above the first one of `image`.
+    pub first_row: usize,
+}
+
+impl Reflection {
+    /// A whole picture at full resolution.
+    #[must_use]
+    pub fn whole(image: Image<4>) -> Self {
+        Self { image, pixel_size: 1, first_row: 0 }
+    }
+}
+
 /// The surroundings in which a phenomenon is drawn: wind, air, sky, and what all others published.
 #[derive(Clone, Debug)]
 pub struct Surroundings<'a> {
@@ -240,9 +260,8 @@ pub struct Surroundings<'a> {
     pub air: &'a Air,
     /// The light of the sky.
     pub sky: Sky,
-    /// The picture in the phenomenon's own [mirror](crate::phenomenon::PhenomenonInfo::mirror): radiance (ACEScg, cd/m^2) and alpha of
-    /// the whole picture.
-    pub reflection: Option<&'a Image<4>>,
+    /// The picture in the phenomenon's own mirror, if it needs one.
+    pub reflection: Option<&'a Reflection>,
     /// With a plate: the background of all phenomena in that mirror, plate and sky.
     pub backdrop: Option<&'a Backdrop>,
     /// Lights, extinction and occluders of the other phenomena and of the scene itself.

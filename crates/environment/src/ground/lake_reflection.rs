@@ -6,42 +6,64 @@ use bansho_base::{
     math::{self, DVec2, MulAdd},
     phenomenon::strip::View,
 };
+use fearless_simd::dispatch;
 
-type Pixel = [f32; 4];
+use super::sample::SampledImage;
+
+/// Columns that are blurred together.
+const COLUMNS: usize = 8;
 
 /// The reflection in facets with Gaussian slopes of r.m.s. `slope`, exact for distant objects. Alpha is unused in the
-/// result. `side` is the size of the reflection's pixels in pixels of the view.
+/// result, which has the pixels and rows of the reflection.
 ///
 /// A facet tilted toward the viewer by s displaces the reflection by 2 s in elevation, one tilted sideways by 2 s times
 /// the sine of the viewing elevation. So the vertical blur is the same everywhere, and the horizontal one vanishes at
 /// the horizon.
-pub(super) fn blurred_reflection(reflection: &Image<4>, side: usize, view: &View, slope: f64) -> Image<4> {
-    let (width, height) = (reflection.width(), reflection.height());
-    let side = side as f64;
+pub(super) fn blurred_reflection(reflection: SampledImage, view: &View, slope: f64) -> Image<4> {
+    let SampledImage { image, pixel_size, first_row } = reflection;
+    let (width, height) = (image.width(), image.height());
+    let side = pixel_size as f64;
     let sigma = 2.0 * slope * view.camera.focal_pixels / side;
-    let elevation_sines: Vec<f64> = (0..height).map(|y| elevation_sine(view, (y as f64 + 0.5) * side)).collect();
-    let columns: Vec<Vec<Pixel>> = (0..width)
+    let elevation_sines: Vec<f64> =
+        (0..height).map(|y| elevation_sine(view, ((first_row + y) as f64 + 0.5) * side)).collect();
+    let level = bansho_base::math::simd::level();
+    let columns: Vec<Vec<[f32; 4 * COLUMNS]>> = (0..width.div_ceil(COLUMNS))
         .into_par_iter()
-        .map(|x| {
-            let mut column: Vec<Pixel> =
-                (0..height).map(|y| with_coverage(reflection.at(x, y), elevation_sines[y] > 0.0)).collect();
-            blur(&mut column, sigma);
+        .map(|block| {
+            let mut column = columns_with_coverage(image, block * COLUMNS, &elevation_sines);
+            dispatch!(level, _simd => blur(&mut column, sigma));
             column
         })
         .collect();
     let mut result = Image::filled(width, height, [0.0; 4]);
     result.pixels_mut().par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
-        row.iter_mut().zip(&columns).for_each(|(pixel, column)| *pixel = column[y]);
-        blur(row, sigma * elevation_sines[y]);
+        for (pixels, column) in row.chunks_mut(COLUMNS).zip(&columns) {
+            let (values, _) = column[y].as_chunks();
+            pixels.copy_from_slice(&values[..pixels.len()]);
+        }
+        dispatch!(level, _simd => blur(row, sigma * elevation_sines[y]));
         row.iter_mut().for_each(|pixel| *pixel = pixel.map(|value| value / pixel[3].max(f32::MIN_POSITIVE)));
     });
     result
 }
 
-/// Stores coverage in alpha. It is 0 above the horizon and outside of the picture, where the reflection is undefined; the
-/// blur is normalized by the blurred coverage.
-fn with_coverage([red, green, blue, _]: Pixel, is_defined: bool) -> Pixel {
-    if is_defined { [red, green, blue, 1.0] } else { [0.0; 4] }
+/// Columns from `first` on, row by row, with coverage in alpha. It is 0 above the horizon and outside of the picture, where the reflection is undefined;
+/// the blur is normalized by the blurred coverage.
+fn columns_with_coverage(image: &Image<4>, first: usize, elevation_sines: &[f64]) -> Vec<[f32; 4 * COLUMNS]> {
+    let count = COLUMNS.min(image.width() - first);
+    let rows = elevation_sines.iter().enumerate();
+    let row = |(y, sine): (usize, &f64)| {
+        let mut values = [0.0; 4 * COLUMNS];
+        if *sine > 0.0 {
+            let (pixels, _) = values.as_chunks_mut();
+            for (value, pixel) in pixels.iter_mut().zip(&image.row(y)[first..first + count]) {
+                let [red, green, blue, _] = *pixel;
+                *value = [red, green, blue, 1.0];
+            }
+        }
+        values
+    };
+    rows.map(row).collect()
 }
 
 /// Sine of the angle between the plane and the line of sight through the picture's center column, `y` pixels from its top;
@@ -52,7 +74,8 @@ fn elevation_sine(view: &View, y: f64) -> f64 {
 }
 
 /// Gaussian blur of standard deviation `sigma` by three extended box filters. Zero beyond the ends.
-fn blur(line: &mut [Pixel], sigma: f64) {
+#[inline(always)]
+fn blur<const N: usize>(line: &mut [[f32; N]], sigma: f64) {
     if sigma <= 0.0 {
         return;
     }
@@ -62,23 +85,35 @@ fn blur(line: &mut [Pixel], sigma: f64) {
     let whole = (0.5 * (math::sqrt(12.0 * variance + 1.0) - 1.0)).floor();
     let fraction = (2.0 * whole + 1.0) * (whole * (whole + 1.0) - 3.0 * variance)
         / (6.0 * (variance - (whole + 1.0) * (whole + 1.0)));
-    (0..3).for_each(|_| running_mean(line, whole as usize, fraction));
+    let mut source = line.to_vec();
+    for _ in 0..3 {
+        source.copy_from_slice(line);
+        running_mean(&source, line, whole as usize, fraction);
+    }
 }
 
 /// Box filter over `whole` pixels and a `fraction` of the next one on both sides. Sums are f64: lamps are 1e8 times
 /// brighter than their surroundings and must cancel exactly when they leave the sum.
-fn running_mean(line: &mut [Pixel], whole: usize, fraction: f64) {
-    let source = line.to_vec();
-    let width = (2 * whole + 1) as f64 + 2.0 * fraction;
-    let at =
-        |index: Option<usize>, c: usize| index.and_then(|i| source.get(i)).map_or(0.0, |pixel| f64::from(pixel[c]));
-    for c in 0..4 {
-        let mut sum: f64 = source.iter().take(whole).map(|pixel| f64::from(pixel[c])).sum();
-        for (index, pixel) in line.iter_mut().enumerate() {
-            sum += at(index.checked_add(whole), c);
-            let edges = at(index.checked_sub(whole + 1), c) + at(index.checked_add(whole + 1), c);
-            pixel[c] = (fraction.fma(edges, sum) / width) as f32;
-            sum -= at(index.checked_sub(whole), c);
+#[inline(always)]
+fn running_mean<const N: usize>(source: &[[f32; N]], line: &mut [[f32; N]], whole: usize, fraction: f64) {
+    let zero = [0.0; N];
+    let per_width = 1.0 / ((2 * whole + 1) as f64 + 2.0 * fraction);
+    let mut sums = [0.0_f64; N];
+    for pixel in source.iter().take(whole) {
+        for c in 0..N {
+            sums[c] += f64::from(pixel[c]);
+        }
+    }
+    for (index, pixel) in line.iter_mut().enumerate() {
+        let entering = index.checked_add(whole).and_then(|i| source.get(i)).unwrap_or(&zero);
+        let leaving = index.checked_sub(whole).and_then(|i| source.get(i)).unwrap_or(&zero);
+        let before = index.checked_sub(whole + 1).and_then(|i| source.get(i)).unwrap_or(&zero);
+        let after = index.checked_add(whole + 1).and_then(|i| source.get(i)).unwrap_or(&zero);
+        for c in 0..N {
+            sums[c] += f64::from(entering[c]);
+            let edges = f64::from(before[c]) + f64::from(after[c]);
+            pixel[c] = (fraction.fma(edges, sums[c]) * per_width) as f32;
+            sums[c] -= f64::from(leaving[c]);
         }
     }
 }

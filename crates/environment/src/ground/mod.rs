@@ -16,25 +16,32 @@
 //!
 //! | equation | function |
 //! | --- | --- |
-//! | diffuse reflection `albedo E / pi` | `shade::PreparedGround::diffuse` |
+//! | diffuse reflection `albedo E / pi` | `shade::PreparedGround::light` |
 //! | albedo of wet ground | `shade::wet_albedo_factor` |
 //! | Fresnel reflectance `F = F0 + (1 - F0) (1 - cos)^5`, n = 1.333 | `wet_reflection::fresnel` |
 //! | microfacet reflection `F D G / (4 cos)` | `wet_reflection::Microfacets::specular_lobe` |
 //! | GTR distribution D and Smith masking G | `wet_reflection::gtr3_distribution_with_masking` |
-//! | deep-water waves, `omega^2 = g k` | `waves::Waves::new`, `waves::Waves::slope` |
+//! | deep-water waves, `omega^2 = g k` | `waves::Waves::new`, `waves::Waves::slopes` |
 //! | blur by unresolved slopes, `sigma = 2 s f` pixels | `lake_reflection::blurred_reflection` |
 //!
 //! # Data flow
 //! `Surface` is the pattern of the ground, built once from [`GroundParameters`]: octaves of noise for albedo, puddles
 //! and films. For a frame, `Ground::lake` computes the waves of the time and the blurred reflection, and `prepare`
-//! collects them in a `PreparedGround`. `PreparedGround` intersects each pixel's line of sight with the plane, samples
-//! the surface with a filter of the pixel's footprint, and adds the diffuse and the specular radiance. A ground of kind
+//! collects them in a `PreparedGround`. For sixteen pixels at a time, `Hits` intersects the lines of sight with the plane, `Surface::samples` samples
+//! the pattern with a filter of the pixel's footprint, `PreparedGround::light` adds the diffuse and the glossy reflection of `lighting`'s lights, and
+//! `draw` the picture in the mirror. Positions are relative to the camera, in single precision; its own position is exact.
+//! While the camera stands still, `row_cache` keeps the pattern, and while the lights do not change either, the light. A ground of kind
 //! `plate` only darkens the plate and adds reflections, where the plate's depth says that it is ground.
 
+mod draw;
+mod hits;
 mod lake_reflection;
+mod lighting;
 mod model;
 mod parameters;
 mod phenomenon;
+mod row_cache;
+mod sample;
 mod shade;
 mod surface;
 mod waves;

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     parameters::{Range, animated::Animated},
-    phenomenon::LevelMirror,
+    phenomenon::{LevelMirror, MirrorFinish},
 };
 
 bansho_base::choice! {
@@ -50,6 +50,12 @@ bansho_base::parameters! {
 impl GroundParameters {
     /// The ground plane as a mirror.
     pub(super) fn mirror(&self) -> LevelMirror {
-        LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance }
+        let finish = match self.kind {
+            GroundKind::Water => MirrorFinish::Waves(self.waves),
+            // Only puddles show the scene.
+            GroundKind::Land | GroundKind::Plate if self.puddles > 0.0 => MirrorFinish::Puddles,
+            GroundKind::Land | GroundKind::Plate => MirrorFinish::Rough,
+        };
+        LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance, finish }
     }
 }

@@ -1,6 +1,6 @@
 //! `impl Phenomenon`: how the renderer uses the ground.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
@@ -11,7 +11,16 @@ use bansho_base::{
     },
 };
 
-use super::{GroundKind, lake_reflection, model::Ground, shade, shade::PreparedGround};
+use super::{
+    GroundKind,
+    hits::{HORIZON, RowDepths},
+    lake_reflection,
+    lighting::GroundLight,
+    model::Ground,
+    row_cache::LightInputs,
+    sample::SampledImage,
+    shade::PreparedGround,
+};
 
 impl Phenomenon for Ground {
     fn info(&self) -> PhenomenonInfo<'_> {
@@ -37,7 +46,7 @@ impl Run for Ground {
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        vec![DepthInterval { near: 0.0, far: shade::HORIZON }]
+        vec![DepthInterval { near: 0.0, far: HORIZON }]
     }
 
     fn prepare<'a>(
@@ -51,22 +60,36 @@ impl Run for Ground {
             GroundKind::Water => 1.0,
             GroundKind::Land | GroundKind::Plate => self.parameters.wetness.at(view.shutter.middle()),
         };
+        let lake = self.lake(view, surroundings);
+        let slope = self.surface.mean_slope();
+        let backdrop = surroundings.backdrop.map(|Backdrop { image, pixel_size }| {
+            let sharp = SampledImage { image, pixel_size: *pixel_size, first_row: 0 };
+            Backdrop { image: lake_reflection::blurred_reflection(sharp, view, slope), pixel_size: *pixel_size }
+        });
+        let others = &surroundings.others;
+        let light = LightInputs {
+            wetness,
+            lights: others.lights.clone(),
+            shadow_casters: others.shadow_casters.clone(),
+            sky: surroundings.sky,
+            backdrop: backdrop.as_ref().map(|backdrop| backdrop.image.clone()),
+        };
+        let has_film = wetness > 0.0 && lake.is_none();
+        let camera_height = view.camera.position.y - self.parameters.height;
         Ok(Box::new(PreparedGround {
             parameters: &self.parameters,
             surface: &self.surface,
             view,
             surroundings,
             wetness,
-            lake: self.lake(view, surroundings),
-            backdrop: surroundings.backdrop.map(|sharp| Backdrop {
-                image: lake_reflection::blurred_reflection(
-                    &sharp.image,
-                    sharp.pixel_size,
-                    view,
-                    self.surface.mean_slope(),
-                ),
-                pixel_size: sharp.pixel_size,
-            }),
+            camera_height,
+            row_depths: RowDepths::new(view, camera_height),
+            lights: others.lights.iter().map(|light| GroundLight::new(light, view.camera.position)).collect(),
+            night_sky: OnceLock::new(),
+            has_film,
+            lake,
+            backdrop,
+            known_rows: self.known_rows.rows(view, has_film, light),
         }))
     }
 }

@@ -1,41 +1,42 @@
-//! Shading of the ground, pixel by pixel.
+//! Light of the ground that does not come from the picture in its mirror, for sixteen pixels at a time.
 
-use std::f32::consts::PI;
+use std::{f32::consts::PI, sync::OnceLock};
 
 use bansho_base::{
+    camera::directions::Directions,
     color::{acescg_from_srgb, luminance},
-    image::Rect,
-    math::{self, DVec2, DVec3, MulAdd},
+    math::{
+        DVec2,
+        simd::{LANES, Lanes, Real, any_positive},
+    },
     phenomenon::{
-        Prepared,
-        strip::{DepthInterval, Strip, View},
-        surroundings::{Backdrop, IncidentLight, Light, Occluder, Surroundings},
+        strip::View,
+        surroundings::{Backdrop, Surroundings},
     },
 };
+use fearless_simd::prelude::*;
 
 use super::{
+    hits::{Hits, RowDepths},
+    lighting::{GroundLight, Shadows, array},
     model::LakeFrame,
     parameters::{GroundKind, GroundParameters},
-    surface::{Surface, SurfaceSample},
-    waves::WaveSlope,
-    wet_reflection::{ShadowedLight, fresnel, glossy_reflection},
+    row_cache::{GroundLightBatch, KnownRows},
+    sample::SampledImage,
+    surface::{GroundPositions, Surface, SurfaceSamples},
+    wet_reflection::{FilmDirection, Microfacets, fresnel},
 };
-use crate::shadow::{sky_visibility, visibility};
+use crate::sky::night::NightSky;
 
-/// Depth at which the ground ends, m: in front of the sky, behind all other phenomena.
-pub(super) const HORIZON: f64 = 1e6;
 /// Fraction of its albedo that soaked ground loses, by total internal reflection in the water (Lekner & Dorf 1988).
 const WET_DARKENING: f64 = 0.55;
 /// Fraction that puddles lose beyond that: they are deeper, and often turbid.
 const PUDDLE_DARKENING: f64 = 0.4;
-/// Radius of lamps for the width of half shadows, m; and the angular radius of sun and moon.
-const SOURCE_RADIUS: f64 = 0.08;
-const SUN_RADIUS: f64 = 0.004_65;
 /// Albedo of deep water.
 const WATER_ALBEDO: f32 = 0.02;
 
 /// Albedo of wet ground relative to dry ground.
-fn wet_albedo_factor(wetness: f64) -> f64 {
+pub(super) fn wet_albedo_factor(wetness: f64) -> f64 {
     1.0 - WET_DARKENING * wetness
 }
 
@@ -53,24 +54,6 @@ impl GroundParameters {
     }
 }
 
-/// The lights that arrive at a point of the ground. Shadows in lights that contribute next to nothing there are left out.
-fn shadowed_lights(lights: &[Light], casters: &[Occluder], point: DVec3) -> Vec<ShadowedLight> {
-    /// Fraction of all light.
-    const NEGLIGIBLE: f32 = 1e-3;
-    let arriving: Vec<IncidentLight> = lights.iter().map(|light| light.incident_light(point)).collect();
-    let whole: f32 = arriving.iter().map(|light| luminance(light.illuminance)).sum();
-    let shadowed = |IncidentLight { illuminance, toward, distance }: IncidentLight| {
-        if casters.is_empty() || toward.y <= 0.0 || luminance(illuminance) <= NEGLIGIBLE * whole {
-            return (illuminance, toward);
-        }
-        let reach = if distance > 0.0 { distance - SOURCE_RADIUS } else { f64::INFINITY };
-        let size = if distance > 0.0 { SOURCE_RADIUS / distance } else { SUN_RADIUS };
-        let visible = visibility(casters, point, toward, reach, size) as f32;
-        (illuminance.map(|value| value * visible), toward)
-    };
-    arriving.into_iter().map(shadowed).collect()
-}
-
 /// One frame of the ground.
 pub(super) struct PreparedGround<'a> {
     pub(super) parameters: &'a GroundParameters,
@@ -78,165 +61,258 @@ pub(super) struct PreparedGround<'a> {
     pub(super) view: &'a View,
     pub(super) surroundings: &'a Surroundings<'a>,
     pub(super) wetness: f64,
-    pub(super) lake: Option<LakeFrame>,
+    /// Height of the camera above the ground, m.
+    pub(super) camera_height: f64,
+    pub(super) row_depths: RowDepths,
+    /// Those of the surroundings.
+    pub(super) lights: Vec<GroundLight>,
+    /// The sky, if it is a night: tabulated by the first thread that needs it.
+    pub(super) night_sky: OnceLock<Option<NightSky>>,
+    /// Whether there is a film of water between puddles.
+    pub(super) has_film: bool,
+    pub(super) lake: Option<LakeFrame<'a>>,
     /// The plate and its sky, blurred as a rough film of water reflects them.
     pub(super) backdrop: Option<Backdrop>,
+    pub(super) known_rows: KnownRows,
 }
 
-/// Intersection of a pixel's line of sight with the ground.
-struct Hit {
-    pixel: DVec2,
-    point: DVec3,
-    depth: f64,
-    /// Cosine of the angle between the line of sight and the normal.
-    cos: f64,
-    /// Length of ground that the pixel covers, m: the geometric mean of along and across the line of sight.
-    footprint: f64,
-    /// Fraction of the pixel below the horizon.
-    coverage: f64,
+/// What sixteen pixels see of a film of water.
+struct Film<S: Simd> {
+    microfacets: Microfacets<Lanes<S>>,
+    viewer: FilmDirection<Lanes<S>>,
+}
+
+/// Light at sixteen points: on level ground, lux, and reflected by the film, cd/m^2.
+struct SurfaceLight<S: Simd> {
+    illuminance: [Lanes<S>; 3],
+    specular: [Lanes<S>; 3],
 }
 
 impl PreparedGround<'_> {
-    fn hit(&self, pixel: DVec2) -> Option<Hit> {
-        let camera = &self.view.camera;
-        let direction = camera.direction(pixel)?;
-        let length = direction.length();
-        let cos = -direction.y / length;
-        // A pixel subtends about 1 / focal radians.
-        let coverage = (cos * camera.focal_pixels + 0.5).clamp(0.0, 1.0);
-        let camera_height = camera.position.y - self.parameters.height;
-        if coverage <= 0.0 || camera_height <= 0.0 {
+    /// The pattern of the ground at some hits.
+    #[inline(always)]
+    pub(super) fn samples<S: Simd>(&self, hits: &Hits<S>) -> SurfaceSamples {
+        let camera = self.view.camera.position;
+        let [xs, zs] = [array(hits.offset[0]), array(hits.offset[2])];
+        let footprint = array(hits.footprint);
+        let positions =
+            GroundPositions { origin: DVec2::new(camera.x, camera.z), offset: [&xs, &zs], footprint: &footprint };
+        self.surface.samples(positions, self.has_film)
+    }
+
+    /// The light of the pixels from column `x` on in row `y`, and the weight of the picture in the mirror.
+    #[inline(always)]
+    pub(super) fn light<S: Simd>(
+        &self,
+        simd: S,
+        hits: &Hits<S>,
+        samples: &SurfaceSamples,
+        [x, y]: [usize; 2],
+    ) -> GroundLightBatch {
+        let film = self.film(simd, hits, samples);
+        let shadows = self.shadows(hits);
+        let mut light = self.sky_light(simd, hits, film.as_ref(), shadows.as_ref(), [x, y]);
+        self.add_lights(simd, hits, film.as_ref(), shadows.as_ref(), &mut light);
+        let puddle = Lanes::from_slice(simd, &samples.puddle);
+        let one = Lanes::splat(simd, 1.0);
+        let glossy = (one - puddle) * Lanes::splat(simd, self.wetness as f32);
+        let albedo = self.albedo(simd, samples);
+        let mut batch = [[0.0; LANES]; 4];
+        for c in 0..3 {
+            let diffuse = light.illuminance[c] * albedo[c] * Lanes::splat(simd, 1.0 / PI);
+            let sum = if film.is_some() { glossy.fma(light.specular[c], diffuse) } else { diffuse };
+            (hits.coverage * sum).store_slice(&mut batch[c]);
+        }
+        let mirrored = if self.lake.is_some() { one } else { puddle * Lanes::splat(simd, self.wetness as f32) };
+        (hits.coverage * mirrored * fresnel(hits.cos)).store_slice(&mut batch[3]);
+        batch
+    }
+
+    /// Albedo as the water leaves it.
+    #[inline(always)]
+    fn albedo<S: Simd>(&self, simd: S, samples: &SurfaceSamples) -> [Lanes<S>; 3] {
+        let splat = |value: f32| Lanes::splat(simd, value);
+        let mut albedo = [splat(WATER_ALBEDO); 3];
+        if self.parameters.kind == GroundKind::Water {
+            return albedo;
+        }
+        let wet = splat(wet_albedo_factor(self.wetness) as f32);
+        let darkening = if self.parameters.kind == GroundKind::Plate { 0.0 } else { PUDDLE_DARKENING * self.wetness };
+        let puddle = Lanes::from_slice(simd, &samples.puddle);
+        let factor = wet * puddle.fma(splat(-darkening as f32), splat(1.0));
+        let shade = Lanes::from_slice(simd, &samples.shade);
+        for c in 0..3 {
+            albedo[c] = (splat(self.surface.albedo[c]) * shade).simd_min(splat(1.0)) * factor;
+        }
+        albedo
+    }
+
+    /// The film of water; `None` if there is none, or puddles cover it in all pixels.
+    #[inline(always)]
+    fn film<S: Simd>(&self, simd: S, hits: &Hits<S>, samples: &SurfaceSamples) -> Option<Film<S>> {
+        let lanes = |values: &[f32; LANES]| Lanes::from_slice(simd, values);
+        let open = Lanes::splat(simd, 1.0) - lanes(&samples.puddle);
+        if !self.has_film || !any_positive(open) {
             return None;
         }
-        let cos = cos.max(0.5 / camera.focal_pixels);
-        let distance = (camera_height / cos).min(HORIZON * 0.5);
-        let depth = distance / length;
-        let footprint = distance / (camera.focal_pixels * math::sqrt(cos.max(1e-6)));
-        Some(Hit { pixel, point: camera.position + direction * depth, depth, cos, footprint, coverage })
-    }
-
-    /// Lambertian reflection: `albedo / pi` times the illuminance.
-    fn diffuse(&self, hit: &Hit, sample: &SurfaceSample, lights: &[ShadowedLight]) -> [f32; 3] {
-        let plate = self.parameters.kind == GroundKind::Plate;
-        // The plate already contains the light of its own sky.
-        let casters = &self.surroundings.others.shadow_casters;
-        let mut illuminance = if plate { [0.0; 3] } else { self.surroundings.sky.horizontal_illuminance() };
-        if !casters.is_empty() {
-            let open = sky_visibility(casters, hit.point) as f32;
-            illuminance = illuminance.map(|value| value * open);
-        }
-        for (each, toward) in lights {
-            let facing = toward.y.max(0.0) as f32;
-            (0..3).for_each(|c| illuminance[c] = each[c].fma(facing, illuminance[c]));
-        }
-        let albedo = match self.parameters.kind {
-            GroundKind::Water => [WATER_ALBEDO; 3],
-            GroundKind::Plate => sample.albedo.map(|value| value * self.wet_albedo_factor()),
-            GroundKind::Land => {
-                let puddle_factor = 1.0 - PUDDLE_DARKENING * self.wetness * sample.puddle;
-                sample.albedo.map(|value| value * self.wet_albedo_factor() * puddle_factor as f32)
-            }
+        let grain = Lanes::splat(simd, self.surface.grain_slope() as f32);
+        let microfacets = Microfacets {
+            tilt: [lanes(&samples.tilt[0]), lanes(&samples.tilt[1])],
+            slopes: [lanes(&samples.film_slope), grain],
+            film: lanes(&samples.film),
         };
-        [0, 1, 2].map(|c| illuminance[c] * albedo[c] / PI)
+        Some(Film { microfacets, viewer: FilmDirection::new(hits.viewer) })
     }
 
-    /// Albedo of the ground relative to dry ground.
-    fn wet_albedo_factor(&self) -> f32 {
-        wet_albedo_factor(self.wetness) as f32
-    }
-
-    /// Radiance that water on the ground reflects.
-    fn specular(&self, hit: &Hit, sample: &SurfaceSample, lights: &[ShadowedLight]) -> [f32; 3] {
-        if self.wetness <= 0.0 {
-            return [0.0; 3];
+    /// What casts shadows, if anything does.
+    #[inline(always)]
+    fn shadows<S: Simd>(&self, hits: &Hits<S>) -> Option<Shadows<'_>> {
+        let casters = &self.surroundings.others.shadow_casters;
+        if casters.is_empty() {
+            return None;
         }
-        match &self.lake {
-            Some(lake) => self.lake_specular(hit, lake),
-            None => self.film_reflection(hit, sample, lights),
+        let points = [array(hits.offset[0]), array(hits.offset[1]), array(hits.offset[2])];
+        Some(Shadows { casters, camera: self.view.camera.position, points })
+    }
+
+    /// Light of the sky. What a plate shows already contains the light of its own sky.
+    #[inline(always)]
+    fn sky_light<S: Simd>(
+        &self,
+        simd: S,
+        hits: &Hits<S>,
+        film: Option<&Film<S>>,
+        shadows: Option<&Shadows>,
+        pixel: [usize; 2],
+    ) -> SurfaceLight<S> {
+        let zero = Lanes::splat(simd, 0.0);
+        let mut light = SurfaceLight { illuminance: [zero; 3], specular: [zero; 3] };
+        if self.parameters.kind != GroundKind::Plate {
+            let horizontal = self.surroundings.sky.horizontal_illuminance();
+            for c in 0..3 {
+                light.illuminance[c] = Lanes::splat(simd, horizontal[c]);
+            }
+        }
+        if let Some(shadows) = shadows {
+            let open = Lanes::from_slice(simd, &shadows.sky_visibility());
+            for c in 0..3 {
+                light.illuminance[c] = light.illuminance[c] * open;
+            }
+        }
+        if let Some(film) = film {
+            light.specular = self.film_sky(simd, hits, film, shadows, pixel);
+        }
+        light
+    }
+
+    /// The backdrop, or else the sky, as the film reflects it.
+    #[inline(always)]
+    fn film_sky<S: Simd>(
+        &self,
+        simd: S,
+        hits: &Hits<S>,
+        film: &Film<S>,
+        shadows: Option<&Shadows>,
+        pixel: [usize; 2],
+    ) -> [Lanes<S>; 3] {
+        // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and from higher
+        // directions.
+        let ([x, y, z], slope) = (hits.viewer, film.microfacets.mean_slope());
+        let rise = y.fma(y, slope * slope).simd_sqrt();
+        let level = x.fma(x, z * z);
+        let down = (rise.fma(rise, level)).simd_sqrt();
+        let scale = Lanes::splat(simd, 1.0) / down.simd_max(Lanes::splat(simd, 1e-20));
+        let toward = [(Lanes::splat(simd, 0.0) - x) * scale, rise * scale, (Lanes::splat(simd, 0.0) - z) * scale];
+        let radiance = match &self.backdrop {
+            Some(Backdrop { image, pixel_size }) => {
+                let (xs, ys) = pixel_centers(pixel);
+                SampledImage { image, pixel_size: *pixel_size, first_row: 0 }.at(simd, &xs, &ys)
+            }
+            None => self.sky_radiance(simd, [array(toward[0]), array(toward[1]), array(toward[2])]),
+        };
+        let mut weight = fresnel(rise);
+        if let Some(shadows) = shadows {
+            weight = weight * Lanes::from_slice(simd, &shadows.far_visibility(&toward, slope));
+        }
+        let mut reflected = [weight; 3];
+        for c in 0..3 {
+            reflected[c] = weight * Lanes::from_slice(simd, &radiance[c]);
+        }
+        reflected
+    }
+
+    /// Radiance of the sky from directions, unit vectors.
+    #[inline(always)]
+    fn sky_radiance<S: Simd>(&self, simd: S, toward: [[f32; LANES]; 3]) -> [[f32; LANES]; 3] {
+        let sky = &self.surroundings.sky;
+        if let Some(planes) = sky.radiance_at_elevations(&toward[1]) {
+            return planes;
+        }
+        let mut planes = [[0.0; LANES]; 3];
+        let tabulate = || sky.night().map(|night| NightSky::new(sky, night, 0.0));
+        if let Some(night_sky) = self.night_sky.get_or_init(tabulate) {
+            let colors = night_sky.radiance(simd, &Directions { components: toward, visible: [true; LANES] });
+            for i in 0..LANES {
+                for c in 0..3 {
+                    planes[c][i] = colors[i][c];
+                }
+            }
+        }
+        planes
+    }
+
+    /// Adds the light of lamps and fires.
+    #[inline(always)]
+    fn add_lights<S: Simd>(
+        &self,
+        simd: S,
+        hits: &Hits<S>,
+        film: Option<&Film<S>>,
+        shadows: Option<&Shadows>,
+        sums: &mut SurfaceLight<S>,
+    ) {
+        let whole = if shadows.is_some() { self.total_luminance(simd, hits) } else { [0.0; LANES] };
+        for light in &self.lights {
+            let arriving = light.arriving(simd, &hits.offset);
+            let mut factor = arriving.factor;
+            if !any_positive(factor) {
+                continue;
+            }
+            if let Some(shadows) = shadows {
+                factor = factor * Lanes::from_slice(simd, &shadows.visibility(light, &arriving, &whole));
+            }
+            let facing = factor * arriving.toward[1].simd_max(Lanes::splat(simd, 0.0));
+            for c in 0..3 {
+                sums.illuminance[c] = facing.fma(Lanes::splat(simd, light.intensity[c]), sums.illuminance[c]);
+            }
+            if let Some(Film { microfacets, viewer }) = film {
+                let toward = FilmDirection::new(arriving.toward);
+                let lobe = factor * microfacets.specular_lobe(&toward, viewer, arriving.angular_radius);
+                for c in 0..3 {
+                    sums.specular[c] = lobe.fma(Lanes::splat(simd, light.intensity[c]), sums.specular[c]);
+                }
+            }
         }
     }
 
-    /// Wet ground: sharp reflections in puddles, glossy ones between them.
-    fn film_reflection(&self, hit: &Hit, sample: &SurfaceSample, lights: &[ShadowedLight]) -> [f32; 3] {
-        let viewer = -(hit.point - self.view.camera.position).normalize_or_zero();
-        let position = DVec2::new(hit.point.x, hit.point.z);
-        let microfacets = self.surface.microfacets(position, hit.footprint, sample.film);
-        let backdrop = self.backdrop.as_ref().map(|Backdrop { image, pixel_size: side }| {
-            let [red, green, blue, _] = image.sample_bilinear(hit.pixel / *side as f64);
-            [red, green, blue]
-        });
-        let blurred_reflection =
-            glossy_reflection(self.surroundings, lights, backdrop, hit.point, viewer, &microfacets);
-        let mirror_image = self.surroundings.reflection.map_or([0.0; 4], |image| image.sample_bilinear(hit.pixel));
-        let (puddle, fresnel, wetness) = (sample.puddle as f32, fresnel(hit.cos) as f32, self.wetness as f32);
-        [0, 1, 2].map(|c| wetness * (puddle * fresnel).fma(mirror_image[c], (1.0 - puddle) * blurred_reflection[c]))
-    }
-
-    fn lake_specular(&self, hit: &Hit, lake: &LakeFrame) -> [f32; 3] {
-        let slope = lake.waves.slope(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let mirror_image = self
-            .surroundings
-            .reflection
-            .map_or([0.0; 4], |image| image.sample_bilinear(self.reflected_pixel(hit, slope)));
-        let blurred_reflection = lake.blurred_reflection.sample_bilinear(hit.pixel);
-        let (unresolved, fresnel) = (slope.unresolved as f32, fresnel(hit.cos) as f32);
-        [0, 1, 2].map(|c| fresnel * unresolved.fma(blurred_reflection[c], (1.0 - unresolved) * mirror_image[c]))
-    }
-
-    /// The pixel of the mirrored picture that a tilted wave shows, for distant objects: the reflection turns by twice
-    /// the tilt.
-    fn reflected_pixel(&self, hit: &Hit, slope: WaveSlope) -> DVec2 {
-        let camera = &self.view.camera;
-        let view_direction = (hit.point - camera.position).normalize_or_zero();
-        let normal = DVec3::new(-slope.resolved.x, 1.0, -slope.resolved.y).normalize();
-        let reflected = view_direction - 2.0 * view_direction.dot(normal) * normal;
-        let below = DVec3::new(reflected.x, -reflected.y.abs(), reflected.z);
-        camera.project(camera.position + below * HORIZON).map_or(hit.pixel, |position| position.pixel)
-    }
-
-    fn radiance(&self, hit: &Hit) -> [f32; 3] {
-        let sample = self.surface.at(DVec2::new(hit.point.x, hit.point.z), hit.footprint);
-        let others = &self.surroundings.others;
-        let lights = shadowed_lights(&others.lights, &others.shadow_casters, hit.point);
-        let (diffuse, specular) = (self.diffuse(hit, &sample, &lights), self.specular(hit, &sample, &lights));
-        [0, 1, 2].map(|c| hit.coverage as f32 * (diffuse[c] + specular[c]))
-    }
-
-    /// Whether the plate at a pixel, with this depth, shows ground: within the tolerance of the height, and within what
-    /// a pixel resolves at grazing angles.
-    fn is_ground(&self, hit: &Hit, plate: f64) -> bool {
-        let camera_height = self.view.camera.position.y - self.parameters.height;
-        let above = camera_height * (1.0 - plate / hit.depth);
-        above.abs() < self.parameters.mirror().tolerance_at(plate, self.view.camera.focal_pixels)
-    }
-
-    /// The transmittance of the sample; `None` if it is hidden.
-    fn transmittance(&self, hit: &Hit, strip: &Strip, index: usize) -> Option<f32> {
-        if self.parameters.kind == GroundKind::Plate {
-            let is_ground = !strip.has_plate() || self.is_ground(hit, f64::from(strip.plate_depth(index)));
-            return is_ground.then_some(self.wet_albedo_factor());
+    /// Sum of the luminances of all lights on planes that face them, without shadows, lux.
+    #[inline(always)]
+    fn total_luminance<S: Simd>(&self, simd: S, hits: &Hits<S>) -> [f32; LANES] {
+        let mut sum = Lanes::splat(simd, 0.0);
+        for light in &self.lights {
+            let strength = Lanes::splat(simd, luminance(light.intensity));
+            sum = light.arriving(simd, &hits.offset).factor.fma(strength, sum);
         }
-        strip.visible(index, hit.depth as f32).then_some(1.0 - hit.coverage as f32)
+        array(sum)
     }
 }
 
-impl Prepared for PreparedGround<'_> {
-    fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let all = DepthInterval { near: 0.0, far: HORIZON };
-        if slice.overlaps(&all) { Rect::from_size(self.view.size[0], self.view.size[1]) } else { Rect::default() }
+/// Centers of the pixels from column `x` on in row `y`.
+#[inline(always)]
+pub(super) fn pixel_centers([x, y]: [usize; 2]) -> ([f32; LANES], [f32; LANES]) {
+    let mut xs = [x as f32; LANES];
+    for i in 0..LANES {
+        xs[i] += i as f32 + 0.5;
     }
-
-    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let rect = strip.rect;
-        for index in 0..strip.len() {
-            let pixel = DVec2::new((rect.x + index % rect.width) as f64, (rect.y + index / rect.width) as f64) + 0.5;
-            let Some(hit) = self.hit(pixel) else { continue };
-            if !slice.contains(hit.depth) {
-                continue;
-            }
-            if let Some(transmittance) = self.transmittance(&hit, strip, index) {
-                strip.add_behind(index, self.radiance(&hit), [transmittance; 3], hit.depth as f32);
-            }
-        }
-    }
+    (xs, [y as f32 + 0.5; LANES])
 }

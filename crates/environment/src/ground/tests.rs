@@ -7,7 +7,7 @@ use bansho_base::{
     phenomenon::{
         Phenomenon, Run,
         strip::{DepthInterval, Shutter, Strip, View},
-        surroundings::{Emitter, Light, Surroundings},
+        surroundings::{Emitter, Light, Reflection, Surroundings},
     },
     world::wind::{Wind, WindParameters},
 };
@@ -25,7 +25,7 @@ fn view() -> View {
     View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, SIZE, 0)
 }
 
-fn drawn(parameters: GroundParameters, lights: Vec<Light>, reflection: Option<&Image<4>>) -> Strip {
+fn drawn(parameters: GroundParameters, lights: Vec<Light>, reflection: Option<&Reflection>) -> Strip {
     let ground = Ground::new(parameters, 1, None);
     let (view, wind) = (view(), Wind::new(WindParameters::default(), 1, None));
     let mut surroundings = Surroundings { reflection, ..Surroundings::from_wind(&wind) };
@@ -85,7 +85,7 @@ fn nothing_is_drawn_above_the_horizon_or_from_below() {
 
 #[test]
 fn a_wet_ground_is_darker_and_mirrors_what_fresnel_says() {
-    let mirror = Image::filled(SIZE[0], SIZE[1], [1000.0, 1000.0, 1000.0, 1.0]);
+    let mirror = Reflection::whole(Image::filled(SIZE[0], SIZE[1], [1000.0, 1000.0, 1000.0, 1.0]));
     let wet = GroundParameters { wetness: 1.0.into(), puddles: 1.0, ..plain() };
     let dry = at(&drawn(plain(), vec![lamp(2.0)], None), DVec3::ZERO);
     let soaked = at(&drawn(wet.clone(), vec![lamp(2.0)], None), DVec3::ZERO);
@@ -94,7 +94,7 @@ fn a_wet_ground_is_darker_and_mirrors_what_fresnel_says() {
     let specular = at(&drawn(wet, Vec::new(), Some(&mirror)), DVec3::ZERO);
     // Seen from (0, 2, 6): the cosine to the normal is 2 / sqrt(40).
     let cos = 2.0 / bansho_base::math::sqrt(40.0);
-    assert!((specular / (1000.0 * wet_reflection::fresnel(cos)) - 1.0).abs() < 0.05, "{specular}");
+    assert!((specular / (1000.0 * f64::from(wet_reflection::fresnel(cos as f32))) - 1.0).abs() < 0.05, "{specular}");
 }
 
 #[test]

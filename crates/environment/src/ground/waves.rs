@@ -4,11 +4,14 @@ use std::f64::consts::{PI, TAU};
 
 use bansho_base::{
     math::{
-        self, DVec2,
+        self, DVec2, MulAdd, approximations,
         random::{Key, Purpose, uniform_f64},
+        simd::LANES,
     },
     world::gravity::STANDARD_GRAVITY,
 };
+
+use super::surface::smoothstep;
 
 /// Number of waves in the sum: enough to show no beat, few enough to evaluate at every pixel.
 const WAVE_COUNT: usize = 14;
@@ -17,13 +20,15 @@ const LENGTH_RATIO: f64 = 40.0;
 /// Largest angle between a wave and the wind, radians.
 const MAX_ANGLE: f64 = 0.42 * PI;
 
-/// One wave: slope = amplitude * cos(k . x - omega t + phase) along k.
+/// One wave: slope = amplitude * cos(k . x - omega t + phase) along k, with x relative to an origin.
 #[derive(Clone, Copy, Debug)]
 struct Wave {
-    vector: DVec2,
-    length: f64,
-    phase: f64,
-    slope: DVec2,
+    /// k, turns per m along x and z.
+    turns_per_meter: [f32; 2],
+    length: f32,
+    /// Phase at the origin, turns.
+    phase: f32,
+    slope: [f32; 2],
 }
 
 /// The waves at one time.
@@ -32,51 +37,78 @@ pub(super) struct Waves {
     waves: Vec<Wave>,
 }
 
-/// The slope of the water at a position.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct WaveSlope {
+/// What determines the waves of a lake.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WaveParameters {
+    pub(super) key: Key,
+    /// R.m.s. slope.
+    pub(super) slope: f64,
+    /// Maximum wavelength, m.
+    pub(super) longest: f64,
+    /// Direction of the wind, unit vector along x and z.
+    pub(super) heading: DVec2,
+    /// In a loop every wave is periodic in this time, s.
+    pub(super) loop_s: Option<f64>,
+}
+
+/// The slope of the water at sixteen positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct WaveSlopes {
     /// Slope along x and z, of the waves that a pixel resolves.
-    pub(super) resolved: DVec2,
+    pub(super) resolved: [[f32; LANES]; 2],
     /// Fraction of the slope variance in waves too short to be resolved.
-    pub(super) unresolved: f64,
+    pub(super) unresolved: [f32; LANES],
 }
 
 impl Waves {
-    /// Waves with an r.m.s. `slope` and a maximum wavelength `longest` (m), in a wind toward `heading`, at time `t`. In
-    /// a loop every wave is periodic in `loop_s` seconds.
-    pub(super) fn new(key: Key, slope: f64, longest: f64, heading: DVec2, t: f64, loop_s: Option<f64>) -> Self {
+    /// The waves at time `t` around an `origin` (x, z). Phases are exact there, however far it is.
+    pub(super) fn new(parameters: &WaveParameters, t: f64, origin: DVec2) -> Self {
+        let WaveParameters { key, slope, longest, heading, loop_s } = *parameters;
         let wave = |index: usize| {
             let words = key.words(index as u64, 0, Purpose::named("wave"));
             let [turn, phase] = [uniform_f64(words[0], words[1]), uniform_f64(words[2], words[3])];
             let fraction = index as f64 / (WAVE_COUNT - 1) as f64;
             let length = longest * math::pow(LENGTH_RATIO, -fraction);
             let along = heading.rotate(unit_vector((2.0 * turn - 1.0) * MAX_ANGLE));
-            let number = TAU / length;
             // Dispersion relation of deep water: omega^2 = g k.
-            let frequency = quantize_frequency(math::sqrt(STANDARD_GRAVITY * number) / TAU, loop_s) * t;
+            let frequency = quantize_frequency(math::sqrt(STANDARD_GRAVITY * TAU / length) / TAU, loop_s) * t;
             let amplitude = slope * math::sqrt(2.0 / WAVE_COUNT as f64);
+            let turns = (along.dot(origin) / length).rem_euclid(1.0) + phase - frequency.rem_euclid(1.0);
             Wave {
-                vector: along * number,
-                length,
-                phase: TAU * (phase - frequency.rem_euclid(1.0)),
-                slope: along * amplitude,
+                turns_per_meter: (along / length).as_vec2().to_array(),
+                length: length as f32,
+                phase: turns.rem_euclid(1.0) as f32,
+                slope: (along * amplitude).as_vec2().to_array(),
             }
         };
         Self { waves: (0..WAVE_COUNT).map(wave).collect() }
     }
 
-    /// The slope at a position (x, z), filtered with a pixel's `footprint`, m.
-    pub(super) fn slope(&self, position: DVec2, footprint: f64) -> WaveSlope {
-        let mut slope = WaveSlope::default();
+    /// The slopes at positions (x, z) relative to the origin, filtered with the pixels' `footprint`, m.
+    #[inline(always)]
+    pub(super) fn slopes(&self, [xs, zs]: [&[f32; LANES]; 2], footprint: &[f32; LANES]) -> WaveSlopes {
+        let mut slopes = WaveSlopes { resolved: [[0.0; LANES]; 2], unresolved: [0.0; LANES] };
         for wave in &self.waves {
-            // Below two pixels a wave is not resolved, from six pixels on wholly.
-            let visibility = math::smoothstep(2.0, 6.0, wave.length / footprint.max(1e-9));
-            if visibility > 0.0 {
-                slope.resolved += wave.slope * (visibility * math::cos(wave.vector.dot(position) + wave.phase));
+            let (mut visibility, mut largest) = ([0.0; LANES], 0.0);
+            for i in 0..LANES {
+                // Below two pixels a wave is not resolved, from six pixels on wholly.
+                let footprint = if footprint[i] > 1e-9 { footprint[i] } else { 1e-9 };
+                let seen = smoothstep(2.0, 6.0, wave.length / footprint);
+                visibility[i] = seen;
+                largest = if seen > largest { seen } else { largest };
+                slopes.unresolved[i] += (-seen).fma(seen, 1.0) * (1.0 / WAVE_COUNT as f32);
             }
-            slope.unresolved += (1.0 - visibility * visibility) / WAVE_COUNT as f64;
+            if largest <= 0.0 {
+                continue;
+            }
+            for i in 0..LANES {
+                let turns = xs[i].fma(wave.turns_per_meter[0], zs[i].fma(wave.turns_per_meter[1], wave.phase));
+                let height = visibility[i] * approximations::cos_turns(turns);
+                slopes.resolved[0][i] = height.fma(wave.slope[0], slopes.resolved[0][i]);
+                slopes.resolved[1][i] = height.fma(wave.slope[1], slopes.resolved[1][i]);
+            }
         }
-        slope
+        slopes
     }
 }
 
@@ -95,17 +127,25 @@ fn unit_vector(angle: f64) -> DVec2 {
 mod tests {
     use super::*;
 
-    fn waves(t: f64, loop_s: Option<f64>) -> Waves {
-        Waves::new(Key::new(1, "ground"), 0.05, 4.0, DVec2::X, t, loop_s)
+    fn waves(t: f64, loop_s: Option<f64>, origin: DVec2) -> Waves {
+        let parameters =
+            WaveParameters { key: Key::new(1, "ground"), slope: 0.05, longest: 4.0, heading: DVec2::X, loop_s };
+        Waves::new(&parameters, t, origin)
+    }
+
+    /// The slope at one position.
+    fn slope(waves: &Waves, x: f64, z: f64, footprint: f32) -> ([f32; 2], f32) {
+        let slopes = waves.slopes([&[x as f32; LANES], &[z as f32; LANES]], &[footprint; LANES]);
+        (slopes.resolved.map(|lanes| lanes[3]), slopes.unresolved[3])
     }
 
     #[test]
     fn the_slope_has_the_variance_asked_for() {
-        let waves = waves(0.0, None);
+        let waves = waves(0.0, None, DVec2::ZERO);
         let positions = 20_000;
         let square = |index: i32| {
-            let position = DVec2::new(f64::from(index) * 1.37, f64::from(index % 611) * 3.11);
-            waves.slope(position, 0.0).resolved.length_squared()
+            let ([x, z], _) = slope(&waves, f64::from(index % 997) * 1.37, f64::from(index % 611) * 3.11, 0.0);
+            f64::from(x * x + z * z)
         };
         let mean = (0..positions).map(square).sum::<f64>() / f64::from(positions);
         assert!((math::sqrt(mean) / 0.05 - 1.0).abs() < 0.1, "{}", math::sqrt(mean));
@@ -113,15 +153,24 @@ mod tests {
 
     #[test]
     fn far_water_has_no_waves_to_be_seen() {
-        let slope = waves(0.0, None).slope(DVec2::new(3.0, 4.0), 10.0);
-        assert_eq!(slope, WaveSlope { resolved: DVec2::ZERO, unresolved: slope.unresolved });
-        assert!((slope.unresolved - 1.0).abs() < 1e-12);
+        let (resolved, unresolved) = slope(&waves(0.0, None, DVec2::ZERO), 3.0, 4.0, 10.0);
+        assert_eq!(resolved, [0.0; 2]);
+        assert!((unresolved - 1.0).abs() < 1e-6);
     }
 
     #[test]
     fn a_loop_ends_where_it_began() {
-        let at = |t| waves(t, Some(3.0)).slope(DVec2::new(1.0, 2.0), 0.0).resolved;
-        assert!((at(0.0) - at(3.0)).length() < 1e-9);
+        let at = |t| DVec2::from(slope(&waves(t, Some(3.0), DVec2::ZERO), 1.0, 2.0, 0.0).0.map(f64::from));
+        assert!((at(0.0) - at(3.0)).length() < 1e-6);
         assert!((at(0.0) - at(1.5)).length() > 1e-4);
+    }
+
+    #[test]
+    fn waves_do_not_move_with_the_origin() {
+        for far in [0.0, 1e7] {
+            let here = slope(&waves(0.5, None, DVec2::new(far, 0.0)), 1.0, 2.0, 0.0).0;
+            let there = slope(&waves(0.5, None, DVec2::new(far - 7.0, 5.0)), 8.0, -3.0, 0.0).0;
+            assert!((here[0] - there[0]).abs() < 1e-5 && (here[1] - there[1]).abs() < 1e-5, "{here:?} {there:?}");
+        }
     }
 }

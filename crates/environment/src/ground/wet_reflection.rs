@@ -1,111 +1,113 @@
 //! Glossy reflection in a rough film of water: the long highlights of lamps on a wet road.
 
-use std::f64::consts::PI;
-
-use bansho_base::{
-    math::{self, DVec2, DVec3, MulAdd},
-    phenomenon::surroundings::{Emitter, Surroundings},
-};
-
-use crate::shadow::visibility;
-
-/// A light that arrives at a point of the ground, in the shadows of obstacles: illuminance on a plane that faces it, lux, and the unit vector toward it.
-pub(super) type ShadowedLight = ([f32; 3], DVec3);
-
-/// Distance that stands for infinity, m.
-const FAR: f64 = 1e3;
+use bansho_base::math::simd::Real;
 
 /// Fresnel reflectance of water at the cosine of the angle of incidence (Schlick 1994, n = 1.333).
-pub(super) fn fresnel(cos: f64) -> f64 {
-    let grazing = 1.0 - cos.clamp(0.0, 1.0);
-    let fifth = grazing * grazing * grazing * grazing * grazing;
-    0.0204 + 0.9796 * fifth
+#[inline(always)]
+pub(super) fn fresnel<R: Real>(cos: R) -> R {
+    let grazing = cos.broadcast(1.0) - cos.simd_clamp01();
+    let square = grazing * grazing;
+    (square * square * grazing).fma(cos.broadcast(0.9796), cos.broadcast(0.0204))
+}
+
+/// A direction in the upper hemisphere from which a film is lit or seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FilmDirection<R> {
+    /// Unit vector away from the film.
+    pub(super) toward: [R; 3],
+    /// Square of the tangent of the angle to the normal.
+    tan_squared: R,
+}
+
+impl<R: Real> FilmDirection<R> {
+    #[inline(always)]
+    pub(super) fn new(toward: [R; 3]) -> Self {
+        let y = toward[1];
+        let one = y.broadcast(1.0);
+        Self { toward, tan_squared: one / (y * y).simd_max(y.broadcast(1e-9)) - one }
+    }
 }
 
 /// Microfacets of wet ground. The slope distribution has longer tails than a Gaussian (Burley 2012: GTR with exponent
 /// 3), so that highlights fade without an edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Microfacets {
+pub(super) struct Microfacets<R> {
     /// Mean slope: that of the bumps that are resolved.
-    pub(super) tilt: DVec2,
+    pub(super) tilt: [R; 2],
     /// Slopes of the unresolved film and of the grains that protrude from it: r.m.s. along each axis of a Gaussian with
     /// the same median.
-    pub(super) slopes: [f64; 2],
+    pub(super) slopes: [R; 2],
     /// Fraction of the film.
-    pub(super) film: f64,
+    pub(super) film: R,
 }
 
-impl Microfacets {
+impl<R: Real> Microfacets<R> {
     /// Radiance toward `viewer` for an illuminance of one lux from `light` on a plane that faces it: `F D G / (4
     /// cos_viewer)` (Cook & Torrance 1982). A light of angular diameter `width` widens the distribution.
-    fn specular_lobe(&self, light: DVec3, viewer: DVec3, width: f64) -> f64 {
-        let Some(half) = (light + viewer).try_normalize() else { return 0.0 };
-        if light.y <= 0.0 || viewer.y <= 0.0 {
-            return 0.0;
+    #[inline(always)]
+    pub(super) fn specular_lobe(&self, light: &FilmDirection<R>, viewer: &FilmDirection<R>, width: R) -> R {
+        let splat = |value: f32| width.broadcast(value);
+        let ([lx, ly, lz], [vx, vy, vz]) = (light.toward, viewer.toward);
+        // The vector halfway, of length 2 cos(angle of incidence), whose slope is that of the facets that mirror the light.
+        let (x, y, z) = (lx + vx, (ly + vy).simd_max(splat(1e-6)), lz + vz);
+        let length_squared = x.fma(x, y.fma(y, z * z));
+        let per_y = splat(1.0) / y;
+        let (slope_x, slope_z) = (splat(0.0) - x.fma(per_y, self.tilt[0]), splat(0.0) - z.fma(per_y, self.tilt[1]));
+        let square = slope_x.fma(slope_x, slope_z * slope_z);
+        let source = (splat(0.25) * width) * (splat(0.25) * width);
+        let mut facets = [splat(0.0); 2];
+        for kind in 0..2 {
+            let slope = self.slopes[kind].simd_max(splat(1e-3));
+            let tans = [light.tan_squared, viewer.tan_squared];
+            facets[kind] = gtr3_distribution_with_masking(square, slope.fma(slope, source), tans);
         }
-        let slope = DVec2::new(-half.x, -half.z) / half.y - self.tilt;
-        let square = slope.length_squared();
-        let weight = |slope: f64| {
-            gtr3_distribution_with_masking(square, math::hypot(slope.max(1e-3), 0.25 * width), light.y, viewer.y)
-        };
-        let microfacets = math::lerp(weight(self.slopes[1]), weight(self.slopes[0]), self.film);
-        let cos_squared = half.y * half.y;
-        fresnel(viewer.dot(half)) * microfacets / (4.0 * viewer.y.max(1e-3) * cos_squared * cos_squared)
+        let facets = self.film.fma(facets[0] - facets[1], facets[1]);
+        let cos_squared = y * y / length_squared;
+        let cos_incidence = vx.fma(x, vy.fma(y, vz * z)) / length_squared.simd_sqrt();
+        let lobe =
+            fresnel(cos_incidence) * facets / (splat(4.0) * vy.simd_max(splat(1e-3)) * (cos_squared * cos_squared));
+        let lit = splat(0.0).select_lt(ly, lobe, splat(0.0));
+        splat(0.0).select_lt(vy, lit, splat(0.0))
     }
 
     /// Mean slope toward a viewer.
-    fn mean_slope(&self) -> f64 {
-        math::lerp(self.slopes[1], self.slopes[0], self.film)
+    #[inline(always)]
+    pub(super) fn mean_slope(&self) -> R {
+        self.film.fma(self.slopes[0] - self.slopes[1], self.slopes[1])
     }
 }
 
-/// GTR distribution D of facets whose slope differs by the root of `square` from the mean, times Smith masking and
-/// shadowing G for the cosines of light and viewer.
-fn gtr3_distribution_with_masking(square: f64, slope: f64, light: f64, viewer: f64) -> f64 {
+/// GTR distribution D of facets whose slope differs by the root of `square` from the mean, with a mean square slope, times Smith masking and
+/// shadowing G for the squared tangents of light and viewer.
+#[inline(always)]
+fn gtr3_distribution_with_masking<R: Real>(square: R, slope_squared: R, tan_squared: [R; 2]) -> R {
     /// Square of the scale at which the median slope equals that of a Gaussian: `2 ln 2 / (sqrt 2 - 1)`.
-    const MEDIAN: f64 = 3.346_817;
-    let width = MEDIAN * slope * slope;
-    let tail = 1.0 + square / width;
-    let masking = |cos: f64| 0.5 * (math::sqrt(1.0 + width * (1.0 / (cos * cos).max(1e-9) - 1.0)) - 1.0);
-    2.0 / (PI * width * tail * tail * tail * (1.0 + masking(light) + masking(viewer)))
-}
-
-/// Radiance of a film of water on horizontal ground at `point`, toward the unit vector `viewer`. It reflects
-/// `backdrop`, or else the sky, and `lights`: those of the surroundings as they arrive there.
-pub(super) fn glossy_reflection(
-    surroundings: &Surroundings,
-    lights: &[ShadowedLight],
-    backdrop: Option<[f32; 3]>,
-    point: DVec3,
-    viewer: DVec3,
-    microfacets: &Microfacets,
-) -> [f32; 3] {
-    // At grazing angles the visible facets are those tilted toward the viewer: they reflect less, and from higher
-    // directions.
-    let rise = math::hypot(viewer.y, microfacets.mean_slope());
-    let specular = DVec3::new(-viewer.x, rise, -viewer.z).normalize();
-    let casters = &surroundings.others.shadow_casters;
-    let backdrop_radiance = backdrop.unwrap_or_else(|| surroundings.sky.radiance(specular));
-    let open = visibility(casters, point, specular, FAR, microfacets.mean_slope().max(0.02));
-    let mut radiance = backdrop_radiance.map(|value| value * (fresnel(rise) * open) as f32);
-    for (light, (illuminance, toward)) in surroundings.others.lights.iter().zip(lights) {
-        let width = match light.emitter {
-            Emitter::Point { position, radius } => radius / (position - point).length().max(radius),
-            Emitter::Directional { .. } | Emitter::Spot { .. } => 0.0,
-        };
-        let weight = microfacets.specular_lobe(*toward, viewer, width) as f32;
-        (0..3).for_each(|c| radiance[c] = illuminance[c].fma(weight, radiance[c]));
-    }
-    radiance
+    const MEDIAN: f32 = 3.346_817;
+    let splat = |value: f32| square.broadcast(value);
+    let width = splat(MEDIAN) * slope_squared;
+    let tail = splat(1.0) + square / width;
+    let root = |tan_squared: R| width.fma(tan_squared, splat(1.0)).simd_sqrt();
+    // 1 + masking of light + masking of viewer, where masking is `(root - 1) / 2`.
+    let masking = splat(0.5) * (root(tan_squared[0]) + root(tan_squared[1]));
+    splat(2.0) / (splat(std::f32::consts::PI) * width * (tail * tail * tail) * masking)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
+    use bansho_base::math::{self, DVec2, DVec3};
+
     use super::*;
 
     /// Microfacets of one kind, none of which is seen by itself.
-    fn even(slope: f64) -> Microfacets {
-        Microfacets { tilt: DVec2::ZERO, slopes: [slope; 2], film: 1.0 }
+    fn even(slope: f64) -> Microfacets<f32> {
+        Microfacets { tilt: [0.0; 2], slopes: [slope as f32; 2], film: 1.0 }
+    }
+
+    fn lobe(microfacets: &Microfacets<f32>, light: DVec3, viewer: DVec3) -> f64 {
+        let [light, viewer] = [light, viewer].map(|toward| FilmDirection::new(toward.as_vec3().to_array()));
+        f64::from(microfacets.specular_lobe(&light, &viewer, 0.0))
     }
 
     /// Share of a lux that is mirrored into the whole hemisphere, over what Fresnel says of a level mirror.
@@ -118,10 +120,10 @@ mod tests {
             let across = math::sqrt(1.0 - y * y);
             for turn in 0..turns {
                 let (sin, cos) = math::sin_cos(f64::from(turn) / f64::from(turns) * 2.0 * PI);
-                sum += even(slope).specular_lobe(light, DVec3::new(across * cos, y, across * sin), 0.0) * y;
+                sum += lobe(&even(slope), light, DVec3::new(across * cos, y, across * sin)) * y;
             }
         }
-        sum * 2.0 * PI / f64::from(rings * turns) / (light.y * fresnel(light.y))
+        sum * 2.0 * PI / f64::from(rings * turns) / (light.y * f64::from(fresnel(light.y as f32)))
     }
 
     #[test]
@@ -140,7 +142,7 @@ mod tests {
             DVec3::new(-cos, rise, sin).normalize()
         };
         let light = DVec3::new(1.0, 0.2, 0.0).normalize();
-        let at = |turn, rise| even(0.06).specular_lobe(light, viewer(turn, rise), 0.0);
+        let at = |turn, rise| lobe(&even(0.06), light, viewer(turn, rise));
         let straight = at(0.0, 0.2);
         assert!(at(0.0, 0.3) > 0.3 * straight, "0.1 radians up");
         assert!(at(0.1, 0.2) < 0.3 * straight, "0.1 radians sideways");
@@ -149,10 +151,10 @@ mod tests {
     #[test]
     fn a_lamp_fades_without_an_edge() {
         let light = DVec3::new(1.0, 0.2, 0.0).normalize();
-        let microfacets = Microfacets { tilt: DVec2::ZERO, slopes: [0.04, 0.16], film: 0.5 };
+        let microfacets = Microfacets { tilt: [0.0; 2], slopes: [0.04, 0.16], film: 0.5 };
         let at = |step: i32| {
             let (sin, cos) = math::sin_cos(1e-3 * f64::from(step));
-            microfacets.specular_lobe(light, DVec3::new(-cos, 0.2, sin).normalize(), 0.0)
+            lobe(&microfacets, light, DVec3::new(-cos, 0.2, sin).normalize())
         };
         // From one pixel of a usual lens to the next; a Gaussian's tail loses a third.
         assert!((0..400).all(|step| at(step + 1) < at(step) && at(step + 1) > 0.85 * at(step)));
@@ -163,14 +165,28 @@ mod tests {
         let (light, viewer) = (DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.6, 0.8, 0.1).normalize());
         let half = (light + viewer).normalize();
         let tilt = DVec2::new(-half.x, -half.z) / half.y;
-        let lobe = |tilt| Microfacets { tilt, ..even(0.03) }.specular_lobe(light, viewer, 0.0);
-        assert!(lobe(tilt) > lobe(DVec2::ZERO) && lobe(tilt) > lobe(2.0 * tilt));
+        let tilted = |tilt: DVec2| lobe(&Microfacets { tilt: tilt.as_vec2().to_array(), ..even(0.03) }, light, viewer);
+        assert!(tilted(tilt) > tilted(DVec2::ZERO) && tilted(tilt) > tilted(2.0 * tilt));
+    }
+
+    #[test]
+    fn grazing_and_degenerate_directions_give_finite_light() {
+        let values = [0.0, 1e-30, 1e-9, 1e-4, 0.5, 1.0];
+        for (y, other) in values.into_iter().flat_map(|y| values.map(|other| (y, other))) {
+            let toward = |y: f64, side: f64| DVec3::new(side * math::sqrt(1.0 - y * y), y, 0.0);
+            for slope in [0.0, 1e-6, 0.5] {
+                for side in [-1.0, 1.0] {
+                    let seen = lobe(&even(slope), toward(y, 1.0), toward(other, side));
+                    assert!(seen.is_finite() && seen >= 0.0, "{y} {other} {slope} {side}: {seen}");
+                }
+            }
+        }
     }
 
     #[test]
     fn water_mirrors_two_hundredths_from_above_and_all_at_the_horizon() {
-        assert!((fresnel(1.0) - 0.0204).abs() < 1e-12);
-        assert!((fresnel(0.0) - 1.0).abs() < 1e-12);
-        assert!((0.05..0.07).contains(&fresnel(0.5)));
+        assert!((fresnel(1.0_f32) - 0.0204).abs() < 1e-7);
+        assert!((fresnel(0.0_f32) - 1.0).abs() < 1e-6);
+        assert!((0.05..0.07).contains(&fresnel(0.5_f32)));
     }
 }

@@ -9,7 +9,7 @@
 //! | equation | function |
 //! | --- | --- |
 //! | luminance of a sphere of radius r, `I / (pi r^2)` | `project_lamp` |
-//! | glare `L = E k / (theta^2 + a^2)^(3/2)`, with a fade to 0 | `Glare::at`, normalized in `Glare::new` |
+//! | glare `L = E k / (theta^2 + a^2)^(3/2)`, with a fade to 0 | `Glare::at_sixteen`, normalized in `Glare::new` |
 //!
 //! # Data flow
 //! [`Lamps`] holds a function of time that returns the visible lights. `project_lamp` turns each into a `Disc` in the

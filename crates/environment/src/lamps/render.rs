@@ -3,13 +3,15 @@
 use bansho_base::{
     color,
     image::Rect,
-    math::{self, DVec2},
+    math::{self, DVec2, MulAdd, simd::LANES},
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
         surroundings::Emitter,
     },
 };
+
+use fearless_simd::dispatch;
 
 use super::model::Lamp;
 
@@ -47,11 +49,20 @@ impl Glare {
         Self { core: c, strength: GLARE_FRACTION / (std::f64::consts::PI * whole) }
     }
 
-    pub(super) fn at(&self, angle: f64) -> f64 {
-        let square = angle * angle;
-        let fade = (1.0 - square / Self::END).max(0.0);
-        let from = square + self.core;
-        self.strength * fade * fade / (from * math::sqrt(from))
+    /// The glare in sixteen pixels of a row: the first is at the angles `x` and `y` from the lamp, each at the angle `step` from the one before.
+    #[inline(always)]
+    pub(super) fn at_sixteen(&self, [x, y, step]: [f32; 3]) -> [f32; LANES] {
+        let (core, strength) = (self.core as f32, self.strength as f32);
+        let mut weights = [0.0; LANES];
+        for i in 0..LANES {
+            let across = step.fma(i as f32, x);
+            let square = across.fma(across, y * y);
+            let fade = square.fma(-1.0 / Self::END as f32, 1.0);
+            let fade = if fade > 0.0 { fade } else { 0.0 };
+            let from = square + core;
+            weights[i] = strength * (fade * fade) / (from * from.sqrt());
+        }
+        weights
     }
 }
 
@@ -164,20 +175,42 @@ impl PreparedLamps<'_> {
     }
 
     /// Adds the glare of a lamp where the plate does not hide the lamp.
+    #[inline(always)]
     pub(super) fn add_glare(&self, disc: &Disc, strip: &mut Strip) {
         let rect = disc.glare_bounds(self.view).intersection(&strip.rect);
-        let focal = self.view.camera.focal_pixels;
-        let glare = Glare::new(disc.radius / focal);
+        let glare = Glare::new(disc.radius / self.view.camera.focal_pixels);
         for y in rect.y..rect.bottom() {
-            for x in rect.x..rect.right() {
-                let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                let distance = (DVec2::new(x as f64, y as f64) + 0.5 - disc.center).length();
-                let weight = glare.at(distance / focal) as f32;
-                if weight > 0.0 && strip.visible(index, disc.depth as f32) {
-                    strip.emit(index, disc.illuminance.map(|value| value * weight), f32::INFINITY);
+            // Batches begin at multiples of sixteen in the whole picture, whatever the strip.
+            let mut x = rect.x / LANES * LANES;
+            while x < rect.right() {
+                let mut weights = glare.at_sixteen(self.offset(disc, x, y));
+                let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
+                let first = (y - strip.rect.y) * strip.rect.width + x + inside.start - strip.rect.x;
+                if strip.has_plate() {
+                    for i in inside.clone() {
+                        let is_seen = strip.visible(first + i - inside.start, disc.depth as f32);
+                        weights[i] = if is_seen { weights[i] } else { 0.0 };
+                    }
                 }
+                let mut light = [weights; 3];
+                for c in 0..3 {
+                    for i in 0..LANES {
+                        light[c][i] = disc.illuminance[c] * weights[i];
+                    }
+                }
+                let [red, green, blue] = &light;
+                let radiance = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
+                strip.add_row_behind(first, radiance, None, &[f32::INFINITY; LANES][inside]);
+                x += LANES;
             }
         }
+    }
+
+    /// Angles from a lamp to the center of the pixel in column `x` and row `y` to the right and down, and between pixels, radians.
+    fn offset(&self, disc: &Disc, x: usize, y: usize) -> [f32; 3] {
+        let per_pixel = 1.0 / self.view.camera.focal_pixels;
+        let offset = (DVec2::new(x as f64, y as f64) + 0.5 - disc.center) * per_pixel;
+        [offset.x as f32, offset.y as f32, per_pixel as f32]
     }
 }
 
@@ -189,7 +222,9 @@ impl Prepared for PreparedLamps<'_> {
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        self.glare_sources(slice).iter().for_each(|disc| self.add_glare(disc, strip));
+        for disc in self.glare_sources(slice) {
+            dispatch!(bansho_base::math::simd::level(), _simd => self.add_glare(disc, strip));
+        }
         for disc in self.discs_in(slice) {
             let rect = disc.bounds(self.view).intersection(&strip.rect);
             for y in rect.y..rect.bottom() {

@@ -26,7 +26,7 @@
 //! where nothing hides it.
 
 mod model;
-mod night;
+pub(crate) mod night;
 mod phenomenon;
 mod render;
 mod row_cache;

@@ -21,7 +21,7 @@ const MILKY_WAY_WIDTH: f64 = 0.14;
 const MILKY_WAY_K: f32 = 5200.0;
 
 /// The night sky, tabulated by elevation.
-pub(super) struct NightSky {
+pub(crate) struct NightSky {
     almucantars: Vec<Almucantar>,
     /// Radiance below the horizon.
     ground: [f32; 4],
@@ -46,7 +46,7 @@ fn with_zero([red, green, blue]: [f32; 3]) -> [f32; 4] {
 }
 
 impl NightSky {
-    pub(super) fn new(sky: &Sky, night: &Night, milky_way: f64) -> Self {
+    pub(crate) fn new(sky: &Sky, night: &Night, milky_way: f64) -> Self {
         let color = color::black_body().radiance(MILKY_WAY_K);
         let scale = milky_way * MILKY_WAY_LUMINANCE / f64::from(color::luminance(color));
         let almucantar = |step: usize| {
@@ -66,7 +66,7 @@ impl NightSky {
 
     /// Radiance in the directions of unit vectors.
     #[inline(always)]
-    pub(super) fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
+    pub(crate) fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
         let [xs, ys, zs] = &directions.components;
         let (mut steps, mut toward, mut milky_way_weights) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {

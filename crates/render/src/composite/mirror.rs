@@ -3,6 +3,8 @@
 //! The plate's depth positions its pixels in the scene. The reflected ray of a pixel is marched through the plate's own picture until it
 //! meets a surface there (screen-space reflections: McGuire & Mara 2014). Where it leaves the plate, it shows the sky.
 
+use std::ops::Range;
+
 use bansho_base::{
     camera::{Camera, Lens},
     host::{
@@ -11,7 +13,11 @@ use bansho_base::{
     },
     image::Image,
     math::{DVec2, DVec3},
-    phenomenon::{LevelMirror, strip::View, surroundings::Backdrop},
+    phenomenon::{
+        LevelMirror,
+        strip::View,
+        surroundings::{Backdrop, Reflection},
+    },
     world::sky::Sky,
 };
 
@@ -29,16 +35,19 @@ const FAR_M: f64 = 1e6;
 /// Side of a pixel of the backdrop, pixels of the picture.
 const BACKDROP_PIXEL: usize = 8;
 
+/// Side of a pixel of a plate's reflection of which only the backdrop is used, pixels of the picture.
+pub(crate) const BACKDROP_SAMPLE: usize = 2;
+
 /// The reflection in the mirror of a phenomenon.
 pub(crate) struct Mirror {
-    /// Radiance and alpha of the whole picture.
-    pub(crate) image: Image<4>,
+    /// The scene in the mirror, if the mirror needs it.
+    pub(crate) picture: Option<Reflection>,
     /// Plate and sky without the phenomena, in low resolution; `None` without a plate.
     pub(crate) backdrop: Option<Backdrop>,
 }
 
 /// The plate as `camera` sees it in a horizontal mirror: absolute radiance with coverage, and depth as the mirrored camera measures it.
-/// Transparent where the reflected ray leaves the plate; empty without a plate.
+/// Transparent where the reflected ray leaves the plate; empty without a plate. `pixel_size` is the side of the result's pixels in pixels of the plate.
 ///
 /// # Errors
 /// The observer asked to stop.
@@ -47,18 +56,19 @@ pub(crate) fn mirrored(
     camera: &Camera,
     mirror: LevelMirror,
     exposure: f32,
+    pixel_size: usize,
     observer: &dyn Observer,
 ) -> Result<PlateFrame, Cancelled> {
     let Some(color) = &plate.color else { return Ok(PlateFrame::default()) };
     let march = RayMarch { color, depth: plate.depth.as_ref(), camera, mirror, exposure };
-    let (width, rows) = (color.width(), color.height());
+    let [width, rows] = [color.width(), color.height()].map(|side| side.div_ceil(pixel_size));
     let mut radiance = Image::filled(width, rows, [0.0; 4]);
     let mut depth = Image::filled(width, rows, [f32::INFINITY]);
     let lines = radiance.pixels_mut().par_chunks_mut(width.max(1)).zip(depth.pixels_mut().par_chunks_mut(width.max(1)));
     lines.enumerate().try_for_each(|(y, (radiance, depth))| {
         observer::check(observer)?;
         for (x, (radiance, depth)) in radiance.iter_mut().zip(depth).enumerate() {
-            let pixel = DVec2::new(x as f64, y as f64) + 0.5;
+            let pixel = (DVec2::new(x as f64, y as f64) + 0.5) * pixel_size as f64;
             if let Some(reflected) = march.reflected(pixel) {
                 (*radiance, depth[0]) = (reflected.radiance, reflected.depth);
             }
@@ -69,12 +79,12 @@ pub(crate) fn mirrored(
 }
 
 /// Composites the sky behind `image`, as the camera of a mirrored `view` sees it. `scale` is the side of a pixel of `image` in pixels of the
-/// view. (In the picture itself the plate takes the role of the sky.)
-pub(crate) fn composite_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale: usize) {
+/// view, `first_row` the number of such pixels above it. (In the picture itself the plate takes the role of the sky.)
+pub(crate) fn composite_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale: usize, first_row: usize) {
     let width = image.width().max(1);
     image.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
-            let center = (DVec2::new(x as f64, y as f64) + 0.5) * scale as f64;
+            let center = (DVec2::new(x as f64, (first_row + y) as f64) + 0.5) * scale as f64;
             let uncovered = 1.0 - pixel[3];
             let Some(direction) = view.camera.direction(center).filter(|_| uncovered > 0.0) else { continue };
             let direction = DVec3::new(direction.x, direction.y.abs(), direction.z).normalize();
@@ -85,14 +95,15 @@ pub(crate) fn composite_sky(image: &mut Image<4>, view: &View, sky: &Sky, scale:
     });
 }
 
-/// Plate and sky in the mirror, in low resolution, for surfaces too rough to reflect more detail.
+/// Plate and sky in the mirror, in low resolution, for surfaces too rough to reflect more detail. The view has the resolution of the mirrored plate.
 pub(crate) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<Backdrop> {
     let fine = mirrored.color.as_ref()?;
-    let size = [fine.width(), fine.height()].map(|side| side.div_ceil(BACKDROP_PIXEL));
+    let side = BACKDROP_PIXEL / view.pixel_size;
+    let size = [fine.width(), fine.height()].map(|pixels| pixels.div_ceil(side));
     let mut coarse = Image::filled(size[0], size[1], [0.0; 4]);
     coarse.pixels_mut().par_chunks_mut(size[0].max(1)).enumerate().for_each(|(row, line)| {
         for (column, pixel) in line.iter_mut().enumerate() {
-            let (xs, ys) = (fine_pixels(column, fine.width()), fine_pixels(row, fine.height()));
+            let (xs, ys) = (fine_pixels(column, side, fine.width()), fine_pixels(row, side, fine.height()));
             let weight = 1.0 / (xs.len() * ys.len()) as f32;
             for y in ys {
                 for value in &fine.row(y)[xs.clone()] {
@@ -101,13 +112,36 @@ pub(crate) fn backdrop(mirrored: &PlateFrame, view: &View, sky: &Sky) -> Option<
             }
         }
     });
-    composite_sky(&mut coarse, view, sky, BACKDROP_PIXEL);
+    composite_sky(&mut coarse, view, sky, side, 0);
     Some(Backdrop { image: coarse, pixel_size: BACKDROP_PIXEL })
 }
 
-/// The columns or rows of the picture, which has `side` of them, in a column or row of the backdrop.
-fn fine_pixels(index: usize, side: usize) -> std::ops::Range<usize> {
-    index * BACKDROP_PIXEL..((index + 1) * BACKDROP_PIXEL).min(side)
+/// The columns or rows of a picture with `count` of them in a column or row of the backdrop, whose pixels have this side.
+fn fine_pixels(index: usize, side: usize, count: usize) -> Range<usize> {
+    index * side..((index + 1) * side).min(count)
+}
+
+/// The rows of the whole picture of `view` in which a horizontal mirror at `height` may be seen, with a margin for interpolation.
+pub(crate) fn mirror_rows(view: &View, height: f64) -> Range<usize> {
+    /// Rows above and below.
+    const MARGIN: usize = 2;
+    let (camera, [width, rows]) = (&view.camera, view.size);
+    if camera.position.y <= height {
+        return 0..0;
+    }
+    if camera.lens != Lens::Perspective {
+        return 0..rows;
+    }
+    // A pixel beyond the horizon, which the mirror may still cover partly, is counted too. How far a direction points below the horizon is convex along
+    // a row of a perspective picture: its maximum lies at an end.
+    let is_below = |x: usize, y: usize| {
+        let direction = camera.direction(DVec2::new(x as f64, y as f64 + 0.5));
+        direction.is_some_and(|direction| -direction.y * camera.focal_pixels > -2.0 * direction.length())
+    };
+    let mut seen = (0..rows).filter(|&y| is_below(0, y) || is_below(width, y));
+    let Some(first) = seen.next() else { return 0..0 };
+    let last = seen.next_back().unwrap_or(first);
+    first.saturating_sub(MARGIN)..(last + 1 + MARGIN).min(rows)
 }
 
 /// A plate through which reflected rays are marched.
@@ -306,7 +340,7 @@ mod tests {
     use bansho_base::{
         camera::CameraParameters,
         host::observer::Unobserved,
-        phenomenon::strip::Shutter,
+        phenomenon::{MirrorFinish, strip::Shutter},
         world::sky::{SkyKind, SkyParameters},
     };
 
@@ -314,7 +348,7 @@ mod tests {
 
     const SIZE: [usize; 2] = [320, 180];
     const EXPOSURE: f32 = 0.5;
-    const WET: LevelMirror = LevelMirror { height: 0.0, plate_tolerance: 0.02 };
+    const WET: LevelMirror = LevelMirror { height: 0.0, plate_tolerance: 0.02, finish: MirrorFinish::Puddles };
     /// A wall across the view, and a pillar before it, m.
     const WALL: f64 = -6.0;
     const WALL_TOP: f64 = 3.0;
@@ -368,7 +402,7 @@ mod tests {
         {
             let view = view(roll, vertical_fov_deg);
             let camera = &view.camera;
-            let seen = mirrored(&plate(&view), camera, WET, EXPOSURE, &Unobserved).unwrap();
+            let seen = mirrored(&plate(&view), camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
             let (color, depth) = (seen.color.unwrap(), seen.depth.unwrap());
             let behind = camera.mirrored(0.0);
             let (mut right, mut wrong) = (0, 0);
@@ -399,11 +433,11 @@ mod tests {
     fn the_sky_is_mirrored_above_the_wall_and_where_the_plate_ends() {
         let view = view(0.0, 60.0);
         let plate = plate(&view);
-        let mirrored = mirrored(&plate, &view.camera, WET, EXPOSURE, &Unobserved).unwrap();
+        let mirrored = mirrored(&plate, &view.camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
         let mut seen = mirrored.color.clone().unwrap();
         let parameters = SkyParameters { kind: SkyKind::Uniform, luminance: 300.0.into(), ..SkyParameters::default() };
         let sky = parameters.at(0.0);
-        composite_sky(&mut seen, &view.mirrored(0.0), &sky, 1);
+        composite_sky(&mut seen, &view.mirrored(0.0), &sky, 1, 0);
         // The lowest row looks 31 degrees down, and by the mirror over the wall and out of the picture.
         let lowest = seen.at(SIZE[0] / 2, SIZE[1] - 1);
         assert_eq!(lowest[..3], sky.radiance(DVec3::Y));
@@ -420,7 +454,7 @@ mod tests {
             matches!(met(camera.position, direction), Some((_, false)))
         };
         let foot = (0..SIZE[1]).find(is_ground).unwrap();
-        let seen = mirrored(plate, camera, mirror, EXPOSURE, &Unobserved).unwrap().color.unwrap();
+        let seen = mirrored(plate, camera, mirror, EXPOSURE, 1, &Unobserved).unwrap().color.unwrap();
         (foot..foot + rows).map(|row| f64::from(seen.at(column as usize, row)[2])).collect()
     }
 
@@ -452,15 +486,54 @@ mod tests {
         }
         let seen = |plate_tolerance: f64| {
             let wet = LevelMirror { plate_tolerance, ..WET };
-            f64::from(mirrored(&plate, camera, wet, EXPOSURE, &Unobserved).unwrap().color.unwrap().at(x, y)[2])
+            f64::from(mirrored(&plate, camera, wet, EXPOSURE, 1, &Unobserved).unwrap().color.unwrap().at(x, y)[2])
         };
         assert!((seen(0.1) - WALL).abs() < 0.2, "{} m south is not the wall", seen(0.1));
         assert!(seen(0.02) > WALL + 1.0, "{} m south is the wall", seen(0.02));
     }
 
     #[test]
+    fn a_mirror_in_larger_pixels_shows_the_centers_of_those() {
+        let view = view(0.0, 60.0);
+        let plate = plate(&view);
+        let coarse = mirrored(&plate, &view.camera, WET, EXPOSURE, 2, &Unobserved).unwrap();
+        let (fine, coarse) = (
+            mirrored(&plate, &view.camera, WET, EXPOSURE, 1, &Unobserved).unwrap().color.unwrap(),
+            coarse.color.unwrap(),
+        );
+        assert_eq!([coarse.width(), coarse.height()], [SIZE[0] / 2, SIZE[1] / 2]);
+        let differs = |&(x, y): &(usize, usize)| {
+            let mean = [0, 1, 2].map(|c| {
+                let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| fine.at(2 * x + i, 2 * y + j)[c]);
+                four.iter().sum::<f32>() / 4.0
+            });
+            (0..3).any(|c| (mean[c] - coarse.at(x, y)[c]).abs() > 0.2)
+        };
+        let pixels = (0..SIZE[0] / 2).flat_map(|x| (0..SIZE[1] / 2).map(move |y| (x, y)));
+        let different = pixels.filter(differs).count();
+        assert!(different < SIZE[0] * SIZE[1] / 4 / 20, "{different}");
+    }
+
+    #[test]
+    fn a_mirror_is_seen_in_the_rows_below_the_horizon() {
+        for roll in [0.0, 7.0, 100.0] {
+            let view = view(roll, 50.0).with_pixel_size(2);
+            let rows = mirror_rows(&view, 0.0);
+            for y in 0..view.size[1] {
+                let below = (0..view.size[0]).any(|x| {
+                    let direction = view.camera.direction(DVec2::new(x as f64, y as f64) + 0.5).unwrap();
+                    -direction.y / direction.length() * view.camera.focal_pixels > -0.5
+                });
+                assert!(!below || rows.contains(&y), "{roll} {y} {rows:?}");
+            }
+            assert!(roll != 0.0 || rows.len() < view.size[1] / 2 + 20, "{rows:?}");
+            assert_eq!(mirror_rows(&view, 5.0), 0..0, "from below");
+        }
+    }
+
+    #[test]
     fn without_a_plate_nothing_is_mirrored() {
-        let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, EXPOSURE, &Unobserved).unwrap();
+        let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
         assert!(seen.color.is_none() && seen.depth.is_none());
     }
 }

@@ -39,6 +39,7 @@ struct MirrorKey {
     plate: PlateKey,
     mirror: LevelMirror,
     exposure_scale: f32,
+    pixel_size: usize,
 }
 
 impl PlateCache {
@@ -74,7 +75,7 @@ impl PlateCache {
         Ok(frame)
     }
 
-    /// The last plate as seen in a horizontal mirror.
+    /// The last plate as seen in a horizontal mirror, in pixels `pixel_size` times as wide and high as those of the plate.
     ///
     /// # Errors
     /// The observer asked to stop.
@@ -82,16 +83,18 @@ impl PlateCache {
         &mut self,
         plan: &Plan,
         mirror: LevelMirror,
+        pixel_size: usize,
         observer: &dyn Observer,
     ) -> Result<Arc<PlateFrame>, Cancelled> {
         let Some((plate_key, plate)) = &self.last else { return Ok(Arc::default()) };
-        let key = MirrorKey { plate: *plate_key, mirror, exposure_scale: plan.exposure_scale() };
+        let key = MirrorKey { plate: *plate_key, mirror, exposure_scale: plan.exposure_scale(), pixel_size };
         if let Some((known, frame)) = &self.mirrored
             && *known == key
         {
             return Ok(frame.clone());
         }
-        let frame = Arc::new(mirror::mirrored(plate, &plate_key.camera, mirror, key.exposure_scale, observer)?);
+        let seen = mirror::mirrored(plate, &plate_key.camera, mirror, key.exposure_scale, pixel_size, observer)?;
+        let frame = Arc::new(seen);
         self.mirrored = Some((key, frame.clone()));
         Ok(frame)
     }

@@ -2,6 +2,7 @@
 
 mod continuing;
 mod data;
+mod reflection;
 mod snapshot;
 pub(crate) mod stepping;
 
@@ -17,7 +18,7 @@ use bansho_base::{
     math::DVec3,
     parameters::BuildError,
     phenomenon::{
-        LevelMirror, Prepared, SnapshotError,
+        Prepared, SnapshotError,
         strip::{Shutter, View},
         surroundings::{Publication, Surroundings},
     },
@@ -29,7 +30,7 @@ use crate::{
     composite::{
         background::Background,
         hiding::HidingDepth,
-        mirror::{self, Mirror},
+        mirror::Mirror,
         plate::PlateFrame,
         plate_cache::PlateCache,
         refraction,
@@ -41,6 +42,7 @@ use crate::{
 };
 
 pub use data::PhenomenonLight;
+use reflection::SceneMirror;
 
 /// Why a frame cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -186,18 +188,23 @@ impl Shot {
             let plate = self.plates.frame(compiled, plan, self.number);
             plate.map_err(|error| RenderError::Plate(Box::new(error)))?
         };
-        let mirrored = match self.mirror() {
-            Some((_, mirror)) => self.plates.mirrored(&self.context.plan, mirror, observer)?,
+        let mut view = self.context.plan.view_at(self.time);
+        let preparing = StageGuard::begin(observer, Stage::Prepare);
+        let publications = self.publications(view.shutter, observer);
+        let mirrored = match self.mirror(&view, &publications) {
+            Some(SceneMirror { mirror, pixel_size, .. }) => {
+                self.plates.mirrored(&self.context.plan, mirror, pixel_size, observer)?
+            }
             None => Arc::default(),
         };
-        let mut view = self.context.plan.view_at(self.time);
+        drop(preparing);
         let recycled = self.recycled.take();
-        let frame = match self.compose(&view, &plate, &mirrored, recycled, observer)? {
+        let frame = match self.compose(&view, &plate, &mirrored, &publications, recycled, observer)? {
             Some(frame) => frame,
             None => {
                 let all = Rect::from_size(view.size[0], view.size[1]);
                 view = view.with_window(all);
-                let whole = self.compose(&view, &plate, &mirrored, None, observer)?;
+                let whole = self.compose(&view, &plate, &mirrored, &publications, None, observer)?;
                 whole.and_then(|whole| crop(whole, self.context.plan.window)).ok_or(Cancelled)?
             }
         };
@@ -260,13 +267,13 @@ impl Shot {
         view: &View,
         plate: &PlateFrame,
         mirrored: &PlateFrame,
+        publications: &[Publication],
         recycled: Option<Frame>,
         observer: &dyn Observer,
     ) -> Result<Option<Frame>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let publications = self.publications(view.shutter, observer);
-        let reflection = self.reflection(view, mirrored, &publications, observer)?;
-        let surroundings = self.surroundings(view, &publications, reflection.as_ref());
+        let reflection = self.reflection(view, mirrored, publications, observer)?;
+        let surroundings = self.surroundings(view, publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.runs.len()).collect();
         let runs: Vec<&ActiveRun> = self.runs.iter().collect();
         let PreparedSlices { slices, prepared } = self.prepare(&all, view, &surroundings, false, observer)?;
@@ -324,52 +331,6 @@ impl Shot {
         each.filter(|(_, entries)| !entries.is_empty())
             .map(|(phenomenon, entries)| PhenomenonMetadata { phenomenon, entries })
             .collect()
-    }
-
-    /// The first mirror, and the index of its phenomenon.
-    fn mirror(&self) -> Option<(usize, LevelMirror)> {
-        let mirrors = self.runs.iter().enumerate();
-        mirrors.filter_map(|(index, each)| Some((index, each.info().mirror?))).next()
-    }
-
-    /// The reflection in the first mirror: all other phenomena, in front of the `mirrored` plate.
-    fn reflection(
-        &self,
-        view: &View,
-        mirrored: &PlateFrame,
-        publications: &[Publication],
-        observer: &dyn Observer,
-    ) -> Result<Option<Mirror>, RenderError> {
-        let Some((mirror_index, mirror)) = self.mirror() else { return Ok(None) };
-        let view = view.mirrored(mirror.height);
-        let surroundings = self.surroundings(&view, publications, None);
-        let others: Vec<usize> = (0..self.runs.len()).filter(|&index| index != mirror_index).collect();
-        let runs: Vec<&ActiveRun> = others.iter().map(|&index| &self.runs[index]).collect();
-        let PreparedSlices { slices, prepared } = self.prepare(&others, &view, &surroundings, true, observer)?;
-        let composition = Composition {
-            outputs: Outputs::RADIANCE,
-            is_mirrored: true,
-            observer,
-            view: &view,
-            runs: &runs,
-            prepared: &prepared,
-            slices: &slices,
-            plate: mirrored,
-            hiding: &HidingDepth::new(&prepared, mirrored),
-            background: Background::plate(mirrored),
-            scratches: &self.scratches,
-        };
-        let mut image = strips::draw_frame(&composition, self.context.header(self.number, self.time), None)?.beauty;
-        let part = StagePart { stage: Stage::Draw, phenomenon: None, is_mirrored: true };
-        let _part = PartGuard::begin(observer, part);
-        let sky = self.context.sky(view.shutter.middle());
-        // An invisible sky lights the ground, but is not reflected in still water.
-        let is_visible = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
-        if is_visible && mirrored.color.is_some() {
-            mirror::composite_sky(&mut image, &view, &sky, 1);
-        }
-        let backdrop = mirror::backdrop(mirrored, &view, &sky);
-        Ok(Some(Mirror { image, backdrop }))
     }
 
     /// Prepares the phenomena with the indices `which`, and cuts them into slices, whose members are positions in `which`.

@@ -22,7 +22,7 @@ pub(crate) fn surroundings<'a>(
         wind: &context.wind,
         air: &context.plan.scene.air,
         sky: context.sky(shutter.middle()),
-        reflection: mirror.map(|mirror| &mirror.image),
+        reflection: mirror.and_then(|mirror| mirror.picture.as_ref()),
         backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
         others: others(context, publications, index, shutter),
     }

@@ -1,0 +1,125 @@
+//! What is known of the ground from earlier frames: its pattern while the camera stands still, and its light while the lights do not change either.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use bansho_base::{
+    camera::Camera,
+    image::{Image, Rect},
+    math::simd::LANES,
+    phenomenon::{
+        strip::View,
+        surroundings::{Light, Occluder},
+    },
+    world::sky::Sky,
+};
+
+use super::surface::SurfaceSamples;
+
+/// Largest window whose rows are kept, pixels. A pixel takes 24 bytes of pattern or 16 bytes of light, so a view at most 100 MB.
+const MAX_CACHED_PIXELS: usize = 1 << 22;
+
+/// Light of the ground in sixteen pixels that does not depend on the picture in its mirror: red, green and blue, and the weight of that picture.
+pub(super) type GroundLightBatch = [[f32; LANES]; 4];
+
+/// A row of the window in batches of sixteen pixels, which the strip that first draws it computes.
+type Rows<T> = Vec<OnceLock<Vec<T>>>;
+
+/// What the pattern depends on, apart from the ground.
+#[derive(Clone, Debug, PartialEq)]
+struct ViewInputs {
+    camera: Camera,
+    size: [usize; 2],
+    window: Rect,
+    has_film: bool,
+}
+
+/// What the light depends on, apart from the ground and the view.
+#[derive(Clone, Debug)]
+pub(super) struct LightInputs {
+    pub(super) wetness: f64,
+    pub(super) lights: Vec<Light>,
+    pub(super) shadow_casters: Vec<Occluder>,
+    pub(super) sky: Sky,
+    pub(super) backdrop: Option<Image<4>>,
+}
+
+impl PartialEq for LightInputs {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { wetness, lights, shadow_casters, sky, backdrop } = self;
+        *wetness == other.wetness
+            && *lights == other.lights
+            && *sky == other.sky
+            && shadow_casters.len() == other.shadow_casters.len()
+            && shadow_casters.iter().zip(&other.shadow_casters).all(|(a, b)| is_same_occluder(a, b))
+            && *backdrop == other.backdrop
+    }
+}
+
+/// Whether two occluders are the same. Distance fields are compared by their place in memory, since they are large.
+fn is_same_occluder(a: &Occluder, b: &Occluder) -> bool {
+    match (a, b) {
+        (Occluder::Mesh { distance, placement }, Occluder::Mesh { distance: other, placement: at }) => {
+            Arc::ptr_eq(distance, other) && placement == at
+        }
+        _ => a == b,
+    }
+}
+
+/// A view in recent frames.
+#[derive(Debug)]
+struct KnownView {
+    view: ViewInputs,
+    light: LightInputs,
+    rows: KnownRows,
+}
+
+/// The rows that are kept of a view.
+#[derive(Clone, Debug)]
+pub(super) enum KnownRows {
+    /// None: in the first frame with this camera, which may be moving.
+    None,
+    /// The pattern, while lights change.
+    Pattern(Arc<Rows<SurfaceSamples>>),
+    /// The light, while nothing changes.
+    Light(Arc<Rows<GroundLightBatch>>),
+}
+
+/// Recent views of a ground.
+#[derive(Debug, Default)]
+pub(super) struct GroundRowCache(Mutex<Vec<KnownView>>);
+
+impl GroundRowCache {
+    /// Views kept: a window, and the whole picture that is drawn instead where air refracts light.
+    const CAPACITY: usize = 2;
+
+    /// The rows of a view, at first empty.
+    pub(super) fn rows(&self, view: &View, has_film: bool, light: LightInputs) -> KnownRows {
+        let inputs = ViewInputs { camera: view.camera, size: view.size, window: view.window, has_film };
+        if view.window.width * view.window.height > MAX_CACHED_PIXELS {
+            return KnownRows::None;
+        }
+        // The list is always consistent, so a poisoned lock is usable.
+        let mut recent = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(index) = recent.iter().position(|known| known.view == inputs) else {
+            recent.insert(0, KnownView { view: inputs, light, rows: KnownRows::None });
+            recent.truncate(Self::CAPACITY);
+            return KnownRows::None;
+        };
+        recent[..=index].rotate_right(1);
+        let known = &mut recent[0];
+        let is_lit_alike = known.light == light;
+        known.light = light;
+        let height = view.window.height;
+        match &known.rows {
+            KnownRows::Light(_) if is_lit_alike => {}
+            KnownRows::Pattern(_) if !is_lit_alike => {}
+            _ if is_lit_alike => known.rows = KnownRows::Light(empty_rows(height)),
+            _ => known.rows = KnownRows::Pattern(empty_rows(height)),
+        }
+        known.rows.clone()
+    }
+}
+
+fn empty_rows<T>(height: usize) -> Arc<Rows<T>> {
+    Arc::new((0..height).map(|_| OnceLock::new()).collect())
+}
