@@ -73,7 +73,11 @@ fn sixteen_pixels_are_as_bright_as_each() {
         }
         assert!(count > fast.len() / 3, "{count}");
         // Largest where a film or a bump is cut by the edge of its octave.
-        assert!(sum / (count as f64) < 1e-3 && worst < 0.1, "{parameters:?}: mean {}, largest {worst}", sum / count as f64);
+        assert!(
+            sum / (count as f64) < 1e-3 && worst < 0.1,
+            "{parameters:?}: mean {}, largest {worst}",
+            sum / count as f64
+        );
     }
 }
 

@@ -65,9 +65,8 @@ pub(super) struct ArrivingLight<S: Simd> {
 impl GroundLight {
     pub(super) fn new(light: &Light, camera: DVec3) -> Self {
         let single = |vector: DVec3| vector.as_vec3().to_array();
-        let offset = |position: DVec3| {
-            single((position - camera).clamp(DVec3::splat(-MAX_OFFSET), DVec3::splat(MAX_OFFSET)))
-        };
+        let offset =
+            |position: DVec3| single((position - camera).clamp(DVec3::splat(-MAX_OFFSET), DVec3::splat(MAX_OFFSET)));
         let geometry = match light.emitter {
             Emitter::Directional { toward } => Geometry::Directional(single(toward)),
             Emitter::Point { position, radius } => {
@@ -88,12 +87,7 @@ impl GroundLight {
         let (offset, radius, cone) = match &self.geometry {
             Geometry::Directional([x, y, z]) => {
                 let toward = [splat(*x), splat(*y), splat(*z)];
-                return ArrivingLight {
-                    factor: splat(1.0),
-                    toward,
-                    distance: splat(0.0),
-                    angular_radius: splat(0.0),
-                };
+                return ArrivingLight { factor: splat(1.0), toward, distance: splat(0.0), angular_radius: splat(0.0) };
             }
             Geometry::Near { offset, radius, cone } => (offset, *radius, cone),
         };
@@ -214,7 +208,10 @@ mod tests {
             for i in 0..LANES {
                 let exact = light.incident_light(camera + DVec3::from(places[i]));
                 let found = 5.0 * factors[i];
-                assert!((found - exact.illuminance[0]).abs() <= 2e-5 * exact.illuminance[0].max(1e-3), "{emitter:?} {i}");
+                assert!(
+                    (found - exact.illuminance[0]).abs() <= 2e-5 * exact.illuminance[0].max(1e-3),
+                    "{emitter:?} {i}"
+                );
                 assert!((f64::from(ys[i]) - exact.toward.y).abs() < 1e-5, "{emitter:?} {i}");
             }
         }

@@ -77,7 +77,11 @@ mod tests {
         for i in 0..LANES {
             let exact = whole.sample_bilinear(DVec2::new(f64::from(xs[i]), f64::from(ys[i])) / 2.0);
             for c in 0..3 {
-                assert!((planes[c][i] - exact[c]).abs() < 1e-3 * exact[c].max(1.0), "{i} {c}: {} {exact:?}", planes[c][i]);
+                assert!(
+                    (planes[c][i] - exact[c]).abs() < 1e-3 * exact[c].max(1.0),
+                    "{i} {c}: {} {exact:?}",
+                    planes[c][i]
+                );
             }
         }
     }

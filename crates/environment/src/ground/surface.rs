@@ -255,8 +255,7 @@ mod tests {
     fn samples(surface: &Surface, origin: DVec2, at: impl Fn(usize) -> [f64; 2], footprint: f32) -> SurfaceSamples {
         let at: [[f64; 2]; LANES] = std::array::from_fn(at);
         let offset = [0, 1].map(|axis| at.map(|position| position[axis] as f32));
-        let positions =
-            GroundPositions { origin, offset: [&offset[0], &offset[1]], footprint: &[footprint; LANES] };
+        let positions = GroundPositions { origin, offset: [&offset[0], &offset[1]], footprint: &[footprint; LANES] };
         dispatch!(Level::new(), _simd => surface.samples(positions, true))
     }
 
@@ -318,7 +317,8 @@ mod tests {
         for far in [0.0, 1e6, -3e7] {
             let at = |i: usize| [0.13 * i as f64, 2.0 - 0.2 * i as f64];
             let here = samples(&surface, DVec2::new(far, -far), at, 0.004);
-            let there = samples(&surface, DVec2::new(far - 3.0, 1.5 - far), |i| [at(i)[0] + 3.0, at(i)[1] - 1.5], 0.004);
+            let there =
+                samples(&surface, DVec2::new(far - 3.0, 1.5 - far), |i| [at(i)[0] + 3.0, at(i)[1] - 1.5], 0.004);
             for i in 0..LANES {
                 assert!((here.shade[i] / there.shade[i] - 1.0).abs() < 2e-3, "{far}: {here:?} {there:?}");
                 assert!((here.tilt[0][i] - there.tilt[0][i]).abs() < 1e-4);

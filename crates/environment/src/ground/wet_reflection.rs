@@ -64,8 +64,8 @@ impl<R: Real> Microfacets<R> {
         let facets = self.film.fma(facets[0] - facets[1], facets[1]);
         let cos_squared = y * y / length_squared;
         let cos_incidence = vx.fma(x, vy.fma(y, vz * z)) / length_squared.simd_sqrt();
-        let lobe = fresnel(cos_incidence) * facets
-            / (splat(4.0) * vy.simd_max(splat(1e-3)) * (cos_squared * cos_squared));
+        let lobe =
+            fresnel(cos_incidence) * facets / (splat(4.0) * vy.simd_max(splat(1e-3)) * (cos_squared * cos_squared));
         let lit = splat(0.0).select_lt(ly, lobe, splat(0.0));
         splat(0.0).select_lt(vy, lit, splat(0.0))
     }
@@ -165,9 +165,7 @@ mod tests {
         let (light, viewer) = (DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.6, 0.8, 0.1).normalize());
         let half = (light + viewer).normalize();
         let tilt = DVec2::new(-half.x, -half.z) / half.y;
-        let tilted = |tilt: DVec2| {
-            lobe(&Microfacets { tilt: tilt.as_vec2().to_array(), ..even(0.03) }, light, viewer)
-        };
+        let tilted = |tilt: DVec2| lobe(&Microfacets { tilt: tilt.as_vec2().to_array(), ..even(0.03) }, light, viewer);
         assert!(tilted(tilt) > tilted(DVec2::ZERO) && tilted(tilt) > tilted(2.0 * tilt));
     }
 
