@@ -127,11 +127,6 @@ impl Surface {
         Microfacets { tilt, slopes: [math::sqrt(unresolved_variance), grain], film: MAX_FILM_FRACTION * film }
     }
 
-    /// Mean slope of wet ground, films and grains together.
-    fn mean_slope(&self) -> f64 {
-        math::lerp(GRAIN_SLOPE_RATIO, 1.0, 0.5 * MAX_FILM_FRACTION) * self.roughness
-    }
-
     /// Fraction of puddles: water collects where the relief is low.
     fn puddle_fraction(&self, relief: f64) -> f64 {
         // The normal quantile at a probability p is approximately the logistic one.
@@ -290,7 +285,7 @@ struct Hit {
 }
 
 /// One frame of the ground.
-pub struct PixelByPixel<'a> {
+pub(crate) struct PixelByPixel<'a> {
     parameters: &'a GroundParameters,
     view: &'a View,
     surroundings: &'a Surroundings<'a>,
@@ -301,7 +296,7 @@ pub struct PixelByPixel<'a> {
 
 impl<'a> PixelByPixel<'a> {
     /// The ground of a view.
-    pub fn new(
+    pub(crate) fn new(
         parameters: &'a GroundParameters,
         seed: u64,
         view: &'a View,
@@ -322,7 +317,7 @@ impl<'a> PixelByPixel<'a> {
     }
 
     /// Draws it into a strip.
-    pub fn draw(&self, strip: &mut Strip) {
+    pub(crate) fn draw(&self, strip: &mut Strip) {
         let rect = strip.rect;
         for index in 0..strip.len() {
             let pixel = DVec2::new((rect.x + index % rect.width) as f64, (rect.y + index / rect.width) as f64) + 0.5;

@@ -16,7 +16,7 @@ use bansho_base::{
 use bansho_environment::ground::{GroundKind, GroundParameters};
 
 /// A camera that looks down at ground, from a place far from the origin.
-pub fn view(size: [usize; 2]) -> View {
+pub(crate) fn view(size: [usize; 2]) -> View {
     let camera = CameraParameters {
         position: [1203.3, 1.5, -810.0].into(),
         target: [1202.4, 1.0, -818.0].into(),
@@ -27,7 +27,7 @@ pub fn view(size: [usize; 2]) -> View {
 }
 
 /// Two headlights and two street lamps under a dusky sky.
-pub fn surroundings<'a>(wind: &'a Wind, reflection: Option<&'a Reflection>) -> Surroundings<'a> {
+pub(crate) fn surroundings<'a>(wind: &'a Wind, reflection: Option<&'a Reflection>) -> Surroundings<'a> {
     let sky = SkyParameters { kind: SkyKind::Overcast, luminance: 0.5.into(), ..SkyParameters::default() };
     let mut surroundings = Surroundings { sky: sky.at(0.0), reflection, ..Surroundings::from_wind(wind) };
     let at = |x: f64, y: f64, z: f64| DVec3::new(1202.0 + x, y, -816.0 + z);
@@ -45,7 +45,7 @@ pub fn surroundings<'a>(wind: &'a Wind, reflection: Option<&'a Reflection>) -> S
 }
 
 /// A smooth picture in the mirror.
-pub fn reflection(size: [usize; 2], pixel_size: usize) -> Reflection {
+pub(crate) fn reflection(size: [usize; 2], pixel_size: usize) -> Reflection {
     let [width, height] = size.map(|side| side.div_ceil(pixel_size));
     let first_row = height / 5;
     let pixels = (first_row..height).flat_map(|y| {
@@ -56,7 +56,7 @@ pub fn reflection(size: [usize; 2], pixel_size: usize) -> Reflection {
 }
 
 /// Wet asphalt with puddles.
-pub fn street() -> GroundParameters {
+pub(crate) fn street() -> GroundParameters {
     GroundParameters {
         color: [0.045, 0.046, 0.05],
         texture: 0.4,
@@ -68,6 +68,6 @@ pub fn street() -> GroundParameters {
 }
 
 /// A lake with small waves.
-pub fn lake() -> GroundParameters {
+pub(crate) fn lake() -> GroundParameters {
     GroundParameters { kind: GroundKind::Water, waves: 0.01, ..GroundParameters::default() }
 }
