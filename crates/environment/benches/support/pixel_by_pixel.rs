@@ -127,7 +127,6 @@ impl Surface {
         Microfacets { tilt, slopes: [math::sqrt(unresolved_variance), grain], film: MAX_FILM_FRACTION * film }
     }
 
-
     /// Fraction of puddles: water collects where the relief is low.
     fn puddle_fraction(&self, relief: f64) -> f64 {
         // The normal quantile at a probability p is approximately the logistic one.

@@ -97,7 +97,7 @@ impl GroundLight {
         let toward = [x * per_distance, y * per_distance, z * per_distance];
         let mut factor = splat(1.0) / square.simd_max(splat((radius * radius).max(1e-12)));
         if let Some(cone) = cone {
-            factor = factor * cone.falloff(&toward);
+            factor *= cone.falloff(&toward);
         }
         let distance = square * per_distance;
         let angular_radius = splat(radius) / distance.simd_max(splat(radius.max(1e-12)));

@@ -196,7 +196,7 @@ impl PreparedGround<'_> {
         if let Some(shadows) = shadows {
             let open = Lanes::from_slice(simd, &shadows.sky_visibility());
             for c in 0..3 {
-                light.illuminance[c] = light.illuminance[c] * open;
+                light.illuminance[c] *= open;
             }
         }
         if let Some(film) = film {
@@ -232,7 +232,7 @@ impl PreparedGround<'_> {
         };
         let mut weight = fresnel(rise);
         if let Some(shadows) = shadows {
-            weight = weight * Lanes::from_slice(simd, &shadows.far_visibility(&toward, slope));
+            weight *= Lanes::from_slice(simd, &shadows.far_visibility(&toward, slope));
         }
         let mut reflected = [weight; 3];
         for c in 0..3 {
@@ -279,7 +279,7 @@ impl PreparedGround<'_> {
                 continue;
             }
             if let Some(shadows) = shadows {
-                factor = factor * Lanes::from_slice(simd, &shadows.visibility(light, &arriving, &whole));
+                factor *= Lanes::from_slice(simd, &shadows.visibility(light, &arriving, &whole));
             }
             let facing = factor * arriving.toward[1].simd_max(Lanes::splat(simd, 0.0));
             for c in 0..3 {
