@@ -10,6 +10,8 @@
 //! that is all of it. Each is the median over the frames after the first. `--check` compares the ratios of the scenes with those of a file,
 //! `--record` writes it.
 
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program of its own")]
+
 mod arguments;
 mod clock;
 mod measure;

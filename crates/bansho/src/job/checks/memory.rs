@@ -53,8 +53,8 @@ impl BytesPerPixel {
         let frame = FRAME_BYTES + depth + 4.0 * channels as f64;
         // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
         let written = match request.display {
-            Some(BitDepth::Eight) => 4.0 + 3.0 + 4.0,
-            Some(BitDepth::Sixteen) => 8.0 + 6.0 + 8.0,
+            Some(BitDepth::Eight) => 4.0 + 3.0 + 2.0,
+            Some(BitDepth::Sixteen) => 8.0 + 6.0 + 5.0,
             None => 12.0 + 3.0 * channels as f64,
         };
         // One frame is written while another one is drawn, in the memory of the former where it is large and its pixels are no longer needed
@@ -65,9 +65,9 @@ impl BytesPerPixel {
         let (drawn, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
         let drawn = drawn as f64 * frame + encoded as f64 * written;
         let plate = if plan.scene().has_plate() { FRAME_BYTES + DEPTH_BYTES } else { 0.0 };
-        // The mirrored picture, its blurred version, and the plate in it.
+        // The mirrored picture and the plate in it.
         let has_mirror = compiled.phenomena().any(|phenomenon| phenomenon.info().mirror.is_some());
-        let mirror = if has_mirror { 2.0 * FRAME_BYTES + plate } else { 0.0 };
+        let mirror = if has_mirror { FRAME_BYTES + plate } else { 0.0 };
         Self { drawn, whole: plate + mirror }
     }
 
