@@ -6,7 +6,7 @@ use std::{
     sync::atomic::{AtomicU8, Ordering},
 };
 
-use fearless_simd::{Level, prelude::*};
+use fearless_simd::Level;
 
 /// A set of SIMD instructions for which kernels are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -129,6 +129,7 @@ impl VectorLevel {
     /// The proof that the machine has the instructions.
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     fn proof(self) -> Option<Level> {
+        use fearless_simd::Simd;
         let widest = widest();
         match self {
             Self::Sse2 => widest.as_sse2().map(Simd::level),
@@ -185,7 +186,7 @@ impl FromStr for VectorLevel {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::dispatch;
+    use fearless_simd::{Simd, dispatch};
 
     use super::*;
 
