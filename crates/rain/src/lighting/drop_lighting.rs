@@ -37,6 +37,12 @@ impl ScatteringTable {
         self.at_position(Self::position(cos_deviation))
     }
 
+    /// The value at the sine of half the scattering angle (0 to 1), 1/sr.
+    #[inline(always)]
+    pub(super) fn at_half_sine(&self, half_sine: f32) -> [f32; 3] {
+        self.at_position(half_sine * TABLE_STEPS as f32)
+    }
+
     /// Table position for the cosine of the scattering angle.
     #[inline(always)]
     fn position(cos_deviation: f32) -> f32 {
