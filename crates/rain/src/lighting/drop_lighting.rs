@@ -68,8 +68,8 @@ pub(crate) struct DropLighting<'a> {
 
 impl DropLighting<'_> {
     /// Mean radiance of a drop at `point` by one light, seen along `direction` (unit vector from the eye), ACEScg, cd/m^2:
-    /// `E p / (4 pi)`.
-    #[inline(always)]
+    /// `E p / (4 pi)`: the scalar twin of [`add`](Self::add).
+    #[cfg(test)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
         let IncidentLight { illuminance, toward, distance } = light.incident_light(point);
         if illuminance == [0.0; 3] {

@@ -264,3 +264,127 @@ impl SightLineIntegrator<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math;
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::{
+        Rain, RainParameters,
+        drops::shutter_state::ShutterState,
+        lighting::{drop_lighting::DropLighting, extinction::RainExtinction},
+        tests::{view_at, wind},
+    };
+    use bansho_base::phenomenon::surroundings::Surroundings;
+
+    const DISTANCES: [f64; 8] = [0.0, 0.5, 1.3, 2.9, 5.2, 8.4, 21.0, 60.0];
+
+    /// One light at a time, one sample at a time, in double precision, with tangents.
+    fn naive(lighting: &DropLighting, profile: &ExtinctionProfile, eye: DVec3, line: DVec3, k: usize) -> [f64; 3] {
+        let light = &lighting.lights[0];
+        let [from, to] = [DISTANCES[k], DISTANCES[k + 1]];
+        let sample = |at: f64, length: f64| {
+            let point = eye + line * at;
+            let is_over_ground = point.y >= profile.shutter_state.ground;
+            let weight = profile.at(at) * length * math::exp(-0.01 * at) * f64::from(u8::from(is_over_ground));
+            lighting.radiance(light, point, line).map(|value| f64::from(value) * weight)
+        };
+        let Some(position) = light.emitter.position() else { return sample(0.5 * (from + to), to - from) };
+        let nearest = (position - eye).dot(line);
+        let h = (position - eye - line * nearest).length().max(MIN_LAMP_DISTANCE);
+        let [first, last] = [from, to].map(|s| math::atan((s - nearest) / h));
+        let samples = ((last - first) / f64::from(SAMPLE_ANGLE)).ceil().max(1.0);
+        let step = (last - first) / samples;
+        (0..samples as usize).fold([0.0; 3], |sum: [f64; 3], index| {
+            let offset = h * math::tan(first + step * (index as f64 + 0.5));
+            let light = sample(nearest + offset, step * (h * h + offset * offset) / h);
+            std::array::from_fn(|c| sum[c] + light[c])
+        })
+    }
+
+    #[test]
+    fn sixteen_samples_at_a_time_give_what_tangents_give_one_by_one() {
+        let rain = Rain::new(RainParameters::default(), "rain", 1, None).unwrap();
+        let (view, calm) = (view_at(1.0, 1.0 / 60.0, [64, 36]), wind([0.0; 3], 0.0));
+        let shutter_state = ShutterState::new(&rain, &view, &Surroundings::from_wind(&calm));
+        let extinction = RainExtinction { all: 0.02, streaks: 0.008 };
+        let profile = ExtinctionProfile { shutter_state: &shutter_state, extinction };
+        let eye = DVec3::new(300.0, 1.6, -200.0);
+        let interval = |pair: &[f64]| Interval {
+            start: pair[0],
+            width: (pair[1] - pair[0]) as f32,
+            depth: (0.01 * pair[0]) as f32,
+            depth_slope: 0.01,
+        };
+        let intervals: Vec<Interval> = DISTANCES.windows(2).map(interval).collect();
+        let position = eye + DVec3::new(0.4, 2.0, -7.0);
+        let axis = DVec3::new(0.1, -1.0, 0.2).normalize();
+        let emitters = [
+            Emitter::Point { position, radius: 0.05 },
+            Emitter::Spot { position, axis, cos_inner: 0.9, cos_outer: 0.6 },
+            Emitter::Directional { toward: DVec3::new(0.6, 0.8, 0.0) },
+        ];
+        let mut lit = 0;
+        for emitter in emitters {
+            let lights = [Light { emitter, intensity: [900.0, 500.0, 200.0] }];
+            let lighting = DropLighting { scattering: &rain.optics.scattering, lights: &lights, extinction: 0.02 };
+            let integrator = SightLineIntegrator {
+                scattering: lighting.scattering,
+                extinction: profile,
+                light_extinction: 0.02,
+                intervals: &intervals,
+                eye,
+                eye_height: (eye.y - shutter_state.ground) as f32,
+            };
+            for line in [[0.4, 2.0, -7.0], [0.0, 0.0, -1.0], [0.1, -0.3, -1.0], [0.41, 1.6, -7.0], [1.0, 0.2, 1.0]] {
+                let line = DVec3::from(line).normalize();
+                let mut sums = [[0.0; 4]; DISTANCES.len()];
+                dispatch!(Level::new(), _simd => integrator.accumulate(line, &lights, &mut sums));
+                let mut expected = [0.0; 3];
+                for k in 0..intervals.len() {
+                    let light = naive(&lighting, &profile, eye, line, k);
+                    for c in 0..3 {
+                        expected[c] += light[c];
+                        let found = f64::from(sums[k + 1][c]);
+                        assert!(
+                            (found - expected[c]).abs() <= 2e-3 * expected[c] + 1e-9,
+                            "{emitter:?} {line} {k}: {found} {}",
+                            expected[c]
+                        );
+                    }
+                    lit += usize::from(light[0] > 0.0);
+                }
+                let mut scalar = [[0.0; 4]; DISTANCES.len()];
+                bansho_base::dispatch_baseline!(_simd => integrator.accumulate(line, &lights, &mut scalar));
+                assert_eq!(sums, scalar, "at every vector width");
+            }
+        }
+        assert!(lit > 60, "{lit}");
+    }
+
+    #[test]
+    fn lamps_anywhere_give_finite_light() {
+        let rain = Rain::new(RainParameters::default(), "rain", 1, None).unwrap();
+        let (view, calm) = (view_at(1.0, 1.0 / 60.0, [64, 36]), wind([0.0; 3], 0.0));
+        let shutter_state = ShutterState::new(&rain, &view, &Surroundings::from_wind(&calm));
+        let extinction = RainExtinction { all: 0.02, streaks: 0.008 };
+        let intervals = [Interval { start: 0.0, width: 1e4, depth: 0.0, depth_slope: 0.02 }];
+        let integrator = SightLineIntegrator {
+            scattering: &rain.optics.scattering,
+            extinction: ExtinctionProfile { shutter_state: &shutter_state, extinction },
+            light_extinction: 0.02,
+            intervals: &intervals,
+            eye: DVec3::ZERO,
+            eye_height: 1.0,
+        };
+        for offset in [0.0, 1e-30, 1e-3, 1e4, 9e8, 1e12, 1e200] {
+            let emitter = Emitter::Point { position: DVec3::new(0.0, 0.0, -offset), radius: 0.0 };
+            let mut sums = [[0.0; 4]; 2];
+            let lights = [Light { emitter, intensity: [1e6; 3] }];
+            dispatch!(Level::new(), _simd => integrator.accumulate(DVec3::NEG_Z, &lights, &mut sums));
+            assert!(sums.iter().flatten().all(|value| value.is_finite() && *value >= 0.0), "{offset}: {sums:?}");
+        }
+    }
+}

@@ -9,8 +9,8 @@ use bansho_base::{
 };
 
 use super::{
-    in_scattering::{HALO_RADIUS, LampHalo},
     equiangular::MIN_LAMP_DISTANCE,
+    in_scattering::{HALO_RADIUS, LampHalo},
     ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
 };
 use crate::lanes::{Lanes, ZERO_LANES, fast_max, fast_min, smoothstep};
@@ -61,7 +61,10 @@ impl HaloCorrector<'_> {
         // Distances are at least depths, so that light up to nearer distances is not needed.
         let indices = self.table.interval(self.slice.near as f32).saturating_sub(1)..self.table.lit_distances();
         let indices = indices.start.min(indices.end.saturating_sub(2))..indices.end;
-        let grids = [(&halo.tiles, &halo.in_scattering, &mut rows.coarse), (&halo.fine_tiles, &halo.fine_in_scattering, &mut rows.fine)];
+        let grids = [
+            (&halo.tiles, &halo.in_scattering, &mut rows.coarse),
+            (&halo.fine_tiles, &halo.fine_in_scattering, &mut rows.fine),
+        ];
         for (tiles, in_scattering, sums) in grids {
             let row = tiles.row_at(y as f32 + 0.5);
             in_scattering.interpolate_rows(tiles, row, 0..tiles.size[0], indices.clone(), sums);

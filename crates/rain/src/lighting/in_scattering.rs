@@ -13,7 +13,7 @@ use bansho_base::{
     math::{DVec2, DVec3, MulAdd},
     phenomenon::{
         strip::{DepthInterval, View},
-        surroundings::{Emitter, Light},
+        surroundings::Light,
     },
 };
 use fearless_simd::{Level, dispatch};

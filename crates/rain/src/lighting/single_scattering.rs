@@ -155,9 +155,7 @@ impl<'a> SingleScattering<'a> {
             }
             let bounds = self.bounds(has_plate);
             let corrector = HaloCorrector { halo, bounds, table: &self.table, lit_end: self.end, slice };
-            let mut compute = |y: usize, columns: Range<usize>, plate: &[f32]| {
-                dispatch!(self.level, _simd => corrector.row(y, columns, plate, &mut scratch))
-            };
+            let mut compute = |y: usize, columns: Range<usize>, plate: &[f32]| dispatch!(self.level, _simd => corrector.row(y, columns, plate, &mut scratch));
             let cached = (!has_plate).then(|| halo.corrections.rows(slice, halo.rect.height));
             for y in rect.y..rect.bottom() {
                 let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
@@ -210,7 +208,12 @@ impl<'a> SingleScattering<'a> {
                         *value = (to - from).fma((x as f32 + 0.5) * (1.0 / FINE_TILE as f32), from);
                     }
                 }
-                add_layer(strip, start + visible.start - strip.rect.x, &values, visible.start - left..visible.end - left);
+                add_layer(
+                    strip,
+                    start + visible.start - strip.rect.x,
+                    &values,
+                    visible.start - left..visible.end - left,
+                );
             }
         }
     }
@@ -234,7 +237,8 @@ impl<'a> SingleScattering<'a> {
     #[inline(always)]
     fn sixteen_corners(&self, y: usize, first: usize, last: usize, row: GridPosition, slice: &DepthInterval) -> Layer {
         let side = self.tiles().side;
-        let mut directions = Directions { components: [[0.0; LANES], [1.0; LANES], [0.0; LANES]], visible: [false; LANES] };
+        let mut directions =
+            Directions { components: [[0.0; LANES], [1.0; LANES], [0.0; LANES]], visible: [false; LANES] };
         let mut sky = SkyColors { once: [ZERO_LANES; 3], endless: [ZERO_LANES; 3] };
         for i in 0..LANES {
             let column = (first + i).min(last);
