@@ -2,7 +2,7 @@
 
 use bansho_base::{
     math::{self, DVec3, MulAdd, approximations, simd::LANES},
-    phenomenon::surroundings::{Emitter, IncidentLight, Light},
+    phenomenon::surroundings::{Emitter, Light},
 };
 
 use super::{drop_phase_function::DropPhaseFunction, tiles::lerp_color};
@@ -71,7 +71,8 @@ impl DropLighting<'_> {
     /// `E p / (4 pi)`: the scalar twin of [`add`](Self::add).
     #[cfg(test)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
-        let IncidentLight { illuminance, toward, distance } = light.incident_light(point);
+        let bansho_base::phenomenon::surroundings::IncidentLight { illuminance, toward, distance } =
+            light.incident_light(point);
         if illuminance == [0.0; 3] {
             return [0.0; 3];
         }

@@ -118,7 +118,8 @@ impl LampAtLine {
         let offset = position - eye;
         let nearest = offset.dot(direction);
         let height = (offset - direction * nearest).length();
-        if !(nearest.abs().max(height) < MAX_LAMP_DISTANCE) {
+        let is_in_reach = nearest.abs() < MAX_LAMP_DISTANCE && height < MAX_LAMP_DISTANCE;
+        if !is_in_reach {
             return None;
         }
         let (min_square, cone, falloff) = match light.emitter {
