@@ -25,7 +25,7 @@
 //! | section 4, textures | streak texture T(R, D) | [`StreakCube::draw`](billboards::texture::StreakCube::draw) |
 //! | section 4, all textures | textures of all rates and diameters, in 8 bits | [`TextureSet::new`](textured_billboards::TextureSet::new) |
 //! | section 5.1 | a billboard turns about the vertical to face the camera | `billboards::Billboards::billboard`, with `method = "textures"` `textured_billboards::quads::Quad::new` |
-//! | section 5.2 | light of a lamp falls with the square of its distance; radiance of a drop `E p / (4 pi)` | `lighting::drop_lighting::DropLighting::radiance`, `lighting::drop_lighting::DropLighting::add`, with `method = "textures"` `textured_billboards::quads::Quad::new` |
+//! | section 5.2 | light of a lamp falls with the square of its distance; radiance of a drop `E p / (4 pi)` | `lighting::drop_lighting::DropLighting::add`, with `method = "textures"` `textured_billboards::quads::Quad::new` |
 //! | oscillation | `f = sqrt(n (n - 1) (n + 2) sigma / (rho r^3)) / (2 pi)`: frequency of mode n of a drop | [`mode_frequency`](streaks::oscillation::mode_frequency) |
 //! | drops of a bin | integral of `n dD` over the bin; the fractional part is a probability | [`SizeBin::count`](drops::size_distribution::SizeBin::count), [`stratified_count`](drops::size_distribution::stratified_count) |
 //! | measured velocity | Gunn and Kinzer (1949) | [`measured_velocity`](drops::terminal_velocity::measured_velocity) |
@@ -34,7 +34,7 @@
 //! | visibility | `3.912 / beta` | [`visibility`](lighting::extinction::visibility) |
 //! | phase function | p: light that a drop scatters by angle | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
 //! | sky light through a drop | integral of `p L` over the sky | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
-//! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::in_scattering::InScatterIntegrator::segment` |
+//! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::equiangular::SightLineIntegrator::add_lamp` |
 //! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::displacement` |
 //!
 //! # Data flow

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     math::{self, DVec3, MulAdd, approximations, simd::LANES},
-    phenomenon::surroundings::{Emitter, IncidentLight, Light},
+    phenomenon::surroundings::{Emitter, Light},
 };
 
 use super::{drop_phase_function::DropPhaseFunction, tiles::lerp_color};
@@ -37,6 +37,12 @@ impl ScatteringTable {
         self.at_position(Self::position(cos_deviation))
     }
 
+    /// The value at the sine of half the scattering angle (0 to 1), 1/sr.
+    #[inline(always)]
+    pub(super) fn at_half_sine(&self, half_sine: f32) -> [f32; 3] {
+        self.at_position(half_sine * TABLE_STEPS as f32)
+    }
+
     /// Table position for the cosine of the scattering angle.
     #[inline(always)]
     fn position(cos_deviation: f32) -> f32 {
@@ -62,10 +68,11 @@ pub(crate) struct DropLighting<'a> {
 
 impl DropLighting<'_> {
     /// Mean radiance of a drop at `point` by one light, seen along `direction` (unit vector from the eye), ACEScg, cd/m^2:
-    /// `E p / (4 pi)`.
-    #[inline(always)]
+    /// `E p / (4 pi)`: the scalar twin of [`add`](Self::add).
+    #[cfg(test)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
-        let IncidentLight { illuminance, toward, distance } = light.incident_light(point);
+        let bansho_base::phenomenon::surroundings::IncidentLight { illuminance, toward, distance } =
+            light.incident_light(point);
         if illuminance == [0.0; 3] {
             return [0.0; 3];
         }

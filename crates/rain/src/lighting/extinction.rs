@@ -2,7 +2,12 @@
 
 use std::f64::consts::PI;
 
-use crate::drops::size_distribution::DropSizeDistribution;
+use bansho_base::math::simd::LANES;
+
+use crate::{
+    drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
+    lanes::{Lanes, ZERO_LANES},
+};
 
 /// Extinction efficiency Q of a drop. Drops are large compared with the wavelength, so the total Q is 2 (the extinction
 /// paradox).
@@ -37,6 +42,31 @@ pub(crate) struct RainExtinction {
     pub(crate) all: f64,
     /// Of the drops that are drawn as streaks near the camera.
     pub(crate) streaks: f64,
+}
+
+/// Extinction coefficient of the medium as a function of the distance from the camera: of all drops that are not drawn as streaks.
+#[derive(Clone, Copy)]
+pub(super) struct ExtinctionProfile<'a> {
+    pub(super) shutter_state: &'a ShutterState,
+    pub(super) extinction: RainExtinction,
+}
+
+impl ExtinctionProfile<'_> {
+    /// At a distance (m), 1/m.
+    pub(super) fn at(&self, distance: f64) -> f64 {
+        self.extinction.all - self.extinction.streaks * f64::from(self.shutter_state.streak_weight(distance as f32))
+    }
+
+    /// At sixteen distances.
+    #[inline(always)]
+    pub(super) fn at_lanes(&self, distances: &Lanes) -> Lanes {
+        let (all, streaks) = (self.extinction.all as f32, self.extinction.streaks as f32);
+        let mut coefficients = ZERO_LANES;
+        for i in 0..LANES {
+            coefficients[i] = all - streaks * self.shutter_state.streak_weight(distances[i]);
+        }
+        coefficients
+    }
 }
 
 /// Meteorological visibility, m: the distance at which a black object has 2 % contrast against the horizon sky

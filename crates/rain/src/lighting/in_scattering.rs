@@ -1,55 +1,79 @@
 //! Light of lamps and fires that the rain scatters toward the camera: integrated along the lines of sight at the corners of a grid, and kept while camera,
 //! lamps and rain stay the same.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::{
+    ops::Range,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+};
 
 use bansho_base::{
     camera::Camera,
+    host::parallel::prelude::*,
     image::Rect,
-    math::{self, DVec2, DVec3},
+    math::{DVec2, DVec3, MulAdd},
     phenomenon::{
         strip::{DepthInterval, View},
-        surroundings::{Emitter, Light},
+        surroundings::Light,
     },
 };
+use fearless_simd::dispatch;
 
 use super::{
     drop_lighting::DropLighting,
-    extinction::RainExtinction,
-    tiles::{FINEST_TILE, TileGrid},
+    equiangular::{Interval, MIN_LAMP_DISTANCE, SightLineIntegrator},
+    extinction::{ExtinctionProfile, RainExtinction},
+    tiles::{FINE_TILE, FINEST_TILE, GridPosition, TileGrid},
 };
-use crate::drops::shutter_state::ShutterState;
 
-/// Angle subtended at a lamp by one sample of the equiangular quadrature, radians.
-const SAMPLE_ANGLE: f64 = 0.15;
-/// Smallest distance of a ray from a lamp, m.
-const MIN_LAMP_DISTANCE: f64 = 0.02;
-
-/// Extinction coefficient as a function of the distance from the camera.
-#[derive(Clone, Copy)]
-pub(super) struct ExtinctionProfile<'a> {
-    pub(super) shutter_state: &'a ShutterState,
-    pub(super) extinction: RainExtinction,
-}
-
-impl ExtinctionProfile<'_> {
-    pub(super) fn at(&self, distance: f64) -> f64 {
-        self.extinction.all - self.extinction.streaks * f64::from(self.shutter_state.streak_weight(distance as f32))
-    }
-}
+/// Corners of a grid that a thread integrates at a time.
+const CORNERS_PER_TASK: usize = 32;
 
 /// In-scattered radiance accumulated from the camera up to each distance, at each corner of a grid.
 #[derive(Debug)]
-pub(super) struct InScattering(pub(super) Vec<Vec<[f32; 3]>>);
+pub(super) struct InScattering {
+    /// Number of distances.
+    pub(super) distances: usize,
+    /// For each corner, the radiance up to each distance, ACEScg, cd/m^2; the fourth component is 0.
+    pub(super) sums: Vec<[f32; 4]>,
+}
 
 impl InScattering {
-    fn new(directions: &[Vec<[f32; 3]>], distances: usize) -> Self {
-        Self((0..distances).map(|k| directions.iter().map(|sums| sums[k]).collect()).collect())
+    /// The light of some lamps at the corners of a grid.
+    fn new(integrator: &SightLineIntegrator, tiles: &TileGrid, lights: &[Light]) -> Self {
+        let distances = integrator.intervals.len() + 1;
+        let mut sums = vec![[0.0; 4]; distances * tiles.directions.len()];
+        let level = bansho_base::math::simd::level();
+        let tasks = sums.par_chunks_mut(distances * CORNERS_PER_TASK).enumerate();
+        tasks.for_each(|(task, sums)| {
+            let directions = &tiles.directions[task * CORNERS_PER_TASK..];
+            for (sums, direction) in sums.chunks_mut(distances).zip(directions) {
+                dispatch!(level, _simd => integrator.accumulate(*direction, lights, sums));
+            }
+        });
+        Self { distances, sums }
     }
 
-    fn add(&mut self, other: &Self) {
-        for (sum, more) in self.0.iter_mut().flatten().zip(other.0.iter().flatten()) {
-            (0..3).for_each(|c| sum[c] += more[c]);
+    /// Interpolates between a row of corners and the next, for some columns and indices of distances: the sums of the first column come first. Others
+    /// are unspecified.
+    #[inline(always)]
+    pub(super) fn interpolate_rows(
+        &self,
+        tiles: &TileGrid,
+        row: GridPosition,
+        columns: Range<usize>,
+        indices: Range<usize>,
+        sums: &mut Vec<[f32; 4]>,
+    ) {
+        sums.resize(columns.len() * self.distances, [0.0; 4]);
+        let start = row.index * tiles.size[0];
+        for (column, sums) in columns.zip(sums.chunks_exact_mut(self.distances)) {
+            let [above, below] = [start + column, start + tiles.size[0] + column]
+                .map(|corner| &self.sums[corner * self.distances..][indices.clone()]);
+            for ((sum, above), below) in sums[indices.clone()].iter_mut().zip(above).zip(below) {
+                for c in 0..4 {
+                    sum[c] = (below[c] - above[c]).fma(row.fraction, above[c]);
+                }
+            }
         }
     }
 }
@@ -65,12 +89,12 @@ pub(super) struct LampHalo {
     pub(super) pixel: DVec2,
     /// The pixels near it.
     pub(super) rect: Rect,
-    /// Its in-scattering at the corners of the picture's grid.
+    /// The part of the picture's grid that covers them, and its in-scattering at the corners.
+    pub(super) tiles: TileGrid,
     pub(super) in_scattering: InScattering,
-    /// A finer grid over the pixels near it, its in-scattering there, and the distances of the rays from the lamp, m.
+    /// A finer grid over them, and its in-scattering there times the distance of the ray from the lamp (m).
     pub(super) fine_tiles: TileGrid,
     pub(super) fine_in_scattering: InScattering,
-    pub(super) ray_distance: Vec<f32>,
     /// Corrections of its pixels for recent depth intervals.
     pub(super) corrections: HaloCorrectionCache,
 }
@@ -113,8 +137,15 @@ fn halo_rect(lamp: DVec2, size: [usize; 2]) -> Rect {
     rect.intersection(&Rect::from_size(size[0], size[1]))
 }
 
+/// The rectangle of whole tiles of the picture's grid around some pixels.
+fn around_tiles(rect: Rect) -> Rect {
+    let [x, y] = [rect.x, rect.y].map(|side| side / FINE_TILE * FINE_TILE);
+    let [right, bottom] = [rect.right(), rect.bottom()].map(|side| side.next_multiple_of(FINE_TILE));
+    Rect { x, y, width: right - x, height: bottom - y }
+}
+
 /// Distance of a ray from the camera to the point at `offset` from the camera, m.
-pub(super) fn ray_distance(offset: DVec3, direction: DVec3) -> f32 {
+fn ray_distance(offset: DVec3, direction: DVec3) -> f32 {
     (offset - direction * offset.dot(direction)).length().max(MIN_LAMP_DISTANCE) as f32
 }
 
@@ -210,16 +241,29 @@ impl InScatterIntegrator<'_> {
         }
     }
 
+    /// The intervals between the distances that lamps light.
+    fn intervals(&self) -> Vec<Interval> {
+        let lit = self.distances.windows(2).zip(self.depths.windows(2)).filter(|(pair, _)| pair[0] < self.end);
+        let interval = |(pair, depths): (&[f64], &[f32])| {
+            let width = (pair[1] - pair[0]) as f32;
+            Interval { start: pair[0], width, depth: depths[0], depth_slope: (depths[1] - depths[0]) / width }
+        };
+        lit.map(interval).collect()
+    }
+
     fn scattering(&self, inputs: ScatteringInputs, tiles: &TileGrid, view: &View) -> LampScattering {
-        let (visible, others) = self.split_lights(view);
-        let halos: Vec<LampHalo> =
-            visible.into_iter().map(|(light, pixel)| self.halo(&light, pixel, tiles, view)).collect();
-        let in_scattering = (!self.lighting.lights.is_empty()).then(|| {
-            let radiance = tiles.map(|_, direction| self.accumulate(direction, &others));
-            let mut in_scattering = InScattering::new(&radiance, self.distances.len());
-            halos.iter().for_each(|halo| in_scattering.add(&halo.in_scattering));
-            in_scattering
-        });
+        let (visible, mut lights) = self.split_lights(view);
+        let integrator = SightLineIntegrator {
+            scattering: self.lighting.scattering,
+            extinction: self.extinction,
+            light_extinction: self.lighting.extinction as f32,
+            intervals: &self.intervals(),
+            eye: self.eye,
+            eye_height: (self.eye.y - self.extinction.shutter_state.ground) as f32,
+        };
+        let halos = visible.iter().filter_map(|(light, pixel)| halo(&integrator, light, *pixel, view)).collect();
+        lights.extend(visible.iter().map(|(light, _)| *light));
+        let in_scattering = (!lights.is_empty()).then(|| InScattering::new(&integrator, tiles, &lights));
         LampScattering { inputs, in_scattering, halos }
     }
 
@@ -227,10 +271,7 @@ impl InScatterIntegrator<'_> {
     fn split_lights(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
         let (mut visible, mut others) = (Vec::new(), Vec::new());
         for light in self.lighting.lights {
-            let projection = match light.emitter {
-                Emitter::Point { position, .. } | Emitter::Spot { position, .. } => view.camera.project(position),
-                Emitter::Directional { .. } => None,
-            };
+            let projection = light.emitter.position().and_then(|position| view.camera.project(position));
             let near = |pixel: DVec2| {
                 (0..2).all(|axis| (-HALO_RADIUS..view.size[axis] as f64 + HALO_RADIUS).contains(&pixel[axis]))
             };
@@ -241,84 +282,32 @@ impl InScatterIntegrator<'_> {
         }
         (visible, others)
     }
+}
 
-    fn halo(&self, light: &Light, pixel: DVec2, tiles: &TileGrid, view: &View) -> LampHalo {
-        let offset = match light.emitter {
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position - self.eye,
-            Emitter::Directional { toward } => toward,
-        };
-        let rect = halo_rect(pixel, view.size);
-        let fine_tiles = TileGrid::over(view, FINEST_TILE, rect);
-        let [in_scattering, fine_in_scattering] = [tiles, &fine_tiles].map(|tiles| {
-            let radiance = tiles.map(|_, direction| self.accumulate(direction, std::slice::from_ref(light)));
-            InScattering::new(&radiance, self.distances.len())
-        });
-        let ray_distance = fine_tiles.directions.iter().map(|direction| ray_distance(offset, *direction)).collect();
-        LampHalo {
-            offset,
-            pixel,
-            rect,
-            in_scattering,
-            fine_tiles,
-            fine_in_scattering,
-            ray_distance,
-            corrections: HaloCorrectionCache::default(),
-        }
+/// The halo of a lamp; `None` for a light at infinity, and where no pixel is near it.
+fn halo(integrator: &SightLineIntegrator, light: &Light, pixel: DVec2, view: &View) -> Option<LampHalo> {
+    let offset = light.emitter.position()? - integrator.eye;
+    let rect = halo_rect(pixel, view.size);
+    if rect.is_empty() {
+        return None;
     }
-
-    /// Light of some lamps scattered toward the camera up to each distance.
-    fn accumulate(&self, direction: DVec3, lights: &[Light]) -> Vec<[f32; 3]> {
-        let mut sums = vec![[0.0; 3]; self.distances.len()];
-        if direction == DVec3::ZERO {
-            return sums;
-        }
-        for light in lights {
-            let mut sum = [0.0_f32; 3];
-            for k in 0..self.distances.len() - 1 {
-                let in_range = self.distances[k] < self.end;
-                let radiance = if in_range { self.segment(light, direction, k) } else { [0.0; 3] };
-                for c in 0..3 {
-                    sum[c] += radiance[c];
-                    sums[k + 1][c] += sum[c];
-                }
-            }
-        }
-        sums
+    let tiles = TileGrid::over(view, FINE_TILE, around_tiles(rect));
+    let fine_tiles = TileGrid::over(view, FINEST_TILE, rect);
+    let [in_scattering, mut fine_in_scattering] =
+        [&tiles, &fine_tiles].map(|tiles| InScattering::new(integrator, tiles, std::slice::from_ref(light)));
+    let corners = fine_in_scattering.sums.chunks_mut(fine_in_scattering.distances);
+    for (sums, direction) in corners.zip(&fine_tiles.directions) {
+        let distance = ray_distance(offset, *direction);
+        sums.iter_mut().flatten().for_each(|value| *value *= distance);
     }
-
-    /// Light of one lamp scattered between two distances: `integral of beta E p / (4 pi) e^-tau ds`.
-    fn segment(&self, light: &Light, direction: DVec3, k: usize) -> [f32; 3] {
-        let [from, to] = [self.distances[k], self.distances[k + 1]];
-        let position = match light.emitter {
-            Emitter::Directional { .. } => return self.sample(light, direction, 0.5 * (from + to), to - from, k),
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => position,
-        };
-        // Equiangular sampling (Kulla & Fajardo 2012): steps of equal angle at the lamp. There ds / r^2 is the angle's
-        // step over the smallest distance h, so the integrand has no peak near the lamp.
-        let nearest = (position - self.eye).dot(direction);
-        let h = (position - self.eye - direction * nearest).length().max(MIN_LAMP_DISTANCE);
-        let [first, last] = [from, to].map(|s| math::atan((s - nearest) / h));
-        let samples = ((last - first) / SAMPLE_ANGLE).ceil().max(1.0);
-        let step = (last - first) / samples;
-        (0..samples as usize).fold([0.0; 3], |sum: [f32; 3], index| {
-            let offset = h * math::tan(first + step * (index as f64 + 0.5));
-            let length = step * (h * h + offset * offset) / h;
-            let radiance = self.sample(light, direction, nearest + offset, length, k);
-            std::array::from_fn(|c| sum[c] + radiance[c])
-        })
-    }
-
-    /// Light scattered within `length` of the line around a distance.
-    fn sample(&self, light: &Light, direction: DVec3, at: f64, length: f64, k: usize) -> [f32; 3] {
-        let point = self.eye + direction * at;
-        let extinction = self.extinction.at(at);
-        if extinction <= 0.0 || point.y < self.extinction.shutter_state.ground {
-            return [0.0; 3];
-        }
-        let radiance = self.lighting.radiance(light, point, direction);
-        let t = ((at - self.distances[k]) / (self.distances[k + 1] - self.distances[k])) as f32;
-        let depth = self.depths[k] + (self.depths[k + 1] - self.depths[k]) * t;
-        let scale = math::approximations::exp(-depth) * (extinction * length) as f32;
-        radiance.map(|value| value * scale)
-    }
+    Some(LampHalo {
+        offset,
+        pixel,
+        rect,
+        tiles,
+        in_scattering,
+        fine_tiles,
+        fine_in_scattering,
+        corrections: HaloCorrectionCache::default(),
+    })
 }

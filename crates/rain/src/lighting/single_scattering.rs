@@ -4,66 +4,40 @@
 use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
+    camera::directions::Directions,
     host::once::get_or_compute,
     image::Rect,
-    math::{self, DVec2, MulAdd},
+    math::{DVec2, DVec3, MulAdd, simd::LANES},
     phenomenon::strip::{DepthInterval, Strip, View},
 };
 use fearless_simd::{Level, dispatch};
 
 use super::{
     drop_lighting::DropLighting,
-    extinction::RainExtinction,
-    in_scattering::{
-        ExtinctionProfile, HALO_RADIUS, InScatterIntegrator, InScattering, LampHalo, LampScattering,
-        LampScatteringCache, ray_distance,
-    },
+    extinction::{ExtinctionProfile, RainExtinction},
+    halos::{HaloCorrector, HaloRows},
+    in_scattering::{InScatterIntegrator, LampScattering, LampScatteringCache},
+    ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
     sky::SkyLighting,
     tiles::{FINE_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
 };
-use crate::drops::shutter_state::ShutterState;
+use crate::{
+    drops::shutter_state::ShutterState,
+    lanes::{Lanes, ZERO_LANES, fast_max},
+};
 
 /// First distance at which accumulated in-scattering is stored, m, and the ratio of successive distances.
 const FIRST_DISTANCE: f64 = 0.5;
 const DISTANCE_RATIO: f64 = 1.25;
 /// Ratio of successive distances beyond the range of lamps.
 const FAR_DISTANCE_RATIO: f64 = 2.0;
-/// Optical depth beyond which light of lamps is neglected: the transmittance is below 1e-17.
-const MAX_OPTICAL_DEPTH: f32 = 40.0;
 /// Depth of the medium, m: it has none.
 const NO_DEPTH: [f32; FINE_TILE] = [f32::INFINITY; FINE_TILE];
-/// A position between two stored distances.
-#[derive(Clone, Copy)]
-struct Bracket {
-    /// Index of the nearer one.
-    index: usize,
-    /// Interpolation fraction toward the next.
-    fraction: f32,
-}
+/// The lines of sight of a tile's row of pixels are computed at once.
+const _: () = assert!(FINE_TILE == LANES);
 
-/// An interval of a line of sight.
-struct RaySegment {
-    /// Its ends among the stored distances.
-    brackets: [Bracket; 2],
-    /// Optical depths of its ends.
-    depths: [f32; 2],
-    /// Inverse transmittance from the camera to its near end; 0 beyond the range of lamps and where nothing is
-    /// transmitted.
-    gain: f32,
-}
-
-impl RaySegment {
-    /// Light of lamps scattered within it, at a corner of a grid, as seen from its near end.
-    fn in_scattered(&self, in_scattering: &InScattering, corner: usize) -> [f32; 3] {
-        if self.gain == 0.0 {
-            return [0.0; 3];
-        }
-        let [near, far] = self.brackets.map(|Bracket { index, fraction }| {
-            lerp_color(in_scattering.0[index][corner], in_scattering.0[index + 1][corner], fraction)
-        });
-        std::array::from_fn(|c| (far[c] - near[c]).max(0.0) * self.gain)
-    }
-}
+/// Radiance (three colors) and opacity of sixteen segments.
+type Layer = [Lanes; 4];
 
 /// Extinction and single scattering along the lines of sight of one frame.
 pub(crate) struct SingleScattering<'a> {
@@ -71,15 +45,21 @@ pub(crate) struct SingleScattering<'a> {
     view: &'a View,
     /// The sky at the corners of the fine grid, at which in-scattering is stored too.
     sky: Arc<SkyLighting>,
-    /// Stored distances, ascending from 0, m.
-    distances: Vec<f64>,
-    /// Optical depth up to each distance.
-    depths: Vec<f32>,
+    /// Optical depth by distance.
+    table: OpticalDepthTable,
     /// Light of lamps and fires that is scattered toward the camera.
     lamps: Arc<LampScattering>,
     /// Range of the light of lamps, and end of the medium in front of a plate, m.
-    end: f64,
+    end: f32,
+    /// End of the medium without a plate, m.
+    farthest: f32,
     ground: f64,
+}
+
+/// Sky light at sixteen positions: radiance of rain that scatters once, and of infinitely deep rain.
+struct SkyColors {
+    once: [Lanes; 3],
+    endless: [Lanes; 3],
 }
 
 impl<'a> SingleScattering<'a> {
@@ -116,14 +96,15 @@ impl<'a> SingleScattering<'a> {
             InScatterIntegrator { lighting, extinction: profile, eye, distances: &distances, depths: &depths, end };
         let tiles = &sky.fine.tiles;
         let lamps = cache.scattering(&integrator, tiles, view);
+        let lit_intervals = distances.windows(2).filter(|pair| pair[0] < end).count();
         Some(Self {
             level: bansho_base::math::simd::level(),
             view,
+            table: OpticalDepthTable::new(&distances, &depths, lit_intervals),
             sky,
-            distances,
-            depths,
             lamps,
-            end,
+            end: end as f32,
+            farthest: distances[distances.len() - 1] as f32,
             ground: shutter_state.ground,
         })
     }
@@ -133,150 +114,71 @@ impl<'a> SingleScattering<'a> {
         &self.sky.fine.tiles
     }
 
-    /// Position of a distance among the stored ones.
-    fn bracket(&self, distance: f64) -> Bracket {
-        let last = self.distances.len() - 1;
-        let next = self.distances.partition_point(|stored| *stored <= distance).clamp(1, last);
-        let (near, far) = (self.distances[next - 1], self.distances[next]);
-        Bracket { index: next - 1, fraction: ((distance - near) / (far - near)).clamp(0.0, 1.0) as f32 }
+    /// The bounds of the medium, with or without a plate.
+    fn bounds(&self, has_plate: bool) -> MediumBounds<'_> {
+        let camera = &self.view.camera;
+        let end = if has_plate { self.end } else { self.farthest };
+        MediumBounds { camera, height: (camera.position.y - self.ground) as f32, end }
     }
 
-    /// The interval between two distances.
-    fn segment(&self, [near, far]: [f64; 2]) -> RaySegment {
-        let brackets = [near, far.max(near)].map(|distance| self.bracket(distance));
-        let depths = brackets.map(|Bracket { index, fraction }| {
-            self.depths[index] + (self.depths[index + 1] - self.depths[index]) * fraction
-        });
-        // Beyond the maximum optical depth nothing is visible, and the gain would overflow.
-        let is_lit = near < self.end && depths[0] < MAX_OPTICAL_DEPTH;
-        let gain = if is_lit { math::approximations::exp(depths[0]) } else { 0.0 };
-        RaySegment { brackets, depths, gain }
-    }
-
-    /// Radiance and transmittance of an interval at a column of the grid, interpolated between `row` and the next.
-    fn radiance_and_transmittance(&self, column: usize, row: GridPosition, segment: &RaySegment) -> [f32; 4] {
+    /// Sky light at a corner of the row of corners `row`, or between it and the next.
+    #[inline(always)]
+    fn sky_at(&self, column: usize, row: GridPosition) -> [[f32; 3]; 2] {
         let columns = self.tiles().size[0];
         let index = row.index * columns + column;
-        let below = index + columns;
-        let down = row.fraction;
-        let [near, far] = segment.depths;
-        let transmittance = math::approximations::exp(near - far);
-        let opacities = segment.depths.map(|depth| 1.0 - math::approximations::exp(-depth));
-        let lit = match &self.lamps.in_scattering {
-            Some(in_scattering) => {
-                lerp_color(segment.in_scattered(in_scattering, index), segment.in_scattered(in_scattering, below), down)
-            }
-            None => [0.0; 3],
-        };
-        let [once, endless] =
-            [&self.sky.fine.radiance, &self.sky.endless].map(|sky| lerp_color(sky[index], sky[below], down));
-        // Approximation of multiple scattering: rain of opacity o shows `o (1 - o)` of the sky light that is scattered
-        // once, and `o^2` of that of infinitely deep rain.
-        let rescattered = opacities[0] + opacities[1];
-        let sky: [f32; 3] = std::array::from_fn(|c| (once[c] + (endless[c] - once[c]) * rescattered).max(0.0));
-        let light: [f32; 3] = std::array::from_fn(|c| lit[c] + sky[c] * (1.0 - transmittance));
-        [light[0], light[1], light[2], transmittance]
+        [&self.sky.fine.radiance, &self.sky.endless]
+            .map(|sky| lerp_color(sky[index], sky[index + columns], row.fraction))
     }
 
-    /// Correction of a pixel near a lamp: the value of the finer grid less that of the picture's grid.
-    fn halo_correction(
-        &self,
-        halo: &LampHalo,
-        x: usize,
-        y: usize,
-        slice: &DepthInterval,
-        plate: Option<f64>,
-    ) -> Option<[f32; 3]> {
-        let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-        let range = self.distance_range(pixel, slice, plate).filter(|range| range[0] < range[1])?;
-        let direction = self.view.camera.direction(pixel)?.normalize_or_zero();
-        let position = pixel.as_vec2().to_array();
-        let mut correction = [0.0_f32; 3];
-        let segment = self.segment(range);
-        let nearest = ray_distance(halo.offset, direction);
-        for (corner, t) in halo.fine_tiles.corner_weights(position) {
-            let factor = t * halo.ray_distance[corner] / nearest;
-            let lit = segment.in_scattered(&halo.fine_in_scattering, corner);
-            (0..3).for_each(|c| correction[c] += lit[c] * factor);
+    /// Sky light scattered within sixteen segments.
+    ///
+    /// Approximation of multiple scattering: rain of opacity o shows `o (1 - o)` of the sky light that is scattered once, and `o^2` of that of infinitely
+    /// deep rain.
+    #[inline(always)]
+    fn scattered_sky(sky: &SkyColors, rescattered: &Lanes, opacities: &Lanes, c: usize) -> Lanes {
+        let mut light = ZERO_LANES;
+        for i in 0..LANES {
+            let (once, endless) = (sky.once[c][i], sky.endless[c][i]);
+            light[i] = fast_max(0.0, (endless - once).fma(rescattered[i], once)) * opacities[i];
         }
-        for (corner, t) in self.tiles().corner_weights(position) {
-            let lit = segment.in_scattered(&halo.in_scattering, corner);
-            (0..3).for_each(|c| correction[c] -= lit[c] * t);
-        }
-        Some(correction)
-    }
-
-    /// The correction of a pixel near a lamp, faded toward the edge of its halo; 0 where there is none.
-    fn faded_correction(
-        &self,
-        halo: &LampHalo,
-        x: usize,
-        y: usize,
-        slice: &DepthInterval,
-        plate: Option<f64>,
-    ) -> [f32; 3] {
-        let distance = (DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - halo.pixel).length() / HALO_RADIUS;
-        let fade = 1.0 - math::smoothstep(0.6, 1.0, distance) as f32;
-        if fade <= 0.0 {
-            return [0.0; 3];
-        }
-        self.halo_correction(halo, x, y, slice, plate).map_or([0.0; 3], |light| light.map(|value| fade * value))
+        light
     }
 
     /// Adds the corrections near lamps to a row of tiles.
     fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+        let has_plate = strip.has_plate();
+        let mut scratch = HaloRows::default();
         for halo in &self.lamps.halos {
             let rect = halo.rect.intersection(&rows);
             if rect.is_empty() {
                 continue;
             }
-            let cached = (!strip.has_plate()).then(|| halo.corrections.rows(slice, halo.rect.height));
+            let bounds = self.bounds(has_plate);
+            let corrector = HaloCorrector { halo, bounds, table: &self.table, lit_end: self.end, slice };
+            let mut compute = |y: usize, columns: Range<usize>, plate: &[f32]| dispatch!(self.level, _simd => corrector.row(y, columns, plate, &mut scratch));
+            let cached = (!has_plate).then(|| halo.corrections.rows(slice, halo.rect.height));
             for y in rect.y..rect.bottom() {
-                let row = cached.as_ref().map(|rows| {
-                    let columns = halo.rect.x..halo.rect.right();
-                    let compute = || columns.map(|x| self.faded_correction(halo, x, y, slice, None)).collect();
-                    get_or_compute(&rows[y - halo.rect.y], compute)
-                });
-                for x in rect.x..rect.right() {
-                    let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                    let light = match row {
-                        Some(row) => row[x - halo.rect.x],
-                        None => {
-                            let plate = Some(f64::from(strip.plate_depth(index)));
-                            self.faded_correction(halo, x, y, slice, plate)
-                        }
-                    };
-                    if light == [0.0; 3] {
-                        continue;
+                let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
+                match &cached {
+                    Some(rows) => {
+                        let all = halo.rect.x..halo.rect.right();
+                        let row = get_or_compute(&rows[y - halo.rect.y], || compute(y, all, &[]));
+                        add_corrections(strip, first, &row[rect.x - halo.rect.x..rect.right() - halo.rect.x]);
                     }
-                    // The medium in front of it is contained in the strip's transmittance too; its effect is small.
-                    (0..3).for_each(|c| strip.radiance[c][index] = (strip.radiance[c][index] + light[c]).max(0.0));
+                    None => {
+                        let plate: Vec<f32> = (0..rect.width).map(|x| strip.plate_depth(first + x)).collect();
+                        add_corrections(strip, first, &compute(y, rect.x..rect.right(), &plate));
+                    }
                 }
             }
         }
-    }
-
-    /// The distances between which a pixel shows the medium in a depth interval, in front of a `plate` (depth, m).
-    fn distance_range(&self, pixel: DVec2, slice: &DepthInterval, plate: Option<f64>) -> Option<[f64; 2]> {
-        let hidden = plate.unwrap_or(f64::INFINITY);
-        let end = if plate.is_some() { self.end } else { self.distances[self.distances.len() - 1] };
-        let camera = &self.view.camera;
-        let direction = camera.direction(pixel)?;
-        let length = direction.length();
-        let ground = (camera.position.y - self.ground) / -direction.y;
-        let far = slice.far.min(hidden).min(if ground > 0.0 { ground } else { f64::INFINITY });
-        // In a mirrored view the camera is beneath the ground, and the rain begins there.
-        let beneath = camera.position.y < self.ground;
-        let near = if beneath { slice.near.max(ground) } else { slice.near };
-        let far = if beneath { slice.far.min(hidden) } else { far };
-        (!beneath || ground > 0.0).then(|| [near, far].map(|depth| (depth * length).min(end)))
     }
 
     /// Draws the pixels of `rows` under the contents of the strip. They are within a row of tiles, which spans the rows
     /// `tile` of the picture.
     pub(crate) fn draw(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         if strip.has_plate() {
-            self.draw_in_front_of_plate(slice, rows, strip);
+            dispatch!(self.level, _simd => self.draw_in_front_of_plate(slice, rows, strip));
         } else {
             dispatch!(self.level, _simd => self.draw_without_plate(slice, tile, rows, strip));
         }
@@ -288,17 +190,7 @@ impl<'a> SingleScattering<'a> {
     fn draw_without_plate(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         let side = self.tiles().side;
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
-        let edge = |y: f64| -> Vec<[f32; 4]> {
-            let position = self.tiles().row_at(y as f32);
-            let corner = |column: usize| {
-                let range = self.distance_range(DVec2::new((column * side) as f64, y), slice, None);
-                range.map_or([0.0, 0.0, 0.0, 1.0], |range| {
-                    self.radiance_and_transmittance(column, position, &self.segment(range))
-                })
-            };
-            columns.clone().map(corner).collect()
-        };
-        let edges = [edge(tile.start as f64), edge(tile.end as f64)];
+        let edges = [tile.start, tile.end].map(|y| self.corners(y, columns.clone(), slice));
         for y in rows.y..rows.bottom() {
             let down = ((y - tile.start) as f32 + 0.5) / tile.len() as f32;
             let corner = |column: usize, c: usize| {
@@ -316,41 +208,161 @@ impl<'a> SingleScattering<'a> {
                         *value = (to - from).fma((x as f32 + 0.5) * (1.0 / FINE_TILE as f32), from);
                     }
                 }
-                values[3].iter_mut().for_each(|transmittance| *transmittance = 1.0 - *transmittance);
-                let [red, green, blue, opacity] =
-                    values.each_ref().map(|row| &row[visible.start - left..visible.end - left]);
-                let first = start + visible.start - strip.rect.x;
-                strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..visible.len()]);
+                add_layer(
+                    strip,
+                    start + visible.start - strip.rect.x,
+                    &values,
+                    visible.start - left..visible.end - left,
+                );
             }
         }
+    }
+
+    /// Radiance and opacity at the corners of some columns of the grid, interpolated to the height `y` of the picture (pixels).
+    #[inline(always)]
+    fn corners(&self, y: usize, columns: Range<usize>, slice: &DepthInterval) -> Vec<[f32; 4]> {
+        let row = self.tiles().row_at(y as f32);
+        let mut corners = Vec::with_capacity(columns.len() + LANES);
+        for first in columns.clone().step_by(LANES) {
+            let layer = self.sixteen_corners(y, first, columns.end - 1, row, slice);
+            for i in 0..LANES {
+                corners.push([layer[0][i], layer[1][i], layer[2][i], layer[3][i]]);
+            }
+        }
+        corners.truncate(columns.len());
+        corners
+    }
+
+    /// Radiance and opacity at the corners of sixteen columns from `first` on, up to the column `last`.
+    #[inline(always)]
+    fn sixteen_corners(&self, y: usize, first: usize, last: usize, row: GridPosition, slice: &DepthInterval) -> Layer {
+        let side = self.tiles().side;
+        let mut directions =
+            Directions { components: [[0.0; LANES], [1.0; LANES], [0.0; LANES]], visible: [false; LANES] };
+        let mut sky = SkyColors { once: [ZERO_LANES; 3], endless: [ZERO_LANES; 3] };
+        for i in 0..LANES {
+            let column = (first + i).min(last);
+            let direction = self.view.camera.direction(DVec2::new((column * side) as f64, y as f64));
+            directions.visible[i] = direction.is_some();
+            let components = direction.unwrap_or(DVec3::Y).as_vec3().to_array();
+            let [once, endless] = self.sky_at(column, row);
+            for c in 0..3 {
+                directions.components[c][i] = components[c];
+                (sky.once[c][i], sky.endless[c][i]) = (once[c], endless[c]);
+            }
+        }
+        let ranges = self.bounds(false).ranges(&mut directions, slice, &[f32::INFINITY; LANES]);
+        let segments = RaySegments::new(&self.table, &ranges, self.end);
+        let (opacities, rescattered) = (segments.opacities(), segments.opacities_up_to_ends());
+        let mut layer = [ZERO_LANES, ZERO_LANES, ZERO_LANES, opacities];
+        for c in 0..3 {
+            layer[c] = Self::scattered_sky(&sky, &rescattered, &opacities, c);
+        }
+        if let Some(lamps) = self.lamps.in_scattering.as_ref().filter(|_| segments.any_lit()) {
+            let stride = lamps.distances * self.tiles().size[0];
+            for i in 0..LANES {
+                let above = row.index * stride + (first + i).min(last) * lamps.distances;
+                let light = segments.in_scattered(i, &lamps.sums, [above, above + stride], row.fraction);
+                for c in 0..3 {
+                    layer[c][i] += light[c];
+                }
+            }
+        }
+        layer
     }
 
     /// A plate may bound the medium at any depth, so intervals are evaluated for each pixel.
+    #[inline(always)]
     fn draw_in_front_of_plate(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
+        let columns = rows.x / FINE_TILE..rows.right().div_ceil(FINE_TILE) + 1;
+        let mut sums = Vec::new();
         for y in rows.y..rows.bottom() {
-            let position = self.tiles().row_at(y as f32 + 0.5);
-            for x in rows.x..rows.right() {
-                let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let Some(range) = self.distance_range(pixel, slice, Some(f64::from(strip.plate_depth(index)))) else {
-                    continue;
-                };
-                if range[1] <= range[0] {
-                    continue;
+            let row = self.tiles().row_at(y as f32 + 0.5);
+            if let Some(lamps) = &self.lamps.in_scattering {
+                lamps.interpolate_rows(self.tiles(), row, columns.clone(), 0..lamps.distances, &mut sums);
+            }
+            for column in columns.start..columns.end - 1 {
+                let left = column * FINE_TILE;
+                let visible = left.max(rows.x)..(left + FINE_TILE).min(rows.right());
+                let first = (y - strip.rect.y) * strip.rect.width + visible.start - strip.rect.x;
+                // Other pixels are hidden.
+                let mut plate = ZERO_LANES;
+                for x in visible.clone() {
+                    plate[x - left] = strip.plate_depth(first + x - visible.start);
                 }
-                let side = self.tiles().side;
-                let column = x / side;
-                let across = ((x % side) as f32 + 0.5) / side as f32;
-                let segment = self.segment(range);
-                let [left, right] =
-                    [column, column + 1].map(|column| self.radiance_and_transmittance(column, position, &segment));
-                composite_pixel(strip, index, std::array::from_fn(|c| (right[c] - left[c]).fma(across, left[c])));
+                let within = visible.start - left..visible.end - left;
+                if let Some(layer) = self.sixteen_pixels(column, column - columns.start, y, row, &sums, slice, &plate) {
+                    add_layer(strip, first, &layer, within);
+                }
             }
         }
     }
+
+    /// Radiance and opacity of the sixteen pixels of a tile in row `y`, in front of a `plate` (depths, m); `None` where it hides all. `sums` has
+    /// the light of lamps in this row, whose column `index` is that of the tile.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "the parts of one row of pixels")]
+    fn sixteen_pixels(
+        &self,
+        column: usize,
+        index: usize,
+        y: usize,
+        row: GridPosition,
+        sums: &[[f32; 4]],
+        slice: &DepthInterval,
+        plate: &Lanes,
+    ) -> Option<Layer> {
+        let mut directions = Directions::new(&self.view.camera, column * FINE_TILE, y);
+        let ranges = self.bounds(true).ranges(&mut directions, slice, plate);
+        if !any_range(&ranges) {
+            return None;
+        }
+        let segments = RaySegments::new(&self.table, &ranges, self.end);
+        let (opacities, rescattered) = (segments.opacities(), segments.opacities_up_to_ends());
+        let mut layer = [ZERO_LANES, ZERO_LANES, ZERO_LANES, opacities];
+        let sky = [column, column + 1].map(|column| self.sky_at(column, row));
+        for c in 0..3 {
+            let [left, right] = [0, 1].map(|side| {
+                let colors = SkyColors { once: [[sky[side][0][c]; LANES]; 3], endless: [[sky[side][1][c]; LANES]; 3] };
+                Self::scattered_sky(&colors, &rescattered, &opacities, c)
+            });
+            for i in 0..LANES {
+                layer[c][i] = (right[i] - left[i]).fma(across(i), left[i]);
+            }
+        }
+        if let Some(lamps) = self.lamps.in_scattering.as_ref().filter(|_| segments.any_lit()) {
+            let corners = [index, index + 1].map(|column| column * lamps.distances);
+            for i in 0..LANES {
+                let light = segments.in_scattered(i, sums, corners, across(i));
+                for c in 0..3 {
+                    layer[c][i] += light[c];
+                }
+            }
+        }
+        Some(layer)
+    }
 }
 
+/// Position of a pixel across its tile, 0 to 1.
 #[inline(always)]
-fn composite_pixel(strip: &mut Strip, index: usize, [red, green, blue, transmittance]: [f32; 4]) {
-    strip.add_row_behind(index, [&[red], &[green], &[blue]], Some(&[1.0 - transmittance]), &[f32::INFINITY]);
+fn across(i: usize) -> f32 {
+    (i as f32 + 0.5) * (1.0 / FINE_TILE as f32)
+}
+
+/// Adds a part of sixteen pixels under the contents of a strip, the first at its pixel `first`.
+#[inline(always)]
+fn add_layer(strip: &mut Strip, first: usize, layer: &Layer, part: Range<usize>) {
+    let [red, green, blue, opacity] = layer.each_ref().map(|row| &row[part.clone()]);
+    strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..part.len()]);
+}
+
+/// Adds corrections to consecutive pixels of a strip. The medium in front of them is contained in the strip's transmittance too; its effect is small.
+fn add_corrections(strip: &mut Strip, first: usize, corrections: &[[f32; 3]]) {
+    for c in 0..3 {
+        for (value, light) in strip.radiance[c][first..].iter_mut().zip(corrections) {
+            if *light != [0.0; 3] {
+                *value = (*value + light[c]).max(0.0);
+            }
+        }
+    }
 }

@@ -65,20 +65,6 @@ impl TileGrid {
         lerp_color(row_color(index), row_color(index + self.size[0]), row.fraction)
     }
 
-    /// The four corners around a position in the picture (pixels), with their bilinear weights.
-    pub(crate) fn corner_weights(&self, [x, y]: [f32; 2]) -> [(usize, f32); 4] {
-        let (column, row) = (self.column_at(x), self.row_at(y));
-        let index = row.index * self.size[0] + column.index;
-        let (across, down) = (column.fraction, row.fraction);
-        let below = index + self.size[0];
-        [
-            (index, (1.0 - across) * (1.0 - down)),
-            (index + 1, across * (1.0 - down)),
-            (below, (1.0 - across) * down),
-            (below + 1, across * down),
-        ]
-    }
-
     /// Row of corners at a vertical position (pixels).
     pub(crate) fn row_at(&self, y: f32) -> GridPosition {
         self.split(y, 1)

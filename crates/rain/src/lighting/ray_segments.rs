@@ -1,0 +1,231 @@
+//! Segments of lines of sight within the medium, sixteen at a time: where they begin and end, and their optical depths.
+
+use bansho_base::{
+    camera::{Camera, directions::Directions},
+    math::{MulAdd, approximations, simd::LANES},
+    phenomenon::strip::DepthInterval,
+};
+
+use crate::lanes::{Lanes, ZERO_LANES, fast_max, fast_min};
+
+/// Optical depth beyond which light of lamps is neglected: the transmittance is below 1e-17.
+const MAX_OPTICAL_DEPTH: f32 = 40.0;
+
+/// Optical depth by distance from the camera, linear between stored distances.
+pub(super) struct OpticalDepthTable {
+    /// Stored distances, ascending from 0, m.
+    distances: Vec<f32>,
+    /// For each interval between them: its start (m), the inverse of its width, the optical depth at its start, and its increase.
+    intervals: Vec<[f32; 4]>,
+    /// Number of intervals that lamps light.
+    lit_intervals: usize,
+}
+
+impl OpticalDepthTable {
+    /// From distances (m) and the optical depths up to them. Lamps light the first `lit_intervals`.
+    pub(super) fn new(distances: &[f64], depths: &[f32], lit_intervals: usize) -> Self {
+        let interval = |k: usize| {
+            let width = (distances[k + 1] - distances[k]).max(f64::MIN_POSITIVE);
+            [distances[k] as f32, (1.0 / width) as f32, depths[k], depths[k + 1] - depths[k]]
+        };
+        Self {
+            distances: distances.iter().map(|distance| *distance as f32).collect(),
+            intervals: (0..distances.len() - 1).map(interval).collect(),
+            lit_intervals,
+        }
+    }
+
+    /// Distances at which the light of lamps is stored.
+    pub(super) fn lit_distances(&self) -> usize {
+        self.lit_intervals + 1
+    }
+
+    /// Index of the interval that contains a distance (m); that of the last one beyond it.
+    #[inline(always)]
+    pub(super) fn interval(&self, distance: f32) -> usize {
+        let next = self.distances.partition_point(|stored| *stored <= distance);
+        next.clamp(1, self.intervals.len()) - 1
+    }
+
+    /// Sixteen distances (m) in the table.
+    #[inline(always)]
+    fn locate(&self, distances: &Lanes) -> TablePositions {
+        let (mut low, mut high) = (distances[0], distances[0]);
+        for i in 1..LANES {
+            low = fast_min(low, distances[i]);
+            high = fast_max(high, distances[i]);
+        }
+        let [first, last] = [low, high].map(|distance| self.interval(distance));
+        let mut found = TablePositions { index: [first as u32; LANES], fraction: ZERO_LANES, depth: ZERO_LANES };
+        // Neighboring pixels are mostly in the same interval.
+        for start in &self.distances[first + 1..=last] {
+            for i in 0..LANES {
+                found.index[i] += u32::from(distances[i] >= *start);
+            }
+        }
+        let mut columns = [ZERO_LANES; 4];
+        for i in 0..LANES {
+            let interval = self.intervals[found.index[i] as usize];
+            for c in 0..4 {
+                columns[c][i] = interval[c];
+            }
+        }
+        let [start, inverse_width, depth, increase] = &columns;
+        for i in 0..LANES {
+            found.fraction[i] = fast_min(1.0, fast_max(0.0, (distances[i] - start[i]) * inverse_width[i]));
+            found.depth[i] = increase[i].fma(found.fraction[i], depth[i]);
+        }
+        found
+    }
+
+    /// Restricts positions to the distances at which the light of lamps is stored.
+    #[inline(always)]
+    fn clamp_to_lit(&self, positions: &mut TablePositions) {
+        let last = self.lit_intervals as u32 - 1;
+        for i in 0..LANES {
+            let is_beyond = positions.index[i] > last;
+            positions.index[i] = if is_beyond { last } else { positions.index[i] };
+            positions.fraction[i] = if is_beyond { 1.0 } else { positions.fraction[i] };
+        }
+    }
+}
+
+/// Sixteen positions between stored distances.
+struct TablePositions {
+    index: [u32; LANES],
+    /// Interpolation fraction toward the next distance.
+    fraction: Lanes,
+    /// Optical depth.
+    depth: Lanes,
+}
+
+/// The distances between which lines of sight are in the medium.
+#[derive(Clone, Copy)]
+pub(super) struct MediumBounds<'a> {
+    pub(super) camera: &'a Camera,
+    /// Height of the camera over the ground, m. In a mirrored view it is negative, and the rain begins at the ground.
+    pub(super) height: f32,
+    /// End of the medium, m.
+    pub(super) end: f32,
+}
+
+impl MediumBounds<'_> {
+    /// Start and end of sixteen lines of sight within a depth interval and in front of a `plate` (depths, m); both alike where there is none.
+    #[inline(always)]
+    pub(super) fn ranges(&self, directions: &mut Directions, slice: &DepthInterval, plate: &Lanes) -> [Lanes; 2] {
+        let lengths = directions.normalize();
+        let (slice_near, slice_far) = (slice.near as f32, slice.far as f32);
+        let is_beneath = self.height < 0.0;
+        let [mut nears, mut fars] = [ZERO_LANES; 2];
+        for i in 0..LANES {
+            let ground = self.height / -directions.components[1][i];
+            let ground = if ground > 0.0 { ground } else { f32::INFINITY };
+            let near = slice_near * lengths[i];
+            let far = fast_min(slice_far, plate[i]) * lengths[i];
+            let near = if is_beneath { fast_max(near, ground) } else { near };
+            let far = if is_beneath { far } else { fast_min(far, ground) };
+            let near = fast_min(self.end, near);
+            let far = fast_max(near, fast_min(self.end, far));
+            nears[i] = if directions.visible[i] { near } else { 0.0 };
+            fars[i] = if directions.visible[i] { far } else { 0.0 };
+        }
+        [nears, fars]
+    }
+}
+
+/// Whether any range is longer than 0.
+#[inline(always)]
+pub(super) fn any_range([near, far]: &[Lanes; 2]) -> bool {
+    let mut any = false;
+    for i in 0..LANES {
+        any |= far[i] > near[i];
+    }
+    any
+}
+
+/// Sixteen segments of lines of sight.
+pub(super) struct RaySegments {
+    /// Their ends among the distances at which the light of lamps is stored.
+    index: [[u32; LANES]; 2],
+    fraction: [Lanes; 2],
+    /// Optical depths of their ends.
+    depths: [Lanes; 2],
+    /// Inverse transmittance from the camera to their near ends; 0 beyond the range of lamps and where nothing is transmitted.
+    gain: Lanes,
+    any_lit: bool,
+}
+
+impl RaySegments {
+    /// The segments between two distances each (m). Lamps light the rain up to `lit_end` (m).
+    #[inline(always)]
+    pub(super) fn new(table: &OpticalDepthTable, [near, far]: &[Lanes; 2], lit_end: f32) -> Self {
+        let [mut from, mut to] = [table.locate(near), table.locate(far)];
+        let (mut gain, mut any_lit) = (ZERO_LANES, false);
+        for i in 0..LANES {
+            // Beyond the maximum optical depth nothing is visible, and the gain would overflow.
+            let is_lit = (near[i] < lit_end) & (from.depth[i] < MAX_OPTICAL_DEPTH) & (far[i] > near[i]);
+            gain[i] = if is_lit { approximations::exp(from.depth[i]) } else { 0.0 };
+            any_lit |= is_lit;
+        }
+        let depths = [from.depth, to.depth];
+        table.clamp_to_lit(&mut from);
+        table.clamp_to_lit(&mut to);
+        Self { index: [from.index, to.index], fraction: [from.fraction, to.fraction], depths, gain, any_lit }
+    }
+
+    /// Whether lamps light any of them.
+    #[inline(always)]
+    pub(super) fn any_lit(&self) -> bool {
+        self.any_lit
+    }
+
+    /// Light of lamps scattered within a segment, as seen from its near end: interpolated by `t` between two corners, whose accumulated light begins at
+    /// two indices of `sums`.
+    #[inline(always)]
+    pub(super) fn in_scattered(&self, i: usize, sums: &[[f32; 4]], corners: [usize; 2], t: f32) -> [f32; 4] {
+        let [left, right] = [self.difference(i, sums, corners[0]), self.difference(i, sums, corners[1])];
+        let mut light = [0.0; 4];
+        for c in 0..4 {
+            light[c] = (right[c] - left[c]).fma(t, left[c]) * self.gain[i];
+        }
+        light
+    }
+
+    /// The increase of accumulated light over a segment.
+    #[inline(always)]
+    fn difference(&self, i: usize, sums: &[[f32; 4]], corner: usize) -> [f32; 4] {
+        let mut ends = [[0.0; 4]; 2];
+        for end in 0..2 {
+            let first = corner + self.index[end][i] as usize;
+            let [from, to] = [sums[first], sums[first + 1]];
+            for c in 0..4 {
+                ends[end][c] = (to[c] - from[c]).fma(self.fraction[end][i], from[c]);
+            }
+        }
+        let mut difference = [0.0; 4];
+        for c in 0..4 {
+            difference[c] = fast_max(0.0, ends[1][c] - ends[0][c]);
+        }
+        difference
+    }
+
+    /// Opacity of the segments.
+    #[inline(always)]
+    pub(super) fn opacities(&self) -> Lanes {
+        let mut opacities = ZERO_LANES;
+        for i in 0..LANES {
+            opacities[i] = 1.0 - approximations::exp(self.depths[0][i] - self.depths[1][i]);
+        }
+        opacities
+    }
+
+    /// Sum of the opacities of the medium up to both ends.
+    #[inline(always)]
+    pub(super) fn opacities_up_to_ends(&self) -> Lanes {
+        let mut sums = ZERO_LANES;
+        for i in 0..LANES {
+            sums[i] = 2.0 - approximations::exp(-self.depths[0][i]) - approximations::exp(-self.depths[1][i]);
+        }
+        sums
+    }
+}
