@@ -89,9 +89,12 @@ struct SurfaceLight<S: Simd> {
 }
 
 impl PreparedGround<'_> {
-    /// The pattern of the ground at some hits.
+    /// The pattern of the ground at some hits. Open water has none.
     #[inline(always)]
     pub(super) fn samples<S: Simd>(&self, hits: &Hits<S>) -> SurfaceSamples {
+        if self.lake.is_some() {
+            return SurfaceSamples::NONE;
+        }
         let camera = self.view.camera.position;
         let [xs, zs] = [array(hits.offset[0]), array(hits.offset[2])];
         let footprint = array(hits.footprint);
