@@ -156,7 +156,7 @@ mod tests {
     fn large_frames_are_in_memory_once_or_twice_where_they_are_written_from_their_pixels() {
         let frame = |width: usize, height: usize| width * height * FRAME_BYTES as usize;
         assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(4096, 4096), writes)), [1, 2]);
-        assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(1280, 720), writes)), [7, 7]);
+        assert_eq!([false, true].map(|writes| max_frames_with_pixels(frame(1280, 720), writes)), [9, 9]);
         assert_eq!(max_frames_with_pixels(0, false), MAX_BYTES_OF_PIXELS);
     }
 }
