@@ -56,6 +56,7 @@ impl HaloCorrector<'_> {
         corrections
     }
 
+    #[inline(always)]
     fn interpolate_rows(&self, y: usize, rows: &mut HaloRows) {
         let halo = self.halo;
         // Distances are at least depths, so that light up to nearer distances is not needed.
