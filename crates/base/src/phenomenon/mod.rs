@@ -112,13 +112,13 @@ pub struct LevelMirror {
     pub height: f64,
     /// Points that a plate shows within this height above or below the mirror belong to the mirror, m.
     pub plate_tolerance: f64,
-    /// How sharply it reflects the scene.
-    pub finish: MirrorFinish,
+    /// How rough it is.
+    pub roughness: MirrorRoughness,
 }
 
-/// How sharply a mirror reflects the scene, which decides the resolution of the picture that is drawn for it.
+/// How rough a mirror is, which decides the resolution of the picture that is drawn for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MirrorFinish {
+pub enum MirrorRoughness {
     /// So rough that it reflects only the [backdrop](surroundings::Backdrop) and lights: it needs no picture.
     Rough,
     /// Puddles: sharp, unless drops fall into them.
@@ -127,7 +127,7 @@ pub enum MirrorFinish {
     Waves(f64),
 }
 
-impl MirrorFinish {
+impl MirrorRoughness {
     /// Side of a pixel of the mirror's picture in pixels of the view, whose camera has this focal length in pixels; `None` if it needs no picture.
     ///
     /// Waves of r.m.s. slope s blur the picture with a standard deviation of `2 s f` pixels; half of that need not be resolved. Rings of drops displace

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     parameters::{Range, animated::Animated},
-    phenomenon::{LevelMirror, MirrorFinish},
+    phenomenon::{LevelMirror, MirrorRoughness},
 };
 
 bansho_base::choice! {
@@ -50,12 +50,12 @@ bansho_base::parameters! {
 impl GroundParameters {
     /// The ground plane as a mirror.
     pub(super) fn mirror(&self) -> LevelMirror {
-        let finish = match self.kind {
-            GroundKind::Water => MirrorFinish::Waves(self.waves),
+        let roughness = match self.kind {
+            GroundKind::Water => MirrorRoughness::Waves(self.waves),
             // Only puddles show the scene.
-            GroundKind::Land | GroundKind::Plate if self.puddles > 0.0 => MirrorFinish::Puddles,
-            GroundKind::Land | GroundKind::Plate => MirrorFinish::Rough,
+            GroundKind::Land | GroundKind::Plate if self.puddles > 0.0 => MirrorRoughness::Puddles,
+            GroundKind::Land | GroundKind::Plate => MirrorRoughness::Rough,
         };
-        LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance, finish }
+        LevelMirror { height: self.height, plate_tolerance: self.plate_tolerance, roughness }
     }
 }

@@ -301,7 +301,6 @@ impl<'a> SingleScattering<'a> {
     /// Radiance and opacity of the sixteen pixels of a tile in row `y`, in front of a `plate` (depths, m); `None` where it hides all. `sums` has
     /// the light of lamps in this row, whose column `index` is that of the tile.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "the parts of one row of pixels")]
     fn sixteen_pixels(
         &self,
         column: usize,

@@ -2,6 +2,7 @@
 
 mod accumulate;
 pub(crate) mod background;
+mod frame_memory;
 pub(crate) mod hiding;
 pub(crate) mod mirror;
 pub(crate) mod plate;

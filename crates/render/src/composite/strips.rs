@@ -7,7 +7,7 @@ use bansho_base::{
         parallel::prelude::*,
         scratch_pool::ScratchPool,
     },
-    image::{Image, Rect},
+    image::Rect,
     math::MulAdd,
     phenomenon::{
         Prepared,
@@ -18,6 +18,7 @@ use bansho_base::{
 use super::{
     accumulate::Accumulator,
     background::{Background, BentPixels},
+    frame_memory::{FrameMemory, StripPixels},
     hiding::HidingDepth,
     plate::PlateFrame,
     slices::Slice,
@@ -191,50 +192,6 @@ impl<'a> Composition<'a> {
     }
 }
 
-/// The memory of a frame.
-struct FrameMemory {
-    beauty: Image<4>,
-    depth: Option<Vec<f32>>,
-    /// Pixels that still contain an earlier frame; all others are empty.
-    stale: Rect,
-}
-
-impl FrameMemory {
-    /// Takes the memory of a recycled frame of the same size: page faults of new memory cost more than drawing a sparse frame.
-    fn new(window: Rect, has_depth: bool, recycled: Option<Frame>) -> Self {
-        let (width, height) = (window.width, window.height);
-        let fits = |frame: &Frame| {
-            frame.beauty.width() == width && frame.beauty.height() == height && frame.depth.is_some() == has_depth
-        };
-        if let Some(Frame { beauty, depth, content, .. }) = recycled.filter(fits) {
-            return Self { beauty, depth, stale: content };
-        }
-        let depth = has_depth.then(|| vec![f32::INFINITY; width * height]);
-        Self { beauty: Image::filled(width, height, [0.0; 4]), depth, stale: Rect::default() }
-    }
-}
-
-/// The pixels of a strip in a frame, row by row.
-struct StripPixels<'a> {
-    beauty: &'a mut [[f32; 4]],
-    /// Empty where the frame has no depth.
-    depth: &'a mut [f32],
-}
-
-impl StripPixels<'_> {
-    /// Clears the stale pixels; the strip begins with row `first` of the frame, which is `width` pixels wide.
-    fn clear(&mut self, stale: Rect, first: usize, width: usize) {
-        let columns = stale.x..stale.right();
-        let is_stale = |row: usize| (stale.y..stale.bottom()).contains(&(first + row));
-        for (_, beauty) in self.beauty.chunks_mut(width).enumerate().filter(|(row, _)| is_stale(*row)) {
-            beauty[columns.clone()].fill([0.0; 4]);
-        }
-        for (_, depth) in self.depth.chunks_mut(width).enumerate().filter(|(row, _)| is_stale(*row)) {
-            depth[columns.clone()].fill(f32::INFINITY);
-        }
-    }
-}
-
 /// Draws and composites the whole window.
 pub(crate) fn draw_frame(
     composition: &Composition,
@@ -243,18 +200,13 @@ pub(crate) fn draw_frame(
 ) -> Result<Frame, Cancelled> {
     let window = composition.view.window;
     let level = bansho_base::math::simd::level();
-    let FrameMemory { mut beauty, mut depth, stale } = FrameMemory::new(window, composition.outputs.depth, recycled);
-    let strip_pixels = STRIP_ROWS * window.width;
-    let mut depth_strips = depth.iter_mut().flat_map(|depth| depth.chunks_mut(strip_pixels));
-    let beauty_strips = beauty.pixels_mut().chunks_mut(strip_pixels);
-    let pixels: Vec<StripPixels> =
-        beauty_strips.map(|beauty| StripPixels { beauty, depth: depth_strips.next().unwrap_or_default() }).collect();
+    let mut memory = FrameMemory::new(window, composition.outputs.depth, recycled);
     let scratches = composition.scratches;
     let has_channels = composition.outputs.layers || composition.outputs.aovs;
-    let strips = pixels.into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
+    let strips = memory.strips().into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
         observer::check(composition.observer)?;
         let _part = composition.begin_part(None);
-        pixels.clear(stale, index * STRIP_ROWS, window.width);
+        pixels.clear();
         let strip = composition.strip_rect(index);
         let rect = composition.nonempty_rect(strip);
         if rect.is_empty() {
@@ -275,7 +227,15 @@ pub(crate) fn draw_frame(
     };
     let opaque = composition.plate.color.is_some() && composition.view.overscan == 0;
     let content = composition.content();
-    Ok(Frame { header, beauty, depth, channels: channels(composition, planes), opaque, content, metadata: Vec::new() })
+    Ok(Frame {
+        header,
+        beauty: memory.beauty,
+        depth: memory.depth,
+        channels: channels(composition, planes),
+        opaque,
+        content,
+        metadata: Vec::new(),
+    })
 }
 
 /// Exposes a strip, computes its alpha, and composites the background behind it.

@@ -41,7 +41,7 @@ impl Shot {
         let (index, mirror) = mirrors.find_map(|(index, each)| Some((index, each.info().mirror?)))?;
         // Only drops in the air extinguish light.
         let is_raining = publications.iter().any(|publication| publication.extinction > 0.0);
-        let pixel_size = mirror.finish.pixel_size(view.camera.focal_pixels, is_raining);
+        let pixel_size = mirror.roughness.pixel_size(view.camera.focal_pixels, is_raining);
         let has_picture = pixel_size.is_some();
         Some(SceneMirror { index, mirror, pixel_size: pixel_size.unwrap_or(BACKDROP_SAMPLE), has_picture })
     }

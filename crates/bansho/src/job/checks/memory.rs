@@ -1,6 +1,6 @@
 //! Whether there is enough memory for the pictures of a job, checked before anything is drawn.
 
-use bansho_base::{host::memory, parameters::ProblemKind};
+use bansho_base::{host::memory, parameters::ProblemKind, phenomenon::MirrorRoughness};
 use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
 use crate::job::{
@@ -14,6 +14,8 @@ const MIN_CHECKED_PIXELS: f64 = 4e6;
 const FRAME_BYTES: f64 = 16.0;
 /// Bytes of the depth of a pixel, which only scene-linear files and refracted light need.
 const DEPTH_BYTES: f64 = 4.0;
+/// Bytes of a pixel of a plate as it is decoded, resampled and converted, measured.
+const PLATE_BYTES: f64 = 60.0;
 /// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
 const MAX_BYTES_OF_PIXELS: usize = 1 << 27;
 /// Bytes of the process without a picture.
@@ -64,10 +66,12 @@ impl BytesPerPixel {
             max_frames_with_pixels(window.width * window.height * frame as usize, request.display.is_none());
         let (drawn, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
         let drawn = drawn as f64 * frame + encoded as f64 * written;
-        let plate = if plan.scene().has_plate() { FRAME_BYTES + DEPTH_BYTES } else { 0.0 };
-        // The mirrored picture and the plate in it.
-        let has_mirror = compiled.phenomena().any(|phenomenon| phenomenon.info().mirror.is_some());
-        let mirror = if has_mirror { FRAME_BYTES + plate } else { 0.0 };
+        let [plate, plate_frame] =
+            if plan.scene().has_plate() { [PLATE_BYTES, FRAME_BYTES + DEPTH_BYTES] } else { [0.0; 2] };
+        // The mirrored picture and the plate in it, unless the mirror is too rough to show either.
+        let mut mirrors = compiled.phenomena().filter_map(|phenomenon| phenomenon.info().mirror);
+        let has_picture = mirrors.any(|mirror| mirror.roughness != MirrorRoughness::Rough);
+        let mirror = if has_picture { FRAME_BYTES + plate_frame } else { 0.0 };
         Self { drawn, whole: plate + mirror }
     }
 
