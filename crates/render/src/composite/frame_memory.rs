@@ -5,8 +5,6 @@ use bansho_base::{
     image::{Image, Rect},
 };
 
-use super::strips::STRIP_ROWS;
-
 /// The memory of a frame.
 pub(super) struct FrameMemory {
     /// Color and alpha.
@@ -41,13 +39,13 @@ impl FrameMemory {
         Self { beauty: Image::filled(width, height, [0.0; 4]), depth, stale: Rect::default() }
     }
 
-    /// Its strips from the top.
-    pub(super) fn strips(&mut self) -> Vec<StripPixels<'_>> {
+    /// Its strips of `strip_rows` rows from the top; the last one may have fewer.
+    pub(super) fn strips(&mut self, strip_rows: usize) -> Vec<StripPixels<'_>> {
         let (width, stale) = (self.beauty.width(), self.stale);
-        let pixels = STRIP_ROWS * width;
+        let pixels = strip_rows * width;
         let mut depth = self.depth.iter_mut().flat_map(|depth| depth.chunks_mut(pixels));
         let strip = |(index, beauty): (usize, _)| {
-            let rows = Rect { x: 0, y: index * STRIP_ROWS, width, height: STRIP_ROWS };
+            let rows = Rect { x: 0, y: index * strip_rows, width, height: strip_rows };
             let stale = stale.intersection(&rows);
             let stale = Rect { y: stale.y.saturating_sub(rows.y), ..stale };
             StripPixels { beauty, depth: depth.next().unwrap_or_default(), stale, width }

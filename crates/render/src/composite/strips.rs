@@ -203,7 +203,7 @@ pub(crate) fn draw_frame(
     let mut memory = FrameMemory::new(window, composition.outputs.depth, recycled);
     let scratches = composition.scratches;
     let has_channels = composition.outputs.layers || composition.outputs.aovs;
-    let strips = memory.strips().into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
+    let strips = memory.strips(STRIP_ROWS).into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
         observer::check(composition.observer)?;
         let _part = composition.begin_part(None);
         pixels.clear();
