@@ -11,6 +11,7 @@
 //! - S. Starik and M. Werman, "Simulation of rain in videos" (2002); K. Garg and S. K. Nayar, "Vision and rain" (2007): opacity of streaks.
 //! - K. Garg and S. K. Nayar, "Photorealistic rendering of rain streaks" (2006): speckle of oscillating drops; frequencies of Lord Rayleigh (1879).
 //! - C. Kulla and M. Fajardo, "Importance sampling techniques for path tracing in participating media" (2012): equiangular sampling.
+//! - R. L. Cook, J. Halstead, M. Planck and D. Ryu, "Stochastic simplification of aggregate detail" (2007): far billboards.
 //! - H. Koschmieder (1924): visibility, and the radiance of infinitely deep rain.
 //!
 //! # Equations

@@ -63,6 +63,9 @@ bansho_base::parameters! {
         wind_response: f64 = 1.0, limits(Range::new(0.0, 2.0));
         /// Whether the light of streaks is omitted where no display would show it.
         culling: bool = true;
+        /// Contribution to a pixel up to which a streak on a billboard stands for several drops, in 8-bit codes of display white. 0 draws every drop, as frames
+        /// with AOVs always do. Only with `method = "billboards"`.
+        simplification_codes: f64 = 1.5, limits(Range::new(0.0, 16.0));
         /// Splashes of drops on the ground.
         splashes: SplashParameters = SplashParameters::default();
     }

@@ -161,6 +161,25 @@ impl Frustum {
         }
         !outside
     }
+
+    /// The part of a line `start + t step` in which [`may_be_visible`](Self::may_be_visible) can be true: the range of t, empty if its ends are reversed.
+    fn visible_part(&self, [start, step]: [DVec3; 2], half: DVec3, radius: f64) -> [f64; 2] {
+        let [mut from, mut to] = [f64::NEG_INFINITY, f64::INFINITY];
+        for side in 0..PLANE_COUNT {
+            let normal = DVec3::from(self.planes.map(|plane| plane[side]));
+            let (rise, excess) =
+                (normal.dot(step), normal.dot(start - self.position) - normal.abs().dot(half) - radius);
+            let crossing = -excess / rise;
+            if rise > 0.0 {
+                to = to.min(crossing);
+            } else if rise < 0.0 {
+                from = from.max(crossing);
+            } else if excess > 0.0 {
+                return [f64::INFINITY, f64::NEG_INFINITY];
+            }
+        }
+        [from, to]
+    }
 }
 
 impl ShutterCameras {
@@ -203,6 +222,13 @@ impl ShutterCameras {
         }
         seen
     }
+
+    /// A range of t outside of which no point `start + t step` passes [`may_be_visible`](Self::may_be_visible); empty if its ends are reversed.
+    pub(crate) fn visible_part(&self, line: [DVec3; 2], half: DVec3, radius: f64) -> [f64; 2] {
+        let parts = self.frusta.iter().map(|frustum| frustum.visible_part(line, half, radius));
+        let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        parts.reduce(hull).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
+    }
 }
 
 #[cfg(test)]
@@ -222,7 +248,7 @@ mod tests {
     fn whatever_projects_into_the_picture_may_be_seen() {
         let view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.02 }, 0.03, [320, 180], 4);
         let cameras = ShutterCameras::new(&view);
-        let (mut seen, mut hidden) = (0, 0);
+        let (mut seen, mut hidden, mut in_part) = (0, 0, 0);
         for i in 0..4000 {
             let u = Key::new(1, "sight").uniforms(i, 0, Purpose::named("point")).map(f64::from);
             let point = DVec3::new(20.0 * u[0] - 10.0, 20.0 * u[1] - 10.0, 20.0 * u[2] - 10.0);
@@ -231,9 +257,18 @@ mod tests {
             };
             let projects = view.camera.project(point).is_some_and(|projection| inside(projection.pixel));
             assert!(!projects || cameras.may_be_visible(point, DVec3::ZERO, 0.0));
+            let (half, radius) = (DVec3::new(0.5, 0.2, 0.5), 0.1);
+            let step = DVec3::new(0.3, 1.0 - 2.0 * u[3], 0.2);
+            let [from, to] = cameras.visible_part([point, step], half, radius);
+            for t in [-20.0, -7.0, -1.0, 0.0, 0.5, 3.0, 11.0] {
+                let may_be_visible = cameras.may_be_visible(point + t * step, half, radius);
+                // There is one camera, so the range is exact but for rounding at its ends.
+                assert!(may_be_visible == (t > from && t < to), "{t} {from} {to}");
+                in_part += usize::from(may_be_visible);
+            }
             seen += usize::from(projects);
             hidden += usize::from(!cameras.may_be_visible(point, DVec3::splat(0.5), 0.0));
         }
-        assert!(seen > 50 && hidden > 3000, "{seen} {hidden}");
+        assert!(seen > 50 && hidden > 3000 && in_part > 500, "{seen} {hidden} {in_part}");
     }
 }

@@ -44,7 +44,7 @@ fn headlights_light_a_cone_of_rain() {
 #[test]
 fn culling_changes_no_pixel_of_a_scene_by_a_255th() {
     for scene in ["street_lamp", "headlights"] {
-        let text = scene_text(scene);
+        let text = scene_text(scene).replace("[[rain]]\n", "[[rain]]\nsimplification_codes = 0.0\n");
         let all = text.replace("[[rain]]\n", "[[rain]]\nculling = false\n");
         assert_ne!(text, all);
         let [culled, all] = [text, all].map(|text| Film::of_text(&text, SMALL, &[30], &SceneOptions::default()));

@@ -4,6 +4,7 @@
 //! The texture T(R, D) of a billboard is stored as a list of drop positions, not as pixels: a drop is narrower than a
 //! pixel, so nearly all pixels would be empty, and streaks drawn from positions are sharp at any size.
 
+pub(crate) mod stochastic_simplification;
 pub mod texture;
 
 use bansho_base::{
@@ -15,11 +16,12 @@ use bansho_base::{
     },
 };
 use fearless_simd::dispatch;
+use stochastic_simplification::StochasticSimplification;
 
 use crate::{
     drops::{
         lattice::{CELL_SIZE, Cell},
-        shutter_state::{DropClassState, Sphere},
+        shutter_state::{DropClassState, Sphere, VisibleCell},
     },
     lanes::{Lanes, ZERO_LANES, fast_max, fast_min},
     streaks::{
@@ -74,16 +76,11 @@ struct Billboard<'a> {
     threshold: f32,
 }
 
-impl Billboard<'_> {
-    /// Visibility of a drop of the texture, from the drop count less its index. It is 1 for all but the last, fractional
-    /// drop, which that fraction of all billboards shows completely and the others do not, with a short fade.
-    #[inline(always)]
-    fn visibility(&self, remaining_count: f32) -> f32 {
-        fast_min(
-            1.0,
-            fast_max(0.0, (remaining_count - self.threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32),
-        )
-    }
+/// Visibility of a drop of a texture, from the drop count less its index. It is 1 for all but the last, fractional
+/// drop, which that fraction of all billboards shows completely and the others do not, with a short fade.
+#[inline(always)]
+fn drop_visibility(remaining_count: f32, threshold: f32) -> f32 {
+    fast_min(1.0, fast_max(0.0, (remaining_count - threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32))
 }
 
 /// Wraps a texture coordinate into 0..1.
@@ -98,14 +95,21 @@ pub(super) struct Billboards<'a> {
     textures: DropTextures,
     /// Radiance below which the light of a streak is left out, cd/m^2.
     culling_radiance: f32,
+    /// Leaves out a part of the drops; `None` to draw them all.
+    simplification: Option<StochasticSimplification>,
 }
 
 impl<'a> Billboards<'a> {
     /// Streaks whose radiance is below `culling_radiance` (cd/m^2) everywhere are drawn without the light of lamps and
     /// fires.
-    pub(super) fn new(projection: StreakProjection<'a>, culling_radiance: f32) -> Self {
+    pub(super) fn new(
+        projection: StreakProjection<'a>,
+        culling_radiance: f32,
+        simplification: Option<StochasticSimplification>,
+    ) -> Self {
         let shutter_state = projection.shutter_state;
-        Self { projection, textures: DropTextures::new(shutter_state.key, &shutter_state.classes), culling_radiance }
+        let textures = DropTextures::new(shutter_state.key, &shutter_state.classes);
+        Self { projection, textures, culling_radiance, simplification }
     }
 
     /// The streaks of all cells that may be visible within a sphere.
@@ -119,8 +123,16 @@ impl<'a> Billboards<'a> {
 
     /// Adds the streaks of a cell's billboard.
     #[inline(always)]
-    fn add_billboard(&self, class: &DropClassState, cell: Cell, builder: &mut StreakChunkBuilder) {
-        let billboard = self.billboard(class, cell);
+    fn add_billboard(&self, class: &DropClassState, visible: &VisibleCell, builder: &mut StreakChunkBuilder) {
+        let fraction = self.fraction(class, visible);
+        let count = (class.count() * fraction) as f32;
+        let contents = class.lattice.contents(visible.cell);
+        let placement = self.projection.shutter_state.key.uniforms(contents, 0, class.purpose(POSITION));
+        if drop_visibility(count, placement[2]) <= 0.0 {
+            return;
+        }
+        builder.set_drops_per_streak(1.0 / fraction);
+        let billboard = self.billboard(class, visible.cell, contents, placement);
         let [base, right, up] = self.quad_edges(&billboard.quad);
         // The bound costs more than it saves without culling.
         let min_peak = if self.culling_radiance > 0.0 {
@@ -130,9 +142,13 @@ impl<'a> Billboards<'a> {
             0.0
         };
         let velocity = billboard.velocity.as_vec3().to_array();
-        let (diameter_mm, count) = (class.diameter_mm as f32, class.count() as f32);
-        let opacity_factor = self.projection.shutter_state.opacity_factor(class.diameter_mm, class.speed) as f32;
+        let diameter_mm = class.diameter_mm as f32;
+        let opacity_factor = self.projection.shutter_state.opacity_factor(class.diameter_mm, class.speed);
+        let opacity_factor = (opacity_factor / fraction) as f32;
         for (batch, texture) in billboard.texture.iter().enumerate() {
+            if (batch * LANES) as f32 >= count + 1.0 {
+                break;
+            }
             let mut drops = DropBatch {
                 positions: [ZERO_LANES; 3],
                 velocities: velocity.map(|v| [v; LANES]),
@@ -141,7 +157,7 @@ impl<'a> Billboards<'a> {
                 presence: ZERO_LANES,
             };
             for i in 0..LANES {
-                drops.presence[i] = billboard.visibility(count - (batch * LANES + i) as i32 as f32);
+                drops.presence[i] = drop_visibility(count - (batch * LANES + i) as i32 as f32, billboard.threshold);
                 let (x, y) = (
                     wrapped(billboard.mirror * (texture[0][i] - billboard.offset[0])),
                     wrapped(texture[1][i] - billboard.offset[1]),
@@ -161,11 +177,26 @@ impl<'a> Billboards<'a> {
         [corner - eye, right - corner, up - corner].map(|vector| vector.as_vec3().to_array())
     }
 
-    fn billboard(&self, class: &DropClassState, cell: Cell) -> Billboard<'_> {
+    /// Fraction of the drops of a billboard that is drawn.
+    fn fraction(&self, class: &DropClassState, visible: &VisibleCell) -> f64 {
+        let StreakProjection { shutter_state, lighting, .. } = self.projection;
+        self.simplification.map_or(1.0, |simplification| {
+            let toward = (visible.center - shutter_state.cameras.middle().position).normalize_or_zero();
+            let radiance = lighting.max_channel(visible.center, toward);
+            simplification.fraction(shutter_state, class, visible.distance, radiance.into())
+        })
+    }
+
+    /// The billboard of a cell with some `contents`, at a random position within it.
+    fn billboard(
+        &self,
+        class: &DropClassState,
+        cell: Cell,
+        contents: u64,
+        [x, z, threshold, _]: [f32; 4],
+    ) -> Billboard<'_> {
         let shutter_state = self.projection.shutter_state;
-        let contents = class.lattice.contents(cell);
         let [across, up, choice, mirrored] = shutter_state.key.uniforms(contents, 0, class.purpose(OFFSET));
-        let [x, z, threshold, _] = shutter_state.key.uniforms(contents, 0, class.purpose(POSITION));
         // At a random position within the cell, so that billboards do not line up.
         let (middle, velocity) = shutter_state.drop_state(class, cell, DVec3::new(x.into(), 0.5, z.into()));
         let height = class.lattice.height();

@@ -46,6 +46,14 @@ impl GustField {
         Some(Self { spacing, first, count, nodes: (0..columns * rows * layers).into_par_iter().map(node).collect() })
     }
 
+    /// Smallest and largest displacement along each axis, m, and the largest speed, m/s.
+    pub(crate) fn extremes(&self) -> ([DVec3; 2], f64) {
+        let displacements = self.nodes.iter().map(|[displacement, _]| *displacement);
+        let none = [DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY)];
+        let range = displacements.fold(none, |[min, max], vector| [min.min(vector), max.max(vector)]);
+        (range, self.nodes.iter().map(|[_, velocity]| velocity.length()).fold(0.0, f64::max))
+    }
+
     /// A box that contains every point whose displaced position is in the box between two corners.
     pub(crate) fn source_bounds(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         /// After this many iterations the box hardly shrinks any more.

@@ -72,6 +72,8 @@ pub(crate) struct Sphere {
 /// A cell of a lattice that may be visible.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisibleCell {
+    /// Its center in the world, m.
+    pub(crate) center: DVec3,
     /// Distance of its center from the camera, m.
     pub(crate) distance: f64,
     pub(crate) cell: Cell,
@@ -191,24 +193,37 @@ impl ShutterState {
         let travel = 0.5 * (class.speed + self.cameras.velocity().length()) * self.cameras.exposure_time
             + margin
             + MAX_DROP_RADIUS;
-        let rows = [low.y.max(self.ground - CELL_SIZE), high.y].map(|y| class.lattice.row(y));
         let mut cells = Vec::new();
+        let mut add = |cell| {
+            let (point, velocity) = self.drop_state(class, cell, DVec3::splat(0.5));
+            let nearest = ((point - center).abs() - half).max(DVec3::ZERO).length();
+            let wind_travel = 0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.cameras.exposure_time;
+            if nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel) {
+                cells.push(VisibleCell { center: point, distance: (point - eye).length(), cell });
+            }
+        };
+        let lines = self.cell_lines(half, travel);
+        let rows = [low.y.max(self.ground - CELL_SIZE), high.y].map(|y| class.lattice.row(y));
         for row in rows[0]..=rows[1] {
             let [first, last] = [low, high].map(|corner| class.lattice.column(row, DVec2::new(corner.x, corner.z)));
             for x in first[0]..=last[0] {
-                for z in first[1]..=last[1] {
-                    let cell = Cell([x, row, z]);
-                    let (point, velocity) = self.drop_state(class, cell, DVec3::splat(0.5));
-                    let nearest = ((point - center).abs() - half).max(DVec3::ZERO).length();
-                    let wind_travel =
-                        0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.cameras.exposure_time;
-                    if nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel) {
-                        cells.push(VisibleCell { distance: (point - eye).length(), cell });
-                    }
-                }
+                let [from, to] = lines.visible_part(class, [x, row], [first[1], last[1]]);
+                (from..=to).for_each(|z| add(Cell([x, row, z])));
             }
         }
         cells
+    }
+
+    /// Lines of cells whose drops move up to `travel` (m) relative to the camera beside what the wind adds.
+    fn cell_lines(&self, half: DVec3, travel: f64) -> CellLines<'_> {
+        let ([min, max], gust_speed) = self.gusts.as_ref().map_or(([DVec3::ZERO; 2], 0.0), |gusts| gusts.extremes());
+        let wind_travel = 0.5 * (self.wind.length() + gust_speed) * self.cameras.exposure_time;
+        CellLines {
+            cameras: &self.cameras,
+            displacement: 0.5 * (min + max),
+            half: half + 0.5 * (max - min),
+            travel: travel + wind_travel,
+        }
     }
 
     /// Whether any solid may block rain.
@@ -219,6 +234,27 @@ impl ShutterState {
     /// Whether a solid blocks the rain that arrives at `point` with `velocity`.
     pub(crate) fn is_sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
         self.occluders.iter().any(|occluder| ray_hits_occluder(occluder, point, -velocity.normalize_or_zero()))
+    }
+}
+
+/// Lines of cells along z, to find which of them may be visible without a look at each.
+struct CellLines<'a> {
+    cameras: &'a ShutterCameras,
+    /// Middle of all displacements by gusts, m.
+    displacement: DVec3,
+    /// Half extents of a cell's drops and of the displacements, m.
+    half: DVec3,
+    /// How far drops move relative to the camera, m.
+    travel: f64,
+}
+
+impl CellLines<'_> {
+    /// The range of cells along z that may be visible, within a range, for `[x, row]`. Reversed if there are none.
+    fn visible_part(&self, class: &DropClassState, [x, row]: [i64; 2], [first, last]: [i64; 2]) -> [i64; 2] {
+        let start = class.lattice.point_in_world(Cell([x, row, 0]), DVec3::splat(0.5)) + self.displacement;
+        let [from, to] = self.cameras.visible_part([start, DVec3::Z * CELL_SIZE], self.half, self.travel);
+        // One more on each side, for rounding.
+        [first.max((from - 1.0).floor() as i64), last.min((to + 1.0).ceil() as i64)]
     }
 }
 

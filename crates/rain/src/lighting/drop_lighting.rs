@@ -69,7 +69,6 @@ pub(crate) struct DropLighting<'a> {
 impl DropLighting<'_> {
     /// Mean radiance of a drop at `point` by one light, seen along `direction` (unit vector from the eye), ACEScg, cd/m^2:
     /// `E p / (4 pi)`: the scalar twin of [`add`](Self::add).
-    #[cfg(test)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
         let bansho_base::phenomenon::surroundings::IncidentLight { illuminance, toward, distance } =
             light.incident_light(point);
@@ -79,6 +78,12 @@ impl DropLighting<'_> {
         let transmittance = approximations::exp(-(self.extinction * distance) as f32);
         let scattered = self.scattering.at(toward.dot(direction) as f32);
         [0, 1, 2].map(|c| illuminance[c] * transmittance * scattered[c])
+    }
+
+    /// Radiance of a drop by all lights as [`radiance`](Self::radiance) gives it, in its brightest color, cd/m^2.
+    pub(crate) fn max_channel(&self, point: DVec3, direction: DVec3) -> f32 {
+        let radiance = |light| self.radiance(light, point, direction).into_iter().fold(0.0, f32::max);
+        self.lights.iter().map(radiance).sum()
     }
 
     /// The lights, prepared for drops whose positions are relative to `eye`.

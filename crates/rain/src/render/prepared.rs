@@ -15,7 +15,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::{
     Rain,
     aovs::write_aovs,
-    billboards::Billboards,
+    billboards::{Billboards, stochastic_simplification::StochasticSimplification},
     drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
     lighting::{
         drop_lighting::{DropLighting, PreparedLight},
@@ -78,7 +78,8 @@ impl<'a> PreparedRain<'a> {
                 let region = PerDropRegion::new(&shutter_state, lights);
                 let mut chunks = frame.projection(DropSelection::PerDrop(&region)).drop_chunks(region.spheres());
                 let projection = frame.projection(DropSelection::Billboard(&region));
-                let billboard_chunks = Billboards::new(projection, frame.culling_radiance()).chunks(bounds);
+                let billboard_chunks =
+                    Billboards::new(projection, frame.culling_radiance(), frame.simplification()).chunks(bounds);
                 billboards = billboard_chunks.iter().map(|chunk| chunk.cell_count).sum();
                 chunks.extend(billboard_chunks);
                 chunks
@@ -108,7 +109,7 @@ impl<'a> PreparedRain<'a> {
             farthest,
             &rain.lamp_scattering,
         );
-        let metadata = frame.metadata(chunks.iter().map(StreakChunk::count).sum(), billboards);
+        let metadata = frame.metadata(chunks.iter().map(|chunk| chunk.drop_count).sum(), billboards);
         Self {
             view,
             level: bansho_base::math::simd::level(),
@@ -160,6 +161,13 @@ impl<'a> FrameInputs<'a> {
         splashes.chunks()
     }
 
+    /// How far billboards are simplified; `None` to draw every drop.
+    fn simplification(&self) -> Option<StochasticSimplification> {
+        let codes = self.rain.parameters.simplification_codes;
+        let white = self.view.white_luminance.filter(|_| codes > 0.0 && !self.view.aovs_requested)?;
+        Some(StochasticSimplification { white, max_contribution: codes / 255.0 })
+    }
+
     /// Radiance below which the light of a streak is culled, cd/m^2.
     fn culling_radiance(&self) -> f32 {
         let white = self.view.white_luminance.filter(|_| self.rain.parameters.culling);
@@ -167,13 +175,13 @@ impl<'a> FrameInputs<'a> {
     }
 
     /// Metadata of the frame.
-    fn metadata(&self, streaks: usize, billboards: usize) -> Vec<MetadataEntry> {
+    fn metadata(&self, drops: f64, billboards: usize) -> Vec<MetadataEntry> {
         let t = self.view.shutter.middle();
         let sizes = DropSizeDistribution::marshall_palmer(self.rain.rate(t));
         let entry = |name, unit, value| MetadataEntry { name, unit, value };
         vec![
             entry("rain_rate", "mm/h", self.rain.rate(t)),
-            entry("drops_in_view", "", streaks as f64),
+            entry("drops_in_view", "", drops.round()),
             entry("billboards_in_view", "", billboards as f64),
             entry("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
             entry("visibility", "m", visibility(&sizes)),

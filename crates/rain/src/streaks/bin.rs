@@ -94,6 +94,8 @@ impl TileBins {
 pub(crate) struct StreakChunk {
     streaks: Vec<PackedStreak>,
     bins: TileBins,
+    /// Number of drops that the streaks stand for.
+    pub(crate) drop_count: f64,
     /// Number of cells with streaks in it.
     pub(crate) cell_count: usize,
 }
@@ -104,13 +106,16 @@ pub(crate) struct StreakChunkBuilder {
     size: [usize; 2],
     streaks: Vec<PackedStreak>,
     ranges: Vec<TileRange>,
+    /// Number of drops that each of the next streaks stands for.
+    drops_per_streak: f64,
+    drop_count: f64,
     cell_count: usize,
 }
 
 impl StreakChunkBuilder {
     /// An empty chunk for a picture of `size` pixels.
     pub(crate) fn new(size: [usize; 2]) -> Self {
-        Self { size, streaks: Vec::new(), ranges: Vec::new(), cell_count: 0 }
+        Self { size, streaks: Vec::new(), ranges: Vec::new(), drops_per_streak: 1.0, drop_count: 0.0, cell_count: 0 }
     }
 
     /// Adds a streak with its bounding box.
@@ -120,12 +125,20 @@ impl StreakChunkBuilder {
         self.streaks.push(PackedStreak::new(segment));
     }
 
+    /// Sets how many drops each streak stands for that is added to this cell.
+    pub(crate) fn set_drops_per_streak(&mut self, drops: f64) {
+        self.drops_per_streak = drops;
+    }
+
     /// Adds a cell's streaks, and counts the cell if there are any.
     #[inline(always)]
     pub(crate) fn add_cell(&mut self, add: impl FnOnce(&mut Self)) {
         let before = self.streaks.len();
+        self.drops_per_streak = 1.0;
         add(self);
-        self.cell_count += usize::from(self.streaks.len() > before);
+        let added = self.streaks.len() - before;
+        self.drop_count += added as f64 * self.drops_per_streak;
+        self.cell_count += usize::from(added > 0);
     }
 
     /// Bins the streaks.
@@ -133,17 +146,13 @@ impl StreakChunkBuilder {
         StreakChunk {
             bins: TileBins::new(self.size, TILE_COLUMNS, &self.ranges),
             streaks: self.streaks,
+            drop_count: self.drop_count,
             cell_count: self.cell_count,
         }
     }
 }
 
 impl StreakChunk {
-    /// Number of streaks.
-    pub(crate) fn count(&self) -> usize {
-        self.streaks.len()
-    }
-
     /// Appends the streaks of a tile to `streaks`.
     ///
     /// They are far apart in memory: copying them in one go overlaps the cache misses, which would otherwise occur one

@@ -130,7 +130,7 @@ impl StreakProjection<'_> {
         self.cell_chunks(
             within,
             0.5 * CELL_SIZE,
-            |class, cell, builder| dispatch!(self.level, _simd => self.add_cell(class, cell, builder)),
+            |class, visible, builder| dispatch!(self.level, _simd => self.add_cell(class, visible.cell, builder)),
         )
     }
 
@@ -140,13 +140,13 @@ impl StreakProjection<'_> {
         &self,
         within: &[Sphere],
         half_width: f64,
-        add: impl Fn(&DropClassState, Cell, &mut StreakChunkBuilder) + Sync,
+        add: impl Fn(&DropClassState, &VisibleCell, &mut StreakChunkBuilder) + Sync,
     ) -> Vec<StreakChunk> {
         let size = self.shutter_state.cameras.size();
         map_cell_chunks(self.shutter_state, within, half_width, |cells| {
             let mut builder = StreakChunkBuilder::new(size);
             for (visible, class) in cells {
-                builder.add_cell(|builder| add(class, visible.cell, builder));
+                builder.add_cell(|builder| add(class, visible, builder));
             }
             builder.build()
         })
@@ -259,6 +259,9 @@ fn unique_cells(
     within: &[Sphere],
     half_width: f64,
 ) -> Vec<VisibleCell> {
+    if let [sphere] = within {
+        return shutter_state.visible_cells(class, *sphere, half_width);
+    }
     let mut cells: Vec<_> =
         within.iter().flat_map(|sphere| shutter_state.visible_cells(class, *sphere, half_width)).collect();
     cells.sort_by_key(|visible| visible.cell);

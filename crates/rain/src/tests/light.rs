@@ -1,15 +1,17 @@
 //! Rain in the light of lamps.
 
 use bansho_base::{
+    host::observer::Unobserved,
     image::Rect,
     math::{self, DVec3},
     phenomenon::{
+        Run,
         strip::{DepthInterval, Strip},
         surroundings::{Emitter, Light, Publication, Surroundings},
     },
 };
 
-use super::{METHODS, Method, draw, draw_part, lamp, rain, streaks, view_at, wind};
+use super::{METHODS, Method, draw, draw_part, lamp, lit, rain, streaks, view_at, wind};
 use crate::{
     RainParameters,
     lighting::{
@@ -68,8 +70,12 @@ fn twice_the_fire_is_twice_the_light_of_streaks_and_airlight() {
 fn culling_changes_no_pixel_by_a_255th() {
     let lights = || vec![lamp([2.0, 4.0, -3.0], 200.0)];
     let white = 2.0;
-    let parameters =
-        |culling| RainParameters { culling, rate_mm_per_h: 100.0.into(), ..streaks(Method::Billboards, 100.0) };
+    let parameters = |culling| RainParameters {
+        culling,
+        simplification_codes: 0.0,
+        rate_mm_per_h: 100.0.into(),
+        ..streaks(Method::Billboards, 100.0)
+    };
     let (culled, all) =
         (lit_by(parameters(true), lights(), Some(white)), lit_by(parameters(false), lights(), Some(white)));
     let mut differ = 0;
@@ -82,6 +88,47 @@ fn culling_changes_no_pixel_by_a_255th() {
         assert_eq!(culled.transmittance(index), all.transmittance(index));
     }
     assert!(differ > 0, "nothing was culled");
+}
+
+/// Mean radiance and transmittance of each block of 40 x 45 pixels, over some frames.
+fn block_means(simplification_codes: f64) -> Vec<[f64; 2]> {
+    const COLUMNS: usize = 8;
+    const ROWS: usize = 4;
+    const FRAMES: usize = 6;
+    let calm = wind([1.0, 0.0, 0.0], 0.3);
+    let parameters = RainParameters { simplification_codes, distance: 20.0, ..streaks(Method::Billboards, 100.0) };
+    let rain = rain(parameters, 1);
+    let mut sums = vec![[0.0; 2]; COLUMNS * ROWS];
+    for frame in 0..FRAMES {
+        let mut view = view_at(1.0 + 0.3 * frame as f64, 1.0 / 60.0, [320, 180]);
+        view.white_luminance = Some(40.0);
+        let surroundings = lit(&calm);
+        let prepared = rain.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let mut strip = Strip::default();
+        strip.reset(Rect::from_size(320, 180), None, 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        for index in 0..strip.len() {
+            let (x, y) = (index % 320 * COLUMNS / 320, index / 320 * ROWS / 180);
+            let block = &mut sums[y * COLUMNS + x];
+            let weight = (COLUMNS * ROWS) as f64 / (FRAMES * strip.len()) as f64;
+            block[0] += weight * f64::from(strip.radiance[1][index]);
+            block[1] += weight * f64::from(strip.transmittance(index)[1]);
+        }
+    }
+    sums
+}
+
+#[test]
+fn simplified_billboards_shine_and_block_as_much_as_all_their_drops() {
+    let [all, simplified] = [0.0, 1.5].map(block_means);
+    assert_ne!(all, simplified);
+    for ([light, transmittance], [simplified_light, simplified_transmittance]) in all.iter().zip(&simplified) {
+        let opacity_ratio = (1.0 - simplified_transmittance) / (1.0 - transmittance);
+        assert!((simplified_light / light - 1.0).abs() < 0.04, "{light} {simplified_light}");
+        assert!((opacity_ratio - 1.0).abs() < 0.04, "{transmittance} {simplified_transmittance}");
+    }
+    let total = |blocks: &[[f64; 2]]| blocks.iter().map(|block| block[0]).sum::<f64>();
+    assert!((total(&simplified) / total(&all) - 1.0).abs() < 0.01, "{} {}", total(&simplified), total(&all));
 }
 
 #[test]
