@@ -58,7 +58,7 @@ mod tests {
         let fraction = |distance: f64, radiance: f64| simplification.fraction(&state, class, distance, radiance);
         // 90 pixels in tan 16 degrees are 313.9 pixels for a meter at a meter. A drop of 2 mm falls 10.8 cm at 6.49 m/s.
         assert!((class.diameter_mm - 2.0).abs() < 1e-9 && (class.speed - 6.49).abs() < 0.02, "{class:?}");
-        let at_10_m = 0.25 * PI * (0.002_f64 * 31.39).powi(2) / (class.speed / 60.0 * 31.39);
+        let at_10_m = 0.25 * PI * 0.06278 * 0.06278 / (class.speed / 60.0 * 31.39);
         assert!((fraction(10.0, 0.0) / (at_10_m / 0.01) - 1.0).abs() < 1e-3, "{}", fraction(10.0, 0.0));
         // As bright as white, it counts for twice as much.
         assert!((fraction(10.0, 10.0) / fraction(10.0, 0.0) - 2.0).abs() < 1e-9);

@@ -7,13 +7,13 @@ use std::{
 };
 
 use bansho_base::{
-    camera::Camera,
+    camera::{Camera, Projection},
     host::parallel::prelude::*,
     image::Rect,
     math::{DVec2, DVec3, MulAdd},
     phenomenon::{
-        strip::{DepthInterval, View},
-        surroundings::Light,
+        strip::View,
+        surroundings::{Emitter, Light},
     },
 };
 use fearless_simd::dispatch;
@@ -27,6 +27,9 @@ use super::{
 
 /// Corners of a grid that a thread integrates at a time.
 const CORNERS_PER_TASK: usize = 32;
+/// Distance from a lamp in the picture, in pixels, from which its scattered light is smooth over two tiles: it falls with this distance, so linear
+/// interpolation is off by 1 %, and 3 % where the ground cuts lines of sight off.
+const SMOOTH_RADIUS: f64 = 160.0;
 
 /// In-scattered radiance accumulated from the camera up to each distance, at each corner of a grid.
 #[derive(Debug)]
@@ -40,17 +43,71 @@ pub(super) struct InScattering {
 impl InScattering {
     /// The light of some lamps at the corners of a grid.
     fn new(integrator: &SightLineIntegrator, tiles: &TileGrid, lights: &[Light]) -> Self {
+        Self::at_corners(integrator, tiles, lights, |_| true)
+    }
+
+    /// The light of some lamps at the corners of the picture's grid. Far from all lamps in the picture, every second corner is enough.
+    fn over_picture(integrator: &SightLineIntegrator, tiles: &TileGrid, lights: &[Light], camera: &Camera) -> Self {
+        if lights.iter().any(|light| matches!(light.emitter, Emitter::Spot { .. })) {
+            return Self::new(integrator, tiles, lights);
+        }
+        let pixel = |light: &Light| Some(camera.project(light.emitter.position()?)?.pixel);
+        let lamps: Vec<DVec2> = lights.iter().filter_map(pixel).collect();
+        let is_near_lamp = |corner: usize| {
+            let here = DVec2::from(tiles.pixel(corner).map(|coordinate| coordinate as f64));
+            lamps.iter().any(|lamp| lamp.distance_squared(here) < SMOOTH_RADIUS * SMOOTH_RADIUS)
+        };
+        let [columns, rows] = tiles.size;
+        let is_last = |index: usize, count: usize| index + 1 == count;
+        let is_integrated = |corner: usize| {
+            let [column, row] = [corner % columns, corner / columns];
+            let is_second =
+                [(column, columns), (row, rows)].map(|(index, count)| index % 2 == 1 && !is_last(index, count));
+            !is_second[0] && !is_second[1] || is_near_lamp(corner)
+        };
+        let mut scattering = Self::at_corners(integrator, tiles, lights, is_integrated);
+        for row in (0..rows).step_by(2).chain((1..rows).step_by(2)) {
+            for column in 0..columns {
+                let corner = row * columns + column;
+                if is_integrated(corner) {
+                    continue;
+                }
+                // Rows between others are interpolated from those, which come before them.
+                let step = if row % 2 == 1 && !is_last(row, rows) { columns } else { 1 };
+                scattering.interpolate_corner(corner, step);
+            }
+        }
+        scattering
+    }
+
+    /// The light of some lamps at those corners of a grid that are selected.
+    fn at_corners(
+        integrator: &SightLineIntegrator,
+        tiles: &TileGrid,
+        lights: &[Light],
+        is_selected: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
         let distances = integrator.intervals.len() + 1;
         let mut sums = vec![[0.0; 4]; distances * tiles.directions.len()];
         let level = bansho_base::math::simd::level();
         let tasks = sums.par_chunks_mut(distances * CORNERS_PER_TASK).enumerate();
         tasks.for_each(|(task, sums)| {
-            let directions = &tiles.directions[task * CORNERS_PER_TASK..];
-            for (sums, direction) in sums.chunks_mut(distances).zip(directions) {
-                dispatch!(level, _simd => integrator.accumulate(*direction, lights, sums));
+            let first = task * CORNERS_PER_TASK;
+            for ((index, sums), direction) in sums.chunks_mut(distances).enumerate().zip(&tiles.directions[first..]) {
+                if is_selected(first + index) {
+                    dispatch!(level, _simd => integrator.accumulate(*direction, lights, sums));
+                }
             }
         });
         Self { distances, sums }
+    }
+
+    /// Sets a corner to the mean of the corners `step` before and after it.
+    fn interpolate_corner(&mut self, corner: usize, step: usize) {
+        for index in corner * self.distances..(corner + 1) * self.distances {
+            let [before, after] = [index - step * self.distances, index + step * self.distances];
+            self.sums[index] = std::array::from_fn(|c| 0.5 * (self.sums[before][c] + self.sums[after][c]));
+        }
     }
 
     /// Interpolates between a row of corners and the next, for some columns and indices of distances: the sums of the first column come first. Others
@@ -85,8 +142,9 @@ impl InScattering {
 pub(super) struct LampHalo {
     /// Vector from the camera to the lamp, m.
     pub(super) offset: DVec3,
-    /// Its position in the picture.
+    /// Its position in the picture, and its depth, m.
     pub(super) pixel: DVec2,
+    pub(super) depth: f64,
     /// The pixels near it.
     pub(super) rect: Rect,
     /// The part of the picture's grid that covers them, and its in-scattering at the corners.
@@ -95,34 +153,13 @@ pub(super) struct LampHalo {
     /// A finer grid over them, and its in-scattering there times the distance of the ray from the lamp (m).
     pub(super) fine_tiles: TileGrid,
     pub(super) fine_in_scattering: InScattering,
-    /// Corrections of its pixels for recent depth intervals.
-    pub(super) corrections: HaloCorrectionCache,
+    /// Corrections of its pixels.
+    pub(super) corrections: HaloCorrections,
 }
 
-/// Corrections of the pixels near a lamp, row by row, for recent depth intervals without a plate. They are the same in every frame while camera, lamps and
-/// slices stay the same.
-#[derive(Debug, Default)]
-pub(super) struct HaloCorrectionCache(Mutex<Vec<(DepthInterval, Arc<HaloCorrections>)>>);
-
-/// Corrections of the pixels near a lamp: a row is computed by the strip that first draws it.
+/// Corrections of the pixels near a lamp without a plate, for whole lines of sight: a row is computed by the strip that first draws it. They are the same in
+/// every frame while camera and lamps stay the same.
 pub(super) type HaloCorrections = Vec<OnceLock<Vec<[f32; 3]>>>;
-
-impl HaloCorrectionCache {
-    /// Number of depth intervals kept: a scene with other phenomena has several slices.
-    const CAPACITY: usize = 4;
-
-    /// The rows of a depth interval, at first without values.
-    pub(super) fn rows(&self, slice: &DepthInterval, height: usize) -> Arc<HaloCorrections> {
-        let mut recent = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, rows)) = recent.iter().find(|(known, _)| known == slice) {
-            return rows.clone();
-        }
-        let rows = Arc::new((0..height).map(|_| OnceLock::new()).collect::<HaloCorrections>());
-        recent.insert(0, (*slice, rows.clone()));
-        recent.truncate(Self::CAPACITY);
-        rows
-    }
-}
 
 /// Radius around a lamp with the finer grid, pixels.
 pub(super) const HALO_RADIUS: f64 = 72.0;
@@ -261,22 +298,24 @@ impl InScatterIntegrator<'_> {
             eye: self.eye,
             eye_height: (self.eye.y - self.extinction.shutter_state.ground) as f32,
         };
-        let halos = visible.iter().filter_map(|(light, pixel)| halo(&integrator, light, *pixel, view)).collect();
+        let halos =
+            visible.iter().filter_map(|(light, projection)| halo(&integrator, light, projection, view)).collect();
         lights.extend(visible.iter().map(|(light, _)| *light));
-        let in_scattering = (!lights.is_empty()).then(|| InScattering::new(&integrator, tiles, &lights));
+        let in_scattering =
+            (!lights.is_empty()).then(|| InScattering::over_picture(&integrator, tiles, &lights, &view.camera));
         LampScattering { inputs, in_scattering, halos }
     }
 
-    /// Lamps in and near the picture with their pixels, and all other lights.
-    fn split_lights(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
+    /// Lamps in and near the picture, projected, and all other lights.
+    fn split_lights(&self, view: &View) -> (Vec<(Light, Projection)>, Vec<Light>) {
         let (mut visible, mut others) = (Vec::new(), Vec::new());
         for light in self.lighting.lights {
             let projection = light.emitter.position().and_then(|position| view.camera.project(position));
             let near = |pixel: DVec2| {
                 (0..2).all(|axis| (-HALO_RADIUS..view.size[axis] as f64 + HALO_RADIUS).contains(&pixel[axis]))
             };
-            match projection.map(|projection| projection.pixel).filter(|pixel| near(*pixel)) {
-                Some(pixel) if visible.len() < MAX_HALOS => visible.push((*light, pixel)),
+            match projection.filter(|projection| near(projection.pixel)) {
+                Some(projection) if visible.len() < MAX_HALOS => visible.push((*light, projection)),
                 _ => others.push(*light),
             }
         }
@@ -285,9 +324,9 @@ impl InScatterIntegrator<'_> {
 }
 
 /// The halo of a lamp; `None` for a light at infinity, and where no pixel is near it.
-fn halo(integrator: &SightLineIntegrator, light: &Light, pixel: DVec2, view: &View) -> Option<LampHalo> {
+fn halo(integrator: &SightLineIntegrator, light: &Light, projection: &Projection, view: &View) -> Option<LampHalo> {
     let offset = light.emitter.position()? - integrator.eye;
-    let rect = halo_rect(pixel, view.size);
+    let rect = halo_rect(projection.pixel, view.size);
     if rect.is_empty() {
         return None;
     }
@@ -302,12 +341,66 @@ fn halo(integrator: &SightLineIntegrator, light: &Light, pixel: DVec2, view: &Vi
     }
     Some(LampHalo {
         offset,
-        pixel,
+        pixel: projection.pixel,
+        depth: projection.depth,
         rect,
         tiles,
         in_scattering,
         fine_tiles,
         fine_in_scattering,
-        corrections: HaloCorrectionCache::default(),
+        corrections: (0..rect.height).map(|_| OnceLock::new()).collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::phenomenon::surroundings::Surroundings;
+
+    use super::*;
+    use crate::{
+        Rain, RainParameters,
+        drops::shutter_state::ShutterState,
+        tests::{lamp, view_at, wind},
+    };
+
+    /// Light at all corners, and with every second one interpolated far from two flames.
+    fn grids(size: [usize; 2]) -> (InScattering, InScattering) {
+        let rain = Rain::new(RainParameters::default(), "rain", 1, None).unwrap();
+        let (view, calm) = (view_at(1.0, 1.0 / 60.0, size), wind([0.0; 3], 0.0));
+        let shutter_state = ShutterState::new(&rain, &view, &Surroundings::from_wind(&calm));
+        let extinction = RainExtinction { all: 0.02, streaks: 0.008 };
+        let intervals = [
+            Interval { start: 0.0, width: 3.0, depth: 0.0, depth_slope: 0.02 },
+            Interval { start: 3.0, width: 20.0, depth: 0.06, depth_slope: 0.02 },
+        ];
+        let integrator = SightLineIntegrator {
+            scattering: &rain.optics.scattering,
+            extinction: ExtinctionProfile { shutter_state: &shutter_state, extinction },
+            light_extinction: 0.02,
+            intervals: &intervals,
+            eye: view.camera.position,
+            eye_height: 1.6,
+        };
+        let tiles = TileGrid::new(&view, FINE_TILE);
+        let lights = [lamp([0.1, 1.9, -3.6], 300.0), lamp([-0.3, 1.7, -3.5], 200.0)];
+        let all = InScattering::new(&integrator, &tiles, &lights);
+        (all, InScattering::over_picture(&integrator, &tiles, &lights, &view.camera))
+    }
+
+    #[test]
+    fn every_second_corner_is_enough_far_from_lamps() {
+        // Odd and even numbers of corners.
+        for size in [[1280, 720], [1264, 700]] {
+            let (all, some) = grids(size);
+            let brightest = all.sums.iter().flatten().copied().fold(0.0, f32::max);
+            let (mut interpolated, mut same, mut worst) = (0, 0, 0.0);
+            for (exact, found) in all.sums.iter().flatten().zip(some.sums.iter().flatten()) {
+                worst = f32::max(worst, (exact - found).abs() / (exact + 1e-3 * brightest));
+                interpolated += usize::from(exact != found);
+                same += usize::from(exact == found && *exact > 0.0);
+            }
+            assert!(interpolated > same, "{interpolated} {same}");
+            assert!(worst < 0.04, "{worst}");
+        }
+    }
 }

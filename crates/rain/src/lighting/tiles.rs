@@ -47,9 +47,16 @@ impl TileGrid {
     pub(crate) fn over(view: &View, side: usize, rect: Rect) -> Self {
         let origin = [rect.x, rect.y];
         let size = [rect.width, rect.height].map(|pixels| pixels.max(1).div_ceil(side) + 1);
-        let position = |index: usize| [origin[0] + index % size[0] * side, origin[1] + index / size[0] * side];
-        let directions = (0..size[0] * size[1]).map(|index| pixel_direction(&view.camera, position(index))).collect();
-        Self { origin, side, size, directions }
+        let mut grid = Self { origin, side, size, directions: Vec::new() };
+        grid.directions =
+            (0..size[0] * size[1]).map(|index| pixel_direction(&view.camera, grid.pixel(index))).collect();
+        grid
+    }
+
+    /// Pixel of a corner.
+    pub(crate) fn pixel(&self, corner: usize) -> [usize; 2] {
+        let [column, row] = [corner % self.size[0], corner / self.size[0]];
+        [self.origin[0] + column * self.side, self.origin[1] + row * self.side]
     }
 
     /// One value for each corner, computed in parallel.

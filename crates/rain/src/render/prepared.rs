@@ -3,6 +3,7 @@
 use bansho_base::{
     frame::MetadataEntry,
     image::Rect,
+    math,
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
@@ -203,6 +204,10 @@ impl Prepared for PreparedRain<'_> {
         if let Some(textured) = &self.textured {
             textured.draw(slice, strip);
         }
+        let slice = &DepthInterval { near: rounded_depth(slice.near), far: rounded_depth(slice.far) };
+        if slice.near >= slice.far {
+            return;
+        }
         for tile_row in rect.y / TILE_ROWS..rect.bottom().div_ceil(TILE_ROWS) {
             let tile = tile_row * TILE_ROWS..(tile_row + 1) * TILE_ROWS;
             let rows = Rect { x: rect.x, y: tile.start, width: rect.width, height: TILE_ROWS }.intersection(&rect);
@@ -214,6 +219,14 @@ impl Prepared for PreparedRain<'_> {
             }
         }
     }
+}
+
+/// The nearest of depths that are a twentieth apart, m. Where other phenomena cut the rain into many thin slices, it is drawn in those that contain such a
+/// depth, all others being almost empty. Slices that meet still meet, and opaque surfaces hide rain by their exact depth.
+fn rounded_depth(depth: f64) -> f64 {
+    /// Logarithm of the ratio of successive depths.
+    const STEP: f64 = 0.05;
+    if depth > 0.0 && depth.is_finite() { math::exp((math::ln(depth) / STEP).round() * STEP) } else { depth }
 }
 
 impl PreparedRain<'_> {
@@ -229,14 +242,13 @@ impl PreparedRain<'_> {
                 let tile_rect = rows.intersection(&Rect { x: origin[0], width: TILE_COLUMNS, ..rows });
                 streaks.clear();
                 for chunk in &self.chunks {
-                    chunk.collect_tile(tile_row, tile_column, &mut streaks);
+                    chunk.collect_tile(tile_row, tile_column, slice, &mut streaks);
                 }
                 if streaks.is_empty() {
                     continue;
                 }
                 buffer.load(simd, origin, tile_rect, rect, &planes);
-                let segments = streaks.iter().map(PackedStreak::unpack);
-                for segment in segments.filter(|segment| slice.contains(f64::from(segment.shading.depth))) {
+                for segment in streaks.iter().map(PackedStreak::unpack) {
                     if aovs.is_empty() {
                         segment.draw(&mut buffer, &mut |_, _| {});
                         continue;

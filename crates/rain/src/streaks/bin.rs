@@ -1,5 +1,7 @@
 //! Tile binning: for each tile of the picture, the streaks that may touch it.
 
+use bansho_base::phenomenon::strip::DepthInterval;
+
 use super::rasterize::{
     PackedStreak, StreakSegment,
     tile::{TILE_COLUMNS, TILE_ROWS},
@@ -94,6 +96,8 @@ impl TileBins {
 pub(crate) struct StreakChunk {
     streaks: Vec<PackedStreak>,
     bins: TileBins,
+    /// The depths of all streaks.
+    depths: DepthInterval,
     /// Number of drops that the streaks stand for.
     pub(crate) drop_count: f64,
     /// Number of cells with streaks in it.
@@ -143,7 +147,12 @@ impl StreakChunkBuilder {
 
     /// Bins the streaks.
     pub(crate) fn build(self) -> StreakChunk {
+        let depths = self.streaks.iter().map(|streak| f64::from(streak.depth()));
+        let nothing = DepthInterval { near: f64::INFINITY, far: f64::NEG_INFINITY };
+        let depths =
+            depths.fold(nothing, |all, depth| DepthInterval { near: all.near.min(depth), far: all.far.max(depth) });
         StreakChunk {
+            depths,
             bins: TileBins::new(self.size, TILE_COLUMNS, &self.ranges),
             streaks: self.streaks,
             drop_count: self.drop_count,
@@ -153,16 +162,28 @@ impl StreakChunkBuilder {
 }
 
 impl StreakChunk {
-    /// Appends the streaks of a tile to `streaks`.
+    /// Appends the streaks of a tile in a depth interval to `streaks`.
     ///
     /// They are far apart in memory: copying them in one go overlaps the cache misses, which would otherwise occur one
     /// by one while drawing.
     #[inline(always)]
-    pub(crate) fn collect_tile(&self, tile_row: usize, tile_column: usize, streaks: &mut Vec<PackedStreak>) {
+    pub(crate) fn collect_tile(
+        &self,
+        tile_row: usize,
+        tile_column: usize,
+        slice: &DepthInterval,
+        streaks: &mut Vec<PackedStreak>,
+    ) {
+        if self.depths.far < slice.near || self.depths.near >= slice.far {
+            return;
+        }
         let members = self.bins.members(tile_row, tile_column);
         streaks.reserve(members.len());
         for index in members {
-            streaks.push(self.streaks[*index as usize]);
+            let streak = self.streaks[*index as usize];
+            if slice.contains(f64::from(streak.depth())) {
+                streaks.push(streak);
+            }
         }
     }
 }

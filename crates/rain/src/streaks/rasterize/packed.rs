@@ -75,6 +75,12 @@ impl PackedStreak {
         }
     }
 
+    /// Depth, m.
+    #[inline(always)]
+    pub(crate) fn depth(&self) -> f32 {
+        self.depth
+    }
+
     #[inline(always)]
     pub(crate) fn unpack(&self) -> StreakSegment {
         let mut light = [0.0; 3];
