@@ -22,7 +22,7 @@ use crate::{
     },
     render::{
         bin::sources::{EmissionInputs, nearest_node},
-        integrate::emission_profile::EmissionProfiles,
+        integrate::{chart_memory::ChartMemory, emission_profile::EmissionProfiles},
         project::field_lines::FieldLines,
         shade::attenuation::EmitterColors,
         single_collisions::collision_pass::CollisionRenderer,
@@ -50,6 +50,8 @@ pub struct Aurora {
     pub(super) run_state: OnceLock<RunState>,
     /// Initial state of every run: created by the first run that needs it, shared by all.
     pub(super) initial_state: Arc<OnceLock<RunState>>,
+    /// Memory of the charts of all runs.
+    pub(super) chart_memory: Arc<ChartMemory>,
     /// Luminance of the brightest column of all shapes, cd/m^2.
     pub(super) max_column_luminance: f64,
     /// The first shape, counted from 0, whose transition has sheets that cross.
@@ -122,6 +124,7 @@ impl Aurora {
             emission,
             run_state: OnceLock::new(),
             initial_state: Arc::default(),
+            chart_memory: Arc::default(),
             parameters,
             sequence: Arc::new(sequence),
             crossing,

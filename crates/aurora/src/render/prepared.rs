@@ -110,6 +110,14 @@ impl<'a> PreparedAurora<'a> {
     }
 }
 
+impl Drop for PreparedAurora<'_> {
+    fn drop(&mut self) {
+        if let DisplayedLight::Chart(chart) = &mut self.displayed {
+            self.aurora.chart_memory.recycle(chart);
+        }
+    }
+}
+
 /// Shared inputs of the charts of a frame.
 pub(super) struct ChartBuilder<'a> {
     pub(super) aurora: &'a Aurora,
@@ -124,14 +132,15 @@ impl ChartBuilder<'_> {
         // The angle of the spread at the minimum distance of such light.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let sorted = |columns| SortedSources::new(&sources.sharp, &chart, columns, self.field, spread_km);
+        let buffer = self.aurora.chart_memory.zeros(chart);
+        let sorted = |columns| SortedSources::new(&sources.sharp, &buffer.chart, columns, self.field, spread_km);
         let Some(collisions) = self.aurora.collisions() else {
             let sorted_sources = sorted(BLOCK_COLUMNS);
-            return ColumnBuffer::new(chart, self.field, self.aurora.profiles(), &sorted_sources);
+            return buffer.integrate(self.field, self.aurora.profiles(), &sorted_sources);
         };
         let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
         let step = (self.aurora.simulation().time() / AuroraSimulation::STEP_S).round() as i64 as u32;
-        collisions.draw(chart, self.field, &sorted_sources, step)
+        collisions.draw(buffer, self.field, &sorted_sources, step)
     }
 
     /// The coarser chart of the red afterglow.
@@ -142,7 +151,7 @@ impl ChartBuilder<'_> {
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
         let sorted_sources = SortedSources::new(&sources.soft, &chart, BLOCK_COLUMNS, self.field, spread_km);
         // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
-        let mut buffer = ColumnBuffer::new(chart, self.field, self.aurora.red_profiles(), &sorted_sources);
+        let mut buffer = ColumnBuffer::zeros(chart).integrate(self.field, self.aurora.red_profiles(), &sorted_sources);
         buffer.sum_red_altitudes();
         buffer
     }

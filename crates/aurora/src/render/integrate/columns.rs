@@ -68,20 +68,19 @@ struct ProfilePass<'a> {
 }
 
 impl ColumnBuffer {
-    /// Integrates the binned sources.
-    pub(crate) fn new(
-        chart: Chart,
+    /// Integrates the binned sources into a buffer without light.
+    pub(crate) fn integrate(
+        mut self,
         field: &FieldLines,
         profiles: &EmissionProfiles,
         sorted_sources: &SortedSources,
     ) -> Self {
         let level = bansho_base::math::simd::level();
-        let [cotangents, inverse_sines] = chart.row_tables(ROWS * KNOT_ROWS);
+        let [cotangents, inverse_sines] = self.chart.row_tables(ROWS * KNOT_ROWS);
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> =
             (0..sorted_sources.bins().count).map(|bin| sorted_sources.bins().distance(bin)).collect();
-        let mut buffer = Self::zeros(chart);
-        let (chart, blocks) = buffer.blocks(BLOCK_COLUMNS);
+        let (chart, blocks) = self.blocks(BLOCK_COLUMNS);
         let pass = ProfilePass {
             chart,
             field,
@@ -97,7 +96,7 @@ impl ColumnBuffer {
             scratch_pool
                 .with(|scratch| dispatch!(level, simd => pass.integrate_block(simd, block, sorted_sources, scratch)));
         });
-        buffer
+        self
     }
 
     /// A buffer without light.

@@ -1,7 +1,7 @@
 //! Renders single collisions as in the thesis (2.4): each source sends random electron tracks down its field line.
 //!
 //! Altitudes are random; laterally each point has the smooth kernel of its source, so rays are as sharp as in the mean
-//! profile. The expected value is [`ColumnBuffer::new`].
+//! profile. The expected value is [`ColumnBuffer::integrate`].
 
 use std::{
     ops::Range,
@@ -123,16 +123,15 @@ impl CollisionRenderer {
         }
     }
 
-    /// Renders sources that are sorted by [`COLLISION_BLOCK_COLUMNS`] at a step of the simulation; each step has other tracks.
+    /// Renders sources that are sorted by [`COLLISION_BLOCK_COLUMNS`] at a step of the simulation into a buffer without light; each step has other tracks.
     pub(crate) fn draw(
         &self,
-        chart: Chart,
+        mut buffer: ColumnBuffer,
         field: &FieldLines,
         sorted_sources: &SortedSources,
         step: u32,
     ) -> ColumnBuffer {
         let level = bansho_base::math::simd::level();
-        let mut buffer = ColumnBuffer::zeros(chart);
         let (chart, blocks) = buffer.blocks(COLLISION_BLOCK_COLUMNS);
         let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), sorted_sources, step };
         // Largest block first (LPT scheduling), for load balance.

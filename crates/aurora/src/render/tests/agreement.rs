@@ -33,11 +33,11 @@ fn beside_profile(
     // Low rows, since single points are spread over two of them.
     let chart = || Chart::new(&Coverage::of_view(&view, &field), STEP, 0.5 * STEP);
     let sorted = |columns| SortedSources::new(&sources, &chart(), columns, &field, spread_of(&sources));
-    let expected = ColumnBuffer::new(chart(), &field, &profiles, &sorted(BLOCK_COLUMNS));
+    let expected = ColumnBuffer::zeros(chart()).integrate(&field, &profiles, &sorted(BLOCK_COLUMNS));
     let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
     let mut mean = vec![[0.0; 4]; expected.light.len()];
     for step in 0..64 {
-        let picture = collisions.draw(chart(), &field, &sorted_sources, step);
+        let picture = collisions.draw(ColumnBuffer::zeros(chart()), &field, &sorted_sources, step);
         for (sum, light) in mean.iter_mut().zip(&picture.light) {
             *sum = std::array::from_fn(|i| light[i].mul_add(1.0 / 64.0, sum[i]));
         }

@@ -6,7 +6,7 @@ mod threads;
 use bansho_base::{
     camera::{CameraParameters, Lens},
     color,
-    host::assets::MemoryAssets,
+    host::{assets::MemoryAssets, observer::Unobserved},
     math::{
         self, DVec2, DVec3,
         curve::{Curve, Interpolation},
@@ -19,7 +19,10 @@ use bansho_base::{
     },
 };
 
-use super::{BlurParameters, RenderingParameters, Sampling, TrackModel, prepared::ChartBuilder};
+use super::{
+    BlurParameters, RenderingParameters, Sampling, TrackModel,
+    prepared::{ChartBuilder, PreparedAurora},
+};
 use crate::{
     Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
@@ -106,7 +109,7 @@ fn draw(
 ) -> ColumnBuffer {
     let chart = Chart::new(&Coverage::of_view(view, field), step, step);
     let sorted_sources = SortedSources::new(sources, &chart, BLOCK_COLUMNS, field, spread_of(sources));
-    ColumnBuffer::new(chart, field, profiles, &sorted_sources)
+    ColumnBuffer::zeros(chart).integrate(field, profiles, &sorted_sources)
 }
 
 /// Cells of one mW/m^2 over a wide square.
@@ -349,6 +352,26 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn a_frame_leaves_its_memory_to_the_next_without_light() {
+    let view = view(Lens::Perspective, [0.0, 24.0, -60.0], [160, 90]);
+    let aurora = Aurora::new(AuroraParameters::default(), "aurora", 1, None, &MemoryAssets::default()).unwrap();
+    let field = aurora.field_lines(view.camera.position);
+    let coverage = Coverage::of_view(&view, &field);
+    let chart = || Chart::new(&coverage, coverage.pixel, coverage.pixel);
+    let memory = &aurora.chart_memory;
+    let mut first = memory.zeros(chart());
+    let address = first.light.as_ptr();
+    memory.recycle(&mut first);
+    for _ in 0..2 {
+        drop(PreparedAurora::new(&aurora, &view, &Unobserved).unwrap());
+        let mut left = memory.zeros(chart());
+        assert_eq!(left.light.as_ptr(), address, "the frame used it");
+        assert!(left.light.iter().flatten().all(|value| *value == 0.0));
+        memory.recycle(&mut left);
     }
 }
 

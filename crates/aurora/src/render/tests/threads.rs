@@ -36,7 +36,7 @@ fn single_collisions_do_not_depend_on_the_number_of_threads() {
             let chart = Chart::new(&Coverage::of_view(&view, &field), 0.25 * STEP, 0.25 * STEP);
             let sorted_sources =
                 SortedSources::new(&sources, &chart, COLLISION_BLOCK_COLUMNS, &field, spread_of(&sources));
-            collisions.draw(chart, &field, &sorted_sources, 3).light
+            collisions.draw(ColumnBuffer::zeros(chart), &field, &sorted_sources, 3).light
         })
     };
     let one = with(1);
