@@ -36,6 +36,11 @@ fn view() -> View {
     View::new(camera, Shutter { open: 3.0, close: 3.0 + 1.0 / 60.0 }, 3.03, SIZE, 0)
 }
 
+/// Heavy rain far around the camera.
+fn wide() -> RainParameters {
+    RainParameters { rate_mm_per_h: 100.0.into(), distance: 20.0, airlight_distance: 0.0, ..RainParameters::default() }
+}
+
 fn rain(method: Method, rate: f64, distance: f64, airlight_distance: f64) -> Rain {
     let parameters =
         RainParameters { rate_mm_per_h: rate.into(), method, distance, airlight_distance, ..RainParameters::default() };
@@ -115,6 +120,14 @@ fn frames(criterion: &mut Criterion) {
         });
     }
     group.sample_size(10);
+    for (name, simplification_codes) in [("billboards, 100 mm/h to 20 m", 1.5), ("naive: every drop of them", 0.0)] {
+        let parameters = RainParameters { simplification_codes, ..wide() };
+        let rain = Rain::new(parameters, "bench", 1, None).expect("the parameters go together");
+        let view = View { white_luminance: Some(40.0), ..view.clone() };
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| pool.install(|| draw_frame(&rain, &view, &surroundings)));
+        });
+    }
     let mut pixels = vec![[0.0; 4]; SIZE[0] * SIZE[1]];
     group.bench_function("naive, 150,000 streaks, 1 thread", |bencher| {
         bencher.iter(|| {

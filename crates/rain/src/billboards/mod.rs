@@ -182,7 +182,7 @@ impl<'a> Billboards<'a> {
         let StreakProjection { shutter_state, lighting, .. } = self.projection;
         self.simplification.map_or(1.0, |simplification| {
             let toward = (visible.center - shutter_state.cameras.middle().position).normalize_or_zero();
-            let radiance = lighting.max_channel(visible.center, toward);
+            let radiance = lighting.max_radiance_along(visible.center, BILLBOARD_RADIUS, toward);
             simplification.fraction(shutter_state, class, visible.distance, radiance.into())
         })
     }

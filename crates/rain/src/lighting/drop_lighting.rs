@@ -69,6 +69,7 @@ pub(crate) struct DropLighting<'a> {
 impl DropLighting<'_> {
     /// Mean radiance of a drop at `point` by one light, seen along `direction` (unit vector from the eye), ACEScg, cd/m^2:
     /// `E p / (4 pi)`: the scalar twin of [`add`](Self::add).
+    #[cfg(test)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
         let bansho_base::phenomenon::surroundings::IncidentLight { illuminance, toward, distance } =
             light.incident_light(point);
@@ -78,12 +79,6 @@ impl DropLighting<'_> {
         let transmittance = approximations::exp(-(self.extinction * distance) as f32);
         let scattered = self.scattering.at(toward.dot(direction) as f32);
         [0, 1, 2].map(|c| illuminance[c] * transmittance * scattered[c])
-    }
-
-    /// Radiance of a drop by all lights as [`radiance`](Self::radiance) gives it, in its brightest color, cd/m^2.
-    pub(crate) fn max_channel(&self, point: DVec3, direction: DVec3) -> f32 {
-        let radiance = |light| self.radiance(light, point, direction).into_iter().fold(0.0, f32::max);
-        self.lights.iter().map(radiance).sum()
     }
 
     /// The lights, prepared for drops whose positions are relative to `eye`.
@@ -113,21 +108,41 @@ impl DropLighting<'_> {
 
     /// Upper bound on the radiance of drops within `radius` (m) of a point, in any color, cd/m^2.
     pub(crate) fn max_radiance(&self, center: DVec3, radius: f64) -> f32 {
-        let max_radiance = |light: &Light| {
-            let intensity = light.intensity.into_iter().fold(0.0, f32::max) * self.scattering.max;
-            let nearest = (light.incident_light(center).distance - radius).max(f64::MIN_POSITIVE);
-            match light.emitter {
-                Emitter::Directional { .. } => intensity,
-                Emitter::Spot { position, axis, cos_outer, .. }
-                    if cone_misses_sphere(center - position, radius, axis, cos_outer) =>
-                {
-                    0.0
-                }
-                Emitter::Point { radius: lamp, .. } => intensity / (nearest * nearest).max(lamp * lamp) as f32,
-                Emitter::Spot { .. } => intensity / (nearest * nearest) as f32,
-            }
+        self.lights.iter().map(|light| max_illuminance(light, center, radius) * self.scattering.max).sum()
+    }
+
+    /// About the largest radiance of drops within `radius` (m) of a point, in any color, seen along `direction` (unit vector from the eye), cd/m^2. It
+    /// considers the angle by which the light turns, and is far below [`max_radiance`](Self::max_radiance), since drops are brightest straight before a
+    /// light.
+    pub(crate) fn max_radiance_along(&self, center: DVec3, radius: f64, direction: DVec3) -> f32 {
+        let radiance = |light: &Light| {
+            let incident = light.incident_light(center);
+            let cosine = incident.toward.dot(direction).clamp(-1.0, 1.0);
+            let sine = math::sqrt(1.0 - cosine * cosine);
+            // The light that comes nearest to straight on: turned by the angle under which the light sees the sphere.
+            let turn = (radius / incident.distance.max(radius)).min(1.0);
+            let turn = if incident.distance > 0.0 { [math::sqrt(1.0 - turn * turn), turn] } else { [1.0, 0.0] };
+            let nearest = if sine <= turn[1] && cosine > 0.0 { 1.0 } else { cosine * turn[0] + sine * turn[1] };
+            let scattered = self.scattering.at(nearest as f32).into_iter().fold(0.0, f32::max);
+            max_illuminance(light, center, radius) * scattered
         };
-        self.lights.iter().map(max_radiance).sum()
+        self.lights.iter().map(radiance).sum()
+    }
+}
+
+/// Upper bound on the illuminance by a light within `radius` (m) of a point, in any color, lux.
+fn max_illuminance(light: &Light, center: DVec3, radius: f64) -> f32 {
+    let intensity = light.intensity.into_iter().fold(0.0, f32::max);
+    let nearest = (light.incident_light(center).distance - radius).max(f64::MIN_POSITIVE);
+    match light.emitter {
+        Emitter::Directional { .. } => intensity,
+        Emitter::Spot { position, axis, cos_outer, .. }
+            if cone_misses_sphere(center - position, radius, axis, cos_outer) =>
+        {
+            0.0
+        }
+        Emitter::Point { radius: lamp, .. } => intensity / (nearest * nearest).max(lamp * lamp) as f32,
+        Emitter::Spot { .. } => intensity / (nearest * nearest) as f32,
     }
 }
 

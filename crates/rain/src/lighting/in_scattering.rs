@@ -7,7 +7,7 @@ use std::{
 };
 
 use bansho_base::{
-    camera::{Camera, Projection},
+    camera::Camera,
     host::parallel::prelude::*,
     image::Rect,
     math::{DVec2, DVec3, MulAdd},
@@ -142,9 +142,8 @@ impl InScattering {
 pub(super) struct LampHalo {
     /// Vector from the camera to the lamp, m.
     pub(super) offset: DVec3,
-    /// Its position in the picture, and its depth, m.
+    /// Its position in the picture.
     pub(super) pixel: DVec2,
-    pub(super) depth: f64,
     /// The pixels near it.
     pub(super) rect: Rect,
     /// The part of the picture's grid that covers them, and its in-scattering at the corners.
@@ -298,24 +297,23 @@ impl InScatterIntegrator<'_> {
             eye: self.eye,
             eye_height: (self.eye.y - self.extinction.shutter_state.ground) as f32,
         };
-        let halos =
-            visible.iter().filter_map(|(light, projection)| halo(&integrator, light, projection, view)).collect();
+        let halos = visible.iter().filter_map(|(light, pixel)| halo(&integrator, light, *pixel, view)).collect();
         lights.extend(visible.iter().map(|(light, _)| *light));
         let in_scattering =
             (!lights.is_empty()).then(|| InScattering::over_picture(&integrator, tiles, &lights, &view.camera));
         LampScattering { inputs, in_scattering, halos }
     }
 
-    /// Lamps in and near the picture, projected, and all other lights.
-    fn split_lights(&self, view: &View) -> (Vec<(Light, Projection)>, Vec<Light>) {
+    /// Lamps in and near the picture with their pixels, and all other lights.
+    fn split_lights(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
         let (mut visible, mut others) = (Vec::new(), Vec::new());
         for light in self.lighting.lights {
             let projection = light.emitter.position().and_then(|position| view.camera.project(position));
             let near = |pixel: DVec2| {
                 (0..2).all(|axis| (-HALO_RADIUS..view.size[axis] as f64 + HALO_RADIUS).contains(&pixel[axis]))
             };
-            match projection.filter(|projection| near(projection.pixel)) {
-                Some(projection) if visible.len() < MAX_HALOS => visible.push((*light, projection)),
+            match projection.map(|projection| projection.pixel).filter(|pixel| near(*pixel)) {
+                Some(pixel) if visible.len() < MAX_HALOS => visible.push((*light, pixel)),
                 _ => others.push(*light),
             }
         }
@@ -324,9 +322,9 @@ impl InScatterIntegrator<'_> {
 }
 
 /// The halo of a lamp; `None` for a light at infinity, and where no pixel is near it.
-fn halo(integrator: &SightLineIntegrator, light: &Light, projection: &Projection, view: &View) -> Option<LampHalo> {
+fn halo(integrator: &SightLineIntegrator, light: &Light, pixel: DVec2, view: &View) -> Option<LampHalo> {
     let offset = light.emitter.position()? - integrator.eye;
-    let rect = halo_rect(projection.pixel, view.size);
+    let rect = halo_rect(pixel, view.size);
     if rect.is_empty() {
         return None;
     }
@@ -341,8 +339,7 @@ fn halo(integrator: &SightLineIntegrator, light: &Light, projection: &Projection
     }
     Some(LampHalo {
         offset,
-        pixel: projection.pixel,
-        depth: projection.depth,
+        pixel,
         rect,
         tiles,
         in_scattering,

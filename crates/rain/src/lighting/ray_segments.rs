@@ -9,7 +9,7 @@ use bansho_base::{
 use crate::lanes::{Lanes, ZERO_LANES, fast_max, fast_min};
 
 /// Optical depth beyond which light of lamps is neglected: the transmittance is below 1e-17.
-pub(super) const MAX_OPTICAL_DEPTH: f32 = 40.0;
+const MAX_OPTICAL_DEPTH: f32 = 40.0;
 
 /// Optical depth by distance from the camera, linear between stored distances.
 pub(super) struct OpticalDepthTable {
@@ -45,12 +45,6 @@ impl OpticalDepthTable {
     pub(super) fn interval(&self, distance: f32) -> usize {
         let next = self.distances.partition_point(|stored| *stored <= distance);
         next.clamp(1, self.intervals.len()) - 1
-    }
-
-    /// Optical depth up to a distance, m.
-    pub(super) fn depth(&self, distance: f32) -> f32 {
-        let [start, inverse_width, depth, increase] = self.intervals[self.interval(distance)];
-        increase * ((distance - start) * inverse_width).clamp(0.0, 1.0) + depth
     }
 
     /// Sixteen distances (m) in the table.

@@ -7,7 +7,7 @@ use bansho_base::{
     camera::directions::Directions,
     host::once::get_or_compute,
     image::Rect,
-    math::{DVec2, DVec3, MulAdd, approximations, simd::LANES},
+    math::{DVec2, DVec3, MulAdd, simd::LANES},
     phenomenon::strip::{DepthInterval, Strip, View},
 };
 use fearless_simd::{Level, dispatch};
@@ -17,7 +17,7 @@ use super::{
     extinction::{ExtinctionProfile, RainExtinction},
     halos::{HaloCorrector, HaloRows},
     in_scattering::{InScatterIntegrator, LampScattering, LampScatteringCache},
-    ray_segments::{MAX_OPTICAL_DEPTH, MediumBounds, OpticalDepthTable, RaySegments, any_range},
+    ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
     sky::SkyLighting,
     tiles::{FINE_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
 };
@@ -31,6 +31,8 @@ const FIRST_DISTANCE: f64 = 0.5;
 const DISTANCE_RATIO: f64 = 1.25;
 /// Ratio of successive distances beyond the range of lamps.
 const FAR_DISTANCE_RATIO: f64 = 2.0;
+/// Where the slice before the camera begins at most, over the camera's nearest depth: slices are cut at rounded depths.
+const FIRST_SLICE_MARGIN: f64 = 1.05;
 /// Depth of the medium, m: it has none.
 const NO_DEPTH: [f32; FINE_TILE] = [f32::INFINITY; FINE_TILE];
 /// The lines of sight of a tile's row of pixels are computed at once.
@@ -144,41 +146,32 @@ impl<'a> SingleScattering<'a> {
         light
     }
 
-    /// Inverse transmittance of the medium up to a distance, m.
-    fn inverse_transmittance(&self, distance: f64) -> f32 {
-        approximations::exp(self.table.depth(distance as f32).min(MAX_OPTICAL_DEPTH))
-    }
-
-    /// Adds the corrections near lamps to a row of tiles. Without a plate, those of whole lines of sight are added in the slice that contains the lamp.
+    /// Adds the corrections near lamps to a row of tiles. Without a plate, those of whole lines of sight are added in the slice before the camera: no slice
+    /// behind it is in front of the ground everywhere.
     fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
         let has_plate = strip.has_plate();
+        if !has_plate && slice.near > self.view.camera.near * FIRST_SLICE_MARGIN {
+            return;
+        }
+        let slice = if has_plate { slice } else { &DepthInterval::ALL };
         let mut scratch = HaloRows::default();
         for halo in &self.lamps.halos {
             let rect = halo.rect.intersection(&rows);
-            let lamp_depth = halo.depth.min(0.9 * f64::from(self.farthest));
-            if rect.is_empty() || !has_plate && !slice.contains(lamp_depth) {
+            if rect.is_empty() {
                 continue;
             }
             let bounds = self.bounds(has_plate);
-            let near_depth = slice.near;
-            let slice = if has_plate { slice } else { &DepthInterval::ALL };
             let corrector = HaloCorrector { halo, bounds, table: &self.table, lit_end: self.end, slice };
             let mut compute = |y: usize, columns: Range<usize>, plate: &[f32]| dispatch!(self.level, _simd => corrector.row(y, columns, plate, &mut scratch));
-            // What is in front of the slice dims it once more.
-            let gain = if has_plate {
-                1.0
-            } else {
-                self.inverse_transmittance(near_depth * halo.offset.length() / halo.depth)
-            };
             for y in rect.y..rect.bottom() {
                 let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
                 if has_plate {
                     let plate: Vec<f32> = (0..rect.width).map(|x| strip.plate_depth(first + x)).collect();
-                    add_corrections(strip, first, &compute(y, rect.x..rect.right(), &plate), 1.0);
+                    add_corrections(strip, first, &compute(y, rect.x..rect.right(), &plate));
                 } else {
                     let all = halo.rect.x..halo.rect.right();
                     let row = get_or_compute(&halo.corrections[y - halo.rect.y], || compute(y, all, &[]));
-                    add_corrections(strip, first, &row[rect.x - halo.rect.x..rect.right() - halo.rect.x], gain);
+                    add_corrections(strip, first, &row[rect.x - halo.rect.x..rect.right() - halo.rect.x]);
                 }
             }
         }
@@ -365,12 +358,12 @@ fn add_layer(strip: &mut Strip, first: usize, layer: &Layer, part: Range<usize>)
     strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..part.len()]);
 }
 
-/// Adds corrections, times `gain`, to consecutive pixels of a strip. The medium in front of them is contained in the strip's transmittance too; its effect is small.
-fn add_corrections(strip: &mut Strip, first: usize, corrections: &[[f32; 3]], gain: f32) {
+/// Adds corrections to consecutive pixels of a strip. The medium in front of them is contained in the strip's transmittance too; its effect is small.
+fn add_corrections(strip: &mut Strip, first: usize, corrections: &[[f32; 3]]) {
     for c in 0..3 {
         for (value, light) in strip.radiance[c][first..].iter_mut().zip(corrections) {
             if *light != [0.0; 3] {
-                *value = (*value + gain * light[c]).max(0.0);
+                *value += light[c];
             }
         }
     }

@@ -165,7 +165,7 @@ fn slices_of_depth_come_to_the_whole() {
             }
             sums[0] += f64::from(light);
             sums[1] += f64::from(whole.radiance[1][index]);
-            // In a slice, the light around the lamp is behind the streaks in front of it, otherwise behind all streaks of the pixel.
+            // Of the slices, the light around the lamp is in the first one, otherwise behind all streaks of the pixel.
             assert!(
                 (light - whole.radiance[1][index]).abs() < 1.5e-2 * light.max(0.1),
                 "{light} {}",

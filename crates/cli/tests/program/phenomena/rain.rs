@@ -71,7 +71,7 @@ fn the_strongest_rain_and_wind_at_any_shutter_give_sensible_pictures() {
 #[test]
 fn twice_the_fire_is_twice_the_light_on_the_rain_beside_it() {
     let fire = "[picture]\nsize = [160, 90]\nexposure_ev100 = 8.0\n[camera]\nposition = [0, 1, 3.6]\ntarget = [0, 0.8, 0]\n\
-                [[flame_sheet]]\nname = \"fire\"\ncolor = { luminance = 12000.0 }\n[[rain]]\nrate_mm_per_h = 60.0\n";
+                [[flame_sheet]]\nname = \"fire\"\ncolor = { luminance = 12000.0 }\n[[rain]]\nrate_mm_per_h = 60.0\nsimplification_codes = 0.0\n";
     let folder = Folder::with_scene(&format!("bansho = 2\n{fire}"));
     let rain = |luminance: &str| {
         let set = format!("flame_sheet.fire.color.luminance={luminance}");
