@@ -125,6 +125,12 @@ pub enum FarmError {
         /// The path or argument.
         path: String,
     },
+    /// A text that Open Job Description would take for an expression.
+    #[error("`{text}`: Open Job Description takes {{{{ and }}}} for an expression; allowed: any other name or option")]
+    Braces {
+        /// The text.
+        text: String,
+    },
     /// Not every frame is complete.
     #[error("{files}: frames {frames} are missing or not complete; the film is made when all are", files = .files.display())]
     Incomplete {
@@ -174,6 +180,7 @@ impl FarmError {
             | Self::NoSuchTask { .. }
             | Self::NoPlan { .. }
             | Self::ControlCharacters { .. }
+            | Self::Braces { .. }
             | Self::NotAFilm { .. }
             | Self::TilesWithMetadata
             | Self::TilesWithOverscan

@@ -42,6 +42,20 @@ pub fn finish(job: &Job, folder: &FarmFolder, plan: &FarmPlan, observer: &dyn Ob
     }
 }
 
+/// Checks that all frames of a job are whole.
+///
+/// # Errors
+/// Some are not.
+pub fn check_whole(job: &PreparedJob) -> Result<(), FarmError> {
+    let states = job.frame_states().into_iter();
+    let missing = job.frames().iter().zip(states).filter(|(_, state)| *state != FrameState::Whole);
+    let missing: Vec<i64> = missing.map(|(frame, _)| *frame).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output().template_path() })
+}
+
 /// Checks that all files of all tasks are whole.
 fn check_tasks(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<(), FarmError> {
     let (grid, tiles) = (plan.grid()?, plan.tile_count());
@@ -123,9 +137,9 @@ fn join_display(size: [usize; 2], rects: &[Rect], parts: Vec<DisplayImage>) -> D
     let is_sixteen = parts.iter().any(|part| matches!(part.pixels, DisplayPixels::Sixteen(_)));
     let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
     if is_sixteen {
-        sixteen.resize(width * height, [0; 4])
+        sixteen.resize(width * height, [0; 4]);
     } else {
-        eight.resize(width * height, [0; 4])
+        eight.resize(width * height, [0; 4]);
     }
     for (part, &rect) in parts.iter().zip(rects) {
         match &part.pixels {
@@ -166,7 +180,10 @@ fn join_linear(
 }
 
 /// Makes a film of finished frames.
-fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> Result<(), FarmError> {
+///
+/// # Errors
+/// The name is not that of a film, a frame cannot be read, or the film cannot be written.
+pub fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> Result<(), FarmError> {
     let mut format = whole.format.clone();
     format.pattern = OutputPattern::parse(path, whole.frames().len()).map_err(JobError::Naming)?;
     if format.pattern.kind().is_sequence() {

@@ -20,7 +20,7 @@ mod error;
 pub mod finish;
 pub mod journal;
 pub mod machine;
-// pub mod openjd;
+pub mod openjd;
 pub mod plan;
 pub mod probe;
 pub mod slurm;

@@ -121,7 +121,8 @@ impl Writer<'_> {
     }
 
     fn check(&self, tasks: usize) -> Result<String, FarmError> {
-        let options = [format!("--nodes=1-{}", tasks.clamp(1, CHECKED_NODES)), "--ntasks-per-node=1".to_owned()];
+        // Without a number of tasks, Slurm gives as many machines of the range as are free.
+        let options = [format!("--nodes=1-{}", tasks.clamp(1, CHECKED_NODES))];
         self.script(&ScriptRequest {
             job: "check",
             log: "check-%j.log",

@@ -188,7 +188,10 @@ fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan) -> 
         (_, Some(message)) => return FinishStatus::Failed { message },
         _ => {}
     }
-    let before = ["check", "snapshots"].map(|name| (name.to_owned(), failure(last(name), plan)));
+    // The check runs on many machines at once, of which one may fail.
+    let checks = attempts.get("check").into_iter().flatten();
+    let check = checks.filter_map(|attempt| failure(Some(attempt), plan)).next();
+    let before = [("check".to_owned(), check), ("snapshots".to_owned(), failure(last("snapshots"), plan))];
     let of_tasks = tasks
         .iter()
         .filter(|task| task.frames.unfinished() > 0)

@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{RenderArgs, values};
+use super::{
+    RenderArgs,
+    values::{self, Frames},
+};
 
 /// Work on many machines.
 #[derive(Args, Debug)]
@@ -30,6 +33,17 @@ Examples:
     Slurm(Box<SlurmArgs>),
     /// Print which frames of a shot are whole, missing or stale. The exit code is 0 only if all is whole.
     Status(FarmStatusArgs),
+    /// Write a job template of Open Job Description, for AWS Deadline Cloud and other schedulers.
+    #[command(after_help = "\
+Options of `bansho render` for all frames follow `--`. The template has parameters for the scene, the frames, the size and the folder of the frames.
+
+Examples:
+  bansho farm openjd shot.toml -o shot.yaml
+  bansho farm openjd shot.toml -o shot.yaml --film shot.mp4 -- --seed 7
+  openjd run shot.yaml -p OutputFolder=/shots/a")]
+    Openjd(OpenjdArgs),
+    /// Check that every frame of a shot is whole, and make a film of the frames. Nothing is drawn.
+    Finish(Box<FinishArgs>),
     /// Run a task of a plan. The scripts of `farm slurm` do this.
     Task(TaskArgs),
 }
@@ -88,6 +102,47 @@ pub(crate) struct FarmStatusArgs {
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// `bansho farm openjd`
+#[derive(Args, Debug)]
+pub(crate) struct OpenjdArgs {
+    /// The scene file.
+    pub(crate) scene: PathBuf,
+    /// The template.
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) out: PathBuf,
+    /// Name of the frames: .png or .exr. [default: SCENE.####.png]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) frame_name: Option<String>,
+    /// Frames, as for `bansho render`. [default: all]
+    #[arg(long, value_name = "SPEC", allow_hyphen_values = true, value_parser = values::parse_frames)]
+    pub(crate) frames: Option<Frames>,
+    /// Replace the scene's picture size.
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = values::parse_size)]
+    pub(crate) size: Option<[usize; 2]>,
+    /// Frames of a chunk; schedulers may adapt it.
+    #[arg(long, value_name = "N", default_value = "24", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) chunk: u32,
+    /// Wanted time of a chunk, minutes.
+    #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_080))]
+    pub(crate) task_minutes: u32,
+    /// Film that the last step makes of the frames, beside them (.mp4 .mov .webm .apng .gif).
+    #[arg(long, value_name = "NAME")]
+    pub(crate) film: Option<String>,
+    /// Options of `bansho render` for all frames.
+    #[arg(last = true, value_name = "OPTIONS")]
+    pub(crate) options: Vec<String>,
+}
+
+/// `bansho farm finish`
+#[derive(Args, Debug)]
+pub(crate) struct FinishArgs {
+    #[command(flatten)]
+    pub(crate) render: RenderArgs,
+    /// Film to make of the frames (.mp4 .mov .webm .apng .gif).
+    #[arg(long, value_name = "PATH", help_heading = "Farm")]
+    pub(crate) film: Option<PathBuf>,
 }
 
 /// `bansho farm task`

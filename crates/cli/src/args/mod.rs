@@ -15,14 +15,17 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
-    farm::{ChunkLength, FarmArgs, FarmCommand, FarmStatusArgs, SlurmArgs, TaskArgs, TaskCommand, ThreadArgs},
+    farm::{
+        ChunkLength, FarmArgs, FarmCommand, FarmStatusArgs, FinishArgs, OpenjdArgs, SlurmArgs, TaskArgs, TaskCommand,
+        ThreadArgs,
+    },
     flipbook::FlipbookArgs,
     input::InputArgs,
     plot::{ColorTexture, DeflectionArgs, KernelTexture, PlotArgs, PlotCommand, PlotOutputArgs},
     render::RenderArgs,
     simulate::SimulateArgs,
     streaks::StreaksArgs,
-    values::Numbers,
+    values::{Frames, Numbers},
     work::{ProgressKind, WorkArgs},
 };
 

@@ -70,8 +70,14 @@ pub(super) fn render_job(arguments: &[String]) -> anyhow::Result<Job> {
     let line = ["bansho", "render"].into_iter().chain(arguments.iter().map(String::as_str));
     match Cli::try_parse_from(line).map(|cli| cli.command) {
         Ok(Command::Render(render)) => Ok(render.job()?),
-        Ok(_) => Err(UsageError("the arguments of the plan are of another command".to_owned()).into()),
-        Err(error) => Err(UsageError(format!("the arguments of the plan: {error}")).into()),
+        Ok(_) => Err(UsageError("these are not options of `bansho render`".to_owned()).into()),
+        Err(error) => {
+            // Only what is wrong: the usage that follows is of another command.
+            let text = error.to_string();
+            let line = text.lines().next().unwrap_or_default();
+            let message = line.strip_prefix("error: ").unwrap_or(line);
+            Err(UsageError(format!("options of `bansho render`: {message}")).into())
+        }
     }
 }
 

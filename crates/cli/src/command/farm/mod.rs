@@ -1,7 +1,9 @@
 //! `bansho farm`
 
 mod arguments;
+mod finish;
 mod journal;
+mod openjd;
 mod slurm;
 mod status;
 mod task;
@@ -18,6 +20,8 @@ pub(crate) fn run(args: &FarmArgs) -> anyhow::Result<()> {
     match &args.command {
         FarmCommand::Slurm(args) => slurm::run(args),
         FarmCommand::Status(args) => status::run(args),
+        FarmCommand::Openjd(args) => openjd::run(args),
+        FarmCommand::Finish(args) => finish::run(args),
         FarmCommand::Task(args) => task::run(args),
     }
 }
