@@ -31,7 +31,7 @@ pub(crate) fn run(args: &OpenjdArgs) -> anyhow::Result<()> {
     let grid = ChunkGrid::new(prepared.plan().frames().start, chunk_frames, prepared.frames().to_vec());
     let name = sequence_name(&job)?.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let template = openjd::template(&TemplateOptions {
-        name: job.scene.stem.clone(),
+        name: job.scene.stem,
         scene: relative_scene(args)?,
         frame_name: name,
         frames: frames::format_list(prepared.frames()),
