@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A shot on a real cluster of Slurm, on three nodes of this machine, and by `openjd run`: the bytes of one process, whatever fails on the way.
 
-    run.py PROGRAM [--long] [--report FILE]
+    run.py PROGRAM [--long] [--frames AURORA,RAIN] [--report FILE]
 
 An aurora, which is simulated and so needs snapshots, runs undisturbed, and its CPU time is compared with that of one process. Rain loses a node in the
 middle of a chunk, one task is requeued, one node is drained, and the disk is full once. With --long both have at least ten minutes of CPU time each way,
@@ -15,6 +15,7 @@ import os
 import pathlib
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -250,8 +251,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program")
     parser.add_argument("--long", action="store_true")
+    parser.add_argument("--frames", type=lambda text: [int(number) for number in text.split(",")], help="number of frames of either shot")
     parser.add_argument("--report", type=pathlib.Path)
     arguments = parser.parse_args()
+    # So that daemons and the disk are cleaned up.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     reason = why_not()
     if reason:
         print(f"ignored: {reason}")
@@ -263,7 +267,7 @@ def main() -> int:
     try:
         subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={DISK_MIB}m", "tmpfs", str(disk)], check=True)
         with Cluster(folder / "cluster") as cluster:
-            prove(program, folder, disk, cluster, arguments.long)
+            prove(program, folder, disk, cluster, arguments)
     finally:
         subprocess.run(["umount", str(disk)], check=False)
         if not failures:
@@ -274,9 +278,11 @@ def main() -> int:
     return int(bool(failures))
 
 
-def prove(program: str, folder: pathlib.Path, disk: pathlib.Path, cluster: Cluster, is_long: bool) -> None:
+def prove(program: str, folder: pathlib.Path, disk: pathlib.Path, cluster: Cluster, arguments: argparse.Namespace) -> None:
     """All shots."""
-    size, frames = ((1920, 1080), (2400, 1400)) if is_long else ((1280, 720), (160, 48))
+    is_long = arguments.long
+    size, frames = ((1920, 1080), (5000, 3000)) if is_long else ((1280, 720), (160, 48))
+    frames = arguments.frames or frames
     pictures = [PICTURE.format(width=size[0], height=size[1], frames=count) for count in frames]
     shots = [
         Shot(program, "aurora", pictures[0] + AURORA.format(particles=1500), frames[0] // 4, folder / "aurora"),
