@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::{
     RenderArgs,
-    values::{self, Frames},
+    values::{self, ChunkLength, Frames},
 };
 
 /// Work on many machines.
@@ -46,15 +46,6 @@ Examples:
     Finish(Box<FinishArgs>),
     /// Run a task of a plan. The scripts of `farm slurm` do this.
     Task(TaskArgs),
-}
-
-/// Number of frames of a chunk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ChunkLength {
-    /// As the measured cost of a frame suggests.
-    Auto,
-    /// This many.
-    Frames(u64),
 }
 
 /// `bansho farm slurm`

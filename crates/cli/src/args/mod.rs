@@ -16,8 +16,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
     farm::{
-        ChunkLength, FarmArgs, FarmCommand, FarmStatusArgs, FinishArgs, OpenjdArgs, SlurmArgs, TaskArgs, TaskCommand,
-        ThreadArgs,
+        FarmArgs, FarmCommand, FarmStatusArgs, FinishArgs, OpenjdArgs, SlurmArgs, TaskArgs, TaskCommand, ThreadArgs,
     },
     flipbook::FlipbookArgs,
     input::InputArgs,
@@ -25,7 +24,7 @@ pub(crate) use self::{
     render::RenderArgs,
     simulate::SimulateArgs,
     streaks::StreaksArgs,
-    values::{Frames, Numbers},
+    values::{ChunkLength, Frames, Numbers},
     work::{ProgressKind, WorkArgs},
 };
 

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use super::farm::ChunkLength;
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
     job::frames::{self, FrameListError},
@@ -15,6 +14,15 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 /// `--frames`
 #[derive(Clone, Debug)]
 pub(crate) struct Frames(pub(crate) Vec<i64>);
+
+/// Number of frames of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ChunkLength {
+    /// As the measured cost of a frame suggests.
+    Auto,
+    /// This many.
+    Frames(u64),
+}
 
 pub(super) fn parse_frames(text: &str) -> Result<Frames, FrameListError> {
     frames::parse(text).map(Frames)

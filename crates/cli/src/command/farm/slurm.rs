@@ -173,7 +173,7 @@ impl Planning<'_> {
     fn plan(&self, reporter: &ProgressReporter) -> Result<Planned, FarmError> {
         let tiled = task::tile_job(&self.job, &self.folder, self.args.tiles, self.request().tiles / 2)?;
         let prepared = tiled.prepare()?;
-        let earlier = self.earlier_plan();
+        let earlier = self.earlier_plan(&prepared);
         let costs = match &earlier {
             Some(plan) => plan.costs,
             None => self.probe(&tiled, &prepared, reporter)?,
@@ -206,10 +206,12 @@ impl Planning<'_> {
     }
 
     /// The plan that this one continues: of the same picture, so that its costs and chunks are those of this one.
-    fn earlier_plan(&self) -> Option<FarmPlan> {
+    fn earlier_plan(&self, prepared: &PreparedJob) -> Option<FarmPlan> {
         let plan = self.folder.read_plan().ok()?;
-        (plan.arguments == self.arguments && plan.tiles == self.args.tiles && plan.folder == self.current)
-            .then_some(plan)
+        // The same options with a changed scene may cost anything.
+        let is_same_scene = || Some(prepared.shot_digest(plan.grid().ok()?.chunk(0)) == *plan.digests.first()?);
+        let is_same = plan.arguments == self.arguments && plan.tiles == self.args.tiles && plan.folder == self.current;
+        (is_same && is_same_scene() == Some(true)).then_some(plan)
     }
 
     /// Draws a few frames.
@@ -244,14 +246,14 @@ impl Planning<'_> {
         let frames: usize = tasks.iter().map(missing).sum();
         let with_snapshots = task::lacks_snapshots(&self.folder, plan, grid, &tasks);
         let snapshots = if with_snapshots { grid.snapshot_count() } else { 0 };
-        let required = space::required_bytes(&plan.costs, frames as u64, snapshots);
-        space::check(self.folder.root(), required, available_bytes(self.folder.root()))?;
         let is_complete = tasks.is_empty() && status::status(&self.job, &self.folder, plan)?.is_complete();
         if !is_complete {
+            // Before anything may fail, so that nothing is measured twice.
             self.folder.write_plan(plan)?;
-            for script in
-                slurm::scripts(plan, &self.folder, &tasks, with_snapshots, &self.slurm_options(memory_bytes)?)?
-            {
+            let required = space::required_bytes(&plan.costs, frames as u64, snapshots);
+            space::check(self.folder.root(), required, available_bytes(self.folder.root()))?;
+            let options = self.slurm_options(memory_bytes)?;
+            for script in slurm::scripts(plan, &self.folder, &tasks, with_snapshots, &options)? {
                 atomic::write_bytes(&self.folder.root().join(script.name), script.text.as_bytes())?;
             }
         }
