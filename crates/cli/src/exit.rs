@@ -2,7 +2,10 @@
 
 use std::process::ExitCode;
 
-use bansho::job::{ErrorCategory, JobError};
+use bansho::{
+    farm::FarmError,
+    job::{ErrorCategory, JobError},
+};
 
 use crate::{
     flags, interrupt,
@@ -28,6 +31,9 @@ pub(crate) enum ReportedError {
     /// A job failed.
     #[error(transparent)]
     Job(JobError),
+    /// Not all frames of a shot are whole, which was the question.
+    #[error("not all frames are whole")]
+    Incomplete,
     /// Another program failed, which printed the error itself.
     #[error("another program failed")]
     OtherProgram,
@@ -39,8 +45,9 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
         Some(ReportedError::Job(job)) => Some(job),
         _ => error.downcast_ref::<JobError>(),
     };
+    let farm = || error.downcast_ref().map(FarmError::category);
     let plot = || error.downcast_ref().map(PlotError::category);
-    match job.map(JobError::category).or_else(plot) {
+    match job.map(JobError::category).or_else(farm).or_else(plot) {
         Some(ErrorCategory::Usage) => USAGE,
         Some(ErrorCategory::Scene) => SCENE,
         Some(ErrorCategory::Cancelled) => interrupt::exit_code(),
@@ -52,7 +59,11 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
 /// Prints an `error:` line for each error that has not been printed yet, and returns the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     if !error.is::<ReportedError>() {
-        match error.downcast_ref::<JobError>() {
+        let of_farm = match error.downcast_ref() {
+            Some(FarmError::Job(job)) => Some(job),
+            _ => None,
+        };
+        match error.downcast_ref::<JobError>().or(of_farm) {
             Some(job) => print_job_error(job),
             None => print_message("error", &format!("{error:#}")),
         }

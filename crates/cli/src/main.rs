@@ -45,6 +45,7 @@ fn run(command: &Command) -> anyhow::Result<()> {
         Command::Upgrade(args) => command::upgrade::run(args),
         Command::Schema => command::generated::run_schema(),
         Command::Render(args) => command::render::run(args),
+        Command::Farm(args) => command::farm::run(args),
         Command::Flipbook(args) => command::flipbook::run(args),
         Command::Streaks(args) => command::streaks::run(args),
         Command::Simulate(args) => command::simulate::run(args),

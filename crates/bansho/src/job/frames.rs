@@ -104,6 +104,12 @@ pub(crate) fn format_ranges(numbers: &[i64]) -> String {
     }
 }
 
+/// `3-14,20` for ascending numbers, all of them, as [`parse`] reads it.
+pub fn format_list(numbers: &[i64]) -> String {
+    let runs: Vec<String> = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b)).map(format_range).collect();
+    runs.join(",")
+}
+
 fn format_range(run: &[i64]) -> String {
     match run {
         [first, .., last] => format!("{first}-{last}"),
@@ -156,5 +162,8 @@ mod tests {
             assert_eq!(format_ranges(numbers), expected);
         }
         assert!(format_ranges(&many).ends_with(", 196, 198 and 150 more"));
+        for numbers in [&many[..], &[-3, -2, 0, 5, 6], &[7]] {
+            assert_eq!(parse(&format_list(numbers)).unwrap(), numbers);
+        }
     }
 }

@@ -38,6 +38,7 @@ pub use render::{
     Summary,
     contact_sheet::ContactBackground,
     prepare::{PreparedJob, check_scene, remarks},
+    resume::FrameState,
 };
 pub use scene_file::{MAX_SCENE_BYTES, SceneFile};
 #[cfg(feature = "rain")]

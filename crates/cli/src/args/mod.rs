@@ -1,5 +1,6 @@
 //! The command line.
 
+mod farm;
 mod flipbook;
 mod input;
 mod plot;
@@ -14,13 +15,16 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
+    farm::{
+        FarmArgs, FarmCommand, FarmStatusArgs, FinishArgs, OpenjdArgs, SlurmArgs, TaskArgs, TaskCommand, ThreadArgs,
+    },
     flipbook::FlipbookArgs,
     input::InputArgs,
     plot::{ColorTexture, DeflectionArgs, KernelTexture, PlotArgs, PlotCommand, PlotOutputArgs},
     render::RenderArgs,
     simulate::SimulateArgs,
     streaks::StreaksArgs,
-    values::Numbers,
+    values::{ChunkLength, Frames, Numbers},
     work::{ProgressKind, WorkArgs},
 };
 
@@ -56,6 +60,8 @@ pub(crate) enum Command {
     Schema,
     /// Draw a scene to pictures, a video, or a contact sheet.
     Render(RenderArgs),
+    /// Draw a shot on many machines, by the batch system that they have.
+    Farm(FarmArgs),
     /// Draw a scene as a flipbook for game engines: color, alpha and motion sheets, and a JSON file.
     Flipbook(FlipbookArgs),
     /// Write streak textures of rain, with the diameter, velocity and opacity of every drop.

@@ -15,6 +15,15 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 #[derive(Clone, Debug)]
 pub(crate) struct Frames(pub(crate) Vec<i64>);
 
+/// Number of frames of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ChunkLength {
+    /// As the measured cost of a frame suggests.
+    Auto,
+    /// This many.
+    Frames(u64),
+}
+
 pub(super) fn parse_frames(text: &str) -> Result<Frames, FrameListError> {
     frames::parse(text).map(Frames)
 }
@@ -24,6 +33,8 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, FrameListError> {
 pub(super) enum ValueError {
     #[error("allowed: WIDTHxHEIGHT such as 1920x1080, 1 to {LARGEST_SIDE} on a side")]
     Size,
+    #[error("allowed: auto, or a number of frames from 1 on")]
+    Chunk,
     #[error("allowed: COLUMNSxROWS such as 8x8, up to 4096 frames in all")]
     Grid,
     #[error("allowed: x,y,width,height in whole pixels from the top left corner, such as 640,0,320,180")]
@@ -57,6 +68,19 @@ fn pair(text: &str, max: usize) -> Option<[usize; 2]> {
 
 pub(super) fn parse_size(text: &str) -> Result<[usize; 2], ValueError> {
     pair(text, LARGEST_SIDE as usize).ok_or(ValueError::Size)
+}
+
+/// `auto`, or a number of frames.
+pub(super) fn parse_chunk(text: &str) -> Result<ChunkLength, ValueError> {
+    match text {
+        "auto" => Ok(ChunkLength::Auto),
+        _ => text
+            .parse()
+            .ok()
+            .filter(|frames| (1..=frames::MAX_FRAMES as u64).contains(frames))
+            .map(ChunkLength::Frames)
+            .ok_or(ValueError::Chunk),
+    }
 }
 
 pub(super) fn parse_seed(text: &str) -> Result<u64, ValueError> {
@@ -191,6 +215,13 @@ mod tests {
     fn grids_are_bounded_in_all() {
         assert_eq!(parse_grid("8x4").unwrap(), [8, 4]);
         assert!(parse_grid("64x64").is_ok() && parse_grid("65x64").is_err() && parse_grid("0x4").is_err());
+    }
+
+    #[test]
+    fn chunks_are_a_number_of_frames_or_automatic() {
+        assert_eq!(parse_chunk("auto").unwrap(), ChunkLength::Auto);
+        assert_eq!(parse_chunk("12").unwrap(), ChunkLength::Frames(12));
+        assert!(["0", "-1", "", "Auto", "1.5", "99999999999"].iter().all(|bad| parse_chunk(bad).is_err()));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub(crate) mod calibrate;
 pub(crate) mod check;
+pub(crate) mod farm;
 pub(crate) mod flipbook;
 pub(crate) mod generated;
 pub(crate) mod new;

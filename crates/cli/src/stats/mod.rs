@@ -136,7 +136,8 @@ impl StatsReport<'_> {
     }
 }
 
-fn cpu_seconds() -> Option<f64> {
+/// Time of all threads of this process on a core, s; `None` where there is no `/proc`.
+pub(crate) fn cpu_seconds() -> Option<f64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
     // The second field is a name in parentheses. User and system time are the 14th and 15th, in hundredths of a second.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();

@@ -2,6 +2,8 @@
 
 mod commands;
 mod crate_dependencies;
+#[cfg(unix)]
+mod farm;
 mod input;
 mod output;
 mod phenomena;

@@ -1,4 +1,5 @@
-//! Output of rendered frames: the sink that writes them, and resuming.
+//! Output of rendered frames: the sink that writes them, resuming, and reading back.
 
+pub mod frame_file;
 pub mod resume;
 pub mod sink;

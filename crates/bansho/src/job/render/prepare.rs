@@ -70,6 +70,11 @@ impl PreparedJob {
         &self.format.pattern
     }
 
+    /// Whether anything in the scene is simulated in steps, so that frames are not independent.
+    pub fn is_stepped(&self) -> bool {
+        self.compiled.is_stepped()
+    }
+
     /// Estimated peak memory of the process during the job, bytes.
     pub fn memory_bytes(&self) -> f64 {
         self.memory_bytes
@@ -165,7 +170,8 @@ impl Job {
         Ok(prepared)
     }
 
-    fn output_path(&self) -> PathBuf {
+    /// The name of the output: the option, or the default.
+    pub fn output_path(&self) -> PathBuf {
         let stem = &self.scene.stem;
         let name =
             if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::default_sequence(stem) };

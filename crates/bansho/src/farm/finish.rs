@@ -1,0 +1,286 @@
+//! The last job of a plan: checks that every frame is whole, joins tiles, and makes the film of the frames.
+
+use std::path::{Path, PathBuf};
+
+use bansho_base::{
+    frame::{DisplayImage, DisplayPixels, Frame},
+    host::observer::{Observer, check},
+    image::{Image, Rect},
+};
+use bansho_media::{
+    files::naming::OutputPattern,
+    format::{OutputKind, PictureFormat},
+    output::{
+        frame_file::{self, FrameFileError, LinearPixels},
+        sink::{FrameSlot, Picture},
+    },
+};
+use rayon::prelude::*;
+
+use super::{
+    error::FarmError,
+    plan::{FarmFolder, FarmPlan},
+    status,
+    task::{tile_job, tile_rect},
+};
+use crate::job::{FrameState, Job, JobError, PreparedJob, frames};
+
+/// Finishes the shot of a plan.
+///
+/// # Errors
+/// Frames are missing or not complete, the scene has changed, or the film cannot be written.
+pub fn finish(job: &Job, folder: &FarmFolder, plan: &FarmPlan, observer: &dyn Observer) -> Result<(), FarmError> {
+    let grid = plan.grid()?;
+    check_tasks(job, folder, plan)?;
+    let whole = Job { frames: Some(grid.frames().to_vec()), resume: true, ..job.clone() }.prepare()?;
+    if plan.tile_count() > 1 {
+        join(&whole, job, folder, plan, observer)?;
+    }
+    match &plan.film {
+        Some(film) => make_film(&whole, &plan.folder.join(film), observer),
+        None => Ok(()),
+    }
+}
+
+/// Checks that all frames of a job are whole.
+///
+/// # Errors
+/// Some are not.
+pub fn check_whole(job: &PreparedJob) -> Result<(), FarmError> {
+    let states = job.frame_states().into_iter();
+    let missing = job.frames().iter().zip(states).filter(|(_, state)| *state != FrameState::Whole);
+    let missing: Vec<i64> = missing.map(|(frame, _)| *frame).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output().template_path() })
+}
+
+/// Checks that all files of all tasks are whole.
+fn check_tasks(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<(), FarmError> {
+    let (grid, tiles) = (plan.grid()?, plan.tile_count());
+    let states = status::task_states(job, folder, plan)?;
+    let of_task = |(task, states): (usize, &Vec<FrameState>)| {
+        let chunk = grid.chunk(task / tiles).to_vec();
+        chunk.into_iter().zip(states.clone()).filter(|(_, state)| *state != FrameState::Whole).map(|(frame, _)| frame)
+    };
+    let mut missing: Vec<i64> = states.iter().enumerate().flat_map(of_task).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    missing.sort_unstable();
+    missing.dedup();
+    Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output_path() })
+}
+
+fn unreadable(path: &Path) -> impl Fn(FrameFileError) -> FarmError + '_ {
+    move |source| FarmError::FrameFile { path: path.to_path_buf(), source }
+}
+
+/// Joins the tiles of all frames that are not joined yet.
+fn join(
+    whole: &PreparedJob,
+    job: &Job,
+    folder: &FarmFolder,
+    plan: &FarmPlan,
+    observer: &dyn Observer,
+) -> Result<(), FarmError> {
+    let states = whole.frame_states();
+    let missing = whole.frames().iter().zip(states).filter(|(_, state)| *state != FrameState::Whole);
+    let patterns = (0..plan.tile_count()).map(|tile| {
+        let path = tile_job(job, folder, plan.tiles, tile)?.output_path();
+        Ok(OutputPattern::parse(&path, whole.frames().len()).map_err(JobError::Naming)?)
+    });
+    let patterns = patterns.collect::<Result<Vec<_>, FarmError>>()?;
+    for (&number, _) in missing {
+        check(observer).map_err(|_| JobError::Cancelled)?;
+        let tiles: Vec<PathBuf> = patterns.iter().map(|pattern| pattern.path(number)).collect();
+        join_frame(whole, number, plan.tiles, &tiles)?;
+    }
+    Ok(())
+}
+
+/// Joins the tiles of one frame to the bytes of the whole picture.
+fn join_frame(whole: &PreparedJob, number: i64, tiles: [usize; 2], paths: &[PathBuf]) -> Result<(), FarmError> {
+    let size = whole.plan().size();
+    let rects: Vec<Rect> = (0..paths.len()).map(|tile| tile_rect(size, tiles, tile)).collect();
+    let sink = whole.format.open(whole.plan(), 1, size, 1)?;
+    let slot = FrameSlot { index: 0, number };
+    let fingerprint = whole.expected_fingerprint(number);
+    match whole.format.pattern.kind() {
+        OutputKind::Exr => {
+            let read = |path: &PathBuf| frame_file::read_exr(path).map_err(unreadable(path));
+            let parts = paths.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+            let frame = join_linear(whole, number, fingerprint, &rects, parts);
+            sink.write(slot, Picture::Linear(&frame))?;
+        }
+        _ => {
+            let read = |path: &PathBuf| frame_file::read_png(path).map_err(unreadable(path));
+            let parts = paths.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+            sink.write(slot, Picture::Display(&join_display(size, &rects, parts), &fingerprint))?;
+        }
+    }
+    Ok(sink.finish()?)
+}
+
+/// Copies the values of a rectangle into a picture of `width` columns.
+fn paste<T: Copy>(whole: &mut [T], width: usize, rect: Rect, part: &[T]) {
+    for (row, values) in part.chunks(rect.width.max(1)).enumerate().take(rect.height) {
+        let begin = (rect.y + row) * width + rect.x;
+        whole[begin..begin + values.len()].copy_from_slice(values);
+    }
+}
+
+fn join_display(size: [usize; 2], rects: &[Rect], parts: Vec<DisplayImage>) -> DisplayImage {
+    let [width, height] = size;
+    let (opaque, alpha) = parts.first().map_or((true, Default::default()), |part| (part.opaque, part.alpha));
+    let is_sixteen = parts.iter().any(|part| matches!(part.pixels, DisplayPixels::Sixteen(_)));
+    let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
+    if is_sixteen {
+        sixteen.resize(width * height, [0; 4]);
+    } else {
+        eight.resize(width * height, [0; 4]);
+    }
+    for (part, &rect) in parts.iter().zip(rects) {
+        match &part.pixels {
+            DisplayPixels::Eight(pixels) if !is_sixteen => paste(&mut eight, width, rect, pixels),
+            DisplayPixels::Sixteen(pixels) => paste(&mut sixteen, width, rect, pixels),
+            DisplayPixels::Eight(_) => {}
+        }
+    }
+    let pixels = if is_sixteen { DisplayPixels::Sixteen(sixteen) } else { DisplayPixels::Eight(eight) };
+    DisplayImage { width, height, opaque, alpha, pixels }
+}
+
+fn join_linear(
+    whole: &PreparedJob,
+    number: i64,
+    fingerprint: [u8; 32],
+    rects: &[Rect],
+    parts: Vec<LinearPixels>,
+) -> Frame {
+    let [width, height] = whole.plan().size();
+    let mut beauty = Image::filled(width, height, [0.0; 4]);
+    let first = parts.first().map(|part| (part.depth.is_some(), part.channels.clone()));
+    let (has_depth, mut channels) = first.unwrap_or_default();
+    let mut depth = has_depth.then(|| vec![f32::INFINITY; width * height]);
+    channels.iter_mut().for_each(|channel| channel.values = vec![0.0; width * height]);
+    for (part, &rect) in parts.iter().zip(rects) {
+        paste(beauty.pixels_mut(), width, rect, part.beauty.pixels());
+        if let (Some(depth), Some(values)) = (&mut depth, &part.depth) {
+            paste(depth, width, rect, values);
+        }
+        for (channel, values) in channels.iter_mut().zip(&part.channels) {
+            paste(&mut channel.values, width, rect, &values.values);
+        }
+    }
+    let header = whole.plan().header(number, fingerprint);
+    let content = Rect::from_size(width, height);
+    Frame { header, beauty, depth, channels, opaque: false, metadata: Vec::new(), content }
+}
+
+/// Makes a film of finished frames.
+///
+/// # Errors
+/// The name is not that of a film, a frame cannot be read, or the film cannot be written.
+pub fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> Result<(), FarmError> {
+    let mut format = whole.format.clone();
+    format.pattern = OutputPattern::parse(path, whole.frames().len()).map_err(JobError::Naming)?;
+    if format.pattern.kind().is_sequence() {
+        return Err(FarmError::NotAFilm { path: path.to_path_buf() });
+    }
+    let window = whole.plan().window();
+    let sink = format.open(whole.plan(), whole.frames().len(), [window.width, window.height], 1)?;
+    for (index, &number) in whole.frames().iter().enumerate() {
+        check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
+        let slot = FrameSlot { index, number };
+        let picture = display_picture(whole, number, sink.picture_format(), observer)?;
+        sink.write(slot, Picture::Display(&picture, &[0; 32]))?;
+    }
+    Ok(sink.finish()?)
+}
+
+/// The display pixels of a finished frame.
+fn display_picture(
+    whole: &PreparedJob,
+    number: i64,
+    picture_format: PictureFormat,
+    observer: &dyn Observer,
+) -> Result<DisplayImage, FarmError> {
+    let path = whole.format.pattern.path(number);
+    if whole.format.pattern.kind() == OutputKind::Png {
+        return frame_file::read_png(&path).map_err(unreadable(&path));
+    }
+    let LinearPixels { beauty, .. } = frame_file::read_exr(&path).map_err(unreadable(&path))?;
+    let header = whole.plan().header(number, whole.expected_fingerprint(number));
+    let content = Rect::from_size(beauty.width(), beauty.height());
+    let opaque = picture_format == PictureFormat::OpaqueDisplay || whole.plan().scene().has_plate();
+    let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque, metadata: Vec::new(), content };
+    Ok(whole.format.to_display(&frame, observer))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use bansho_base::host::observer::Unobserved;
+
+    use super::*;
+    use crate::{
+        farm::{chunks::ChunkGrid, plan::PlanOptions, task::chunk_job},
+        job::SceneFile,
+    };
+
+    const SCENE: &str = "bansho = 2\n[picture]\nsize = [53, 37]\nframes = 3\n[[flame_sheet]]\n";
+
+    /// A job in `folder` and its plan with these tiles and chunks of two frames.
+    fn shot(folder: &Path, name: &str, tiles: [usize; 2]) -> (Job, FarmFolder, FarmPlan) {
+        let scene = SceneFile::read_stream("scene", SCENE.as_bytes()).unwrap();
+        let out = folder.join(name);
+        let farm = FarmFolder::beside(&out);
+        let is_exr = name.ends_with("exr");
+        let job = Job { out: Some(out), layers: is_exr, aovs: is_exr, ..Job::new(scene) };
+        let prepared = job.prepare().unwrap();
+        let grid = ChunkGrid::new(0, 2, prepared.frames().to_vec());
+        let digests = (0..grid.count()).map(|chunk| prepared.shot_digest(grid.chunk(chunk))).collect();
+        let options = PlanOptions { folder: folder.to_path_buf(), tiles, ..PlanOptions::default() };
+        (job, farm, FarmPlan::new(options, &grid, 0, 2, digests))
+    }
+
+    #[test]
+    fn joined_tiles_have_the_bytes_of_the_whole_picture() {
+        for name in ["a.####.png", "a.####.exr"] {
+            let (whole, tiled) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+            let (job, ..) = shot(whole.path(), name, [1, 1]);
+            job.prepare().unwrap().run(&Unobserved).unwrap();
+            let (job, farm, plan) = shot(tiled.path(), name, [3, 2]);
+            for task in 0..plan.task_count() - 1 {
+                chunk_job(&job, &farm, &plan, task).unwrap().run(&Unobserved).unwrap();
+            }
+            let refused = finish(&job, &farm, &plan, &Unobserved);
+            assert!(matches!(refused, Err(FarmError::Incomplete { frames, .. }) if frames == "2"), "{name}");
+            chunk_job(&job, &farm, &plan, plan.task_count() - 1).unwrap().run(&Unobserved).unwrap();
+            finish(&job, &farm, &plan, &Unobserved).unwrap();
+            for number in 0..3 {
+                let file = name.replace("####", &format!("{number:04}"));
+                let [expected, found] = [&whole, &tiled].map(|folder| fs::read(folder.path().join(&file)).unwrap());
+                assert!(expected == found, "{file}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_film_of_finished_frames_is_that_of_a_render() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(folder.path(), "a.####.png", [1, 1]);
+        job.prepare().unwrap().run(&Unobserved).unwrap();
+        let plan = FarmPlan { film: Some("a.apng".into()), ..plan };
+        finish(&job, &farm, &plan, &Unobserved).unwrap();
+        let direct = Job { out: Some(folder.path().join("b.apng")), ..job.clone() };
+        direct.prepare().unwrap().run(&Unobserved).unwrap();
+        let [film, direct] = ["a.apng", "b.apng"].map(|name| fs::read(folder.path().join(name)).unwrap());
+        assert!(film == direct);
+        let sequence = FarmPlan { film: Some("c.####.png".into()), ..plan };
+        assert!(matches!(finish(&job, &farm, &sequence, &Unobserved), Err(FarmError::NotAFilm { .. })));
+    }
+}

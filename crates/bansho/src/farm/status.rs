@@ -1,0 +1,314 @@
+//! The state of all frames of a plan, from files alone: the frames themselves, and the journals of tasks.
+
+use serde::Serialize;
+
+use super::{
+    error::FarmError,
+    journal::{self, Attempt, Attempts},
+    plan::{FarmFolder, FarmPlan},
+    task,
+};
+use crate::job::{FrameState, Job};
+
+/// Numbers of frames by the state of their files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct FrameCounts {
+    /// Complete, and of this scene and version.
+    pub whole: usize,
+    /// Without a file.
+    pub missing: usize,
+    /// Complete, of another scene, other options or another version.
+    pub stale: usize,
+    /// Truncated or damaged.
+    pub damaged: usize,
+}
+
+impl FrameCounts {
+    /// Counts states.
+    pub fn of(states: &[FrameState]) -> Self {
+        let count = |state| states.iter().filter(|&&found| found == state).count();
+        let [whole, missing, stale, damaged] =
+            [FrameState::Whole, FrameState::Missing, FrameState::Stale, FrameState::Damaged].map(count);
+        Self { whole, missing, stale, damaged }
+    }
+
+    /// Number of frames.
+    pub fn total(&self) -> usize {
+        self.whole + self.missing + self.stale + self.damaged
+    }
+
+    /// Number of frames that must be drawn.
+    pub fn unfinished(&self) -> usize {
+        self.total() - self.whole
+    }
+}
+
+/// The state of a task.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TaskStatus {
+    /// Its number.
+    pub task: usize,
+    /// Its first frame.
+    pub first: i64,
+    /// Its last frame.
+    pub last: i64,
+    /// The tile that it draws.
+    pub tile: usize,
+    /// Its frames.
+    #[serde(flatten)]
+    pub frames: FrameCounts,
+    /// The attempts at it, in their order.
+    pub attempts: Vec<Attempt>,
+}
+
+/// The state of the job that comes after all tasks.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "state", rename_all = "lowercase")]
+pub enum FinishStatus {
+    /// It found all frames whole, and made the film.
+    Done,
+    /// It failed.
+    Failed {
+        /// Its message.
+        message: String,
+    },
+    /// It did not run, because what it depends on failed.
+    Blocked {
+        /// What failed, by the names of journals, and why.
+        by: Vec<(String, String)>,
+    },
+    /// It waits for tasks.
+    Waiting,
+}
+
+/// The state of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FarmStatus {
+    /// The frames of the shot.
+    pub frames: FrameCounts,
+    /// The tasks.
+    pub tasks: Vec<TaskStatus>,
+    /// The job after all tasks.
+    pub finish: FinishStatus,
+    /// Whether the film exists, where one is made.
+    pub film: Option<bool>,
+    /// Time of a frame within its task, s, from the journals.
+    pub seconds_per_frame: Option<f64>,
+    /// Number of tasks that began and did not end.
+    pub running: usize,
+    /// Time until all frames are drawn, s, if as many tasks run as now; of one task where none runs.
+    pub seconds_left: Option<f64>,
+}
+
+impl FarmStatus {
+    /// Whether all frames are whole, and the film is made.
+    pub fn is_complete(&self) -> bool {
+        self.frames.unfinished() == 0 && self.film != Some(false)
+    }
+}
+
+/// The state of each frame of each task, in the order of tasks.
+///
+/// # Errors
+/// The job cannot be prepared, or the plan is damaged.
+pub fn task_states(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<Vec<Vec<FrameState>>, FarmError> {
+    let (grid, tiles) = (plan.grid()?, plan.tile_count());
+    let mut of_tasks = vec![Vec::new(); plan.task_count()];
+    for tile in 0..tiles {
+        let job = Job { frames: Some(grid.frames().to_vec()), ..task::tile_job(job, folder, plan.tiles, tile)? };
+        let mut states = job.prepare()?.frame_states().into_iter();
+        for chunk in 0..grid.count().min(plan.digests.len()) {
+            of_tasks[chunk * tiles + tile] = states.by_ref().take(grid.chunk(chunk).len()).collect();
+        }
+    }
+    Ok(of_tasks)
+}
+
+/// The state of the frames of a plan, whose job is `job`.
+///
+/// # Errors
+/// The job cannot be prepared, or the plan is damaged.
+pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<FarmStatus, FarmError> {
+    let (grid, tiles) = (plan.grid()?, plan.tile_count());
+    let attempts = journal::read(&folder.journal());
+    let states = task_states(job, folder, plan)?;
+    let frames = match tiles {
+        1 => FrameCounts::of(&states.concat()),
+        // Tiles count only when they are joined.
+        _ => {
+            let job = Job { frames: Some(grid.frames().to_vec()), ..job.clone() };
+            FrameCounts::of(&job.prepare()?.frame_states())
+        }
+    };
+    let task = |(task, states): (usize, &Vec<FrameState>)| {
+        let chunk = grid.chunk(task / tiles);
+        TaskStatus {
+            task,
+            first: chunk.first().copied().unwrap_or(0),
+            last: chunk.last().copied().unwrap_or(0),
+            tile: task % tiles,
+            frames: FrameCounts::of(states),
+            attempts: attempts.get(&journal::task_name(task)).cloned().unwrap_or_default(),
+        }
+    };
+    let tasks: Vec<TaskStatus> = states.iter().enumerate().map(task).collect();
+    let film = plan.film.as_ref().map(|film| plan.folder.join(film).is_file());
+    let seconds_per_frame = seconds_per_frame(&tasks);
+    let running = tasks.iter().filter(|task| is_running(task, plan)).count();
+    let left: usize = tasks.iter().map(|task| task.frames.unfinished()).sum();
+    let seconds_left = seconds_per_frame.map(|seconds| seconds * left as f64 / running.max(1) as f64);
+    let finish = finish_status(&attempts, &tasks, plan);
+    Ok(FarmStatus { frames, tasks, finish, film, seconds_per_frame, running, seconds_left })
+}
+
+fn seconds_per_frame(tasks: &[TaskStatus]) -> Option<f64> {
+    let attempts = || tasks.iter().flat_map(|task| &task.attempts).filter(|attempt| attempt.drawn > 0);
+    let drawn: usize = attempts().map(|attempt| attempt.drawn).sum();
+    let seconds: f64 = attempts().map(|attempt| attempt.seconds).sum();
+    (drawn > 0).then(|| seconds / drawn as f64)
+}
+
+fn is_running(task: &TaskStatus, plan: &FarmPlan) -> bool {
+    let last = task.attempts.last();
+    task.frames.unfinished() > 0 && last.is_some_and(|last| last.code.is_none() && last.token == plan.token)
+}
+
+/// Why an attempt failed; `None` if it did not, or belongs to an earlier plan.
+fn failure(attempt: Option<&Attempt>, plan: &FarmPlan) -> Option<String> {
+    let attempt = attempt.filter(|attempt| attempt.token == plan.token)?;
+    let code = attempt.code.filter(|&code| code != 0)?;
+    Some(format!("exit code {code} on {}: {}", attempt.node, attempt.message.as_deref().unwrap_or("no message")))
+}
+
+fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan) -> FinishStatus {
+    let last = |name: &str| attempts.get(name).and_then(|attempts| attempts.last());
+    let finish = last("finish").filter(|attempt| attempt.token == plan.token);
+    match (finish.and_then(|finish| finish.code), failure(finish, plan)) {
+        (Some(0), _) => return FinishStatus::Done,
+        (_, Some(message)) => return FinishStatus::Failed { message },
+        _ => {}
+    }
+    // The check runs on many machines at once, of which one may fail.
+    let checks = attempts.get("check").into_iter().flatten();
+    let check = checks.filter_map(|attempt| failure(Some(attempt), plan)).next();
+    let before = [("check".to_owned(), check), ("snapshots".to_owned(), failure(last("snapshots"), plan))];
+    let of_tasks = tasks
+        .iter()
+        .filter(|task| task.frames.unfinished() > 0)
+        .map(|task| (journal::task_name(task.task), failure(task.attempts.last(), plan)));
+    let by: Vec<_> = before.into_iter().chain(of_tasks).filter_map(|(name, why)| Some((name, why?))).collect();
+    if by.is_empty() { FinishStatus::Waiting } else { FinishStatus::Blocked { by } }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::{
+        farm::{journal::Event, plan::tests::plan},
+        job::SceneFile,
+    };
+
+    const SCENE: &str = "bansho = 2\n[picture]\nsize = [8, 8]\nframes = 10\n";
+
+    /// A job of ten empty frames in `folder`, and its plan of three chunks.
+    fn shot(folder: &tempfile::TempDir, text: &str) -> (Job, FarmFolder, FarmPlan) {
+        let scene = SceneFile::read_stream("scene", text.as_bytes()).unwrap();
+        let out = folder.path().join("a.####.png");
+        let farm = FarmFolder::beside(&out);
+        let job = Job { out: Some(out), ..Job::new(scene) };
+        let plan = plan();
+        let prepared = job.prepare().unwrap();
+        let digests = (0..3).map(|chunk| prepared.shot_digest(plan.grid().unwrap().chunk(chunk))).collect();
+        let plan = FarmPlan { digests, ..plan };
+        farm.write_plan(&plan).unwrap();
+        (job, farm, plan)
+    }
+
+    fn start(plan: &FarmPlan) -> Event {
+        Event::Start { node: "n1".into(), token: plan.token.clone(), frames: 4, kept: 0, threads: 1 }
+    }
+
+    fn end(code: u8, message: &str) -> Event {
+        Event::End { code, message: Some(message.into()), seconds: 8.0, cpu_seconds: None }
+    }
+
+    #[test]
+    fn frames_are_counted_by_their_files() {
+        use bansho_base::host::observer::Unobserved;
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        assert_eq!(status(&job, &farm, &plan).unwrap().frames, FrameCounts { missing: 10, ..FrameCounts::default() });
+        task::chunk_job(&job, &farm, &plan, 1).unwrap().run(&Unobserved).unwrap();
+        let path = |number: u32| folder.path().join(format!("a.{number:04}.png"));
+        // Another seed, which an empty picture does not show, and a truncated file.
+        let other = Job { seed: Some(9), frames: Some(vec![0]), ..job.clone() };
+        other.prepare().unwrap().run(&Unobserved).unwrap();
+        let whole = fs::read(path(5)).unwrap();
+        fs::write(path(5), &whole[..whole.len() - 3]).unwrap();
+        let found = status(&job, &farm, &plan).unwrap();
+        assert_eq!(found.frames, FrameCounts { whole: 3, missing: 5, stale: 1, damaged: 1 });
+        assert_eq!(found.tasks[1].frames, FrameCounts { whole: 3, damaged: 1, ..FrameCounts::default() });
+        assert_eq!((found.tasks[2].first, found.tasks[2].last), (8, 9));
+        assert!(!found.is_complete());
+        (0..3).for_each(|index| drop(task::chunk_job(&job, &farm, &plan, index).unwrap().run(&Unobserved).unwrap()));
+        assert!(status(&job, &farm, &plan).unwrap().is_complete());
+        assert!(!status(&job, &farm, &FarmPlan { film: Some("a.mp4".into()), ..plan }).unwrap().is_complete());
+    }
+
+    #[test]
+    fn tasks_of_a_changed_scene_refuse() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        let (changed, ..) = (Job { seed: Some(5), ..job.clone() }, ());
+        assert!(matches!(task::chunk_job(&changed, &farm, &plan, 0), Err(FarmError::SceneChanged)));
+        assert!(matches!(task::chunk_job(&job, &farm, &plan, 3), Err(FarmError::NoSuchTask { index: 3, count: 3 })));
+    }
+
+    #[test]
+    fn tiles_have_the_digest_of_the_whole_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        let tiled = FarmPlan { tiles: [2, 2], ..plan };
+        let prepared = task::chunk_job(&job, &farm, &tiled, 7).unwrap();
+        assert_eq!(prepared.frames(), [4, 5, 6, 7]);
+        assert_eq!(prepared.output().path(4), folder.path().join("a.farm/tiles/3/a.0004.png"));
+    }
+
+    #[test]
+    fn the_time_left_follows_from_journals() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        for task in 0..2 {
+            let journal = journal::Journal::create(&farm.journal(), &journal::task_name(task)).unwrap();
+            journal.write(&start(&plan)).unwrap();
+            journal.write(&Event::Frame { number: 0, seconds: 6.0 }).unwrap();
+        }
+        let found = status(&job, &farm, &plan).unwrap();
+        // 10 frames of 6 s by two tasks.
+        assert_eq!((found.running, found.seconds_left), (2, Some(30.0)));
+        assert_eq!(found.finish, FinishStatus::Waiting);
+    }
+
+    #[test]
+    fn what_failed_is_why_the_last_job_did_not_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        let write = |name: &str, event: Event| {
+            let journal = journal::Journal::create(&farm.journal(), name).unwrap();
+            journal.write(&start(&plan)).unwrap();
+            journal.write(&event).unwrap();
+        };
+        write("task-2", end(143, "stopped"));
+        write("task-1", end(1, "disk full"));
+        write("task-1", Event::Frame { number: 4, seconds: 1.0 });
+        let FinishStatus::Blocked { by } = status(&job, &farm, &plan).unwrap().finish else { panic!("a task failed") };
+        assert_eq!(by, [("task-2".to_owned(), "exit code 143 on n1: stopped".to_owned())], "task 1 was begun again");
+        // A plan that was submitted again knows nothing of it.
+        let again = FarmPlan { token: "new".into(), ..plan.clone() };
+        assert_eq!(status(&job, &farm, &again).unwrap().finish, FinishStatus::Waiting);
+        write("finish", end(0, ""));
+        assert_eq!(status(&job, &farm, &plan).unwrap().finish, FinishStatus::Done);
+    }
+}

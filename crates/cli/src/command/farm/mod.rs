@@ -1,0 +1,43 @@
+//! `bansho farm`
+
+mod arguments;
+mod finish;
+mod journal;
+mod openjd;
+mod slurm;
+mod status;
+mod task;
+
+use bansho::farm::FarmError;
+
+use crate::{
+    args::{FarmArgs, FarmCommand},
+    interrupt,
+    progress::{JobResult, ProgressReporter},
+};
+
+pub(crate) fn run(args: &FarmArgs) -> anyhow::Result<()> {
+    match &args.command {
+        FarmCommand::Slurm(args) => slurm::run(args),
+        FarmCommand::Status(args) => status::run(args),
+        FarmCommand::Openjd(args) => openjd::run(args),
+        FarmCommand::Finish(args) => finish::run(args),
+        FarmCommand::Task(args) => task::run(args),
+    }
+}
+
+/// Runs `work` in a thread pool of its own, and reports what a job in it says and does. Without a result there was nothing to draw.
+fn run_in_pool(
+    threads: Option<u16>,
+    reporter: ProgressReporter,
+    work: impl FnOnce(&ProgressReporter) -> Result<Option<JobResult>, FarmError> + Send,
+) -> anyhow::Result<()> {
+    interrupt::set_grace_period(reporter.forced_exit_message());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from)).build()?;
+    match pool.install(|| work(&reporter)) {
+        Ok(Some(result)) => reporter.finish(Ok(result), pool.current_num_threads()),
+        Ok(None) => Ok(()),
+        Err(FarmError::Job(error)) => reporter.finish(Err(error), pool.current_num_threads()),
+        Err(error) => Err(error.into()),
+    }
+}

@@ -1,0 +1,86 @@
+//! `bansho farm openjd`
+
+use std::{
+    fs,
+    path::{self, Path},
+};
+
+use bansho::{
+    base::host::printable::printable,
+    farm::{
+        chunks::ChunkGrid,
+        openjd::{self, TemplateOptions},
+        task::sequence_name,
+    },
+    job::{Job, frames},
+    media::{MediaError, files::atomic},
+};
+
+use super::arguments;
+use crate::{
+    args::{Frames, OpenjdArgs},
+    output::print,
+};
+
+/// Writes the template.
+pub(crate) fn run(args: &OpenjdArgs) -> anyhow::Result<()> {
+    let job = job(args)?;
+    sequence_name(&job)?;
+    let prepared = job.prepare()?;
+    let chunk_frames = u64::from(args.chunk);
+    let grid = ChunkGrid::new(prepared.plan().frames().start, chunk_frames, prepared.frames().to_vec());
+    let name = sequence_name(&job)?.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let template = openjd::template(&TemplateOptions {
+        name: job.scene.stem,
+        scene: relative_scene(args)?,
+        frame_name: name,
+        frames: frames::format_list(prepared.frames()),
+        size: prepared.plan().size(),
+        chunk_frames,
+        task_s: 60 * u64::from(args.task_minutes),
+        snapshot_frame: grid.last_snapshot().filter(|_| prepared.is_stepped()),
+        options: args.options.clone(),
+        film: args.film.clone(),
+        memory_bytes: prepared.memory_bytes(),
+    })?;
+    check_replaceable(&args.out)?;
+    atomic::write_bytes(&args.out, template.as_bytes())?;
+    Ok(print(&format!("{}: written. Run it here: openjd run {0}\n", printable(&args.out.display().to_string())))?)
+}
+
+/// Only a template is replaced.
+fn check_replaceable(path: &Path) -> Result<(), MediaError> {
+    match fs::read(path) {
+        Ok(existing) if !existing.starts_with(b"specificationVersion: ") => {
+            Err(MediaError::AlreadyExists { path: path.to_path_buf() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The job of all frames, with the options that follow `--`.
+fn job(args: &OpenjdArgs) -> anyhow::Result<Job> {
+    let scene = args.scene.display().to_string();
+    // What the template states itself, so that it is refused when it is stated twice.
+    let stated = ["--frames=0", "--size=1x1", "--out=a.png", "--resume", "--snapshots=a"].map(str::to_owned);
+    let scene = ["--".to_owned(), scene];
+    let line: Vec<String> = stated.into_iter().chain(args.options.iter().cloned()).chain(scene).collect();
+    let job = arguments::render_job(&line)?;
+    let stem = job.scene.stem.clone();
+    Ok(Job {
+        frames: args.frames.clone().map(|Frames(numbers)| numbers),
+        size: args.size,
+        snapshots: None,
+        out: Some(args.frame_name.clone().unwrap_or_else(|| format!("{stem}.####.png")).into()),
+        resume: true,
+        ..job
+    })
+}
+
+/// The scene as seen from the folder of the template: Open Job Description allows no default outside of it.
+fn relative_scene(args: &OpenjdArgs) -> anyhow::Result<Option<String>> {
+    let template = path::absolute(&args.out)?;
+    let scene = path::absolute(&args.scene)?;
+    let relative = scene.strip_prefix(template.parent().unwrap_or(Path::new("/")));
+    Ok(relative.ok().and_then(Path::to_str).map(str::to_owned))
+}

@@ -1,0 +1,295 @@
+//! `bansho farm slurm`
+
+use std::{
+    collections::hash_map::RandomState,
+    env, fs,
+    hash::{BuildHasher, Hasher},
+    io,
+    path::{self, Path, PathBuf},
+    process::{Command, Stdio},
+    thread,
+    time::Instant,
+};
+
+use bansho::{
+    Unobserved,
+    base::{host::printable::printable, math::simd::set_vector_level},
+    farm::{
+        FarmError, FarmFolder, FarmPlan,
+        chunks::{self, ChunkGrid, ChunkRequest, ShotCosts},
+        machine,
+        plan::PlanOptions,
+        probe::{self, ProbeObserver},
+        slurm::{self, SlurmOptions},
+        space, status, task,
+    },
+    job::{Job, PreparedJob},
+    media::files::atomic,
+};
+
+use super::{arguments, run_in_pool};
+use crate::{
+    args::{ChunkLength, SlurmArgs},
+    exit::{ReportedError, UsageError},
+    output::{print, print_error_lines},
+    progress::ProgressReporter,
+};
+
+/// `MaxArraySize` of a cluster that does not state another.
+const MAX_ARRAY_SIZE: usize = 1001;
+
+/// Plans the tasks of a shot, writes their scripts, and submits them.
+pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
+    if args.render.scene.as_os_str() == "-" {
+        return Err(UsageError("tasks read the scene, too; allowed: a file in a shared folder".to_owned()).into());
+    }
+    set_vector_level(args.render.work.vector_level)?;
+    let job = args.render.job()?;
+    let folder = folder_of(&job)?;
+    if args.submit {
+        check_slurm(args)?;
+    }
+    check_no_active_jobs(&folder, args.submit)?;
+    let arguments = arguments::of_render(env::args_os(), &["farm", "slurm"])?;
+    let planning = Planning { args, job, folder, arguments, current: env::current_dir()?, max_tasks: max_tasks(args) };
+    let reporter = ProgressReporter::new(args.render.work.progress, args.render.work.stats);
+    let mut planned = None;
+    run_in_pool(args.render.work.threads, reporter, |reporter| {
+        planned = Some(planning.plan(reporter)?);
+        Ok(None)
+    })?;
+    let Some(planned) = planned else { return Ok(()) };
+    print(&planned.summary)?;
+    match (planned.is_complete, args.submit) {
+        (true, _) => Ok(()),
+        (false, true) => submit(&planning.folder),
+        (false, false) => Ok(print(&format!("submit: sh {}\n", shown(&planning.folder.root().join("submit.sh"))))?),
+    }
+}
+
+/// The folder of the plan, as all machines name it.
+fn folder_of(job: &Job) -> anyhow::Result<FarmFolder> {
+    Ok(FarmFolder::new(path::absolute(FarmFolder::beside(&task::sequence_name(job)?).root())?))
+}
+
+fn shown(path: &Path) -> String {
+    printable(&path.display().to_string()).into_owned()
+}
+
+/// A program of Slurm with its output.
+fn slurm_output(program: &str, arguments: &[&str]) -> io::Result<std::process::Output> {
+    Command::new(program).args(arguments).stdin(Stdio::null()).output()
+}
+
+/// Checks that `sbatch` is there and takes the partition and all other options, before anything is drawn. What it says against them is passed on.
+fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
+    let partition = args.partition.iter().map(|partition| format!("--partition={partition}"));
+    let mut test = Command::new("sbatch");
+    test.args(["--test-only", "--wrap=true", "--time=1"]).args(partition).args(&args.sbatch);
+    match test.stdin(Stdio::null()).stdout(Stdio::null()).output() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(UsageError(
+            "--submit: there is no `sbatch` on the path; allowed: a machine with the commands of Slurm, or only to write the scripts, without --submit"
+                .to_owned(),
+        )
+        .into()),
+        Err(error) => Err(anyhow::Error::from(error).context("sbatch")),
+        Ok(output) if output.status.success() => Ok(()),
+        Ok(output) => {
+            print_error_lines(String::from_utf8_lossy(&output.stderr).trim_end());
+            Err(ReportedError::OtherProgram.into())
+        }
+    }
+}
+
+/// Refuses to plan again while jobs of the last plan are queued or running: they would find another plan than they were submitted for.
+fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<()> {
+    let Ok(text) = fs::read_to_string(folder.jobs()) else { return Ok(()) };
+    let submitted: Vec<&str> = text.lines().filter_map(|line| line.split_whitespace().nth(1)).collect();
+    let queued = match slurm_output("squeue", &["--me", "--noheader", "--format=%F"]) {
+        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).into_owned(),
+        _ if !is_needed => return Ok(()),
+        Ok(output) => {
+            print_error_lines(String::from_utf8_lossy(&output.stderr).trim_end());
+            return Err(ReportedError::OtherProgram.into());
+        }
+        Err(error) => return Err(anyhow::Error::from(error).context("squeue")),
+    };
+    let mut active: Vec<&str> = queued.lines().map(str::trim).filter(|id| submitted.contains(id)).collect();
+    active.dedup();
+    if active.is_empty() {
+        return Ok(());
+    }
+    let ids = active.join(" ");
+    Err(UsageError(format!(
+        "jobs {ids} of this shot are queued or running; allowed: to wait for them, or `scancel {ids}`"
+    ))
+    .into())
+}
+
+/// The largest number of tasks of an array.
+fn max_tasks(args: &SlurmArgs) -> usize {
+    let of_cluster = || {
+        let output = slurm_output("scontrol", &["show", "config"]).ok().filter(|output| output.status.success())?;
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let line = text.lines().find_map(|line| line.trim_start().strip_prefix("MaxArraySize"))?;
+        line.trim_start_matches([' ', '=']).trim().parse().ok()
+    };
+    args.max_array_size.map(|size| size as usize).or_else(of_cluster).unwrap_or(MAX_ARRAY_SIZE).max(1)
+}
+
+/// Runs `submit.sh`, whose words are those of `sbatch`.
+fn submit(folder: &FarmFolder) -> anyhow::Result<()> {
+    let status = Command::new("sh").arg(folder.root().join("submit.sh")).stdin(Stdio::null()).status()?;
+    if status.success() { Ok(()) } else { Err(ReportedError::OtherProgram.into()) }
+}
+
+/// A random word.
+fn random_token() -> String {
+    let word = || RandomState::new().build_hasher().finish();
+    format!("{:016x}{:016x}", word(), word())
+}
+
+struct Planning<'a> {
+    args: &'a SlurmArgs,
+    job: Job,
+    folder: FarmFolder,
+    arguments: Vec<String>,
+    current: PathBuf,
+    max_tasks: usize,
+}
+
+struct Planned {
+    summary: String,
+    is_complete: bool,
+}
+
+impl Planning<'_> {
+    fn request(&self) -> ChunkRequest {
+        let tiles = self.args.tiles[0] * self.args.tiles[1];
+        ChunkRequest { task_s: 60.0 * f64::from(self.args.task_minutes), tiles, max_tasks: self.max_tasks }
+    }
+
+    /// Measures, cuts, and writes plan and scripts.
+    fn plan(&self, reporter: &ProgressReporter) -> Result<Planned, FarmError> {
+        let tiled = task::tile_job(&self.job, &self.folder, self.args.tiles, self.request().tiles / 2)?;
+        let prepared = tiled.prepare()?;
+        let earlier = self.earlier_plan(&prepared);
+        let costs = match &earlier {
+            Some(plan) => plan.costs,
+            None => self.probe(&tiled, &prepared, reporter)?,
+        };
+        let chunk_frames = match (self.args.chunk, &earlier) {
+            (ChunkLength::Frames(frames), _) => frames,
+            (ChunkLength::Auto, Some(plan)) => plan.chunk_frames,
+            (ChunkLength::Auto, None) => chunks::chunk_frames(prepared.frames(), &costs, &self.request())?,
+        };
+        let first_frame = prepared.plan().frames().start;
+        let grid = ChunkGrid::new(first_frame, chunk_frames, prepared.frames().to_vec());
+        chunks::check_task_count(&grid, &self.request())?;
+        let digests = (0..grid.count()).map(|chunk| prepared.shot_digest(grid.chunk(chunk))).collect();
+        let options = self.options(prepared.is_stepped() && grid.last_snapshot().is_some(), costs)?;
+        let plan = FarmPlan::new(options, &grid, first_frame, chunk_frames, digests);
+        self.write(&plan, &grid, prepared.memory_bytes())
+    }
+
+    fn options(&self, snapshots: bool, costs: ShotCosts) -> Result<PlanOptions, FarmError> {
+        Ok(PlanOptions {
+            token: random_token(),
+            arithmetic: machine::arithmetic_digest(&Unobserved)?,
+            folder: self.current.clone(),
+            arguments: self.arguments.clone(),
+            tiles: self.args.tiles,
+            snapshots,
+            film: self.args.film.clone(),
+            costs,
+        })
+    }
+
+    /// The plan that this one continues: of the same picture, so that its costs and chunks are those of this one.
+    fn earlier_plan(&self, prepared: &PreparedJob) -> Option<FarmPlan> {
+        let plan = self.folder.read_plan().ok()?;
+        // The same options with a changed scene may cost anything.
+        let is_same_scene = || Some(prepared.shot_digest(plan.grid().ok()?.chunk(0)) == *plan.digests.first()?);
+        let is_same = plan.arguments == self.arguments && plan.tiles == self.args.tiles && plan.folder == self.current;
+        (is_same && is_same_scene() == Some(true)).then_some(plan)
+    }
+
+    /// Draws a few frames.
+    fn probe(&self, job: &Job, prepared: &PreparedJob, reporter: &ProgressReporter) -> Result<ShotCosts, FarmError> {
+        let frames = probe::frames(prepared.frames(), prepared.is_stepped());
+        let snapshots = prepared.is_stepped().then(|| self.folder.snapshots());
+        let every = prepared.is_stepped().then_some(i64::MAX as u64);
+        // Not resumed: what exists already would not be measured.
+        let job = Job {
+            frames: Some(frames.clone()),
+            resume: false,
+            snapshots: snapshots.clone(),
+            snapshot_every: every,
+            ..job.clone()
+        };
+        let since = Instant::now();
+        let clock = || since.elapsed().as_secs_f64();
+        let observer = ProbeObserver::new(reporter, &clock);
+        let drawn = job.prepare()?;
+        drawn.run(&observer)?;
+        let bytes = |path: PathBuf| fs::metadata(path).map_or(0, |file| file.len());
+        let largest = frames.iter().map(|&number| bytes(drawn.output().path(number))).max().unwrap_or(0);
+        let first = prepared.plan().frames().start;
+        let snapshot_bytes = snapshots.map_or(0, |folder| bytes(folder.join(format!("state.{first}.bansho"))));
+        Ok(ShotCosts { frame_bytes: largest, snapshot_bytes, ..observer.costs(&frames).unwrap_or_default() })
+    }
+
+    fn write(&self, plan: &FarmPlan, grid: &ChunkGrid, memory_bytes: f64) -> Result<Planned, FarmError> {
+        let states = status::task_states(&self.job, &self.folder, plan)?;
+        let missing = |task: &usize| status::FrameCounts::of(&states[*task]).unfinished();
+        let tasks: Vec<usize> = (0..states.len()).filter(|task| missing(task) > 0).collect();
+        let frames: usize = tasks.iter().map(missing).sum();
+        let with_snapshots = task::lacks_snapshots(&self.folder, plan, grid, &tasks);
+        let snapshots = if with_snapshots { grid.snapshot_count() } else { 0 };
+        let is_complete = tasks.is_empty() && status::status(&self.job, &self.folder, plan)?.is_complete();
+        if !is_complete {
+            // Before anything may fail, so that nothing is measured twice.
+            self.folder.write_plan(plan)?;
+            let required = space::required_bytes(&plan.costs, frames as u64, snapshots);
+            space::check(self.folder.root(), required, available_bytes(self.folder.root()))?;
+            let options = self.slurm_options(memory_bytes)?;
+            for script in slurm::scripts(plan, &self.folder, &tasks, with_snapshots, &options)? {
+                atomic::write_bytes(&self.folder.root().join(script.name), script.text.as_bytes())?;
+            }
+        }
+        let summary = summary(plan, tasks.len(), frames, with_snapshots, &self.folder);
+        Ok(Planned { summary, is_complete })
+    }
+
+    fn slurm_options(&self, memory_bytes: f64) -> Result<SlurmOptions, FarmError> {
+        let io = |source| FarmError::Io { path: self.current.clone(), source };
+        let cores = || thread::available_parallelism().map_or(1, usize::from);
+        Ok(SlurmOptions {
+            program: self.args.program.clone().map_or_else(env::current_exe, Ok).map_err(io)?,
+            name: self.job.scene.stem.clone(),
+            partition: self.args.partition.clone(),
+            cpus: self.args.render.work.threads.map_or_else(cores, usize::from),
+            memory_bytes,
+            sbatch: self.args.sbatch.clone(),
+        })
+    }
+}
+
+/// Free bytes on the disk of a folder, or of the nearest folder above it that exists.
+fn available_bytes(folder: &Path) -> Option<u64> {
+    folder.ancestors().find(|folder| folder.is_dir()).and_then(|folder| fs4::available_space(folder).ok())
+}
+
+fn summary(plan: &FarmPlan, tasks: usize, frames: usize, with_snapshots: bool, folder: &FarmFolder) -> String {
+    if tasks == 0 {
+        return "all frames are whole\n".to_owned();
+    }
+    let ShotCosts { startup_s, step_s, draw_s, .. } = plan.costs;
+    let stepping = if step_s > 0.0 { format!(", {step_s:.2} s a step") } else { String::new() };
+    let snapshots = if with_snapshots { ", after a job that leaves snapshots" } else { "" };
+    format!(
+        "{frames} frames in {tasks} tasks of up to {} frames{snapshots}: {}\nmeasured here: {draw_s:.2} s a frame{stepping}, {startup_s:.1} s before the first\n",
+        plan.chunk_frames,
+        shown(folder.root())
+    )
+}

@@ -1,0 +1,262 @@
+//! Tasks for a batch system, with a Slurm that is only imitated. `tests/farm` has the real one.
+
+use std::{
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use serde_json::Value;
+
+use crate::support::{FLAME, Folder, Run, wait_until};
+
+/// Notes its arguments, and gives jobs ascending numbers.
+const SBATCH: &str = "#!/bin/sh\necho \"$@\" >>\"$FAKE/sbatch.log\"\ncase \"$*\" in *--test-only*) exit 0;; esac\ngrep -c parsable \"$FAKE/sbatch.log\"\n";
+const SQUEUE: &str = "#!/bin/sh\ncat \"$FAKE/queue\" 2>/dev/null; exit 0\n";
+const SCONTROL: &str = "#!/bin/sh\necho 'MaxArraySize            = 4'\n";
+const SCANCEL: &str = "#!/bin/sh\necho \"$@\" >>\"$FAKE/scancel.log\"\n";
+/// Runs the program on one machine.
+const SRUN: &str = "#!/bin/sh\nshift\nexec \"$@\"\n";
+
+/// A folder with a scene of six frames, and a Slurm that does nothing.
+fn folder() -> Folder {
+    let folder = Folder::with_scene(FLAME);
+    for (name, text) in
+        [("sbatch", SBATCH), ("squeue", SQUEUE), ("scontrol", SCONTROL), ("scancel", SCANCEL), ("srun", SRUN)]
+    {
+        program(&folder, name, text);
+    }
+    folder
+}
+
+fn program(folder: &Folder, name: &str, text: &str) {
+    let name = format!("bin/{name}");
+    folder.write(&name, text);
+    fs::set_permissions(folder.path(&name), fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+/// `command` with the imitated Slurm before all else on the path.
+fn with_slurm<'a>(folder: &Folder, command: &'a mut Command) -> &'a mut Command {
+    let path = format!("{}:{}", folder.path("bin").display(), std::env::var("PATH").unwrap_or_default());
+    command.env("PATH", path).env("FAKE", folder.path(""))
+}
+
+/// `bansho farm slurm scene.toml --threads 1` with `arguments`.
+fn plan(folder: &Folder, arguments: &[&str]) -> Run {
+    let line = [&["farm", "slurm", "scene.toml", "--threads", "1"], arguments].concat();
+    Run::of(with_slurm(folder, &mut folder.command(&line)).output().unwrap())
+}
+
+fn read(folder: &Folder, name: &str) -> String {
+    fs::read_to_string(folder.path(name)).unwrap_or_default()
+}
+
+/// Runs a batch script, as Slurm would.
+fn batch(folder: &Folder, script: &str, task: usize) -> Run {
+    let mut shell = Command::new("sh");
+    shell.arg(folder.path(&format!("out/scene/scene.farm/{script}"))).env("SLURM_ARRAY_TASK_ID", task.to_string());
+    Run::of(with_slurm(folder, &mut shell).current_dir("/").stdin(Stdio::null()).output().unwrap())
+}
+
+fn status(folder: &Folder) -> (Option<i32>, Value) {
+    let run = folder.run(&["farm", "status", "scene.toml", "--json"]);
+    (
+        run.code,
+        serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {}{}", run.stdout, run.stderr)),
+    )
+}
+
+#[test]
+fn an_array_draws_the_bytes_of_one_process_and_is_not_submitted_again() {
+    let (folder, alone) = (folder(), Folder::with_scene(FLAME));
+    let planned = plan(&folder, &["--chunk", "2", "--film", "film.apng", "--submit"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.stderr);
+    assert!(planned.stdout.contains("check 1\nframes 2\nfinish 3\n"), "{}", planned.stdout);
+    let submitted = read(&folder, "sbatch.log");
+    assert!(submitted.contains("--dependency=afterok:2 --kill-on-invalid-dep=yes finish.sbatch"), "{submitted}");
+    let (code, before) = status(&folder);
+    assert_eq!((code, &before["complete"], &before["finish"]["state"]), (Some(1), &false.into(), &"waiting".into()));
+    assert_eq!(batch(&folder, "finish.sbatch", 0).code, Some(1), "frames are missing");
+    assert_eq!(status(&folder).1["finish"]["state"], "failed");
+    assert_eq!(batch(&folder, "check.sbatch", 0).code, Some(0));
+    for task in 0..3 {
+        let run = batch(&folder, "frames.sbatch", task);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    let finish = batch(&folder, "finish.sbatch", 0);
+    assert_eq!(finish.code, Some(0), "{}", finish.stderr);
+    let (code, after) = status(&folder);
+    assert_eq!((code, &after["complete"], &after["frames"]["whole"]), (Some(0), &true.into(), &6.into()));
+    alone.succeed(&["render", "scene.toml"]);
+    let frames = |folder: &Folder| -> Vec<_> {
+        folder.files("out/scene").into_iter().filter(|(name, _)| name.ends_with(".png")).collect()
+    };
+    assert!(frames(&folder) == frames(&alone));
+    assert!(folder.path("film.apng").exists());
+    let again = plan(&folder, &["--chunk", "2", "--film", "film.apng", "--submit"]);
+    assert_eq!((again.code, again.stdout.as_str()), (Some(0), "all frames are whole\n"));
+    assert_eq!(read(&folder, "sbatch.log").matches("parsable").count(), 3);
+}
+
+#[test]
+fn only_what_is_missing_is_submitted_again() {
+    let folder = folder();
+    plan(&folder, &["--chunk", "2", "--submit"]);
+    for task in 0..3 {
+        batch(&folder, "frames.sbatch", task);
+    }
+    fs::remove_file(folder.path("out/scene/scene.0003.png")).unwrap();
+    let again = plan(&folder, &["--submit"]);
+    assert!(again.stdout.starts_with("1 frames in 1 tasks of up to 2 frames"), "{}{}", again.stdout, again.stderr);
+    assert!(read(&folder, "out/scene/scene.farm/frames.sbatch").contains("#SBATCH --array=1\n"));
+    let run = batch(&folder, "frames.sbatch", 1);
+    assert!(run.stderr.contains("1 frame in") && run.stderr.contains("1 was kept"), "{}", run.stderr);
+}
+
+#[test]
+fn a_missing_slurm_and_its_own_words_are_told_before_anything_is_drawn() {
+    let folder = folder();
+    let empty = folder.path("empty");
+    let mut command = folder.command(&["farm", "slurm", "scene.toml", "--submit"]);
+    let missing = Run::of(command.env("PATH", empty).output().unwrap());
+    assert_eq!((missing.code, missing.errors()), (Some(2), 1));
+    assert!(missing.stderr.contains("there is no `sbatch` on the path"), "{}", missing.stderr);
+    program(&folder, "sbatch", "#!/bin/sh\necho 'sbatch: error: invalid partition specified: nowhere' >&2\nexit 1\n");
+    let refused = plan(&folder, &["--partition", "nowhere", "--submit"]);
+    assert_eq!(
+        (refused.code, refused.stderr.as_str()),
+        (Some(1), "sbatch: error: invalid partition specified: nowhere\n")
+    );
+    assert!(!folder.path("out").exists());
+}
+
+#[test]
+fn jobs_before_one_that_is_refused_are_canceled() {
+    let folder = folder();
+    let refuses_array = format!("{SBATCH}case \"$*\" in *frames.sbatch) exit 1;; esac\n");
+    program(&folder, "sbatch", &refuses_array);
+    let refused = plan(&folder, &["--submit"]);
+    assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+    assert_eq!(read(&folder, "scancel.log"), "1\n");
+    assert!(!folder.path("out/scene/scene.farm/jobs").exists());
+}
+
+#[test]
+fn a_shot_whose_jobs_are_queued_is_not_planned_again() {
+    let folder = folder();
+    assert_eq!(plan(&folder, &["--submit"]).code, Some(0));
+    folder.write("queue", "2\n2\n77\n");
+    for submit in [&["--submit"][..], &[]] {
+        let refused = plan(&folder, submit);
+        assert_eq!(refused.code, Some(2));
+        assert!(refused.stderr.contains("jobs 2 of this shot are queued or running"), "{}", refused.stderr);
+    }
+}
+
+#[test]
+fn arrays_are_no_larger_than_the_cluster_allows() {
+    let folder = folder();
+    let refused = plan(&folder, &["--chunk", "1"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(
+        refused.stderr.contains("6 tasks; allowed: up to 4, which are chunks of at least 2 frames"),
+        "{}",
+        refused.stderr
+    );
+    let automatic = plan(&folder, &["--task-minutes", "1"]);
+    assert_eq!(automatic.code, Some(0), "{}", automatic.stderr);
+}
+
+#[test]
+fn tasks_of_another_scene_folder_or_plan_refuse() {
+    let folder = folder();
+    plan(&folder, &["--chunk", "2"]);
+    folder.write("scene.toml", &FLAME.replace("seed = 7", "seed = 8"));
+    let changed = batch(&folder, "frames.sbatch", 1);
+    assert_eq!(changed.code, Some(1));
+    assert!(changed.stderr.contains("frames of two scenes would be mixed"), "{}", changed.stderr);
+    let (_, found) = status(&folder);
+    assert_eq!(found["finish"]["by"][0][0], "task-1");
+    assert!(found["frames"]["stale"].as_u64().unwrap() > 0, "{found}");
+    folder.write("scene.toml", FLAME);
+    let plan_file = "out/scene/scene.farm/plan.json";
+    let text = read(&folder, plan_file);
+    let version = format!("Bansho {}", env!("CARGO_PKG_VERSION"));
+    folder.write(plan_file, &text.replace(&version, "Bansho 0.0.1"));
+    let other = batch(&folder, "frames.sbatch", 1);
+    assert!(other.stderr.contains(&format!("this machine runs {version}")), "{}", other.stderr);
+    let arithmetic = serde_json::from_str::<Value>(&text).unwrap()["arithmetic"].as_str().unwrap().to_owned();
+    folder.write(plan_file, &text.replace(&arithmetic, "00"));
+    let other = batch(&folder, "frames.sbatch", 1);
+    assert!(other.stderr.contains("this machine draws other bytes"), "{}", other.stderr);
+    folder.write(plan_file, "{");
+    let other = batch(&folder, "frames.sbatch", 1);
+    assert_eq!((other.code, other.errors()), (Some(1), 1));
+}
+
+#[test]
+fn a_signal_to_the_batch_shell_stops_the_task_and_keeps_its_frames() {
+    let folder = Folder::with_scene(&FLAME.replace("frames = 6", "frames = 3000").replace("[48, 64]", "[480, 640]"));
+    let planned = folder.run(&["farm", "slurm", "scene.toml", "--chunk", "3000", "--threads", "1"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.stderr);
+    let script = folder.path("out/scene/scene.farm/frames.sbatch");
+    let mut shell = Command::new("sh");
+    let child = shell
+        .arg(script)
+        .env("SLURM_ARRAY_TASK_ID", "0")
+        .stdin(Stdio::null())
+        .stderr(Stdio::piped())
+        .stdout(Stdio::piped());
+    let child = child.spawn().unwrap();
+    let is_there = |number: u32| folder.path(&format!("out/scene/scene.{number:04}.png")).exists();
+    wait_until("the second frame", || is_there(2));
+    let killed = Command::new("kill").arg("-TERM").arg(child.id().to_string()).status().unwrap();
+    assert!(killed.success());
+    let run = Run::of(child.wait_with_output().unwrap());
+    assert_eq!(run.code, Some(143), "{}", run.stderr);
+    let journal = read(&folder, "out/scene/scene.farm/journal/task-0.0.jsonl");
+    let end: Value = serde_json::from_str(journal.lines().last().unwrap()).unwrap();
+    assert_eq!((&end["event"], &end["code"]), (&"end".into(), &143.into()));
+    let hidden = fs::read_dir(folder.path("out/scene")).unwrap().flatten();
+    assert!(hidden.into_iter().all(|entry| entry.path().extension() != Some("part".as_ref())));
+}
+
+#[test]
+fn films_streams_and_other_outputs_are_refused() {
+    let folder = folder();
+    for (arguments, words) in [
+        (&["-o", "a.mp4"][..], "one file holds all frames"),
+        (&["--contact-sheet", "4"], "one file holds all frames"),
+        (&["--tiles", "100x1"], "at most one for each pixel"),
+        (&["--tiles", "2x2", "--crop", "0,0,4,4"], "cannot be used with"),
+        (&["--chunk", "0"], "auto, or a number of frames"),
+        (&["--frames", "5-1"], "runs backward"),
+        (&["--partition", "a\nb"], "control characters"),
+    ] {
+        let refused = plan(&folder, arguments);
+        assert_eq!(refused.code, Some(2), "{arguments:?}: {}", refused.stderr);
+        assert!(refused.stderr.contains(words), "{arguments:?}: {}", refused.stderr);
+    }
+    let stdin = folder.run(&["farm", "slurm", "-"]);
+    assert_eq!((stdin.code, stdin.errors()), (Some(2), 1));
+    let none = folder.run(&["farm", "status", "scene.toml", "-o", "elsewhere/a.####.png"]);
+    assert_eq!((none.code, none.errors()), (Some(2), 1), "{}", none.stderr);
+}
+
+#[test]
+fn a_template_replaces_only_templates() {
+    let folder = folder();
+    folder.succeed(&["farm", "openjd", "scene.toml", "-o", "a.yaml", "--", "--seed", "3"]);
+    folder.succeed(&["farm", "openjd", "scene.toml", "-o", "a.yaml", "--chunk", "3"]);
+    let text = read(&folder, "a.yaml");
+    assert!(
+        text.contains("name: ChunkFrames\n    type: INT\n    description: \"Frames of a chunk.\"\n    default: 3\n"),
+        "{text}"
+    );
+    let refused = folder.run(&["farm", "openjd", "scene.toml", "-o", "scene.toml"]);
+    assert_eq!((refused.code, read(&folder, "scene.toml").as_str()), (Some(1), FLAME));
+    let twice = folder.run(&["farm", "openjd", "scene.toml", "-o", "b.yaml", "--", "--size", "9x9"]);
+    assert_eq!((twice.code, twice.errors()), (Some(2), 1), "{}", twice.stderr);
+    assert!(!Path::new(&folder.path("b.yaml")).exists());
+}
