@@ -1,8 +1,11 @@
 //! Conversion from a file's chromaticities to known primaries.
 
-use bansho_base::host::assets::Encoding;
+use bansho_base::{color::srgb_from_acescg, host::assets::Encoding};
 
 use crate::exr::attribute::AP1;
+
+/// CIE xy of red, green, blue and white.
+pub(crate) type Chromaticities = [[f32; 2]; 4];
 
 /// A color matrix, and the encoding of its result; without a matrix, the encoding of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,23 +15,28 @@ pub(crate) struct Conversion {
 }
 
 /// CIE xy of red, green, blue and white of Rec. 709 and sRGB.
-const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+pub(crate) const REC709: Chromaticities = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+
+/// CIE xy of red, green, blue and white of Rec. 2020.
+pub(crate) const REC2020: Chromaticities = [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], [0.3127, 0.3290]];
 
 /// Tolerance for rounded chromaticities.
 const TOLERANCE: f32 = 0.001;
 
 type Matrix = [[f64; 3]; 3];
 
+/// Whether two sets of chromaticities are the same, up to rounding.
+pub(crate) fn is_near(own: Chromaticities, known: Chromaticities) -> bool {
+    own.as_flattened().iter().zip(known.as_flattened()).all(|(a, b)| (a - b).abs() <= TOLERANCE)
+}
+
 /// The conversion for these chromaticities; without any, Rec. 709 is assumed. `None` for collinear ones.
-pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conversion> {
+pub(crate) fn conversion(chromaticities: Option<Chromaticities>) -> Option<Conversion> {
     let own = chromaticities.unwrap_or(REC709);
-    let is = |known: [[f32; 2]; 4]| {
-        own.as_flattened().iter().zip(known.as_flattened()).all(|(a, b)| (a - b).abs() <= TOLERANCE)
-    };
-    if is(REC709) {
+    if is_near(own, REC709) {
         return Some(Conversion { encoding: Encoding::LinearSrgb, matrix: None });
     }
-    if is(AP1) {
+    if is_near(own, AP1) {
         return Some(Conversion { encoding: Encoding::LinearAcescg, matrix: None });
     }
     let (from, to) = (to_xyz(own)?, to_xyz(REC709)?);
@@ -38,10 +46,37 @@ pub(crate) fn conversion(chromaticities: Option<[[f32; 2]; 4]>) -> Option<Conver
     is_finite.then_some(Conversion { encoding: Encoding::LinearSrgb, matrix: Some(matrix) })
 }
 
-/// XYZ of chromaticity xy with Y = 1.
-fn xyz([x, y]: [f32; 2]) -> Option<[f64; 3]> {
+/// A color in the encoding of `conversion`.
+#[inline(always)]
+pub(crate) fn apply(conversion: &Conversion, color: [f32; 3]) -> [f32; 3] {
+    match &conversion.matrix {
+        None => color,
+        Some(rows) => rows.map(|row| row[0] * color[0] + (row[1] * color[1] + row[2] * color[2])),
+    }
+}
+
+/// Linear sRGB of light in `encoding`.
+#[inline(always)]
+pub(crate) fn srgb_of(encoding: Encoding, color: [f32; 3]) -> [f32; 3] {
+    if encoding == Encoding::LinearAcescg { srgb_from_acescg(color) } else { color }
+}
+
+/// Weights of the luminance; `None` for collinear chromaticities.
+pub(crate) fn luminance_weights(chromaticities: Chromaticities) -> Option<[f32; 3]> {
+    to_xyz(chromaticities).map(|rows| rows[1].map(|weight| weight as f32))
+}
+
+/// XYZ of chromaticity xy, up to a factor: y may be 0, as of XYZ itself.
+fn direction([x, y]: [f32; 2]) -> Option<[f64; 3]> {
     let (x, y) = (f64::from(x), f64::from(y));
-    let color = [x / y, 1.0, (1.0 - x - y) / y];
+    let color = [x, y, 1.0 - x - y];
+    color.iter().all(|value| value.is_finite()).then_some(color)
+}
+
+/// XYZ of chromaticity xy with Y = 1.
+fn xyz(chromaticity: [f32; 2]) -> Option<[f64; 3]> {
+    let [x, y, z] = direction(chromaticity)?;
+    let color = [x / y, 1.0, z / y];
     color.iter().all(|value| value.is_finite()).then_some(color)
 }
 
@@ -51,21 +86,21 @@ fn white(chromaticities: [[f32; 2]; 4]) -> Option<[f64; 3]> {
 
 /// Linear RGB to XYZ so that (1, 1, 1) is the white (SMPTE RP 177).
 fn to_xyz(chromaticities: [[f32; 2]; 4]) -> Option<Matrix> {
-    let [red, green, blue, white] = chromaticities.map(xyz);
+    let [red, green, blue, _] = chromaticities.map(direction);
     let columns = transposed([red?, green?, blue?]);
-    let scale = apply(inverse(columns)?, white?);
+    let scale = times(inverse(columns)?, white(chromaticities)?);
     Some(columns.map(|row| [row[0] * scale[0], row[1] * scale[1], row[2] * scale[2]]))
 }
 
 /// Bradford chromatic adaptation (ICC.1:2022, annex E).
 fn bradford(from: [f64; 3], to: [f64; 3]) -> Option<Matrix> {
     const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
-    let (before, after) = (apply(CONES, from), apply(CONES, to));
+    let (before, after) = (times(CONES, from), times(CONES, to));
     let scaled = [0, 1, 2].map(|cone| CONES[cone].map(|value| value * after[cone] / before[cone]));
     Some(multiply(inverse(CONES)?, scaled))
 }
 
-fn apply(matrix: Matrix, vector: [f64; 3]) -> [f64; 3] {
+fn times(matrix: Matrix, vector: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2])
 }
 
@@ -117,6 +152,17 @@ mod tests {
         for row in matrix {
             assert!((row.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{row:?}");
         }
+    }
+
+    #[test]
+    fn xyz_itself_has_primaries_whose_y_is_zero() {
+        let xyz = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0]];
+        let conversion = conversion(Some(xyz)).unwrap();
+        // Equal energy is white, and D65's Y alone is greener than white.
+        let white = apply(&conversion, [1.0; 3]);
+        assert!(white.iter().all(|value| (value - 1.0).abs() < 1e-5), "{white:?}");
+        let green = apply(&conversion, [0.0, 1.0, 0.0]);
+        assert!(green[1] > 1.0 && green[0] < 0.0, "{green:?}");
     }
 
     #[test]
