@@ -514,3 +514,18 @@ fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
     write("a.gltf", "{");
     assert_eq!(assets.files("a.gltf", 0).unwrap().len(), 1);
 }
+
+#[test]
+fn a_mesh_finds_its_buffer_by_an_encoded_uri() {
+    let folder = tempfile::tempdir().unwrap();
+    let gltf = |uri: &str| format!(r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"uri":"{uri}","byteLength":1}}]}}"#);
+    let files = |uri: &str| {
+        fs::write(folder.path().join("a.gltf"), gltf(uri)).unwrap();
+        FileAssets::new(folder.path()).files("a.gltf", 0).unwrap()[1].file_name().unwrap().to_owned()
+    };
+    assert_eq!(files("My%20Mesh.bin"), "My Mesh.bin");
+    assert_eq!(files("%E7%81%AB.bin"), "火.bin");
+    assert_eq!(files("100%.bin"), "100%.bin");
+    fs::write(folder.path().join("My%20Mesh.bin"), "x").unwrap();
+    assert_eq!(files("My%20Mesh.bin"), "My%20Mesh.bin");
+}

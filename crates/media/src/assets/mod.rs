@@ -174,7 +174,7 @@ impl FileAssets {
         if let Some(mesh) = self.lock_cache().meshes.get(path) {
             return Ok(mesh.clone());
         }
-        let read_resource = |uri: &str, limit: u64| self.read(&path.with_file_name(uri), limit);
+        let read_resource = |uri: &str, limit: u64| self.read(&beside(path, uri), limit);
         let mesh = self.within_limit(|limit| {
             let file = self.read(path, limit.available())?;
             decode_mesh(&file, extension(path), &read_resource, limit)
@@ -194,7 +194,7 @@ impl FileAssets {
             return Ok(drawing.clone());
         }
         let drawing = self.within_limit(|limit| {
-            let drawing = decode_drawing(&self.read_text(path)?)?;
+            let drawing = decode_drawing(&self.read(path, TEXT_BYTES)?)?;
             limit.check(drawing.memory_bytes()).map(|()| drawing)
         });
         let drawing = Arc::new(drawing?);
@@ -218,7 +218,7 @@ impl FileAssets {
         }
         let file = self.read(path, self.limits.memory_bytes).unwrap_or_default();
         let uris = external_buffer_uris(&file, extension(path));
-        uris.into_iter().map(|uri| path.with_file_name(uri)).collect()
+        uris.iter().map(|uri| beside(path, uri)).collect()
     }
 
     /// A digest of a file and of its external buffers.
@@ -242,6 +242,38 @@ impl FileAssets {
         hasher.update_reader(file).map_err(InputError::from)?;
         Ok(*hasher.finalize().as_bytes())
     }
+}
+
+/// The file that a URI in the file `path` names. Bytes such as `%20` are decoded, unless a file has the very name: some exporters do not encode.
+fn beside(path: &Path, uri: &str) -> PathBuf {
+    let verbatim = path.with_file_name(uri);
+    match percent_decoded(uri) {
+        Some(decoded) if !verbatim.is_file() => path.with_file_name(decoded),
+        _ => verbatim,
+    }
+}
+
+/// The URI with its percent-encoded bytes decoded (RFC 3986, 2.1); `None` if it has none, or is no text then.
+fn percent_decoded(uri: &str) -> Option<String> {
+    if !uri.contains('%') {
+        return None;
+    }
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        let digit = |index: usize| after.get(index).and_then(|digit| char::from(*digit).to_digit(16));
+        match (byte, digit(0), digit(1)) {
+            (b'%', Some(high), Some(low)) => {
+                bytes.push((16 * high + low) as u8);
+                rest = &after[2..];
+            }
+            _ => {
+                bytes.push(byte);
+                rest = after;
+            }
+        }
+    }
+    String::from_utf8(bytes).ok()
 }
 
 fn extension(path: &Path) -> &str {

@@ -118,7 +118,7 @@ impl Assets for BundledAssets {
     }
 
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
-        decode_drawing(&self.text(path)?).map(Arc::new).map_err(|problem| error(path, problem))
+        decode_drawing(self.require(path)?).map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
