@@ -228,7 +228,7 @@ mod tests {
         let srgb = (b"sRGB", Cow::Borrowed(&[0][..]));
         let plain = [128, 128, 64];
         assert_eq!(codes(&decoded(&[])), plain);
-        assert_eq!(codes(&decoded(&[p3.clone()])), [128, 128, 53]);
+        assert_eq!(codes(&decoded(std::slice::from_ref(&p3))), [128, 128, 53]);
         assert_eq!(codes(&decoded(&[p3, srgb.clone(), gamma(100_000)])), [128, 128, 53]);
         assert_eq!(codes(&decoded(&[srgb, gamma(55_556)])), plain);
         assert_eq!(codes(&decoded(&[gamma(45_455)])), plain);
@@ -247,7 +247,7 @@ mod tests {
             chunk(b"iCCP", b"name\0\0not zlib"),
             gamma(0),
         ] {
-            let picture = decoded(&[chunk.clone()]);
+            let picture = decoded(std::slice::from_ref(&chunk));
             assert_eq!(
                 (codes(&picture), picture.remarks.len()),
                 ([128, 128, 64], 1),

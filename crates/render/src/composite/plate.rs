@@ -145,6 +145,7 @@ pub(crate) fn over_black(
     [r, g, b, coverage]: [f32; 4],
 ) -> [f32; 4] {
     let linear = |color: [f32; 3]| to_scene(view, encoding, color);
+    let encoded = [r, g, b];
     let [r, g, b] = match alpha {
         // Blended in encoded values over black, or already multiplied in linear light.
         PictureAlpha::Opaque | PictureAlpha::Associated | PictureAlpha::Straight(AlphaConvention::Encoded) => {
@@ -157,8 +158,36 @@ pub(crate) fn over_black(
     };
     match alpha {
         PictureAlpha::Opaque => [r, g, b, 1.0],
+        PictureAlpha::Straight(AlphaConvention::Encoded) if encoding == Encoding::DisplaySrgb => {
+            [r, g, b, coverage_of_encoded_alpha(encoded, coverage.clamp(0.0, 1.0))]
+        }
         _ => [r, g, b, coverage.clamp(0.0, 1.0)],
     }
+}
+
+/// Steps of bisection: 1/4096, a fraction of a code.
+const COVERAGE_STEPS: usize = 12;
+/// Mid-gray, over which the alpha of encoded values is closest to that of light: encoded, and its light.
+const MID_GRAY_ENCODED: f32 = 0.5;
+const MID_GRAY: f32 = 0.214_041_14;
+
+/// Coverage in linear light of a pixel that blends in encoded values: its blend over mid-gray has the same mean. The color is multiplied by alpha. It is the
+/// inverse of what a picture with alpha in encoded values is written by (`color::display::quantize`).
+fn coverage_of_encoded_alpha(values: [f32; 3], alpha: f32) -> f32 {
+    if alpha <= 0.0 || alpha >= 1.0 {
+        return alpha;
+    }
+    let light = values.map(color::decode_srgb);
+    let wanted = values.iter().sum::<f32>() + 3.0 * (1.0 - alpha) * MID_GRAY_ENCODED;
+    let blended = |transmitted: f32| -> f32 {
+        light.iter().map(|light| color::encode_srgb(light + transmitted * MID_GRAY)).sum()
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..COVERAGE_STEPS {
+        let middle = 0.5 * (low + high);
+        if blended(middle) < wanted { low = middle } else { high = middle }
+    }
+    1.0 - 0.5 * (low + high)
 }
 
 /// Exposed ACEScg of the values of a plate. The view transform is inverted, so that a plate made for display is displayed unchanged.
@@ -205,6 +234,17 @@ fn depth_of_lens(camera: &Camera, kind: DepthKind, meters: f64, x: usize, y: usi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_veil_covers_as_much_of_mid_gray_as_where_it_was_painted() {
+        // A black veil of half: encoded 0.5 becomes 0.25, light 0.2140 becomes 0.0509, so 76.2 % are covered.
+        assert!((coverage_of_encoded_alpha([0.0; 3], 0.5) - 0.7622).abs() < 1e-3);
+        // A mid-gray veil changes nothing: its light 0.0509 and the rest of 0.2140.
+        assert!((coverage_of_encoded_alpha([0.25; 3], 0.5) - 0.2378).abs() < 1e-3);
+        // Half white is brighter there than its light alone could be: nothing is covered.
+        assert!(coverage_of_encoded_alpha([0.5; 3], 0.5) < 1e-3);
+        assert_eq!([0.0, 1.0].map(|alpha| coverage_of_encoded_alpha([0.0; 3], alpha)), [0.0, 1.0]);
+    }
 
     #[test]
     fn a_plate_of_the_pictures_size_is_taken_pixel_by_pixel() {

@@ -187,7 +187,7 @@ fn least_squares(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let covariance: f64 = points.iter().map(|[x, y]| (x - mean_x) * (y - mean_y)).sum();
     let variance: f64 = points.iter().map(|[x, _]| (x - mean_x) * (x - mean_x)).sum();
     let slope = covariance / variance;
-    (variance > 0.0 && slope.is_finite()).then(|| [mean_y - slope * mean_x, slope])
+    (variance > 0.0 && slope.is_finite()).then_some([mean_y - slope * mean_x, slope])
 }
 
 fn judged(points: &[[f64; 3]], values: &[[f64; 2]], shift: f64, slope: f64) -> DepthFit {
