@@ -26,7 +26,10 @@ type FileReader<'a> = Reader<Cursor<&'a [u8]>>;
 fn open(file: &[u8], limit: MemoryLimit, pixel_bytes: u64) -> Result<FileReader<'_>, AssetProblem> {
     let mut decoder = Decoder::new_with_limits(Cursor::new(file), Limits { bytes: METADATA_BYTES });
     decoder.set_transformations(Transformations::EXPAND);
-    let reader = decoder.read_info().map_err(damaged)?;
+    let reader = decoder.read_info().map_err(|error| match has_chunk(file, *b"cICP") {
+        true => damaged(format!("{error}; perhaps its cICP states YCbCr, which a PNG cannot have (allowed: matrix 0)")),
+        false => damaged(error),
+    })?;
     let info = reader.info();
     let [width, height] = limits::check_size([info.width.into(), info.height.into()])?;
     let claimed_bytes = width * height * info.bits_per_pixel() as u64 / 8;
