@@ -14,6 +14,12 @@ const HIDDEN_ELEMENTS: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marke
 const OTHER_ELEMENTS: [&str; 7] = ["use", "text", "rect", "circle", "ellipse", "image", "foreignObject"];
 /// Most elements within one another, uses included.
 const MAX_DEPTH: usize = 256;
+/// Most closings of a path in a row: `usvg` takes each one level deeper.
+const MAX_CLOSINGS: usize = 100;
+/// Farthest that all segments of a path may lead together, well within single precision.
+const MAX_REACH: f64 = 1e30;
+/// Most attributes of an element.
+const MAX_ATTRIBUTES: usize = 4096;
 /// Most nodes of a text.
 const MAX_NODES: u32 = 4_000_000;
 
@@ -29,9 +35,10 @@ pub(super) struct SvgDocument {
 
 /// Reads the text and checks its data.
 pub(super) fn read(text: &str) -> Result<SvgDocument, AssetProblem> {
+    check_attributes(text)?;
     let options = ParsingOptions { allow_dtd: true, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| match error {
-        roxmltree::Error::NoRootNode => damaged("it is not an SVG"),
+        _ if !text.contains("<svg") && !text.contains(":svg") => damaged("it is not an SVG"),
         error => damaged(error),
     })?;
     let root = document.root_element();
@@ -49,6 +56,15 @@ pub(super) fn read(text: &str) -> Result<SvgDocument, AssetProblem> {
     let cut =
         root.attributes().filter(|attribute| sides.contains(&attribute.name())).map(|attribute| attribute.range());
     Ok(SvgDocument { text: without(text, cut.collect()), view_box, others: check.others })
+}
+
+/// Rejects tags of so many attributes that comparing each with all others would take seconds.
+fn check_attributes(text: &str) -> Result<(), AssetProblem> {
+    let crowded = text.split('<').any(|tag| {
+        let tag = tag.split('>').next().unwrap_or_default();
+        tag.bytes().filter(|byte| *byte == b'=').nth(MAX_ATTRIBUTES).is_some()
+    });
+    if crowded { Err(damaged(format!("an element has more than {MAX_ATTRIBUTES} attributes"))) } else { Ok(()) }
 }
 
 /// The text in which these ranges are spaces.
@@ -117,9 +133,22 @@ impl<'a> DataCheck<'a, '_> {
 
     /// The points of a path.
     fn path(&self, node: Node, data: &Attribute) -> Result<u64, AssetProblem> {
-        let mut points = 0;
+        let (mut points, mut closings, mut reach) = (0, 0, 0.0_f64);
         for segment in PathParser::from(data.value()) {
-            points += match segment.map_err(|error| self.fault(node, data, format!("its path data: {error}")))? {
+            let segment = segment.map_err(|error| self.fault(node, data, format!("its path data: {error}")))?;
+            closings = if matches!(segment, PathSegment::ClosePath { .. }) { closings + 1 } else { 0 };
+            if closings > MAX_CLOSINGS {
+                return Err(self.fault(
+                    node,
+                    data,
+                    format!("its path data close it more than {MAX_CLOSINGS} times in a row"),
+                ));
+            }
+            reach += end_of(&segment);
+            if reach.is_nan() || reach > MAX_REACH {
+                return Err(self.fault(node, data, "a point is infinitely far away"));
+            }
+            points += match segment {
                 PathSegment::MoveTo { .. }
                 | PathSegment::LineTo { .. }
                 | PathSegment::HorizontalLineTo { .. }
@@ -143,6 +172,22 @@ impl<'a> DataCheck<'a, '_> {
             return Err(self.fault(node, data, format!("its points have {numbers} numbers; allowed: pairs")));
         }
         Ok(numbers / 2 + 1)
+    }
+}
+
+/// The larger coordinate of where a segment ends.
+fn end_of(segment: &PathSegment) -> f64 {
+    match *segment {
+        PathSegment::MoveTo { x, y, .. }
+        | PathSegment::LineTo { x, y, .. }
+        | PathSegment::CurveTo { x, y, .. }
+        | PathSegment::SmoothCurveTo { x, y, .. }
+        | PathSegment::Quadratic { x, y, .. }
+        | PathSegment::SmoothQuadratic { x, y, .. }
+        | PathSegment::EllipticalArc { x, y, .. } => x.abs().max(y.abs()),
+        PathSegment::HorizontalLineTo { x, .. } => x.abs(),
+        PathSegment::VerticalLineTo { y, .. } => y.abs(),
+        PathSegment::ClosePath { .. } => 0.0,
     }
 }
 

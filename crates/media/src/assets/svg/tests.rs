@@ -95,6 +95,11 @@ fn a_path_that_is_a_dot_is_left_out_and_the_rest_drawn() {
 fn faults_name_their_path_and_their_line() {
     assert!(error("<svg>\n<path id='arc' d='M0 0L1'/></svg>").contains("path `arc` in line 2: its path data: "));
     assert!(error("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes in line 1: "));
+    assert!(
+        error(&format!("<svg><path d='M0 0L1 1{}'/></svg>", "Z".repeat(100_000)))
+            .contains("more than 100 times in a row")
+    );
+    assert!(error("<svg><path d='M0 0L1e300 1'/></svg>").contains("infinitely far away"));
     assert!(error("<svg><polyline points='0 0 1'/></svg>").contains("its points have 3 numbers; allowed: pairs"));
     assert!(error("<svg><polygon points='0 0 x 1'/></svg>").contains("its points: "));
     assert!(
