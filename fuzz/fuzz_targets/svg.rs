@@ -3,7 +3,7 @@
 
 use bansho_media::assets::svg::decode_drawing;
 
-libfuzzer_sys::fuzz_target!(|text: &str| {
+libfuzzer_sys::fuzz_target!(|text: &[u8]| {
     if let Ok(drawing) = decode_drawing(text) {
         assert!(!drawing.strokes.is_empty());
         assert!(drawing.min.is_finite() && drawing.max.is_finite());

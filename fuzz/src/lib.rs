@@ -10,7 +10,7 @@ use bansho_base::{
     color::AlphaConvention,
     frame::Frame,
     host::{
-        assets::{MemoryAssets, Picture},
+        assets::{MemoryAssets, Picture, PictureLayers},
         observer::Observer,
     },
 };
@@ -118,7 +118,7 @@ fn telling_panics<T>(work: impl FnOnce() -> T) -> T {
 pub fn read_plate(bytes: &[u8], extension: &str) {
     one_thread();
     telling_panics(|| {
-        if let Ok(picture) = decode_picture(bytes, extension, limits::MemoryLimit::default()) {
+        if let Ok(picture) = decode_picture(bytes, extension, &PictureLayers::default(), limits::MemoryLimit::default()) {
             check_plate(picture);
         }
     });

@@ -155,10 +155,7 @@ fn plan(text: &str) -> Planned {
     let mut assets = MemoryAssets::default();
     let pixels = (0..SIZE[0] * SIZE[1]).map(|index| plate(index % SIZE[0], index / SIZE[0])).collect();
     let color = Image::from_pixels(SIZE[0], SIZE[1], pixels).expect("as many pixels as the size says");
-    assets.insert_picture(
-        "plate.png",
-        Picture { color, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None },
-    );
+    assets.insert_picture("plate.png", Picture::opaque(color, Encoding::DisplaySrgb));
     let assets = Arc::new(assets);
     let text = format!("bansho = 2\n[picture]\nsize = [1920, 1080]\n{text}");
     let scene = Scene::parse("bench.toml", &text, &[PatchParameters::KIND]).expect("a valid scene");

@@ -37,7 +37,7 @@ impl Assets for Procedural {
             let height = 1.0 - (index / 160) as f32 / 90.0;
             *pixel = [0.2 * height, 0.25 * height, 0.3 * height, 1.0];
         }
-        Ok(Arc::new(Picture { color, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100: None }))
+        Ok(Arc::new(Picture::opaque(color, Encoding::DisplaySrgb)))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {

@@ -30,7 +30,7 @@ fn plate(exposure_ev100: Option<f64>) -> Arc<MemoryAssets> {
         |index: usize| if index / SIZE[0] < SIZE[1] / 3 { [0.75, 0.78, 0.82, 1.0] } else { [0.12, 0.11, 0.1, 1.0] };
     let color = Image::from_pixels(SIZE[0], SIZE[1], (0..SIZE[0] * SIZE[1]).map(shade).collect()).unwrap();
     let mut assets = MemoryAssets::default();
-    assets.insert_picture("wall.jpg", Picture { color, depth: None, encoding: Encoding::DisplaySrgb, exposure_ev100 });
+    assets.insert_picture("wall.jpg", Picture { exposure_ev100, ..Picture::opaque(color, Encoding::DisplaySrgb) });
     Arc::new(assets)
 }
 

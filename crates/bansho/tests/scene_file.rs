@@ -390,20 +390,20 @@ fn the_schema_knows_every_parameter() {
 }
 
 #[test]
-fn a_plate_of_another_depth_size_is_refused() {
+fn a_plate_of_another_shape_than_its_depth_is_refused() {
     use bansho_base::{
         host::assets::{Encoding, Picture},
         image::Image,
     };
     let mut assets = checkerboard(16, 12, None);
-    let color = Image::filled(8, 6, [1.0; 4]);
+    let color = Image::filled(8, 8, [1.0; 4]);
     assets.insert_picture(
         "depth.exr",
-        Picture { color, depth: Some(vec![1.0; 48]), encoding: Encoding::LinearSrgb, exposure_ev100: None },
+        Picture { depth: Some(vec![1.0; 64]), ..Picture::opaque(color, Encoding::LinearSrgb) },
     );
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\ndepth = \"depth.exr\"\n");
     let error = compiled("scene.toml", &text, &kinds(), assets.clone()).err().unwrap().to_string();
-    assert!(error.contains("plate.depth: depth.exr: has 8 x 6 pixels; allowed: 16 x 12"), "{error}");
+    assert!(error.contains("plate.depth: depth.exr: has 8 x 8 pixels; allowed: 16 x 12"), "{error}");
     assert!(error.starts_with("scene.toml:"), "{error}");
     let flat = text.replace("depth.exr", "plate.png");
     let error = compiled("scene.toml", &flat, &kinds(), assets).err().unwrap().to_string();

@@ -6,7 +6,7 @@ use bansho_base::{
     camera::CameraHeader,
     color::AlphaConvention,
     frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
-    host::assets::{AssetProblem, Assets, Encoding, Picture},
+    host::assets::{AssetProblem, Assets, Encoding, Picture, PictureAlpha, PictureLayers, PictureRemark},
     image::{Image, Rect},
 };
 use bansho_media::{
@@ -16,7 +16,7 @@ use bansho_media::{
 };
 
 fn decode_picture(bytes: &[u8], extension: &str) -> Result<Picture, AssetProblem> {
-    assets::decode_picture(bytes, extension, MemoryLimit::default())
+    assets::decode_picture(bytes, extension, &PictureLayers::default(), MemoryLimit::default())
 }
 
 fn display(width: usize, height: usize) -> DisplayImage {
@@ -100,8 +100,8 @@ fn what_bansho_writes_it_reads() {
     let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
     assert_eq!(picture.encoding, Encoding::LinearAcescg);
     assert_eq!(picture.depth, original.depth);
-    // Straight color from premultiplied.
-    assert_eq!(picture.color.at(4, 0), [4.0, 0.5, -1.0, 0.5]);
+    // Associated, as it is in the file.
+    assert_eq!((picture.color.at(4, 0), picture.alpha), ([2.0, 0.25, -0.5, 0.5], PictureAlpha::Associated));
 }
 
 #[test]
@@ -111,8 +111,8 @@ fn an_exr_with_another_data_window_is_laid_into_its_display_window() {
     original.header.data_origin = [-1, 2];
     let picture = decode_picture(&exr_bytes(&original), "exr").unwrap();
     assert_eq!((picture.color.width(), picture.color.height()), (4, 4));
-    assert_eq!(picture.color.at(0, 2)[0], 1.0);
-    assert_eq!(picture.color.at(2, 3)[0], 7.0);
+    assert_eq!(picture.color.at(0, 2)[0], 0.5);
+    assert_eq!(picture.color.at(2, 3)[0], 3.5);
     assert_eq!(picture.color.at(3, 3), [0.0; 4]);
     assert_eq!(picture.color.at(0, 0), [0.0; 4]);
     assert_eq!(picture.depth.unwrap()[0], f32::INFINITY);
@@ -160,7 +160,7 @@ fn tiled_float_and_depth_only_exr_files_are_read() {
     let layered = decode_picture(&tiled_exr(&["plate.R", "plate.G", "plate.B"], Compression::ZIP16), "exr").unwrap();
     assert_eq!(layered.color.at(0, 0), [0.0, 1.0, 2.0, 1.0]);
     let useless = decode_picture(&tiled_exr(&["a", "b"], Compression::ZIP16), "exr");
-    assert!(matches!(useless, Err(AssetProblem::NoChannel(_))));
+    assert!(matches!(useless, Err(AssetProblem::NoKnownLayer { .. })));
 }
 
 /// A gray JPEG of 8 x 8 pixels, all 128: the smallest possible baseline file.
@@ -307,13 +307,13 @@ fn files_are_found_numbered_digested_and_remembered() {
 fn what_is_wrong_with_a_file_is_said_with_its_path() {
     let folder = tempfile::tempdir().unwrap();
     let assets = FileAssets::new(folder.path());
-    fs::write(folder.path().join("a.tiff"), "x").unwrap();
+    fs::write(folder.path().join("a.xyz"), "x").unwrap();
     fs::write(folder.path().join("a.png"), "").unwrap();
     fs::create_dir(folder.path().join("d.png")).unwrap();
     let error = |path: &str| assets.picture(path, 3).unwrap_err();
     assert_eq!(error("no.png").problem, AssetProblem::Missing);
     assert!(error("p.##.png").path.ends_with("p.03.png"));
-    assert_eq!(error("a.tiff").problem, AssetProblem::UnknownKind);
+    assert_eq!(error("a.xyz").problem, AssetProblem::UnknownKind);
     assert!(matches!(error("a.png").problem, AssetProblem::Damaged(_)));
     assert_eq!(error("d.png").problem, AssetProblem::NotAFile { found: "a folder" });
     for name in ["#.#.png".to_owned(), format!("{}.png", "#".repeat(21))] {
@@ -362,9 +362,64 @@ fn plates_of_every_kind_say_with_which_exposure_they_were_taken() {
     assert_eq!(decode_picture(&exr_bytes(&frame), "exr").unwrap().exposure_ev100, Some(9.5));
 }
 
+/// An Exif block with an orientation, as a camera writes it: big-endian, one entry.
+fn orientation_block(tag: u8) -> Vec<u8> {
+    [&b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"[..], &[tag], &[0; 6]].concat()
+}
+
+#[test]
+fn a_photograph_is_turned_as_its_camera_was_held() {
+    let jpeg = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/court.jpg")).unwrap();
+    let stored = decode_picture(&jpeg, "jpg").unwrap();
+    let block = [b"Exif\0\0".as_slice(), &orientation_block(6)].concat();
+    let length = (block.len() as u16 + 2).to_be_bytes();
+    let turned = [&jpeg[..2], &[0xff, 0xe1], &length, &block, &jpeg[2..]].concat();
+    let turned = decode_picture(&turned, "jpg").unwrap();
+    let (width, height) = (stored.color.width(), stored.color.height());
+    assert_eq!((turned.color.width(), turned.color.height()), (height, width));
+    // The stored row 0 is at the right, the stored column 0 at the top.
+    for [x, y] in [[0, 0], [width - 1, 0], [5, height - 3]] {
+        assert_eq!(turned.color.at(height - 1 - y, x), stored.color.at(x, y));
+    }
+
+    let mut png = Vec::new();
+    let mut info = ::png::Info::with_size(2, 1);
+    info.exif_metadata = Some(orientation_block(8).into());
+    let mut writer = ::png::Encoder::with_info(&mut png, info).unwrap().write_header().unwrap();
+    writer.write_image_data(&[0, 255]).unwrap();
+    writer.finish().unwrap();
+    let picture = decode_picture(&png, "png").unwrap();
+    assert_eq!((picture.color.width(), picture.color.at(0, 0)[0], picture.color.at(0, 1)[0]), (1, 1.0, 0.0));
+    let depth = assets::decode_depth(&png, "png", None, MemoryLimit::default()).unwrap();
+    assert_eq!((depth.values.width(), depth.values.at(0, 0), depth.values.at(0, 1)), (1, [255.0], [0.0]));
+}
+
+#[test]
+fn a_damaged_photograph_is_drawn_and_told_and_junk_between_its_segments_changes_nothing() {
+    let jpeg = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/plates/court.jpg")).unwrap();
+    let whole = decode_picture(&jpeg, "jpg").unwrap();
+    assert_eq!(whole.remarks, []);
+    let junk = [&jpeg[..2], &[0xff, 0xfe, 0, 4, 1, 2], &[7; 9], &jpeg[2..]].concat();
+    assert_eq!(decode_picture(&junk, "jpg").unwrap(), whole);
+    let cut = decode_picture(&jpeg[..jpeg.len() / 2], "jpg").unwrap();
+    assert!(matches!(cut.remarks[..], [PictureRemark::Corrupt(_)]), "{:?}", cut.remarks);
+}
+
+#[test]
+fn a_name_with_a_number_sign_is_a_name_if_that_file_exists() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, width) in [("take#2.png", 3), ("take72.png", 5), ("shot7.png", 7)] {
+        fs::write(folder.path().join(name), png_bytes(&display(width, 2))).unwrap();
+    }
+    let assets = FileAssets::new(folder.path());
+    assert_eq!(assets.picture("take#2.png", 7).unwrap().color.width(), 3);
+    assert_eq!(assets.picture("shot#.png", 7).unwrap().color.width(), 7);
+}
+
 /// The smallest memory limit with which `bytes` are decoded, and the error with one byte less.
 fn least_memory(bytes: &[u8], extension: &str) -> u64 {
-    let read = |total| assets::decode_picture(bytes, extension, MemoryLimit { total, used: 0 });
+    let read =
+        |total| assets::decode_picture(bytes, extension, &PictureLayers::default(), MemoryLimit { total, used: 0 });
     let AssetProblem::Memory { bytes: least, limit: 0, others: 0 } = read(0).unwrap_err() else {
         panic!("{extension}")
     };
@@ -458,4 +513,19 @@ fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
     // A damaged file names no buffers.
     write("a.gltf", "{");
     assert_eq!(assets.files("a.gltf", 0).unwrap().len(), 1);
+}
+
+#[test]
+fn a_mesh_finds_its_buffer_by_an_encoded_uri() {
+    let folder = tempfile::tempdir().unwrap();
+    let gltf = |uri: &str| format!(r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"uri":"{uri}","byteLength":1}}]}}"#);
+    let files = |uri: &str| {
+        fs::write(folder.path().join("a.gltf"), gltf(uri)).unwrap();
+        FileAssets::new(folder.path()).files("a.gltf", 0).unwrap()[1].file_name().unwrap().to_owned()
+    };
+    assert_eq!(files("My%20Mesh.bin"), "My Mesh.bin");
+    assert_eq!(files("%E7%81%AB.bin"), "火.bin");
+    assert_eq!(files("100%.bin"), "100%.bin");
+    fs::write(folder.path().join("My%20Mesh.bin"), "x").unwrap();
+    assert_eq!(files("My%20Mesh.bin"), "My%20Mesh.bin");
 }

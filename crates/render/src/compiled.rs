@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
-    host::assets::Assets,
+    host::assets::{Assets, Picture, PictureAlpha},
     parameters::{BuildError, Reader},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Run, Stepped, Stepping, kind::BuildContext, strip::Shutter, surroundings::Occluder,
@@ -102,6 +102,16 @@ impl CompiledScene {
         let enabled = phenomena.chain(backdrop(&scene, &obstacles, previous)).collect();
         let wind = Wind::new(scene.wind.clone(), scene.seed, scene.loop_s);
         Ok(Self { wind, obstacles, built, enabled, scene, assets })
+    }
+
+    /// The image of the plate in the first frame; `None` without a plate, or if it cannot be read.
+    pub fn plate_image(&self) -> Option<Arc<Picture>> {
+        self.scene.plate.read_image(self.assets.as_ref(), self.scene.picture.first_frame).ok()?
+    }
+
+    /// Whether the plate covers the picture: it has one, whose image is opaque in the first frame.
+    pub fn has_opaque_plate(&self) -> bool {
+        self.plate_image().is_some_and(|picture| picture.alpha == PictureAlpha::Opaque)
     }
 
     /// The same scene with another instance at `index`, as a program changes parameters while a shot runs: only that phenomenon is built, and may

@@ -21,7 +21,7 @@ use crate::{
     planning::exposure::assumed_of_plate,
     shot::stepping::scene_publication,
 };
-use bansho_scene::PLATE_LAYER;
+use bansho_scene::{PLATE_LAYER, PlateRemark};
 
 /// A scene during one exposure.
 struct ExposedScene<'a> {
@@ -54,6 +54,15 @@ impl<'a> ExposedScene<'a> {
     }
 }
 
+/// What users should know about how the files of the plate were read, in the first frame.
+fn of_plate_files(compiled: &CompiledScene) -> Vec<(String, Remark)> {
+    let scene = compiled.scene();
+    let read = scene.plate.read_frame(compiled.assets().as_ref(), scene.picture.first_frame);
+    let Ok(Some(pictures)) = read else { return Vec::new() };
+    let remark = |remark: &PlateRemark| (PLATE_LAYER.to_owned(), Remark::new(remark.to_string()));
+    pictures.remarks().iter().map(remark).collect()
+}
+
 /// What users should know about how phenomena will look: the name of each phenomenon, and the remark.
 ///
 /// Only what holds in the first, the middle and the last frame is reported. That nothing lights a phenomenon is reported only where nothing
@@ -80,5 +89,10 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
         (PLATE_LAYER.to_owned(), Remark::new(message))
     });
     let of_phenomena = (0..runs.len()).filter_map(remark);
-    plate.into_iter().chain(of_phenomena).chain(faint_phenomenon_remarks(compiled, plan)).collect()
+    plate
+        .into_iter()
+        .chain(of_plate_files(compiled))
+        .chain(of_phenomena)
+        .chain(faint_phenomenon_remarks(compiled, plan))
+        .collect()
 }

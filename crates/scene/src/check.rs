@@ -189,12 +189,16 @@ fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
     }
 }
 
-/// The depth and the exposure of a plate need its image.
+/// The depth, its known points and the exposure of a plate need its image.
 fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
         let span = nearest_span(root, "plate.depth");
         let kind = ProblemKind::Conflict("a depth needs an `image` that it belongs to".into());
         reader.within("plate", |r| r.within("depth", |r| r.report_at(span, kind)));
+    }
+    if scene.plate.image.is_none() && !scene.plate.depth_known.is_empty() {
+        let kind = ProblemKind::Conflict("known depths need an `image` in which they are".into());
+        report_build_error(BuildError { key: "depth_known".into(), kind }, "plate".into(), root, reader);
     }
     if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {
         let reason = "an exposure needs an `image` that was taken with it".to_owned();

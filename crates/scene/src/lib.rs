@@ -31,8 +31,9 @@ pub use self::{
     report::SceneError,
     tables::{
         defaults::ImpliedBackdrop,
-        picture::{self, DepthKind, FrameRate, LightParameters, PictureParameters, PlateParameters},
-        plate::PlatePictures,
+        depth::{DepthFit, DepthScale},
+        picture::{self, DepthKind, FrameRate, LightParameters, PictureParameters, PlateAlpha, PlateParameters},
+        plate::{PlateDepth, PlatePictures, PlateRemark},
     },
     text::{
         edit::{self, operation},

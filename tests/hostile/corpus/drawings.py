@@ -1,5 +1,8 @@
 """Drawings: SVG files that are broken, huge or clever."""
 
+import gzip
+import zlib
+
 from .case import Case, Content, lines, parts
 
 SCENE = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[[aurora]]\n[[aurora.shapes]]\n[[aurora.shapes.sheets]]\nsvg_file = "drawing.svg"\n'
@@ -27,6 +30,17 @@ def _laughs() -> str:
     return f'<?xml version="1.0"?><!DOCTYPE svg [{entities}]>' + _svg('<path d="&l9;"/>')
 
 
+def _packed_spaces() -> bytes:
+    """A gigabyte in a megabyte."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, 31)
+    return b"".join([*(packer.compress(b" " * MEGA) for _ in range(1000)), packer.flush()])
+
+
+def _doubling_uses() -> str:
+    groups = "".join(f'<g id="g{level}"><use href="#g{level - 1}"/><use href="#g{level - 1}"/></g>' for level in range(1, 41))
+    return _svg(f'<defs><path id="g0" d="M1 5L9 5"/>{groups}</defs><use href="#g40"/>')
+
+
 def cases() -> list[Case]:
     head, tail = _svg("|").split("|")
     external = '<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
@@ -38,22 +52,29 @@ def cases() -> list[Case]:
         _drawing("no strokes", _svg(""), words="no strokes"),
         _drawing("only what is no stroke", _svg('<rect/><use href="#a"/><text>a</text>'), words="only rect, use, text"),
         _drawing("no UTF-8", b"<svg>\xff\xfe</svg>", words="UTF-8"),
-        _drawing("UTF-16", _svg(LINE).encode("utf-16"), words="UTF-8"),
+        _drawing("UTF-16", _svg(LINE).encode("utf-16"), 0),
+        _drawing("UTF-16 that ends within a pair", b"\xff\xfe" + b"\0\xd8", words="UTF-16"),
+        _drawing("packed", gzip.compress(_svg(LINE).encode()), 0),
+        _drawing("packed and cut", gzip.compress(_svg(LINE).encode())[:20], words="damaged"),
+        _drawing("packed: 1 GB of spaces", _packed_spaces(), words="unpacked", signaled=True),
+        _drawing("5,000 uses of 1,000 points", _svg(f'<defs><path id="a" d="M0 0{"L1 1" * 1000}"/></defs>' + '<use href="#a"/>' * 5000), words="points"),
+        _drawing("uses that double 40 times", _doubling_uses(), words="points"),
+        _drawing("a use of itself", _svg('<g id="a"><use href="#a"/></g>'), words="use themselves"),
         _drawing("NUL", _svg(LINE).replace("svg", "s\0vg"), words=""),
-        _drawing("a billion laughs", _laughs(), words="path|laughs|numbers"),
-        _drawing("an external entity", external + _svg('<path d="&x;"/>'), words="path"),
-        _drawing("an external entity beside a stroke", external + _svg("<text>&x;</text>" + LINE), 0),
+        _drawing("a billion laughs", _laughs(), words="entity"),
+        _drawing("an external entity", external + _svg('<path d="&x;"/>'), words="entity"),
+        _drawing("an external entity beside a stroke", external + _svg("<text>&x;</text>" + LINE), words="entity"),
         _drawing("an external style sheet", '<?xml-stylesheet href="file:///dev/zero"?>' + _svg(f'<image href="/dev/zero"/>{LINE}'), 0),
-        _drawing("an unclosed tag", "<svg><path d='M0 0L1 1'", words="does not end"),
-        _drawing("an unclosed comment", "<svg><!-- ", words="does not end"),
-        _drawing("an unclosed declaration", "<!DOCTYPE svg [ <!ENTITY", words="does not end"),
-        _drawing("an unclosed attribute", "<svg><path d='M0 0", words="does not end"),
-        _drawing("an attribute without quotes", "<svg a=1/>", words="quotes"),
+        _drawing("an unclosed tag", "<svg><path d='M0 0L1 1'", words="never closed"),
+        _drawing("an unclosed comment", "<svg><!-- ", words="expected"),
+        _drawing("an unclosed declaration", "<!DOCTYPE svg [ <!ENTITY", words="not an SVG"),
+        _drawing("an unclosed attribute", "<svg><path d='M0 0", words="unexpected end"),
+        _drawing("an attribute without quotes", "<svg a=1/>", words="quote"),
         _drawing("tags that close what is not open", "</svg>" * 1000 + _svg(LINE), (0, 3)),
         _drawing("1,000,000 tags that close nothing", parts(("</svg>", MEGA), (_svg(LINE), 1)), (0, 3), signaled=True, large=True),
         _drawing("groups 100,000 deep", parts((head, 1), ("<g>", 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signaled=True),
         _drawing("transforms 100,000 deep", parts((head, 1), ('<g transform="rotate(1) scale(1)">', 100_000), (LINE, 1), ("</g>", 100_000), (tail, 1)), (0, 3), signaled=True),
-        _drawing("transforms that grow without end", parts((head, 1), ('<g transform="scale(10)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), words="infinitely far|transform"),
+        _drawing("transforms that grow without end", parts((head, 1), ('<g transform="scale(10)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), words="deep|infinitely far|transform"),
         _drawing("transforms that shrink to nothing", parts((head, 1), ('<g transform="scale(0.1)">', 1000), (LINE, 1), ("</g>", 1000), (tail, 1)), (0, 3)),
         _drawing("a transform of 100,000 parts", _svg(f'<path transform="{"rotate(1) " * 100_000}" d="M1 5L9 5"/>'), (0, 3)),
         _drawing("a transform of nothing known", _svg('<g transform="turn(3)"/>'), words="transform"),
@@ -63,7 +84,7 @@ def cases() -> list[Case]:
         _drawing("a view box of denormal numbers", f'<svg viewBox="0 0 5e-324 5e-324">{LINE}</svg>', (0, 3)),
         _path("no path", "hello world", words="path"),
         _path("a path that begins with a line", "L9 5", words="path"),
-        _path("a path that lacks numbers", "M1 5L9", words="lacks numbers"),
+        _path("a path that lacks numbers", "M1 5L9", words="path data"),
         _path("a path of huge numbers", "M1e308 1e308L-1e308 -1e308", (0, 3)),
         _path("a path of infinite numbers", "M1e999 0L1 1", words="path"),
         _path("a path of not-a-numbers", "MNaN NaN L1 1", words="path"),
@@ -80,7 +101,7 @@ def cases() -> list[Case]:
         _drawing("3,000,000 segments", parts((head + '<path d="M1 5', 1), ("l1 0", 3 * MEGA), ('"/>' + tail, 1)), 3, "points", signaled=True, large=True),
         _drawing("1,000,000 curves", parts((head + '<path d="M1 5', 1), ("c1 1 2 2 3 0", MEGA), ('"/>' + tail, 1)), 3, "points", signaled=True, large=True),
         _drawing("100,000 strokes", parts((head, 1), (LINE, 100_000), (tail, 1)), (0, 3), signaled=True),
-        _drawing("100,000 attributes", parts((head + "<path ", 1), ("a='1' ", 100_000), ("d='M1 5L9 5'/>" + tail, 1)), 0),
+        _drawing("100,000 attributes", head + "<path " + "".join(f"a{index}='1' " for index in range(100_000)) + "d='M1 5L9 5'/>" + tail, (0, 3), signaled=True),
         _drawing("10,000 bracketed declarations", parts(("<!DOCTYPE svg [ ] >", 10_000), (_svg(LINE), 1)), (0, 3)),
         _drawing("1,000,000 declarations without brackets", parts(("<!a>", MEGA), (_svg(LINE), 1)), (0, 3), signaled=True, large=True),
         _drawing("15 MB of text", parts((head, 1), ("a" * 1000, 15_000), (LINE + tail, 1)), 0, signaled=True, large=True),

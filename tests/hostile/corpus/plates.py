@@ -150,7 +150,7 @@ def _jpeg() -> list[Case]:
         plate("restarts of every block", "jpg", start + tables + jpeg.segment(0xDD, struct.pack(">H", 1)) + frame + scan + end, (0, 3), "damaged"),
         plate("16 MB of fill bytes", "jpg", built(lambda: start + b"\xff" * (16 * MEGA) + whole[3:]), (0, 3), "damaged", large=True),
         plate("100,000 comments", "jpg", built(lambda: start + jpeg.segment(0xFE, b"a" * 20) * 100_000 + whole[2:]), 0),
-        plate("JPEG 2000", "jpg", b"\0\0\0\x0cjP  \r\n\x87\n" + bytes(200), words="damaged"),
+        plate("JPEG 2000", "jpg", b"\0\0\0\x0cjP  \r\n\x87\n" + bytes(200), words="a JPEG 2000 picture"),
     ]
 
 
@@ -181,7 +181,7 @@ def _exr() -> list[Case]:
         *[_garbage(compression) for compression in exr.COMPRESSIONS],
         plate("compression 77", "exr", one(exr.attributes(24, 16, compression=77)), words="damaged|compress"),
         plate("no channels", "exr", listed(b"\0"), words="damaged|channel"),
-        plate("channels of other names", "exr", listed(exr.channels("QUX")), words="channel|damaged"),
+        plate("channels of other names", "exr", listed(exr.channels("QUX")), words="layer|damaged"),
         plate("a channel name that does not end", "exr", listed(b"R" * 5000), words="damaged"),
         plate("5,000 channels", "exr", listed(b"".join(exr.channel(b"c%d" % index) for index in range(5000)) + b"\0"), words="damaged|channels"),
         plate("channels of an unknown kind", "exr", listed(exr.channels("BGR", 99)), words="damaged"),
@@ -237,7 +237,7 @@ def _kinds() -> list[Case]:
         depth("of colors only", "exr", exr.black(24, 16), "channel|depth|Z"),
         depth("garbage", "exr", bytes(range(256)) * 4, "damaged"),
         named("missing", "gone.png", words="no such file"),
-        named("of an unknown kind", "flat.tiff", words="not a picture Bansho reads", extra={"flat.tiff": flat}),
+        named("of an unknown kind", "flat.xyz", words="not a picture Bansho reads", extra={"flat.xyz": flat}),
         named("without an extension", "flat", words="not a picture Bansho reads", extra={"flat": flat}),
         named("name of 5,000 bytes", "a" * 5000 + ".png", words="cannot be read|no such"),
         named("name with NUL", "a\\u0000.png", words=""),

@@ -4,7 +4,10 @@ use std::{ops::Range, path::PathBuf, sync::Arc};
 
 use bansho::{
     BitDepth, CompiledScene, DisplayImage, Plan, PlanOptions, SceneOptions, Shot, Unobserved, View,
-    base::frame::{DisplayPixels, Frame},
+    base::{
+        frame::{DisplayPixels, Frame},
+        host::assets::PictureLayers,
+    },
     media::assets::{FileAssets, decode_picture, limits::MemoryLimit},
 };
 
@@ -228,7 +231,7 @@ pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String
         return None;
     }
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let known = decode_picture(&bytes, "png", MemoryLimit::default()).unwrap();
+    let known = decode_picture(&bytes, "png", &PictureLayers::default(), MemoryLimit::default()).unwrap();
     let known: Vec<[f32; 3]> = known.color.pixels().iter().map(|pixel| over_black(*pixel)).collect();
     let drawn = encoded(image);
     let (mean, worst) = blurred_difference(&known, &drawn, size);

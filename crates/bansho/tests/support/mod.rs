@@ -106,6 +106,6 @@ pub(crate) fn checkerboard_at(width: usize, height: usize, depth: Option<Vec<f32
     };
     let color = Image::from_pixels(width, height, (0..width * height).map(shade).collect()).unwrap();
     let mut assets = MemoryAssets::default();
-    assets.insert_picture("plate.png", Picture { color, depth, encoding: Encoding::DisplaySrgb, exposure_ev100: None });
+    assets.insert_picture("plate.png", Picture { depth, ..Picture::opaque(color, Encoding::DisplaySrgb) });
     assets
 }

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use super::memory;
 use crate::{
+    color::AlphaConvention,
     geometry::{
         mesh::{Mesh, MeshError},
         strokes::Drawing,
@@ -22,17 +23,108 @@ pub enum Encoding {
     LinearAcescg,
 }
 
-/// A decoded picture.
+/// How the alpha of a picture relates to its colors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PictureAlpha {
+    /// Its alpha is 1 everywhere.
+    #[default]
+    Opaque,
+    /// Colors are not multiplied by alpha, and blend in the values of this convention (PNG, WebP, TIFF).
+    Straight(AlphaConvention),
+    /// Colors are multiplied by alpha, and blend in linear light (EXR).
+    Associated,
+}
+
+/// A decoded picture, as a viewer shows it: turned as its file says, in known colors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Red, green, blue, straight alpha (1 where the file has none), in `encoding`.
+    /// Red, green, blue in `encoding`, and alpha (1 where the file has none).
     pub color: Image<4>,
+    /// How alpha relates to the colors.
+    pub alpha: PictureAlpha,
     /// The file's depth channel (`Z`), if it has one; row after row.
     pub depth: Option<Vec<f32>>,
     /// Encoding of the colors.
     pub encoding: Encoding,
     /// Exposure value at ISO 100 with which it was taken, if the file records it.
     pub exposure_ev100: Option<f64>,
+    /// What users should know about how the file was read.
+    pub remarks: Vec<PictureRemark>,
+}
+
+impl Picture {
+    /// An opaque picture without depth.
+    pub fn opaque(color: Image<4>, encoding: Encoding) -> Self {
+        let (alpha, depth) = (PictureAlpha::Opaque, None);
+        Self { color, alpha, depth, encoding, exposure_ev100: None, remarks: Vec::new() }
+    }
+}
+
+/// The depth of a picture, in the units of its file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthMap {
+    /// Values; for integers the codes. Not finite, or 0, where the depth is unknown or infinite.
+    pub values: Image<1>,
+    /// What users should know about how the file was read.
+    pub remarks: Vec<PictureRemark>,
+}
+
+/// Which layers of a picture are read; by default those that conventions of renderers name.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct PictureLayers {
+    /// The layer of the colors.
+    pub image: Option<String>,
+    /// The layer or channel of the depth.
+    pub depth: Option<String>,
+}
+
+/// What users should know about how a picture was read: what was used without being asked for, and what was not honored.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PictureRemark {
+    /// Some of its pixels are not opaque.
+    #[error("its alpha is used: where it is transparent, so is the picture ({})", blending(*.0))]
+    AlphaUsed(PictureAlpha),
+    /// Its color profile is damaged or of a kind that is not supported.
+    #[error("its ICC profile cannot be used ({0}), so its values are taken as sRGB")]
+    Profile(String),
+    /// It states colors that are unknown or contradictory.
+    #[error("{0}, so its values are taken as sRGB")]
+    Colors(String),
+    /// Its values exceed the white of a display.
+    #[error("its values are {transfer}: {white} cd/m^2 is display white")]
+    HighDynamicRange {
+        /// Name of the transfer function.
+        transfer: &'static str,
+        /// Luminance of display white, cd/m^2.
+        white: f32,
+    },
+    /// Its Exif data are damaged.
+    #[error("its Exif data are damaged ({0}); orientation and exposure may be missing")]
+    Exif(String),
+    /// Its orientation has no meaning.
+    #[error("its orientation is {0} (allowed: 1 to 8), so it is not turned")]
+    Orientation(u32),
+    /// Its pixels are not square.
+    #[error(
+        "its pixels are {0} times as wide as high (pixelAspectRatio), but drawn as squares; resize it to square pixels"
+    )]
+    PixelAspect(f32),
+    /// Its data are damaged in a part, which decoders fill.
+    #[error("a part of its data is corrupt ({0}), so a part of the picture may be wrong")]
+    Corrupt(String),
+    /// It is an animation or has several pages.
+    #[error("it has several pictures, of which the first is used")]
+    SeveralPictures,
+}
+
+/// Words for how alpha blends.
+fn blending(alpha: PictureAlpha) -> &'static str {
+    match alpha {
+        PictureAlpha::Opaque => "opaque",
+        PictureAlpha::Straight(AlphaConvention::Encoded) => "straight, blended in encoded values",
+        PictureAlpha::Straight(AlphaConvention::Linear) => "straight, blended in linear light",
+        PictureAlpha::Associated => "associated, blended in linear light",
+    }
 }
 
 /// Why an asset could not be loaded.
@@ -51,6 +143,17 @@ fn other_inputs_note(others: u64) -> String {
 
 fn found_instead_note(instead: &[&str]) -> String {
     if instead.is_empty() { String::new() } else { format!(", only {}", instead.join(", ")) }
+}
+
+/// Most layers that an error lists.
+const LISTED_LAYERS: usize = 24;
+
+fn counted_names(names: &[String]) -> String {
+    let listed = names.iter().take(LISTED_LAYERS).cloned().collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(LISTED_LAYERS) {
+        0 => listed,
+        more => format!("{listed} and {more} more"),
+    }
 }
 
 /// What can be wrong with an asset.
@@ -116,8 +219,39 @@ pub enum AssetProblem {
     #[error("has no stroke of the id `{0}`")]
     NoStroke(String),
     /// The extension of its name is not that of a supported picture format.
-    #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr)")]
+    #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr, .webp, .tif, .tiff)")]
     UnknownKind,
+    /// The extension of its name is not that of a supported format of depth.
+    #[error("is not a depth Bansho reads (allowed: .exr, .png, .pfm, .npy, .tif, .tiff)")]
+    UnknownDepthKind,
+    /// It is of a format that is known, and not read.
+    #[error("is {format}, which Bansho does not read; {advice}")]
+    UnsupportedFormat {
+        /// The format, with its article.
+        format: &'static str,
+        /// What to convert it to, and how.
+        advice: &'static str,
+    },
+    /// The requested layer is not in the picture.
+    #[error("has no layer `{layer}` of {use_of_layer}; it has {}", counted_names(.layers))]
+    NoLayer {
+        /// The layer.
+        layer: String,
+        /// What it would be used for.
+        use_of_layer: &'static str,
+        /// The layers that it has.
+        layers: Vec<String>,
+    },
+    /// None of its layers is known to be what is needed.
+    #[error("has no layer that is known to be {use_of_layer}; it has {}; `{key}` in [plate] chooses one", counted_names(.layers))]
+    NoKnownLayer {
+        /// What it would be used for.
+        use_of_layer: &'static str,
+        /// The key that chooses a layer.
+        key: &'static str,
+        /// The layers that it has.
+        layers: Vec<String>,
+    },
     /// The extension of its name is not that of a supported mesh format.
     #[error("is not a mesh Bansho reads (allowed: .glb, .gltf)")]
     UnknownMeshKind,
@@ -161,6 +295,28 @@ pub trait Assets: Send + Sync {
     /// # Errors
     /// The asset is missing, damaged, too large or not a picture.
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError>;
+
+    /// As [`picture`](Self::picture), with these layers of a file that has several. What knows no layers ignores them.
+    ///
+    /// # Errors
+    /// As [`picture`](Self::picture), or the picture has no such layer.
+    fn picture_layers(&self, path: &str, frame: i64, _layers: &PictureLayers) -> Result<Arc<Picture>, AssetError> {
+        self.picture(path, frame)
+    }
+
+    /// The depth at `path`, for frame `frame` if it is a sequence, from the layer or channel `layer`.
+    ///
+    /// # Errors
+    /// The asset is missing, damaged, too large or has no depth.
+    fn depth(&self, path: &str, frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
+        let layers = PictureLayers { image: None, depth: layer.map(str::to_owned) };
+        let picture = self.picture_layers(path, frame, &layers)?;
+        let missing = || AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("Z".into()) };
+        let values = picture.depth.as_ref().ok_or_else(missing)?;
+        let pixels = values.iter().map(|&value| [value]).collect();
+        let values = Image::from_pixels(picture.color.width(), picture.color.height(), pixels).ok_or_else(missing)?;
+        Ok(Arc::new(DepthMap { values, remarks: picture.remarks.clone() }))
+    }
 
     /// All triangles of the scene at `path`, in its own coordinates.
     ///

@@ -1,18 +1,63 @@
-//! Exposure value of a photograph from its Exif data.
+//! Orientation and exposure value of a photograph from its Exif data.
 
-use bansho_base::{color::ev100_of_camera, math};
+use bansho_base::{color::ev100_of_camera, host::assets::PictureRemark, math};
 use exif::{Exif, In, Reader, Tag, Value};
 
-/// Exposure value at ISO 100 from an Exif block that begins with its TIFF header; `None` if a tag is missing or the block is damaged.
-///
-/// From exposure time, f-number and sensitivity. Time and f-number may be in APEX units instead (CIPA DC-008, annex C).
-pub(crate) fn exif_ev100(block: &[u8]) -> Option<f64> {
+use super::orientation::Orientation;
+
+/// What is used of an Exif block.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ExifData {
+    /// The orientation.
+    pub(crate) orientation: Orientation,
+    /// Exposure value at ISO 100.
+    pub(crate) ev100: Option<f64>,
+    /// What is wrong with it.
+    pub(crate) remarks: Vec<PictureRemark>,
+}
+
+/// Reads an Exif block that begins with its TIFF header, or with `Exif` and two zeros. Nothing outside the block is read, whatever it points to.
+pub(crate) fn read(block: &[u8]) -> ExifData {
+    let block = block.strip_prefix(b"Exif\0\0").unwrap_or(block);
+    let mut damage = None;
     let exif = Reader::new().continue_on_error(true).read_raw(block.to_vec());
-    let exif = exif.or_else(|error| error.distill_partial_result(|_| {})).ok()?;
-    let value = |tag| number(&exif, tag);
+    let exif =
+        exif.or_else(|error| error.distill_partial_result(|errors| damage = errors.first().map(ToString::to_string)));
+    let mut data = ExifData::default();
+    match exif {
+        Ok(exif) => {
+            data.remarks.extend(damage.map(PictureRemark::Exif));
+            data.ev100 = ev100(&exif);
+            data.set_orientation(orientation_tag(&exif));
+        }
+        Err(error) => data.remarks.push(PictureRemark::Exif(error.to_string())),
+    }
+    data
+}
+
+impl ExifData {
+    /// Sets the orientation from the value of its tag, if there is one.
+    pub(crate) fn set_orientation(&mut self, tag: Option<u32>) {
+        let Some(value) = tag else { return };
+        match Orientation::from_tag(value) {
+            Some(orientation) => self.orientation = orientation,
+            // Written where the orientation is unknown.
+            None if value == 0 => {}
+            None => self.remarks.push(PictureRemark::Orientation(value)),
+        }
+    }
+}
+
+fn orientation_tag(exif: &Exif) -> Option<u32> {
+    exif.get_field(Tag::Orientation, In::PRIMARY)?.value.get_uint(0)
+}
+
+/// From exposure time, f-number and sensitivity; `None` if one is missing. Time and f-number may be in APEX units instead (CIPA DC-008, annex C).
+fn ev100(exif: &Exif) -> Option<f64> {
+    let value = |tag| number(exif, tag);
     let time = value(Tag::ExposureTime).or_else(|| value(Tag::ShutterSpeedValue).map(|speed| math::exp2(-speed)));
     let f_number = value(Tag::FNumber).or_else(|| value(Tag::ApertureValue).map(|value| math::exp2(0.5 * value)));
-    ev100_of_camera(f_number?, time?, sensitivity(&exif)?)
+    ev100_of_camera(f_number?, time?, sensitivity(exif)?)
 }
 
 /// Largest value of `PhotographicSensitivity`; it means that the sensitivity is in another tag.
@@ -60,10 +105,10 @@ mod tests {
         let iso = (Tag::PhotographicSensitivity, Value::Short(vec![400]));
         let plain = block(&[(Tag::ExposureTime, rational(1, 250)), (Tag::FNumber, rational(40, 10)), iso.clone()]);
         // log2(16 * 250) - 2.
-        assert!((exif_ev100(&plain).unwrap() - 9.9658).abs() < 1e-3);
+        assert!((read(&plain).ev100.unwrap() - 9.9658).abs() < 1e-3);
         let speed = Value::SRational(vec![SRational { num: 8, denom: 1 }]);
         let apex = block(&[(Tag::ShutterSpeedValue, speed), (Tag::ApertureValue, rational(4, 1)), iso]);
-        assert!((exif_ev100(&apex).unwrap() - 10.0).abs() < 1e-9);
+        assert!((read(&apex).ev100.unwrap() - 10.0).abs() < 1e-9);
     }
 
     #[test]
@@ -72,12 +117,37 @@ mod tests {
         let f_number = (Tag::FNumber, rational(4, 1));
         let iso = (Tag::PhotographicSensitivity, Value::Short(vec![100]));
         let whole = block(&[time.clone(), f_number.clone(), iso.clone()]);
-        assert_eq!(exif_ev100(&block(&[time, iso.clone()])), None);
-        assert_eq!(exif_ev100(&block(&[(Tag::ExposureTime, rational(1, 0)), f_number, iso])), None);
+        assert_eq!(read(&block(&[time, iso.clone()])).ev100, None);
+        assert_eq!(read(&block(&[(Tag::ExposureTime, rational(1, 0)), f_number, iso])).ev100, None);
         for end in 0..whole.len() {
             // Truncated anywhere, it gives an exposure or none.
-            let _ = exif_ev100(&whole[..end]);
+            let _ = read(&whole[..end]);
         }
-        assert_eq!(exif_ev100(b"no Exif at all"), None);
+        let none = read(b"no Exif at all");
+        assert!(none.ev100.is_none() && matches!(none.remarks[..], [PictureRemark::Exif(_)]));
+    }
+
+    #[test]
+    fn the_orientation_is_found_and_one_without_meaning_is_told() {
+        for tag in 1..=8_u16 {
+            let found = read(&block(&[(Tag::Orientation, Value::Short(vec![tag]))]));
+            assert_eq!((Some(found.orientation), found.remarks.len()), (Orientation::from_tag(tag.into()), 0));
+        }
+        for (tag, remarks) in [(0, vec![]), (9, vec![PictureRemark::Orientation(9)])] {
+            let found = read(&block(&[(Tag::Orientation, Value::Short(vec![tag]))]));
+            assert_eq!((found.orientation, found.remarks), (Orientation::Upright, remarks));
+        }
+    }
+
+    #[test]
+    fn what_points_outside_its_block_is_told_and_the_rest_is_used() {
+        let orientation = (Tag::Orientation, Value::Short(vec![6]));
+        let mut bad = block(&[orientation, (Tag::ImageDescription, Value::Ascii(vec![vec![b'x'; 30]]))]);
+        // The offset of the description, the entry 0x010e of the first directory.
+        let entry = bad.windows(2).position(|pair| pair == [0x01, 0x0e]).unwrap();
+        bad[entry + 8..entry + 12].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff]);
+        let found = read(&bad);
+        assert_eq!(found.orientation, Orientation::Turned90);
+        assert!(matches!(found.remarks[..], [PictureRemark::Exif(_)]), "{found:?}");
     }
 }

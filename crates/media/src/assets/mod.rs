@@ -1,13 +1,21 @@
 //! Assets from files: plates, depth, meshes, drawings, text.
 
 mod cache;
+mod color;
+mod decoded;
 mod exif;
+mod formats;
 pub mod gltf;
-mod image;
+mod jpeg;
 pub mod limits;
+mod numpy;
 mod openexr;
-mod primaries;
+mod orientation;
+mod pfm;
+mod png;
 pub mod svg;
+mod tiff;
+mod webp;
 
 use std::{
     collections::HashMap,
@@ -18,11 +26,12 @@ use std::{
 
 use bansho_base::{
     geometry::{mesh::Mesh, strokes::Drawing},
-    host::assets::{AssetError, AssetProblem, Assets, Picture},
+    host::assets::{AssetError, AssetProblem, Assets, DepthMap, Picture, PictureLayers},
 };
 
 use self::{
-    cache::PictureCache,
+    cache::{PictureCache, PictureKey},
+    formats::{DepthFormat, PictureFormat},
     limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
 };
 use crate::files::{
@@ -32,8 +41,9 @@ use crate::files::{
 use gltf::{decode_mesh, external_buffer_uris};
 use svg::decode_drawing;
 
-/// Largest size of the picture cache, bytes. The last picture is always kept.
+/// Largest size of the cache of pictures, and of that of depths, bytes. The last one is always kept.
 const CACHE_BYTES: usize = 512 << 20;
+const DEPTH_CACHE_BYTES: usize = 128 << 20;
 
 /// Limits on the files that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +61,7 @@ impl Default for InputLimits {
 }
 
 /// Pictures, meshes, drawings and texts in files. Paths are relative to a folder; a run of `#` in a file name is replaced by the frame
-/// number. Files are cached, so a change of a file is only seen after [`FileAssets::clear_cache`].
+/// number, unless it is a single one and a file has that very name. Files are cached, so a change of a file is only seen after [`FileAssets::clear_cache`].
 ///
 /// A file is rejected before memory is allocated if it is not a regular file, is outside [`InputLimits::root`], claims more than
 /// [`limits::SIDE`] pixels on a side or more than its bytes could contain, or would exceed [`InputLimits::memory_bytes`] together with the
@@ -65,7 +75,8 @@ pub struct FileAssets {
 
 #[derive(Debug, Default)]
 struct AssetCache {
-    pictures: PictureCache,
+    pictures: PictureCache<Picture>,
+    depths: PictureCache<DepthMap>,
     meshes: HashMap<PathBuf, Arc<Mesh>>,
     drawings: HashMap<PathBuf, Arc<Drawing>>,
     digests: HashMap<PathBuf, [u8; 32]>,
@@ -76,12 +87,13 @@ impl AssetCache {
     fn used(&self) -> u64 {
         let meshes = self.meshes.values().map(|mesh| mesh.memory_bytes());
         let drawings = self.drawings.values().map(|drawing| drawing.memory_bytes());
-        self.pictures.bytes() as u64 + meshes.chain(drawings).sum::<u64>()
+        (self.pictures.bytes() + self.depths.bytes()) as u64 + meshes.chain(drawings).sum::<u64>()
     }
 
     /// Evicts all pictures, and the meshes and drawings without other users.
     fn evict_unused(&mut self) {
         self.pictures.clear();
+        self.depths.clear();
         self.meshes.retain(|_, mesh| Arc::strong_count(mesh) > 1);
         self.drawings.retain(|_, drawing| Arc::strong_count(drawing) > 1);
     }
@@ -109,6 +121,9 @@ impl FileAssets {
     /// More than one run of `#` in the name, or a run of more than 20.
     pub fn resolve(&self, path: &str, frame: i64) -> Result<PathBuf, AssetError> {
         let (folder, name) = path.rsplit_once('/').map_or(("", path), |(folder, name)| (folder, name));
+        if name.matches('#').count() == 1 && self.folder.join(path).is_file() {
+            return Ok(self.folder.join(path));
+        }
         let template = FrameTemplate::parse(name, false)
             .map_err(|_| AssetError { path: path.to_owned(), problem: AssetProblem::FrameNumber })?;
         // An absolute path begins with an empty folder.
@@ -159,7 +174,7 @@ impl FileAssets {
         if let Some(mesh) = self.lock_cache().meshes.get(path) {
             return Ok(mesh.clone());
         }
-        let read_resource = |uri: &str, limit: u64| self.read(&path.with_file_name(uri), limit);
+        let read_resource = |uri: &str, limit: u64| self.read(&beside(path, uri), limit);
         let mesh = self.within_limit(|limit| {
             let file = self.read(path, limit.available())?;
             decode_mesh(&file, extension(path), &read_resource, limit)
@@ -179,7 +194,7 @@ impl FileAssets {
             return Ok(drawing.clone());
         }
         let drawing = self.within_limit(|limit| {
-            let drawing = decode_drawing(&self.read_text(path)?)?;
+            let drawing = decode_drawing(&self.read(path, TEXT_BYTES)?)?;
             limit.check(drawing.memory_bytes()).map(|()| drawing)
         });
         let drawing = Arc::new(drawing?);
@@ -203,7 +218,7 @@ impl FileAssets {
         }
         let file = self.read(path, self.limits.memory_bytes).unwrap_or_default();
         let uris = external_buffer_uris(&file, extension(path));
-        uris.into_iter().map(|uri| path.with_file_name(uri)).collect()
+        uris.iter().map(|uri| beside(path, uri)).collect()
     }
 
     /// A digest of a file and of its external buffers.
@@ -229,37 +244,114 @@ impl FileAssets {
     }
 }
 
+/// The file that a URI in the file `path` names. Bytes such as `%20` are decoded, unless a file has the very name: some exporters do not encode.
+fn beside(path: &Path, uri: &str) -> PathBuf {
+    let verbatim = path.with_file_name(uri);
+    match percent_decoded(uri) {
+        Some(decoded) if !verbatim.is_file() => path.with_file_name(decoded),
+        _ => verbatim,
+    }
+}
+
+/// The URI with its percent-encoded bytes decoded (RFC 3986, 2.1); `None` if it has none, or is no text then.
+fn percent_decoded(uri: &str) -> Option<String> {
+    if !uri.contains('%') {
+        return None;
+    }
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        let digit = |index: usize| after.get(index).and_then(|digit| char::from(*digit).to_digit(16));
+        match (byte, digit(0), digit(1)) {
+            (b'%', Some(high), Some(low)) => {
+                bytes.push((16 * high + low) as u8);
+                rest = &after[2..];
+            }
+            _ => {
+                bytes.push(byte);
+                rest = after;
+            }
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
 fn extension(path: &Path) -> &str {
     path.extension().and_then(|extension| extension.to_str()).unwrap_or_default()
 }
 
-/// Decodes a picture from the bytes of a file with this `extension` (without the dot): `png`, `jpg`, `jpeg` or `exr`.
+/// Decodes a picture from the bytes of a file with this `extension` (without the dot): PNG, JPEG, EXR, WebP or TIFF. `layers` chooses the layers of
+/// an EXR.
 ///
 /// # Errors
-/// Another extension, a size beyond the [`limits`] or beyond `limit`, or damage. Never panics, and never allocates memory that the bytes
-/// could not fill.
-pub fn decode_picture(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Result<Picture, AssetProblem> {
-    match extension.to_ascii_lowercase().as_str() {
-        "png" => image::png(bytes, limit),
-        "jpg" | "jpeg" => image::jpeg(bytes, limit),
-        "exr" => openexr::decode(bytes, limit),
-        _ => Err(AssetProblem::UnknownKind),
+/// Another format, a size beyond the [`limits`] or beyond `limit`, no such layer, or damage. Never panics, and never allocates memory that the
+/// bytes could not fill.
+pub fn decode_picture(
+    bytes: &[u8],
+    extension: &str,
+    layers: &PictureLayers,
+    limit: MemoryLimit,
+) -> Result<Picture, AssetProblem> {
+    match formats::picture_format(bytes, extension)? {
+        PictureFormat::Png => png::decode(bytes, limit),
+        PictureFormat::Jpeg => jpeg::decode(bytes, limit),
+        PictureFormat::Exr => openexr::decode(bytes, layers, limit),
+        PictureFormat::WebP => webp::decode(bytes, limit),
+        PictureFormat::Tiff => tiff::decode(bytes, limit),
+    }
+}
+
+/// Decodes a depth from the bytes of a file with this `extension` (without the dot): EXR, PNG, PFM, NPY or TIFF. `layer` chooses the layer of an EXR.
+///
+/// # Errors
+/// As [`decode_picture`], or no depth.
+pub fn decode_depth(
+    bytes: &[u8],
+    extension: &str,
+    layer: Option<&str>,
+    limit: MemoryLimit,
+) -> Result<DepthMap, AssetProblem> {
+    match formats::depth_format(bytes, extension)? {
+        DepthFormat::Exr => openexr::decode_depth(bytes, layer, limit),
+        DepthFormat::Png => png::depth(bytes, limit),
+        DepthFormat::Pfm => pfm::depth(bytes, limit),
+        DepthFormat::Npy => numpy::depth(bytes, limit),
+        DepthFormat::Tiff => tiff::depth(bytes, limit),
     }
 }
 
 impl Assets for FileAssets {
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
-        let path = self.resolve(path, frame)?;
-        if let Some(picture) = self.lock_cache().pictures.get(&path) {
+        self.picture_layers(path, frame, &PictureLayers::default())
+    }
+
+    fn picture_layers(&self, path: &str, frame: i64, layers: &PictureLayers) -> Result<Arc<Picture>, AssetError> {
+        let key = PictureKey { path: self.resolve(path, frame)?, layers: layers.clone() };
+        if let Some(picture) = self.lock_cache().pictures.get(&key) {
             return Ok(picture);
         }
         let picture = self.within_limit(|limit| {
-            let file = self.read(&path, limit.available())?;
-            decode_picture(&file, extension(&path), limit)
+            let file = self.read(&key.path, limit.available())?;
+            decode_picture(&file, extension(&key.path), layers, limit)
         });
-        let picture = Arc::new(picture.map_err(|problem| error(&path, problem))?);
-        self.lock_cache().pictures.insert(path, picture.clone(), CACHE_BYTES);
+        let picture = Arc::new(picture.map_err(|problem| error(&key.path, problem))?);
+        self.lock_cache().pictures.insert(key, picture.clone(), CACHE_BYTES);
         Ok(picture)
+    }
+
+    fn depth(&self, path: &str, frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
+        let layers = PictureLayers { image: None, depth: layer.map(str::to_owned) };
+        let key = PictureKey { path: self.resolve(path, frame)?, layers };
+        if let Some(depth) = self.lock_cache().depths.get(&key) {
+            return Ok(depth);
+        }
+        let depth = self.within_limit(|limit| {
+            let file = self.read(&key.path, limit.available())?;
+            decode_depth(&file, extension(&key.path), layer, limit)
+        });
+        let depth = Arc::new(depth.map_err(|problem| error(&key.path, problem))?);
+        self.lock_cache().depths.insert(key, depth.clone(), DEPTH_CACHE_BYTES);
+        Ok(depth)
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {

@@ -7,6 +7,8 @@ use super::attribute::{FLAG_LONG_NAMES, MAGIC, Window};
 /// The header of one part.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct PartHeader {
+    /// The part's name, which files of several parts have.
+    pub(crate) name: Option<String>,
     pub(crate) channels: Vec<ChannelEntry>,
     pub(crate) compression: Option<u8>,
     pub(crate) data_window: Option<Window>,
@@ -175,6 +177,10 @@ impl PartHeader {
             }
             ("chromaticities", b"chromaticities") => {
                 self.chromaticities = Some([value.pair()?, value.pair()?, value.pair()?, value.pair()?]);
+            }
+            ("name", b"string") => {
+                let text = &value.file[value.at..];
+                self.name = Some(String::from_utf8_lossy(text).into_owned());
             }
             (_, b"float") => self.floats.push((name.to_owned(), value.float()?)),
             (_, b"string") => self.strings.push((name.to_owned(), value.at..value.file.len())),

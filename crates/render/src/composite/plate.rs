@@ -2,9 +2,9 @@
 
 use bansho_base::{
     camera::{Camera, Lens},
-    color,
+    color::{self, AlphaConvention},
     host::{
-        assets::{Assets, Encoding, Picture},
+        assets::{Assets, Encoding, Picture, PictureAlpha},
         parallel::prelude::*,
     },
     image::Image,
@@ -13,13 +13,15 @@ use bansho_base::{
 };
 
 use crate::plan::Plan;
-use bansho_scene::{DepthKind, PlatePictures};
+use bansho_scene::{DepthKind, PlateDepth, PlatePictures};
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PlateFrame {
-    /// Exposed scene-linear ACEScg and coverage, which is 0 outside the plate (overscan).
+    /// Exposed scene-linear ACEScg over black, and coverage, which is 0 outside the plate (overscan).
     pub(crate) color: Option<Image<4>>,
+    /// Whether its picture has pixels that are not opaque.
+    pub(crate) is_transparent: bool,
     /// Depth in the convention of the camera's lens, m.
     pub(crate) depth: Option<Image<1>>,
 }
@@ -29,14 +31,19 @@ pub(crate) struct PlateFrame {
 /// # Errors
 /// The picture or its depth cannot be read.
 pub(crate) fn load(plan: &Plan, assets: &dyn Assets, number: i64, camera: &Camera) -> Result<PlateFrame, BuildError> {
-    let Some(PlatePictures { image, depth }) = plan.scene.plate.read_frame(assets, number)? else {
+    let Some(PlatePictures { image, alpha, depth, .. }) = plan.scene.plate.read_frame(assets, number)? else {
         return Ok(PlateFrame::default());
     };
-    let width = image.color.width();
-    let mapping = PlateMapping::new(plan, [width, image.color.height()]);
-    let depths = depth.as_ref().and_then(|picture| picture.depth.as_ref());
-    let depth = depths.map(|depths| resample_depth(plan, camera, depths, width, &mapping));
-    Ok(PlateFrame { color: Some(resample_color(plan, &image, &mapping)), depth })
+    let mapping = PlateMapping::new(plan, [image.color.width(), image.color.height()]);
+    let color = resample_color(plan, &image, alpha, &mapping);
+    let mut depth = depth.map(|depth| resample_depth(camera, &depth, &mapping));
+    let is_transparent = alpha != PictureAlpha::Opaque;
+    if let Some(depth) = depth.as_mut().filter(|_| is_transparent) {
+        // What is not there hides nothing, whatever depth the file gives it.
+        let both = depth.pixels_mut().iter_mut().zip(color.pixels());
+        both.filter(|(_, [.., alpha])| *alpha <= 0.0).for_each(|(depth, _)| *depth = [f32::INFINITY]);
+    }
+    Ok(PlateFrame { color: Some(color), is_transparent, depth })
 }
 
 /// The mapping between pixels of the picture and of the plate. The plate covers the picture, centered; what exceeds it is cropped.
@@ -97,7 +104,7 @@ fn filter_taps(mapping: &PlateMapping, axis: usize, pixel: usize) -> Vec<FilterT
     taps
 }
 
-fn resample_color(plan: &Plan, picture: &Picture, mapping: &PlateMapping) -> Image<4> {
+fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: &PlateMapping) -> Image<4> {
     let columns: Vec<_> = (0..mapping.picture[0]).map(|x| filter_taps(mapping, 0, x)).collect();
     let view = plan.view_transform();
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [0.0; 4]);
@@ -107,20 +114,80 @@ fn resample_color(plan: &Plan, picture: &Picture, mapping: &PlateMapping) -> Ima
             if !(mapping.covers(0, x) && mapping.covers(1, y)) {
                 continue;
             }
-            let mut sum = [0.0_f32; 3];
+            let mut sum = [0.0_f32; 4];
             for row in &rows {
                 for column in &columns[x] {
-                    let color = picture.color.at(column.pixel, row.pixel);
-                    for c in 0..3 {
+                    let color = premultiplied(alpha, picture.color.at(column.pixel, row.pixel));
+                    for c in 0..4 {
                         sum[c] += row.weight * column.weight * color[c];
                     }
                 }
             }
-            let [red, green, blue] = to_scene(&view, picture.encoding, sum);
-            *pixel = [red, green, blue, 1.0];
+            *pixel = over_black(&view, picture.encoding, alpha, sum);
         }
     });
     image
+}
+
+/// The values of a pixel multiplied by its alpha, between which pixels are interpolated.
+pub(crate) fn premultiplied(alpha: PictureAlpha, [r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    match alpha {
+        PictureAlpha::Straight(_) => [r * a, g * a, b * a, a],
+        PictureAlpha::Opaque | PictureAlpha::Associated => [r, g, b, a],
+    }
+}
+
+/// Exposed ACEScg of a pixel over black, and its coverage, from values multiplied by alpha.
+pub(crate) fn over_black(
+    view: &color::View,
+    encoding: Encoding,
+    alpha: PictureAlpha,
+    [r, g, b, coverage]: [f32; 4],
+) -> [f32; 4] {
+    let linear = |color: [f32; 3]| to_scene(view, encoding, color);
+    let encoded = [r, g, b];
+    let [r, g, b] = match alpha {
+        // Blended in encoded values over black, or already multiplied in linear light.
+        PictureAlpha::Opaque | PictureAlpha::Associated | PictureAlpha::Straight(AlphaConvention::Encoded) => {
+            linear([r, g, b])
+        }
+        PictureAlpha::Straight(AlphaConvention::Linear) if coverage > 0.0 => {
+            linear([r, g, b].map(|value| value / coverage)).map(|value| value * coverage)
+        }
+        PictureAlpha::Straight(AlphaConvention::Linear) => [0.0; 3],
+    };
+    match alpha {
+        PictureAlpha::Opaque => [r, g, b, 1.0],
+        PictureAlpha::Straight(AlphaConvention::Encoded) if encoding == Encoding::DisplaySrgb => {
+            [r, g, b, coverage_of_encoded_alpha(encoded, coverage.clamp(0.0, 1.0))]
+        }
+        _ => [r, g, b, coverage.clamp(0.0, 1.0)],
+    }
+}
+
+/// Steps of bisection: 1/4096, a fraction of a code.
+const COVERAGE_STEPS: usize = 12;
+/// Mid-gray, over which the alpha of encoded values is closest to that of light: encoded, and its light.
+const MID_GRAY_ENCODED: f32 = 0.5;
+const MID_GRAY: f32 = 0.214_041_14;
+
+/// Coverage in linear light of a pixel that blends in encoded values: its blend over mid-gray has the same mean. The color is multiplied by alpha. It is the
+/// inverse of what a picture with alpha in encoded values is written by (`color::display::quantize`).
+fn coverage_of_encoded_alpha(values: [f32; 3], alpha: f32) -> f32 {
+    if alpha <= 0.0 || alpha >= 1.0 {
+        return alpha;
+    }
+    let light = values.map(color::decode_srgb);
+    let wanted = values.iter().sum::<f32>() + 3.0 * (1.0 - alpha) * MID_GRAY_ENCODED;
+    let blended = |transmitted: f32| -> f32 {
+        light.iter().map(|light| color::encode_srgb(light + transmitted * MID_GRAY)).sum()
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..COVERAGE_STEPS {
+        let middle = 0.5 * (low + high);
+        if blended(middle) < wanted { low = middle } else { high = middle }
+    }
+    1.0 - 0.5 * (low + high)
 }
 
 /// Exposed ACEScg of the values of a plate. The view transform is inverted, so that a plate made for display is displayed unchanged.
@@ -132,33 +199,28 @@ pub(crate) fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) 
     }
 }
 
-/// Depth of the nearest plate pixel: depths are not interpolated.
-fn resample_depth(plan: &Plan, camera: &Camera, depth: &[f32], plate_width: usize, mapping: &PlateMapping) -> Image<1> {
-    let kind = plan.scene.plate.depth_kind;
-    let scale = plan.scene.plate.depth_scale;
+/// Depth of the nearest value: depths are not interpolated, since between near and far there is nothing.
+fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -> Image<1> {
+    let (values, [width, height]) = (depth.values(), depth.size);
+    let per_plate_pixel = [width as f64 / mapping.plate[0] as f64, height as f64 / mapping.plate[1] as f64];
+    let nearest = |axis: usize, pixel| {
+        let position = mapping.plate_position(axis, pixel) * per_plate_pixel[axis];
+        (position as usize).min(depth.size[axis] - 1)
+    };
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
             if mapping.covers(0, x) && mapping.covers(1, y) {
-                let nearest = |axis, pixel| (mapping.plate_position(axis, pixel) as usize).min(mapping.plate[axis] - 1);
-                let value = f64::from(depth[nearest(1, y) * plate_width + nearest(0, x)]);
-                let meters = match kind {
-                    DepthKind::Inverse => scale / value,
-                    DepthKind::Axis | DepthKind::Distance => scale * value,
-                };
-                pixel[0] = depth_of_lens(camera, kind, meters, x, y) as f32;
+                let meters = depth.scale.meters_of(values[nearest(1, y) * width + nearest(0, x)]);
+                pixel[0] = depth_of_lens(camera, depth.scale.kind, meters, x, y) as f32;
             }
         }
     });
     image
 }
 
-/// Depth in the convention of the camera's lens: along the axis for perspective, else the distance. Invalid depths become infinite, so that
-/// they hide nothing.
+/// Depth in the convention of the camera's lens: along the axis for perspective, else the distance.
 fn depth_of_lens(camera: &Camera, kind: DepthKind, meters: f64, x: usize, y: usize) -> f64 {
-    if meters.is_nan() || meters <= 0.0 {
-        return f64::INFINITY;
-    }
     let distance_per_depth = || {
         let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
         direction.map_or(1.0, |direction| direction.length())
@@ -172,6 +234,17 @@ fn depth_of_lens(camera: &Camera, kind: DepthKind, meters: f64, x: usize, y: usi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_veil_covers_as_much_of_mid_gray_as_where_it_was_painted() {
+        // A black veil of half: encoded 0.5 becomes 0.25, light 0.2140 becomes 0.0509, so 76.2 % are covered.
+        assert!((coverage_of_encoded_alpha([0.0; 3], 0.5) - 0.7622).abs() < 1e-3);
+        // A mid-gray veil changes nothing: its light 0.0509 and the rest of 0.2140.
+        assert!((coverage_of_encoded_alpha([0.25; 3], 0.5) - 0.2378).abs() < 1e-3);
+        // Half white is brighter there than its light alone could be: nothing is covered.
+        assert!(coverage_of_encoded_alpha([0.5; 3], 0.5) < 1e-3);
+        assert_eq!([0.0, 1.0].map(|alpha| coverage_of_encoded_alpha([0.0; 3], alpha)), [0.0, 1.0]);
+    }
 
     #[test]
     fn a_plate_of_the_pictures_size_is_taken_pixel_by_pixel() {

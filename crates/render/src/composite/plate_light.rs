@@ -8,7 +8,7 @@ use bansho_base::{
     world::sky::{ElevationProfile, ElevationSample},
 };
 
-use super::plate::{PlateMapping, to_scene};
+use super::plate::{PlateMapping, over_black, premultiplied};
 use crate::{compiled::CompiledScene, plan::Plan};
 
 /// Samples along a plate's longer side.
@@ -21,8 +21,8 @@ const CLIPPED_LUMINANCE: f32 = 2.0;
 ///
 /// It is computed once a shot, so that it does not flicker, and from the whole plate, whatever the crop.
 pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<ElevationProfile> {
-    let path = plan.scene.plate.image.as_ref()?;
-    let picture = compiled.assets().picture(&path.0, plan.scene.picture.first_frame).ok()?;
+    let picture = compiled.plate_image()?;
+    let alpha = plan.scene.plate.alpha_of(&picture);
     let camera = plan.camera.at(0.0, plan.size);
     let [width, height] = [picture.color.width(), picture.color.height()];
     let mapping = PlateMapping::new(plan, [width, height]);
@@ -33,8 +33,9 @@ pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<Eleva
         .flat_map(|y| positions(width).map(move |x| [x, y]))
         .filter_map(|[x, y]| {
             let pixel = DVec2::new(mapping.picture_position(0, x), mapping.picture_position(1, y));
-            let [red, green, blue, _] = picture.color.at(x, y);
-            let light = to_scene(&view, picture.encoding, [red, green, blue]);
+            let [red, green, blue, _] =
+                over_black(&view, picture.encoding, alpha, premultiplied(alpha, picture.color.at(x, y)));
+            let light = [red, green, blue];
             sample(&camera, pixel, limited(picture.encoding, light))
         })
         .collect();
@@ -96,7 +97,7 @@ fn limited(encoding: Encoding, light: [f32; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::plate::to_scene, *};
 
     #[test]
     fn the_sky_above_a_plate_is_as_bright_as_the_sky_in_it_and_brighter_overhead() {

@@ -225,7 +225,8 @@ pub(crate) fn draw_frame(
         strips.try_for_each(|planes| planes.map(|_| ()))?;
         Vec::new()
     };
-    let opaque = composition.plate.color.is_some() && composition.view.overscan == 0;
+    let plate = composition.plate;
+    let opaque = plate.color.is_some() && !plate.is_transparent && composition.view.overscan == 0;
     let content = composition.content();
     Ok(Frame {
         header,

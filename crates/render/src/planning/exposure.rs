@@ -56,10 +56,9 @@ pub(crate) fn assumed_of_plate(compiled: &CompiledScene, plan: &Plan) -> Option<
 /// Exposure value at ISO 100 with which the plate was taken, if the scene or the picture states it.
 fn of_plate(compiled: &CompiledScene) -> Option<f64> {
     let plate = &compiled.scene().plate;
-    let path = plate.image.as_ref()?;
     match plate.exposure_ev100 {
-        Auto::Set(ev100) => Some(ev100),
-        Auto::Auto => compiled.assets().picture(&path.0, compiled.scene().picture.first_frame).ok()?.exposure_ev100,
+        Auto::Set(ev100) => plate.image.as_ref().map(|_| ev100),
+        Auto::Auto => compiled.plate_image()?.exposure_ev100,
     }
 }
 

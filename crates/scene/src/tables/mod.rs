@@ -1,5 +1,6 @@
 //! The shared tables of a scene file, and the defaults of those that a text omits.
 
 pub(crate) mod defaults;
+pub(crate) mod depth;
 pub mod picture;
 pub(crate) mod plate;

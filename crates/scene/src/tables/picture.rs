@@ -3,7 +3,9 @@
 use bansho_base::{
     color::MAX_EV100,
     math::{self, DVec3},
-    parameters::{AssetPath, Auto, Kind, Node, Parameter, ProblemKind, Range, Reader, Value, animated::Animated},
+    parameters::{
+        AssetPath, Auto, Kind, Length, Node, Parameter, ProblemKind, Range, Reader, Value, animated::Animated,
+    },
     phenomenon::surroundings::{Emitter, Light},
 };
 
@@ -124,17 +126,43 @@ bansho_base::choice! {
     }
 }
 
+bansho_base::choice! {
+    /// The values that the alpha of a plate blends.
+    pub enum PlateAlpha {
+        /// Linear light in an EXR, or as the mark `bansho:alpha` of a PNG says; else encoded values.
+        Auto = "auto",
+        /// Encoded values, as browsers and image editors blend them.
+        Encoded = "encoded",
+        /// Linear light, as compositors and game engines blend it.
+        Linear = "linear",
+    }
+}
+
+/// Bounds of a known depth: pixels and meters.
+const KNOWN_DEPTH: Range = Range::new(0.0, 1e6);
+
 bansho_base::parameters! {
     /// A picture over which the phenomena are composited, and its depth, which hides what is behind it.
     pub struct PlateParameters {
-        /// PNG, JPEG or EXR; `####` is replaced by the frame number.
+        /// PNG, JPEG, EXR, WebP or TIFF; `####` is replaced by the frame number.
         image: Option<AssetPath> = None;
-        /// EXR whose channel `Z`, or whose only channel, is depth. The default is the channel `Z` of the image.
+        /// The layer of an EXR that is shown, such as "ViewLayer.Combined". The default is the one that renderers write for this use.
+        image_layer: Option<String> = None;
+        /// The values that the alpha of the image blends, where it is not in an EXR.
+        alpha: PlateAlpha = PlateAlpha::Auto;
+        /// Depth of the image: EXR, PNG, PFM, TIFF or NPY. The default is the depth in the image itself, if it is an EXR that has one.
         depth: Option<AssetPath> = None;
+        /// The layer or channel of an EXR that is its depth, such as "RenderLayer.Depth.Z". The default is the one that renderers write for this use.
+        depth_layer: Option<String> = None;
         /// What the depth measures.
         depth_kind: DepthKind = DepthKind::Axis;
-        /// Meters for each unit of the depth channel.
+        /// Meters for each unit of the depth; for integers, each code: 0.001 for millimeters. An inverse depth is 1 / (`depth_shift` + value / `depth_scale`).
         depth_scale: f64 = 1.0, limits(Range::new(1e-6, 1e6)), unit("m");
+        /// Inverse distance where an inverse depth is 0.
+        depth_shift: f64 = 0.0, limits(Range::new(-1e6, 1e6)), unit("1/m");
+        /// Points whose distance along the camera's axis is known, as [x, y, meters], in pixels of the image from its upper left corner. From two or more of them,
+        /// scale and shift of an inverse depth are found by least squares.
+        depth_known: Vec<[f64; 3]> = Vec::new(), limits(Length { min: 0, max: 1000, item: KNOWN_DEPTH });
         /// Exposure value at ISO 100 with which it was taken, so that its white is 1.2 * 2^EV cd/m^2: 15 in sunshine, 12 under heavy clouds, 4 in
         /// a lit street at night. "auto": that of the file (Exif, EXR), else an assumed value.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-MAX_EV100, MAX_EV100)), unit("EV");

@@ -6,9 +6,9 @@ use bansho::{
     Assets, MemoryAssets,
     base::{
         geometry::{mesh::Mesh, strokes::Drawing},
-        host::assets::{AssetError, AssetProblem, Picture},
+        host::assets::{AssetError, AssetProblem, DepthMap, Picture, PictureLayers},
     },
-    media::assets::{decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing},
+    media::assets::{decode_depth, decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing},
 };
 
 /// The embedded files, and files added by the user.
@@ -63,6 +63,14 @@ impl Assets for OverlayAssets {
         self.source(path).picture(path, frame)
     }
 
+    fn picture_layers(&self, path: &str, frame: i64, layers: &PictureLayers) -> Result<Arc<Picture>, AssetError> {
+        self.source(path).picture_layers(path, frame, layers)
+    }
+
+    fn depth(&self, path: &str, frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
+        self.source(path).depth(path, frame, layer)
+    }
+
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
         self.source(path).mesh(path)
     }
@@ -89,9 +97,18 @@ fn extension(name: &str) -> &str {
 }
 
 impl Assets for BundledAssets {
-    fn picture(&self, path: &str, _frame: i64) -> Result<Arc<Picture>, AssetError> {
-        let picture = decode_picture(self.require(path)?, extension(path), MemoryLimit::default());
+    fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
+        self.picture_layers(path, frame, &PictureLayers::default())
+    }
+
+    fn picture_layers(&self, path: &str, _frame: i64, layers: &PictureLayers) -> Result<Arc<Picture>, AssetError> {
+        let picture = decode_picture(self.require(path)?, extension(path), layers, MemoryLimit::default());
         picture.map(Arc::new).map_err(|problem| error(path, problem))
+    }
+
+    fn depth(&self, path: &str, _frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
+        let depth = decode_depth(self.require(path)?, extension(path), layer, MemoryLimit::default());
+        depth.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
@@ -101,7 +118,7 @@ impl Assets for BundledAssets {
     }
 
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
-        decode_drawing(&self.text(path)?).map(Arc::new).map_err(|problem| error(path, problem))
+        decode_drawing(self.require(path)?).map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {

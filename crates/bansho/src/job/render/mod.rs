@@ -77,7 +77,8 @@ impl PreparedJob {
         observer: &dyn JobObserver,
     ) -> Result<(), JobError> {
         let max_in_flight = rayon::current_num_threads() + 1;
-        let sink = self.format.open(&self.plan, numbers.len(), size, max_in_flight)?;
+        let sink =
+            self.format.open(&self.plan, self.compiled.has_opaque_plate(), numbers.len(), size, max_in_flight)?;
         let drawn = AtomicUsize::new(0);
         let files = FileWriter { format: &self.format, sink, max_in_flight, observer, drawn, finished };
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
@@ -87,7 +88,7 @@ impl PreparedJob {
 
     /// Draws all frames into one picture and writes it.
     fn run_contact_sheet(&self, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
-        let sink = self.format.open(&self.plan, 1, sheet.size(), 1)?;
+        let sink = self.format.open(&self.plan, self.compiled.has_opaque_plate(), 1, sheet.size(), 1)?;
         let make_tile = |frame: &mut Frame, observer: &dyn Observer| {
             contact_sheet::tile(frame, self.contact_background, &self.format, observer)
         };

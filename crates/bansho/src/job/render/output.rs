@@ -63,17 +63,18 @@ impl Format {
         [Some(picture.to_path_buf()), metadata].into_iter().flatten()
     }
 
-    /// Opens the files for `count` frames of `size` pixels. Up to `max_in_flight` of them are written at once.
+    /// Opens the files for `count` frames of `size` pixels, all of them `opaque` or not. Up to `max_in_flight` of them are written at once.
     pub(crate) fn open(
         &self,
         plan: &Plan,
+        opaque: bool,
         count: usize,
         size: [usize; 2],
         max_in_flight: usize,
     ) -> Result<Sink, JobError> {
         let fps = plan.fps();
         let options = SinkOptions {
-            opaque: plan.scene().has_plate(),
+            opaque,
             alpha: self.alpha,
             sixteen_bits: self.bits == BitDepth::Sixteen,
             window: max_in_flight,

@@ -270,7 +270,7 @@ impl Job {
         if self.transparent && (scene.has_plate() || scene.shows_stated_backdrop()) {
             warnings.push(Warning::TransparentUnused);
         }
-        let has_alpha = kind.has_straight_alpha() && !job.plan.scene().has_plate() && job.sheet.is_none();
+        let has_alpha = kind.has_straight_alpha() && !job.compiled.has_opaque_plate() && job.sheet.is_none();
         if self.alpha.is_some() && !has_alpha {
             warnings.push(Warning::AlphaUnused);
         }

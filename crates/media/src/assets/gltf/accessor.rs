@@ -4,33 +4,85 @@ use bansho_base::host::assets::AssetProblem;
 
 use super::{buffers::Buffers, json::Object};
 
-/// Element types.
+/// Types of components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Element {
-    /// Three floats of 32 bits.
-    Vector,
+enum Component {
     U8,
     U16,
     U32,
+    F32,
+}
+
+impl Component {
+    fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+}
+
+/// Element types.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Element {
+    component: Component,
+    components: usize,
 }
 
 impl Element {
+    /// The element type of an accessor; `None` for one that is not used.
     fn of(accessor: &Object) -> Result<Option<Self>, AssetProblem> {
-        Ok(match (accessor.required_unsigned("componentType")?, accessor.text("type")?) {
-            (5126, Some("VEC3")) => Some(Self::Vector),
-            (5121, Some("SCALAR")) => Some(Self::U8),
-            (5123, Some("SCALAR")) => Some(Self::U16),
-            (5125, Some("SCALAR")) => Some(Self::U32),
-            _ => None,
-        })
+        let component = match accessor.required_unsigned("componentType")? {
+            5121 => Component::U8,
+            5123 => Component::U16,
+            5125 => Component::U32,
+            5126 => Component::F32,
+            _ => return Ok(None),
+        };
+        let components = match accessor.text("type")? {
+            Some("SCALAR") => 1,
+            Some("VEC3") => 3,
+            Some("VEC4") => 4,
+            Some("MAT4") => 16,
+            _ => return Ok(None),
+        };
+        Ok(Some(Self { component, components }))
     }
 
     fn bytes(self) -> usize {
+        self.component.bytes() * self.components
+    }
+}
+
+/// What an accessor is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum AccessorUse {
+    Positions,
+    Indices,
+    Joints,
+    Weights,
+    Matrices,
+}
+
+impl AccessorUse {
+    fn allows(self, Element { component, components }: Element) -> bool {
         match self {
-            Self::Vector => 12,
-            Self::U8 => 1,
-            Self::U16 => 2,
-            Self::U32 => 4,
+            Self::Positions => component == Component::F32 && components == 3,
+            Self::Indices => component != Component::F32 && components == 1,
+            Self::Joints => matches!(component, Component::U8 | Component::U16) && components == 4,
+            Self::Weights => component != Component::U32 && components == 4,
+            Self::Matrices => component == Component::F32 && components == 16,
+        }
+    }
+
+    fn expected(self) -> &'static str {
+        match self {
+            Self::Positions => "is not that of positions; allowed: VEC3 of componentType 5126, floats",
+            Self::Indices => "is not that of indices; allowed: SCALAR of componentType 5121, 5123 or 5125",
+            Self::Joints => "is not that of joints; allowed: VEC4 of componentType 5121 or 5123",
+            Self::Weights => "is not that of weights; allowed: VEC4 of componentType 5121, 5123 or 5126",
+            Self::Matrices => "is not that of matrices; allowed: MAT4 of componentType 5126, floats",
         }
     }
 }
@@ -46,25 +98,37 @@ pub(super) struct Accessor<'b> {
 }
 
 impl<'b> Accessor<'b> {
+    fn read(root: &Object, index: usize, buffers: &'b Buffers, usage: AccessorUse) -> Result<Self, AssetProblem> {
+        let accessor = root.item("accessors", index)?;
+        match Element::of(&accessor)?.filter(|element| usage.allows(*element)) {
+            Some(element) => Self::with_element(root, &accessor, element, buffers),
+            None => Err(accessor.error_at("type", usage.expected())),
+        }
+    }
+
     /// The accessor `accessors[index]` as positions: vectors of three floats.
     pub(super) fn positions(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
-        let accessor = root.item("accessors", index)?;
-        match Element::of(&accessor)? {
-            Some(Element::Vector) => Self::with_element(root, &accessor, Element::Vector, buffers),
-            _ => {
-                Err(accessor.error_at("type", "is not that of positions; allowed: VEC3 of componentType 5126, floats"))
-            }
-        }
+        Self::read(root, index, buffers, AccessorUse::Positions)
     }
 
     /// The accessor `accessors[index]` as indices: unsigned integers of 8, 16 or 32 bits.
     pub(super) fn indices(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
-        let accessor = root.item("accessors", index)?;
-        match Element::of(&accessor)? {
-            Some(element) if element != Element::Vector => Self::with_element(root, &accessor, element, buffers),
-            _ => Err(accessor
-                .error_at("type", "is not that of indices; allowed: SCALAR of componentType 5121, 5123 or 5125")),
-        }
+        Self::read(root, index, buffers, AccessorUse::Indices)
+    }
+
+    /// The accessor `accessors[index]` as indices of four joints.
+    pub(super) fn joints(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        Self::read(root, index, buffers, AccessorUse::Joints)
+    }
+
+    /// The accessor `accessors[index]` as weights of four joints.
+    pub(super) fn weights(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        Self::read(root, index, buffers, AccessorUse::Weights)
+    }
+
+    /// The accessor `accessors[index]` as matrices of four by four floats.
+    pub(super) fn matrices(root: &Object, index: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
+        Self::read(root, index, buffers, AccessorUse::Matrices)
     }
 
     fn with_element(
@@ -98,28 +162,51 @@ impl<'b> Accessor<'b> {
         Ok(Self { bytes, stride, count, element })
     }
 
-    fn elements<const N: usize>(self) -> impl Iterator<Item = [u8; N]> + use<'b, N> {
-        let element = move |index: usize| self.bytes.get(index * self.stride..)?.first_chunk::<N>().copied();
-        (0..self.count).filter_map(element)
+    /// The bytes of each element.
+    fn elements(self) -> impl Iterator<Item = &'b [u8]> + use<'b> {
+        let bytes = self.element.bytes();
+        (0..self.count).filter_map(move |index| self.bytes.get(index * self.stride..)?.get(..bytes))
     }
 
-    /// The elements as vectors; empty if they are integers.
+    /// The first `N` components of each element as floats; integers are divided by the largest.
+    pub(super) fn floats<const N: usize>(self) -> impl Iterator<Item = [f32; N]> + use<'b, N> {
+        let component = self.element.component;
+        self.elements().map(move |bytes| std::array::from_fn(|index| float(component, bytes, index)))
+    }
+
+    /// The first `N` components of each element as integers; 0 if they are floats.
+    pub(super) fn integers<const N: usize>(self) -> impl Iterator<Item = [u32; N]> + use<'b, N> {
+        let component = self.element.component;
+        self.elements().map(move |bytes| std::array::from_fn(|index| integer(component, bytes, index)))
+    }
+
+    /// The elements as vectors.
     pub(super) fn vectors(self) -> impl Iterator<Item = [f32; 3]> + use<'b> {
-        let vector = |bytes: [u8; 12]| {
-            std::array::from_fn(|axis| {
-                f32::from_le_bytes([bytes[4 * axis], bytes[4 * axis + 1], bytes[4 * axis + 2], bytes[4 * axis + 3]])
-            })
-        };
-        self.elements::<12>().map(vector)
+        self.floats()
     }
 
-    /// The elements as integers; empty if they are vectors.
+    /// The elements as integers.
     pub(super) fn indices_u32(self) -> Vec<u32> {
-        match self.element {
-            Element::Vector => Vec::new(),
-            Element::U8 => self.elements().map(|[byte]| u32::from(byte)).collect(),
-            Element::U16 => self.elements().map(|bytes| u32::from(u16::from_le_bytes(bytes))).collect(),
-            Element::U32 => self.elements().map(u32::from_le_bytes).collect(),
-        }
+        self.integers().map(|[index]| index).collect()
+    }
+}
+
+/// The component with this index; 0 beyond the element.
+fn integer(component: Component, bytes: &[u8], index: usize) -> u32 {
+    match component {
+        Component::U8 => bytes.get(index).copied().map_or(0, u32::from),
+        Component::U16 => bytes.as_chunks::<2>().0.get(index).map_or(0, |bytes| u16::from_le_bytes(*bytes).into()),
+        Component::U32 => bytes.as_chunks::<4>().0.get(index).map_or(0, |bytes| u32::from_le_bytes(*bytes)),
+        Component::F32 => 0,
+    }
+}
+
+/// The component with this index; 0 beyond the element.
+fn float(component: Component, bytes: &[u8], index: usize) -> f32 {
+    match component {
+        Component::F32 => bytes.as_chunks::<4>().0.get(index).map_or(0.0, |bytes| f32::from_le_bytes(*bytes)),
+        Component::U8 => integer(component, bytes, index) as f32 / 255.0,
+        Component::U16 => integer(component, bytes, index) as f32 / 65535.0,
+        Component::U32 => integer(component, bytes, index) as f32,
     }
 }

@@ -95,6 +95,11 @@ impl<'a> Object<'a> {
         self.read(key, &format!("{N} numbers"), numbers)
     }
 
+    /// Any number of numbers.
+    pub(super) fn number_list(&self, key: &str) -> Result<Option<Vec<f64>>, AssetProblem> {
+        self.read(key, "numbers", |value| value.as_array()?.iter().map(Value::as_f64).collect())
+    }
+
     /// An object.
     pub(super) fn object(&self, key: &str) -> Result<Option<Self>, AssetProblem> {
         let object = |value: &'a Value| Some(Self { path: self.path_of(key), fields: value.as_object()? });

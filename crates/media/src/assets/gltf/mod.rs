@@ -8,8 +8,9 @@ mod buffers;
 mod glb;
 mod json;
 mod nodes;
+mod skins;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map::Entry};
 
 use bansho_base::{
     geometry::mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, MeshError},
@@ -17,7 +18,14 @@ use bansho_base::{
     math::{DMat4, DVec3},
 };
 
-use self::{accessor::Accessor, buffers::Buffers, glb::Glb, json::Object, nodes::MeshInstance};
+use self::{
+    accessor::Accessor,
+    buffers::Buffers,
+    glb::Glb,
+    json::Object,
+    nodes::{MeshInstance, SceneNodes},
+    skins::{Influences, MorphTargets, Skin},
+};
 use super::limits::MemoryLimit;
 
 /// Reads an external buffer of a glTF by its URI, up to a number of bytes.
@@ -35,8 +43,8 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
 /// Decodes all triangles of the default scene, with the transforms of their nodes. Without a default scene it is the first one; without
 /// scenes, all nodes.
 ///
-/// `file` are the bytes of a file with this `extension`; `read_resource` reads external buffers. Morph targets, skins, required extensions, and
-/// sparse or compressed accessors are not supported.
+/// `file` are the bytes of a file with this `extension`; `read_resource` reads external buffers. Skins and morph targets are in their rest pose.
+/// Sparse or compressed accessors are not supported, nor required extensions that change geometry.
 ///
 /// # Errors
 /// Another extension, damage, an unsupported feature, more memory than `limit`, or no triangles. Never panics.
@@ -56,20 +64,30 @@ pub fn decode_mesh(
     let value = json::parse(json)?;
     let root = Object::root(&value)?;
     check_version_and_extensions(&root)?;
-    let mesh_instances = nodes::mesh_instances(&root)?;
+    let SceneNodes { meshes: mesh_instances, world_from_node } = nodes::scene_nodes(&root)?;
     let limit = MemoryLimit { used: limit.used.saturating_add(read_bytes), ..limit };
     let buffers = Buffers::read(&root, binary, read_resource, limit)?;
     let mut meshes = BTreeMap::new();
-    for &MeshInstance { mesh, .. } in &mesh_instances {
-        if let std::collections::btree_map::Entry::Vacant(entry) = meshes.entry(mesh) {
-            entry.insert(TrianglePrimitives::read(&root, mesh, &buffers)?);
+    let mut skins = BTreeMap::new();
+    for &MeshInstance { mesh, skin, .. } in &mesh_instances {
+        if let Entry::Vacant(entry) = meshes.entry(mesh) {
+            let stated = || mesh_instances.iter().filter(|other| other.mesh == mesh);
+            entry.insert(TrianglePrimitives::read(&root, mesh, stated(), &buffers)?);
+        }
+        let Some(skin) = skin else { continue };
+        if let Entry::Vacant(entry) = skins.entry(skin) {
+            entry.insert(Skin::read(&root, skin, &world_from_node, &buffers)?);
         }
     }
     let mesh_bytes = check_totals(mesh_instances.iter().map(|instance| &meshes[&instance.mesh]))?;
     limit.check(buffers.memory_bytes().saturating_add(mesh_bytes))?;
     let mut builder = MeshBuilder::default();
-    for MeshInstance { mesh, world_from_mesh } in &mesh_instances {
-        meshes[mesh].primitives.iter().try_for_each(|primitive| builder.add(primitive, world_from_mesh))?;
+    for instance in &mesh_instances {
+        let TrianglePrimitives { primitives, weights, .. } = &meshes[&instance.mesh];
+        let weights = instance.weights.as_ref().unwrap_or(weights);
+        let skin = instance.skin.map(|skin| &skins[&skin]);
+        let pose = Pose { weights, skin, world_from_mesh: &instance.world_from_mesh };
+        primitives.iter().try_for_each(|primitive| builder.add(primitive, &pose))?;
     }
     Ok(Mesh::new(builder.vertices, builder.triangles)?)
 }
@@ -94,13 +112,57 @@ fn check_version_and_extensions(root: &Object) -> Result<(), AssetProblem> {
     if !version.starts_with("2.") {
         return Err(asset.error_at("version", format!("is {version:?}; allowed: \"2.0\"")));
     }
-    match root.list("extensionsRequired")? {
-        [] => Ok(()),
-        [first, ..] => {
-            Err(root
-                .error_at("extensionsRequired", format!("requires {first}; allowed: files that require no extensions")))
+    let required = root.list("extensionsRequired")?.iter().map(|name| name.as_str().unwrap_or_default());
+    let geometry: Vec<&str> = required.filter(|name| !concerns_no_geometry(name)).collect();
+    let advice = |name: &str| COMPRESSION.iter().find(|(known, _)| *known == name).map(|(_, advice)| *advice);
+    // What compresses the mesh is named first: it explains everything else.
+    if let Some((name, advice)) = geometry.iter().find_map(|name| Some((name, advice(name)?))) {
+        return Err(root.error_at("extensionsRequired", format!("requires {name:?}: {advice}")));
+    }
+    match geometry.first() {
+        None => Ok(()),
+        Some(first) => {
+            let message = format!("requires {first:?}; allowed: extensions of materials, textures and lights");
+            Err(root.error_at("extensionsRequired", message))
         }
     }
+}
+
+/// Extensions that compress geometry, and what to do.
+const COMPRESSION: [(&str, &str); 4] = [
+    (
+        "KHR_draco_mesh_compression",
+        "its mesh is compressed by Draco; export it without compression (in Blender: Data, Mesh, Compression off), or unpack it by `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "EXT_meshopt_compression",
+        "its mesh is compressed by meshopt; export it without `-c` of gltfpack, or unpack it by `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_meshopt_compression",
+        "its mesh is compressed by meshopt; export it without `-c` of gltfpack, or unpack it by `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_mesh_quantization",
+        "its positions are quantized to integers; export it with `-noq` of gltfpack, or by `gltf-transform dequantize in.glb out.glb`",
+    ),
+];
+
+/// Whether an extension only concerns materials, textures, lights, sounds or notes.
+fn concerns_no_geometry(name: &str) -> bool {
+    const PREFIXES: [&str; 10] = [
+        "KHR_materials_",
+        "EXT_materials_",
+        "ADOBE_materials_",
+        "KHR_texture_",
+        "EXT_texture_",
+        "MSFT_texture_",
+        "KHR_lights_",
+        "EXT_lights_",
+        "KHR_xmp",
+        "KHR_audio",
+    ];
+    PREFIXES.iter().any(|prefix| name.starts_with(prefix))
 }
 
 /// Rejects too many triangles or vertices before any are read; returns the memory for building the mesh.
@@ -119,8 +181,19 @@ fn check_totals<'m>(meshes: impl Iterator<Item = &'m TrianglePrimitives<'m>>) ->
     Ok((vertices * VERTEX_BYTES + triangles * TRIANGLE_BYTES) as u64)
 }
 
+/// How the vertices of a mesh are placed.
+struct Pose<'a> {
+    /// Weights of the morph targets.
+    weights: &'a [f64],
+    /// The skin, which replaces the transform.
+    skin: Option<&'a Skin>,
+    world_from_mesh: &'a DMat4,
+}
+
 /// The triangle primitives of a mesh.
 struct TrianglePrimitives<'b> {
+    /// Weights of its morph targets.
+    weights: Vec<f64>,
     primitives: Vec<Primitive<'b>>,
     triangles: usize,
     vertices: usize,
@@ -131,6 +204,8 @@ struct Primitive<'b> {
     positions: Accessor<'b>,
     indices: Option<Accessor<'b>>,
     mode: PrimitiveMode,
+    targets: MorphTargets<'b>,
+    influences: Influences<'b>,
 }
 
 /// Topology of a primitive.
@@ -163,10 +238,21 @@ impl PrimitiveMode {
 }
 
 impl<'b> TrianglePrimitives<'b> {
-    fn read(root: &Object, mesh: usize, buffers: &'b Buffers) -> Result<Self, AssetProblem> {
-        let mut own = Self { primitives: Vec::new(), triangles: 0, vertices: 0 };
-        for primitive in root.item("meshes", mesh)?.items("primitives")? {
-            let Some(primitive) = Primitive::read(root, &primitive?, buffers)? else { continue };
+    /// Reads a mesh that is shown by these `instances`.
+    fn read<'i>(
+        root: &Object,
+        mesh: usize,
+        instances: impl Iterator<Item = &'i MeshInstance>,
+        buffers: &'b Buffers,
+    ) -> Result<Self, AssetProblem> {
+        let mesh = root.item("meshes", mesh)?;
+        let weights = mesh.number_list("weights")?.unwrap_or_default();
+        let stated: Vec<&[f64]> = instances.map(|instance| instance.weights.as_deref().unwrap_or(&weights)).collect();
+        let is_used =
+            |target: usize| stated.iter().any(|weights| weights.get(target).is_some_and(|weight| *weight != 0.0));
+        let mut own = Self { weights: weights.clone(), primitives: Vec::new(), triangles: 0, vertices: 0 };
+        for primitive in mesh.items("primitives")? {
+            let Some(primitive) = Primitive::read(root, &primitive?, is_used, buffers)? else { continue };
             let triangles = primitive.mode.triangles(primitive.indices.unwrap_or(primitive.positions).count);
             if triangles > 0 {
                 own.triangles = own.triangles.saturating_add(triangles);
@@ -180,15 +266,37 @@ impl<'b> TrianglePrimitives<'b> {
 
 impl<'b> Primitive<'b> {
     /// `None` for points, lines and primitives without positions.
-    fn read(root: &Object, primitive: &Object, buffers: &'b Buffers) -> Result<Option<Self>, AssetProblem> {
+    fn read(
+        root: &Object,
+        primitive: &Object,
+        is_used: impl Fn(usize) -> bool,
+        buffers: &'b Buffers,
+    ) -> Result<Option<Self>, AssetProblem> {
         let accessors = root.list("accessors")?.len();
         let attributes = primitive.object("attributes")?;
-        let positions = attributes.map(|attributes| attributes.index("POSITION", accessors)).transpose()?.flatten();
+        let Some(attributes) = attributes else { return Ok(None) };
+        let positions = attributes.index("POSITION", accessors)?;
         let (Some(mode), Some(positions)) = (PrimitiveMode::of(primitive)?, positions) else { return Ok(None) };
         let positions = Accessor::positions(root, positions, buffers)?;
         let indices = primitive.index("indices", accessors)?;
         let indices = indices.map(|indices| Accessor::indices(root, indices, buffers)).transpose()?;
-        Ok(Some(Self { positions, indices, mode }))
+        let targets = MorphTargets::read(root, primitive, is_used, buffers)?;
+        let influences = Influences::read(root, &attributes, positions.count, buffers)?;
+        Ok(Some(Self { positions, indices, mode, targets, influences }))
+    }
+}
+
+impl Primitive<'_> {
+    /// Its vertices in the world.
+    fn vertices(&self, pose: &Pose) -> Vec<DVec3> {
+        let mut vertices: Vec<DVec3> =
+            self.positions.vectors().map(|vertex| DVec3::from(vertex.map(f64::from))).collect();
+        self.targets.apply(&mut vertices, pose.weights);
+        match pose.skin.filter(|_| !self.influences.is_empty()) {
+            Some(skin) => self.influences.apply(&mut vertices, skin),
+            None => vertices.iter_mut().for_each(|vertex| *vertex = pose.world_from_mesh.transform_point3(*vertex)),
+        }
+        vertices
     }
 }
 
@@ -203,12 +311,10 @@ impl MeshBuilder {
     ///
     /// # Errors
     /// An index beyond its vertices.
-    fn add(&mut self, primitive: &Primitive, world_from_mesh: &DMat4) -> Result<(), MeshError> {
+    fn add(&mut self, primitive: &Primitive, pose: &Pose) -> Result<(), MeshError> {
         let (first, count) = (self.vertices.len() as u32, primitive.positions.count);
-        let transformed = |vertex: [f32; 3]| {
-            world_from_mesh.transform_point3(DVec3::from(vertex.map(f64::from))).as_vec3().to_array()
-        };
-        self.vertices.extend(primitive.positions.vectors().map(transformed));
+        let vertices = primitive.vertices(pose).into_iter().map(|vertex| vertex.as_vec3().to_array());
+        self.vertices.extend(vertices);
         let indices = primitive.indices.map_or_else(|| (0..count as u32).collect(), Accessor::indices_u32);
         let triangles = triangles(primitive.mode, &indices);
         for (triangle, own) in triangles.iter().enumerate() {

@@ -14,29 +14,58 @@ const MAX_NODES: usize = 100_000;
 pub(super) struct MeshInstance {
     pub(super) mesh: usize,
     pub(super) world_from_mesh: DMat4,
+    /// The skin that moves it, instead of its transform.
+    pub(super) skin: Option<usize>,
+    /// Weights of its morph targets; `None` for those of the mesh.
+    pub(super) weights: Option<Vec<f64>>,
+}
+
+/// What a scene shows.
+pub(super) struct SceneNodes {
+    pub(super) meshes: Vec<MeshInstance>,
+    /// The transforms of all nodes.
+    pub(super) world_from_node: Vec<DMat4>,
 }
 
 struct Node {
     mesh: Option<usize>,
+    skin: Option<usize>,
+    weights: Option<Vec<f64>>,
     parent_from_node: DMat4,
     children: Vec<usize>,
     parent: Option<usize>,
 }
 
 /// The meshes of the default scene; without a default, of the first scene; without scenes, of all nodes.
-pub(super) fn mesh_instances(root: &Object) -> Result<Vec<MeshInstance>, AssetProblem> {
+pub(super) fn scene_nodes(root: &Object) -> Result<SceneNodes, AssetProblem> {
     let nodes = read_tree(root)?;
-    let mut mesh_instances = Vec::new();
-    let mut stack: Vec<(usize, DMat4)> =
-        root_nodes(root, &nodes)?.into_iter().map(|node| (node, DMat4::IDENTITY)).collect();
+    let world_from_node = world_transforms(&nodes);
+    let mut meshes = Vec::new();
+    let mut stack = root_nodes(root, &nodes)?;
     // Every node has at most one parent, so none is visited twice.
-    while let Some((index, world_from_parent)) = stack.pop() {
+    while let Some(index) = stack.pop() {
         let node = &nodes[index];
-        let world_from_node = world_from_parent * node.parent_from_node;
-        mesh_instances.extend(node.mesh.map(|mesh| MeshInstance { mesh, world_from_mesh: world_from_node }));
-        stack.extend(node.children.iter().map(|&child| (child, world_from_node)));
+        meshes.extend(node.mesh.map(|mesh| MeshInstance {
+            mesh,
+            world_from_mesh: world_from_node[index],
+            skin: node.skin,
+            weights: node.weights.clone(),
+        }));
+        stack.extend(&node.children);
     }
-    Ok(mesh_instances)
+    Ok(SceneNodes { meshes, world_from_node })
+}
+
+/// The transforms of all nodes, which form trees.
+fn world_transforms(nodes: &[Node]) -> Vec<DMat4> {
+    let mut world_from_node = vec![DMat4::IDENTITY; nodes.len()];
+    let mut stack: Vec<usize> = (0..nodes.len()).filter(|&index| nodes[index].parent.is_none()).collect();
+    while let Some(index) = stack.pop() {
+        let world_from_parent = nodes[index].parent.map_or(DMat4::IDENTITY, |parent| world_from_node[parent]);
+        world_from_node[index] = world_from_parent * nodes[index].parent_from_node;
+        stack.extend(&nodes[index].children);
+    }
+    world_from_node
 }
 
 /// Reads all nodes, which must form trees: no node has two parents or is its own ancestor.
@@ -45,9 +74,8 @@ fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
     if count > MAX_NODES {
         return Err(root.error_at("nodes", format!("has {count} elements; allowed: up to {MAX_NODES}")));
     }
-    let meshes = root.list("meshes")?.len();
-    let mut nodes: Vec<Node> =
-        root.items("nodes")?.map(|node| read(&node?, count, meshes)).collect::<Result<_, _>>()?;
+    let lengths = [count, root.list("meshes")?.len(), root.list("skins")?.len()];
+    let mut nodes: Vec<Node> = root.items("nodes")?.map(|node| read(&node?, lengths)).collect::<Result<_, _>>()?;
     for index in 0..count {
         for child in std::mem::take(&mut nodes[index].children) {
             if let Some(other) = nodes[child].parent.replace(index) {
@@ -70,7 +98,8 @@ fn read_tree(root: &Object) -> Result<Vec<Node>, AssetProblem> {
     Ok(nodes)
 }
 
-fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem> {
+/// Reads a node of a file with these numbers of nodes, meshes and skins.
+fn read(node: &Object, [nodes, meshes, skins]: [usize; 3]) -> Result<Node, AssetProblem> {
     let vector = |key, default: f32| {
         let numbers: Option<[f32; 3]> = node.numbers(key)?;
         Ok::<_, AssetProblem>(DVec3::from(numbers.unwrap_or([default; 3]).map(f64::from)))
@@ -85,6 +114,8 @@ fn read(node: &Object, nodes: usize, meshes: usize) -> Result<Node, AssetProblem
     };
     Ok(Node {
         mesh: node.index("mesh", meshes)?,
+        skin: node.index("skin", skins)?,
+        weights: node.number_list("weights")?,
         parent_from_node,
         children: node.indices("children", nodes)?,
         parent: None,

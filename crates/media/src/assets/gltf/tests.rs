@@ -137,7 +137,7 @@ fn a_fault_says_where_it_is_and_what_is_allowed() {
         (
             r#""buffers":[{"#,
             r#""extensionsRequired":["X"],"buffers":[{"#,
-            r#"extensionsRequired requires "X"; allowed: "#,
+            r#"extensionsRequired requires "X"; allowed: extensions of materials"#,
         ),
         (r#""buffers":[{"#, r#""buffers":[7,{"#, "buffers[0] is invalid; allowed: an object"),
     ];
@@ -281,5 +281,64 @@ fn every_single_damaged_byte_is_survived() {
             // Any result will do, as long as it returns.
             drop(decode_mesh(&bad, "glb", &no_resources, LIMIT));
         }
+    }
+}
+
+#[test]
+fn extensions_of_materials_never_refuse_a_mesh_and_compression_is_named_first() {
+    let requires =
+        |names: &str| changed(r#""buffers":[{"#, &format!(r#""extensionsRequired":[{names}],"buffers":[{{"#));
+    let plain = requires(r#""KHR_materials_clearcoat","KHR_texture_basisu","EXT_texture_webp","KHR_lights_punctual""#);
+    assert_eq!(decode_mesh(&plain, "glb", &no_resources, LIMIT).unwrap().len(), 1);
+    for (name, words) in [
+        ("KHR_draco_mesh_compression", "compressed by Draco; export it without"),
+        ("EXT_meshopt_compression", "compressed by meshopt; export"),
+        ("KHR_mesh_quantization", "quantized to integers; export"),
+    ] {
+        let told = reason(&requires(&format!(r#""X","{name}""#)), "glb");
+        assert!(told.contains(words) && told.contains(name), "{told}");
+    }
+}
+
+#[test]
+fn attributes_of_an_application_and_morph_weights_are_read_as_the_format_says() {
+    let own = document("", 3, "").replace(r#""POSITION":0"#, r#""POSITION":0,"_HEAT":0"#);
+    assert_eq!(decode_mesh(&glb(&own, &bytes()), "glb", &no_resources, LIMIT).unwrap().len(), 1);
+    // The displacements are the positions themselves: weight 0.5 scales by 1.5. The node's weights come before the mesh's.
+    let morphed = own.replace(r#""indices":1}]"#, r#""indices":1,"targets":[{"POSITION":0},{}]}],"weights":[0.5,1]"#);
+    let top = |json: &str| decode_mesh(&glb(json, &bytes()), "glb", &no_resources, LIMIT).unwrap().bounds()[1];
+    assert_eq!(top(&own), DVec3::new(2.0, 7.0, 0.0));
+    assert_eq!(top(&morphed), DVec3::new(3.0, 8.0, 0.0));
+    assert_eq!(top(&morphed.replace(r#""mesh":0,"#, r#""mesh":0,"weights":[1,0],"#)), DVec3::new(4.0, 9.0, 0.0));
+}
+
+#[test]
+fn a_skin_in_its_rest_pose_moves_its_vertices_and_its_node_does_not() {
+    // Two joints: the first moves by (0, 0, 1) from its bind pose, the second turns by 180 degrees about z. The vertex at (1, 0, 0) belongs to the second,
+    // that at (0, 1, 0) half to each, the one at 0 to the first.
+    let json = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1,2]}],
+        "nodes":[{"mesh":0,"skin":0,"translation":[9,9,9]},{"translation":[0,0,3]},{"rotation":[0,0,1,0]}],
+        "skins":[{"joints":[1,2],"inverseBindMatrices":3}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":1,"WEIGHTS_0":2}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},{"bufferView":1,"componentType":5121,"count":3,"type":"VEC4"},
+                     {"bufferView":2,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"},
+                     {"bufferView":3,"componentType":5126,"count":2,"type":"MAT4"}],
+        "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12},
+                       {"buffer":0,"byteOffset":48,"byteLength":12},{"buffer":0,"byteOffset":60,"byteLength":128}],
+        "buffers":[{"byteLength":188}]}"#;
+    let mut binary = bytes()[..36].to_vec();
+    binary.extend([[0, 1, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]].as_flattened());
+    binary.extend([[255, 0, 0, 0], [255, 0, 0, 0], [85, 85, 0, 0]].as_flattened());
+    for depth in [-2.0_f32, 0.0] {
+        let identity: [[f32; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+        let mut matrix = identity;
+        matrix[3][2] = depth;
+        binary.extend(matrix.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
+    }
+    let mesh = decode_mesh(&glb(json, &binary), "glb", &no_resources, LIMIT).unwrap();
+    let corners: Vec<DVec3> = mesh.triangles().flatten().collect();
+    let expected = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.5]];
+    for (found, wanted) in corners.iter().zip(expected) {
+        assert!((*found - DVec3::from(wanted)).length() < 1e-6, "{corners:?}");
     }
 }

@@ -69,7 +69,7 @@ pub(crate) fn mirrored(
         }
         Ok(())
     })?;
-    Ok(PlateFrame { color: Some(radiance), depth: plate.depth.is_some().then_some(depth) })
+    Ok(PlateFrame { color: Some(radiance), is_transparent: false, depth: plate.depth.is_some().then_some(depth) })
 }
 
 /// Composites the sky behind `image`, as the camera of a mirrored `view` sees it. `scale` is the side of a pixel of `image` in pixels of the
@@ -194,7 +194,7 @@ mod tests {
                 }
             }
         }
-        PlateFrame { color: Some(color), depth: Some(depth) }
+        PlateFrame { color: Some(color), is_transparent: false, depth: Some(depth) }
     }
 
     #[test]

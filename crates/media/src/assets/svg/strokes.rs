@@ -1,0 +1,102 @@
+//! From a resolved tree to polylines.
+
+use bansho_base::{geometry::strokes::Stroke, host::assets::AssetProblem, math::DVec2};
+use usvg::{
+    Group, Node, Path,
+    tiny_skia_path::{PathSegment, Point, Transform},
+};
+
+use super::damaged;
+
+/// Segments of a curve.
+pub(super) const CURVE_SEGMENTS: usize = 16;
+
+/// The strokes of a tree, moved by `origin`.
+pub(super) fn of(root: &Group, origin: DVec2) -> Result<Vec<Stroke>, AssetProblem> {
+    let mut strokes = Vec::new();
+    collect(root, None, origin, &mut strokes)?;
+    Ok(strokes)
+}
+
+fn non_empty(id: &str) -> Option<&str> {
+    (!id.is_empty()).then_some(id)
+}
+
+/// Adds the strokes of a group whose nearest named group is `name`. Its depth was bounded by the first pass.
+fn collect(group: &Group, name: Option<&str>, origin: DVec2, strokes: &mut Vec<Stroke>) -> Result<(), AssetProblem> {
+    let name = non_empty(group.id()).or(name);
+    for child in group.children() {
+        match child {
+            Node::Group(group) => collect(group, name, origin, strokes)?,
+            Node::Path(path) if path.is_visible() => {
+                let id = non_empty(path.id()).or(name);
+                for points in polylines(path, origin) {
+                    if !points.iter().all(|point| point.is_finite()) {
+                        let id = id.unwrap_or("without an id");
+                        return Err(damaged(format!("path `{id}`: a point is infinitely far away")));
+                    }
+                    strokes.push(Stroke { id: id.map(str::to_owned), points });
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The subpaths of a path, each as a polyline; moves that draw nothing are left out.
+fn polylines(path: &Path, origin: DVec2) -> Vec<Vec<DVec2>> {
+    let transform = path.abs_transform();
+    let mut lines: Vec<Vec<DVec2>> = Vec::new();
+    let mut current = Point::zero();
+    for segment in path.data().segments() {
+        let place = |point: DVec2| transformed(&transform, point) + origin;
+        if let PathSegment::MoveTo(point) = segment {
+            lines.push(vec![place(exact(point))]);
+            current = point;
+            continue;
+        }
+        let Some(line) = lines.last_mut() else { continue };
+        let start = exact(current);
+        let steps = || (1..=CURVE_SEGMENTS).map(|step| step as f64 / CURVE_SEGMENTS as f64);
+        match segment {
+            PathSegment::MoveTo(_) => {}
+            PathSegment::LineTo(end) => {
+                line.push(place(exact(end)));
+                current = end;
+            }
+            PathSegment::QuadTo(control, end) => {
+                line.extend(steps().map(|t| place(quadratic([start, exact(control), exact(end)], t))));
+                current = end;
+            }
+            PathSegment::CubicTo(first, second, end) => {
+                line.extend(steps().map(|t| place(cubic([start, exact(first), exact(second), exact(end)], t))));
+                current = end;
+            }
+            PathSegment::Close => line.extend(line.first().copied().filter(|first| line.last() != Some(first))),
+        }
+    }
+    lines.retain(|line| line.iter().any(|point| *point != line[0]));
+    lines
+}
+
+fn exact(point: Point) -> DVec2 {
+    DVec2::new(f64::from(point.x), f64::from(point.y))
+}
+
+fn transformed(transform: &Transform, point: DVec2) -> DVec2 {
+    let column = |x: f32, y: f32| DVec2::new(f64::from(x), f64::from(y));
+    column(transform.sx, transform.ky) * point.x
+        + column(transform.kx, transform.sy) * point.y
+        + column(transform.tx, transform.ty)
+}
+
+fn quadratic([a, b, c]: [DVec2; 3], t: f64) -> DVec2 {
+    let s = 1.0 - t;
+    a * (s * s) + b * (2.0 * s * t) + c * (t * t)
+}
+
+fn cubic([a, b, c, d]: [DVec2; 4], t: f64) -> DVec2 {
+    let s = 1.0 - t;
+    a * (s * s * s) + b * (3.0 * s * s * t) + c * (3.0 * s * t * t) + d * (t * t * t)
+}

@@ -1,0 +1,154 @@
+use super::*;
+
+fn decoded(text: &str) -> Drawing {
+    decode_drawing(text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"))
+}
+
+fn error(text: &str) -> String {
+    decode_drawing(text.as_bytes()).unwrap_err().to_string()
+}
+
+/// Names and points of the strokes.
+fn strokes(text: &str) -> Vec<(Option<String>, Vec<[f64; 2]>)> {
+    let points = |points: &[DVec2]| points.iter().map(|point| point.to_array()).collect();
+    decoded(text).strokes.iter().map(|stroke| (stroke.id.clone(), points(&stroke.points))).collect()
+}
+
+fn expect(text: &str, expected: &[(&str, &[[f64; 2]])]) {
+    let found = strokes(text);
+    assert_eq!(found.len(), expected.len(), "{text}: {found:?}");
+    for ((name, points), (wanted_name, wanted)) in found.iter().zip(expected) {
+        assert_eq!(name.as_deref().unwrap_or_default(), *wanted_name, "{text}");
+        let is_near = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).abs() < 1e-4 && (a[1] - b[1]).abs() < 1e-4;
+        assert!(points.len() == wanted.len() && points.iter().zip(*wanted).all(is_near), "{text}: {points:?}");
+    }
+}
+
+#[test]
+fn strokes_stand_where_their_groups_put_them() {
+    let text = r#"<?xml version="1.0"?>
+        <svg xmlns="http://www.w3.org/2000/svg" viewBox="-10 0 20 40" width="5cm">
+          <defs><path d="M0 0L9 9"/></defs>
+          <g transform="translate(1 2)" id="both">
+            <path id="left" transform="scale(2)" d="M0 0L1 1"/>
+            <polyline points="0,0 1,0 1,1"/>
+            <g style="fill:none; display : none"><line x2="1" y2="1"/></g>
+          </g>
+          <line id="right" x1="1" y1="2" x2="3" y2="4"/>
+          <circle r="3"/>
+        </svg>"#;
+    let lines: [(&str, &[[f64; 2]]); 3] = [
+        ("left", &[[1.0, 2.0], [3.0, 4.0]]),
+        ("both", &[[1.0, 2.0], [2.0, 2.0], [2.0, 3.0]]),
+        ("right", &[[1.0, 2.0], [3.0, 4.0]]),
+    ];
+    expect(text, &lines);
+    let drawing = decoded(text);
+    assert_eq!((drawing.min, drawing.max), (DVec2::new(-10.0, 0.0), DVec2::new(10.0, 40.0)));
+}
+
+#[test]
+fn uses_style_sheets_units_and_nested_coordinates_are_those_of_a_browser() {
+    let line: &[[f64; 2]] = &[[5.0, 5.0], [6.0, 5.0]];
+    let svg = |inner: &str| format!("<svg viewBox='0 0 100 100' width='900' height='10'>{inner}</svg>");
+    let defs = "<defs><path id='arc' d='M0 0H1'/></defs>";
+    expect(&svg(&format!("{defs}<use id='left' href='#arc' x='5' y='5'/>")), &[("left", line)]);
+    expect(&svg(&format!("{defs}<g id='all'><use href='#arc' transform='translate(5 5)'/></g>")), &[("all", line)]);
+    expect(&svg("<style>.off{display:none}</style><path class='off' d='M0 0H9'/><path d='M5 5h1'/>"), &[("", line)]);
+    expect(&svg("<path visibility='hidden' d='M0 0H9'/><path fill='none' stroke='none' d='M5 5h1'/>"), &[("", line)]);
+    expect(&svg("<line x1='5%' y1='5%' x2='6%' y2='5'/>"), &[("", line)]);
+    expect(&svg("<svg x='5' y='5' width='10' height='10' viewBox='0 0 10 10'><path d='M0 0h1'/></svg>"), &[("", line)]);
+    expect(&svg("<switch><g systemLanguage='xx'><path d='M0 0H9'/></g><path d='M5 5h1'/></switch>"), &[("", line)]);
+    expect(&svg("<path d='M5 5h1' style='clip-path:url(#none);mask:url(#x);marker-end:url(#arrow)'/>"), &[("", line)]);
+    let turned = "<path transform-origin='5 5' transform='rotate(180)' d='M5 5h-1'/>";
+    expect(&svg(turned), &[("", line)]);
+    let millimeters: &[[f64; 2]] = &[[0.0, 0.0], [96.0, 0.0]];
+    expect("<svg width='30mm' height='20mm'><line x2='25.4mm'/></svg>", &[("", millimeters)]);
+}
+
+#[test]
+fn without_a_view_box_the_strokes_say_what_was_drawn_on() {
+    for text in ["<svg><path d='M1 2L5 4'/></svg>", "<svg width='30' height='90'><path d='M1 2L5 4'/></svg>"] {
+        let drawing = decoded(text);
+        assert_eq!((drawing.min, drawing.max), (DVec2::new(1.0, 2.0), DVec2::new(5.0, 4.0)), "{text}");
+    }
+}
+
+#[test]
+fn curves_and_arcs_stay_on_their_circle() {
+    let drawing = decoded("<svg viewBox='0 0 9 9'><path d='M4 2A2 2 0 0 1 2 4'/><path d='M0 0Q1 2 2 0'/></svg>");
+    let [arc, curve] = &drawing.strokes[..] else { panic!() };
+    let radius = |point: &DVec2| point.distance(DVec2::splat(2.0));
+    assert!(arc.points.iter().all(|point| (radius(point) - 2.0).abs() < 2e-3), "{arc:?}");
+    assert_eq!((curve.points.len(), curve.points[8]), (17, DVec2::new(1.0, 1.0)));
+}
+
+#[test]
+fn a_path_that_is_a_dot_is_left_out_and_the_rest_drawn() {
+    expect(
+        "<svg viewBox='0 0 9 9'><path d='M1 1'/><path d='M2 2z'/><path d='M3 3H4'/></svg>",
+        &[("", &[[3.0, 3.0], [4.0, 3.0]])],
+    );
+}
+
+#[test]
+fn faults_name_their_path_and_their_line() {
+    assert!(error("<svg>\n<path id='arc' d='M0 0L1'/></svg>").contains("path `arc` in line 2: its path data: "));
+    assert!(error("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes in line 1: "));
+    assert!(
+        error(&format!("<svg><path d='M0 0L1 1{}'/></svg>", "Z".repeat(100_000)))
+            .contains("more than 100 times in a row")
+    );
+    assert!(error("<svg><path d='M0 0L1e300 1'/></svg>").contains("infinitely far away"));
+    assert!(error("<svg><polyline points='0 0 1'/></svg>").contains("its points have 3 numbers; allowed: pairs"));
+    assert!(error("<svg><polygon points='0 0 x 1'/></svg>").contains("its points: "));
+    assert!(
+        error("<svg><g id='all' transform='turn(3)'/></svg>")
+            .contains("g `all` in line 1: its transform cannot be read")
+    );
+    for view in ["", "0 0 10", "0 0 10 0", "0 0 -3 4", "0 0 wide 3", "0 0 1 2 3"] {
+        let shown = error(&format!("<svg viewBox='{view}'><path d='M0 0L1 1'/></svg>"));
+        assert!(shown.contains(&format!("its viewBox is `{view}`")), "{shown}");
+    }
+}
+
+#[test]
+fn what_holds_no_strokes_is_refused() {
+    for (text, instead) in [
+        ("<svg><path/></svg>", vec![]),
+        ("<svg><circle r='1'/></svg>", vec!["circle"]),
+        ("<svg><defs><rect/></defs><use href='#a'/><text>A</text><use/></svg>", vec!["use", "text"]),
+    ] {
+        assert_eq!(decode_drawing(text.as_bytes()), Err(AssetProblem::NoStrokes { instead }), "{text}");
+    }
+    for broken in ["", "<html/>", "<svg", "<svg><path d='M1'/></svg>", "<svg transform='x'/>", "</svg></svg>", "plain"]
+    {
+        assert!(matches!(decode_drawing(broken.as_bytes()), Err(AssetProblem::Damaged(_))), "{broken}");
+    }
+}
+
+#[test]
+fn what_would_take_too_long_is_refused_before_it_is_resolved() {
+    let begun = std::time::Instant::now();
+    let uses = "<use href='#a'/>".repeat(5000);
+    let path = format!("<path id='a' d='M0 0{}'/>", "L1 1".repeat(1000));
+    assert!(error(&format!("<svg>{path}{uses}</svg>")).contains("more than 1000000 points"));
+    let doubled: String =
+        (1..40).map(|n| format!("<g id='g{n}'><use href='#g{0}'/><use href='#g{0}'/></g>", n - 1)).collect();
+    assert!(
+        error(&format!("<svg><defs><path id='g0' d='M0 0H1'/>{doubled}</defs><use href='#g39'/></svg>"))
+            .contains("points")
+    );
+    assert!(error("<svg><g id='a'><use href='#a'/></g><path d='M0 0H1'/></svg>").contains("use themselves"));
+    let deep = format!("<svg>{}<path d='M0 0H1'/>{}</svg>", "<g>".repeat(100_000), "</g>".repeat(100_000));
+    assert!(error(&deep).contains("deep"));
+    assert!(begun.elapsed().as_secs_f64() < 5.0, "{:?}", begun.elapsed());
+}
+
+#[test]
+fn strokes_far_from_the_page_are_refused_where_single_precision_would_bend_them() {
+    let at = |x: f64| format!("<svg><path d='M{x} 0L{} 0 {} 1'/></svg>", x + 1.0, x + 1.0);
+    let near = decoded(&at(1500.0));
+    assert!((near.max.x - near.min.x - 1.0).abs() < 1e-4);
+    assert!(error(&at(4_500_000.0)).contains("Move them near 0"));
+}

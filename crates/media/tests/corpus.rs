@@ -1,0 +1,167 @@
+//! Small files by independent writers are read as independent readers read them. `python/make_corpus.py` writes them, and `expected.json` beside them.
+
+use std::{fs, path::PathBuf};
+
+use bansho_base::{
+    geometry::strokes::Drawing,
+    host::assets::{AssetProblem, DepthMap, Encoding, Picture, PictureAlpha, PictureLayers, PictureRemark},
+};
+use bansho_media::assets::{decode_depth, decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing};
+use serde_json::Value;
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/corpus")
+}
+
+/// A file, and what is expected of it.
+struct Case {
+    name: String,
+    bytes: Vec<u8>,
+    expected: Value,
+}
+
+impl Case {
+    fn text(&self, key: &str) -> Option<String> {
+        self.expected.get(key)?.as_str().map(str::to_owned)
+    }
+
+    fn numbers(&self, key: &str) -> Option<Vec<f64>> {
+        let number = |value: &Value| match value.as_str() {
+            Some("inf") => f64::INFINITY,
+            Some(_) => f64::NAN,
+            None => value.as_f64().unwrap(),
+        };
+        Some(self.expected.get(key)?.as_array()?.iter().map(number).collect())
+    }
+
+    fn extension(&self) -> &str {
+        self.name.rsplit('.').next().unwrap()
+    }
+
+    /// The problems that a picture or its depth has with the expectation.
+    fn differences(&self) -> Result<(), String> {
+        match self.text("kind").as_deref() {
+            Some("picture") => {
+                let layers = PictureLayers { image: self.text("image_layer"), depth: None };
+                let read = decode_picture(&self.bytes, self.extension(), &layers, MemoryLimit::default());
+                self.judge(read, |picture| self.picture(picture))
+            }
+            Some("depth") => self
+                .judge(decode_depth(&self.bytes, self.extension(), None, MemoryLimit::default()), |map| {
+                    self.depth(map)
+                }),
+            Some("strokes") => self.judge(decode_drawing(&self.bytes), |drawing| self.strokes(drawing)),
+            _ => {
+                let none = |_: &str, _: u64| Err(AssetProblem::Missing);
+                let read = decode_mesh(&self.bytes, self.extension(), &none, MemoryLimit::default());
+                self.judge(read, |mesh| {
+                    let bounds: Vec<f64> = mesh.bounds().iter().flat_map(|corner| corner.to_array()).collect();
+                    let expected = self.expected["bounds"]
+                        .as_array()
+                        .unwrap()
+                        .iter()
+                        .flat_map(|corner| corner.as_array().unwrap());
+                    near(&bounds, &expected.map(|value| value.as_f64().unwrap()).collect::<Vec<_>>(), 1e-5)?;
+                    equal("triangles", mesh.len() as u64, self.expected["triangles"].as_u64().unwrap())
+                })
+            }
+        }
+    }
+
+    /// Judges what was read, or the error.
+    fn judge<T>(&self, read: Result<T, AssetProblem>, judge: impl Fn(&T) -> Result<(), String>) -> Result<(), String> {
+        match (read, self.text("error")) {
+            (Ok(read), None) => judge(&read),
+            (Ok(_), Some(words)) => Err(format!("is read instead of refused for `{words}`")),
+            (Err(error), Some(words)) if error.to_string().contains(&words) => Ok(()),
+            (Err(error), _) => Err(format!("is refused: {error}")),
+        }
+    }
+
+    fn picture(&self, picture: &Picture) -> Result<(), String> {
+        self.remark(&picture.remarks)?;
+        self.size([picture.color.width(), picture.color.height()])?;
+        let is_linear = picture.encoding != Encoding::DisplaySrgb;
+        if let Some(encoding) = self.text("encoding") {
+            equal("encoding", is_linear, encoding == "linear")?;
+        }
+        let values: Vec<f64> = picture.color.pixels().as_flattened().iter().map(|value| f64::from(*value)).collect();
+        if let Some(expected) = self.numbers("values") {
+            near(&values, &expected, self.expected["tolerance"].as_f64().unwrap())?;
+        }
+        if self.text("alpha").as_deref() == Some("associated") {
+            equal("alpha", picture.alpha, PictureAlpha::Associated)?;
+        }
+        if let Some(expected) = self.numbers("depth") {
+            let depth = picture.depth.as_ref().ok_or("has no depth")?;
+            near(&depth.iter().map(|value| f64::from(*value)).collect::<Vec<_>>(), &expected, 1e-6)?;
+        }
+        Ok(())
+    }
+
+    fn depth(&self, map: &DepthMap) -> Result<(), String> {
+        self.remark(&map.remarks)?;
+        self.size([map.values.width(), map.values.height()])?;
+        let values: Vec<f64> = map.values.pixels().as_flattened().iter().map(|value| f64::from(*value)).collect();
+        near(&values, &self.numbers("values").unwrap(), 1e-6)
+    }
+
+    /// The first and the last point of every stroke, within 1e-4 of the page.
+    fn strokes(&self, drawing: &Drawing) -> Result<(), String> {
+        let ends = drawing.strokes.iter().flat_map(|stroke| [stroke.points.first(), stroke.points.last()]);
+        let found: Vec<f64> = ends.flatten().flat_map(|point| point.to_array()).collect();
+        let lines = self.expected["lines"].as_array().unwrap().iter().flat_map(|line| line.as_array().unwrap());
+        let expected: Vec<f64> =
+            lines.flat_map(|point| point.as_array().unwrap()).map(|value| value.as_f64().unwrap()).collect();
+        near(&found, &expected, 1e-4 * 100.0)
+    }
+
+    /// A remark with the expected words, or none.
+    fn remark(&self, remarks: &[PictureRemark]) -> Result<(), String> {
+        let told: Vec<String> = remarks.iter().map(ToString::to_string).collect();
+        match (self.text("remark"), &told[..]) {
+            (None, []) => Ok(()),
+            (Some(words), [only]) if only.contains(&words) => Ok(()),
+            (words, told) => Err(format!("tells {told:?} instead of {words:?}")),
+        }
+    }
+
+    fn size(&self, found: [usize; 2]) -> Result<(), String> {
+        let expected = self.numbers("size").unwrap();
+        equal("size", found.map(|side| side as f64), [expected[0], expected[1]])
+    }
+}
+
+fn equal<T: PartialEq + std::fmt::Debug>(what: &str, found: T, expected: T) -> Result<(), String> {
+    if found == expected { Ok(()) } else { Err(format!("{what} is {found:?} instead of {expected:?}")) }
+}
+
+/// Compares numbers: to `tolerance` below 1, relative to it above.
+fn near(found: &[f64], expected: &[f64], tolerance: f64) -> Result<(), String> {
+    equal("the number of values", found.len(), expected.len())?;
+    for (index, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let is_same = found == expected || found.is_nan() && expected.is_nan();
+        let off = (found - expected).abs();
+        // A tolerance of whole codes is met to the rounding of single precision.
+        if !is_same && !(off <= tolerance * expected.abs().max(1.0) + 2e-7) {
+            return Err(format!("value {index} is {found} instead of {expected}"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn files_of_other_programs_are_read_as_other_readers_read_them() {
+    let text = fs::read_to_string(folder().join("expected.json")).unwrap();
+    let entries: Vec<Value> = serde_json::from_str(&text).unwrap();
+    assert!(entries.len() >= 150, "{} files", entries.len());
+    let mut faults = Vec::new();
+    for expected in entries {
+        let name = expected["file"].as_str().unwrap().to_owned();
+        let case = Case { bytes: fs::read(folder().join(&name)).unwrap(), name, expected };
+        if let Err(fault) = case.differences() {
+            faults.push(format!("{}: {fault}", case.name));
+        }
+    }
+    assert!(faults.is_empty(), "{} files:\n{}", faults.len(), faults.join("\n"));
+}
