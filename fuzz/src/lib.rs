@@ -6,6 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use bansho::KINDS;
 use bansho_base::{
     color::AlphaConvention,
     frame::Frame,
@@ -14,9 +15,11 @@ use bansho_base::{
         observer::Observer,
     },
 };
-use bansho::KINDS;
-use bansho_media::assets::{decode_picture, limits};
-use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError, Shot, display::{BitDepth, display}};
+use bansho_media::assets::{decode_depth, decode_picture, limits};
+use bansho_render::{
+    CompiledScene, Plan, PlanOptions, RenderError, Shot,
+    display::{BitDepth, display},
+};
 use bansho_scene::{Scene, SceneOptions};
 
 /// Stops a frame that takes too long: a scene may rightly ask for much work, and that is no fault.
@@ -118,8 +121,55 @@ fn telling_panics<T>(work: impl FnOnce() -> T) -> T {
 pub fn read_plate(bytes: &[u8], extension: &str) {
     one_thread();
     telling_panics(|| {
-        if let Ok(picture) = decode_picture(bytes, extension, &PictureLayers::default(), limits::MemoryLimit::default()) {
+        if let Ok(picture) = decode_picture(bytes, extension, &PictureLayers::default(), limits::MemoryLimit::default())
+        {
             check_plate(picture);
+        }
+    });
+}
+
+/// Reads `bytes` as a depth, whose format the first byte chooses.
+///
+/// # Panics
+/// The map breaks what its reader promises.
+pub fn read_depth(bytes: &[u8]) {
+    one_thread();
+    let Some((choice, bytes)) = bytes.split_first() else { return };
+    let extension = ["npy", "pfm", "tiff", "png", "exr"][usize::from(*choice) % 5];
+    telling_panics(|| {
+        if let Ok(map) = decode_depth(bytes, extension, None, limits::MemoryLimit::default()) {
+            let (width, height) = (map.values.width(), map.values.height());
+            assert!(width > 0 && height > 0 && width.max(height) as u64 <= limits::SIDE, "{width} x {height}");
+        }
+    });
+}
+
+/// Reads `profile` as that of a gray TIFF of four pixels.
+///
+/// # Panics
+/// A color is not from 0 to 1.
+pub fn read_profile(profile: &[u8]) {
+    one_thread();
+    let pixels = [0, 60, 150, 255];
+    let entry = |tag: u16, kind: u16, count: u32, value: u32| {
+        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
+    };
+    let start = 8 + 2 + 12 * 9 + 4;
+    let entries = [
+        entry(256, 4, 1, 2),
+        entry(257, 4, 1, 2),
+        entry(258, 3, 1, 8),
+        entry(262, 3, 1, 1),
+        entry(273, 4, 1, start),
+        entry(277, 3, 1, 1),
+        entry(278, 4, 1, 2),
+        entry(279, 4, 1, 4),
+        entry(34675, 7, profile.len() as u32, start + 4),
+    ];
+    let file = [&b"II*\0\x08\0\0\0\x09\0"[..], &entries.concat(), &[0; 4], &pixels, profile].concat();
+    telling_panics(|| {
+        if let Ok(picture) = decode_picture(&file, "tiff", &PictureLayers::default(), limits::MemoryLimit::default()) {
+            assert!(picture.color.pixels().as_flattened().iter().all(|value| (0.0..=1.0).contains(value)));
         }
     });
 }

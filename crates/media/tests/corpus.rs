@@ -143,7 +143,8 @@ fn near(found: &[f64], expected: &[f64], tolerance: f64) -> Result<(), String> {
         let is_same = found == expected || found.is_nan() && expected.is_nan();
         let off = (found - expected).abs();
         // A tolerance of whole codes is met to the rounding of single precision.
-        if !is_same && !(off <= tolerance * expected.abs().max(1.0) + 2e-7) {
+        let is_near = off <= tolerance * expected.abs().max(1.0) + 2e-7;
+        if !(is_same || is_near) {
             return Err(format!("value {index} is {found} instead of {expected}"));
         }
     }

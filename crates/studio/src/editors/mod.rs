@@ -32,7 +32,7 @@ impl KindEditors {
 }
 
 /// Extensions of drawing files.
-const DRAWINGS: [&str; 1] = ["svg"];
+const DRAWINGS: [&str; 2] = ["svg", "svgz"];
 
 /// Adds a dropped file to the selected phenomenon, if an editor imports files with its extension: a drawing becomes the first shape of an
 /// aurora. `name` is the file as the scene names it. Returns whether an editor imports such files; errors are shown in the status line.

@@ -25,7 +25,7 @@ enum Entry {
 const SCENES: &[&str] = &[".toml"];
 
 /// Extensions of assets: plates, drawings and meshes.
-const ASSETS: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".svg", ".glb", ".gltf"];
+const ASSETS: &[&str] = &[".png", ".jpg", ".jpeg", ".exr", ".webp", ".tif", ".tiff", ".svg", ".svgz", ".glb", ".gltf"];
 
 impl FileDialog {
     /// Starts in the folder of `path`, or in the working directory.

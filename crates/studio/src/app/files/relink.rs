@@ -17,7 +17,7 @@ use crate::{
 /// Extensions of mesh files.
 const MESHES: [&str; 2] = ["glb", "gltf"];
 /// Extensions of picture files.
-const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
+const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "exr", "webp", "tif", "tiff"];
 
 impl Session {
     /// Sets `parameter` to the file `file`.
@@ -53,7 +53,7 @@ impl Session {
             self.edit("plate", &[Operation::Set { path: parameter, value: name }]);
         } else {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
-            let reason = "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr) can be added";
+            let reason = "only scenes (.toml), drawings (.svg), meshes (.glb, .gltf) and pictures (.png, .jpg, .exr, .webp, .tiff) can be added";
             self.set_notice(Some(format!("{name}: {reason}")));
         }
     }
