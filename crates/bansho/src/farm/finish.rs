@@ -104,7 +104,7 @@ fn join(
 fn join_frame(whole: &PreparedJob, number: i64, tiles: [usize; 2], paths: &[PathBuf]) -> Result<(), FarmError> {
     let size = whole.plan().size();
     let rects: Vec<Rect> = (0..paths.len()).map(|tile| tile_rect(size, tiles, tile)).collect();
-    let sink = whole.format.open(whole.plan(), 1, size, 1)?;
+    let sink = whole.format.open(whole.plan(), whole.compiled.has_opaque_plate(), 1, size, 1)?;
     let slot = FrameSlot { index: 0, number };
     let fingerprint = whole.expected_fingerprint(number);
     match whole.format.pattern.kind() {
@@ -190,7 +190,8 @@ pub fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> R
         return Err(FarmError::NotAFilm { path: path.to_path_buf() });
     }
     let window = whole.plan().window();
-    let sink = format.open(whole.plan(), whole.frames().len(), [window.width, window.height], 1)?;
+    let (opaque, size) = (whole.compiled.has_opaque_plate(), [window.width, window.height]);
+    let sink = format.open(whole.plan(), opaque, whole.frames().len(), size, 1)?;
     for (index, &number) in whole.frames().iter().enumerate() {
         check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
         let slot = FrameSlot { index, number };
