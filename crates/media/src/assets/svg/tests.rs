@@ -146,9 +146,34 @@ fn what_would_take_too_long_is_refused_before_it_is_resolved() {
 }
 
 #[test]
-fn strokes_far_from_the_page_are_refused_where_single_precision_would_bend_them() {
-    let at = |x: f64| format!("<svg><path d='M{x} 0L{} 0 {} 1'/></svg>", x + 1.0, x + 1.0);
-    let near = decoded(&at(1500.0));
-    assert!((near.max.x - near.min.x - 1.0).abs() < 1e-4);
-    assert!(error(&at(4_500_000.0)).contains("Move them near 0"));
+fn strokes_far_from_the_page_are_moved_and_refused_where_single_precision_would_bend_them() {
+    // Meters of a national grid, to the millimeter.
+    let (x, y) = (512_345.678, 4_712_345.123);
+    let text = format!(
+        "<svg viewBox='{x} {y} 9 9'><path id='a' d='m{x} {y}l1 0 0 1.5H{} v1 q1 1 2 0 A1 2 10 0 1 {} {}z'/>\
+         <polyline points='{x},{y} {} {}'/><line x1='{x}' y1='{y}' x2='{}' y2='{y}'/></svg>",
+        x + 0.25,
+        x + 3.0,
+        y + 0.5,
+        x + 0.125,
+        y + 1.0,
+        x + 7.0
+    );
+    let drawing = decoded(&text);
+    assert!(drawing.min.distance(DVec2::new(x, y)) < 1e-9 && drawing.max.distance(DVec2::new(x + 9.0, y + 9.0)) < 1e-9);
+    let expected = [
+        [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]],
+        [[0.0, 0.0], [0.125, 1.0], [0.125, 1.0]],
+        [[0.0, 0.0], [7.0, 0.0], [7.0, 0.0]],
+    ];
+    for (stroke, expected) in drawing.strokes.iter().zip(expected) {
+        let points = [0, 1, stroke.points.len() - 1].map(|index| stroke.points[index] - drawing.min);
+        for (found, expected) in points.iter().zip(expected) {
+            assert!(found.distance(expected.into()) < 1e-5, "{found} is not {expected:?}");
+        }
+    }
+    let arc_end = DVec2::new(3.0, 0.5);
+    assert!(drawing.strokes[0].points.iter().any(|point| (*point - drawing.min).distance(arc_end) < 1e-5));
+    let turned = format!("<svg><path transform='rotate(1)' d='M{x} 0L{} 0 {} 1'/></svg>", x + 1.0, x + 1.0);
+    assert!(error(&turned).contains("Move them near 0"));
 }
