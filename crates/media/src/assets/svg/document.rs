@@ -35,6 +35,8 @@ pub(super) struct SvgDocument {
     pub(super) view_box: Option<[DVec2; 2]>,
     /// Names of elements that are drawn and are no strokes.
     pub(super) others: Vec<&'static str>,
+    /// Number of paths that are a single point.
+    pub(super) dots: usize,
 }
 
 /// Reads the text and checks its data.
@@ -49,7 +51,7 @@ pub(super) fn read(text: &str) -> Result<SvgDocument, AssetProblem> {
     if root.tag_name().name() != "svg" {
         return Err(damaged("it is not an SVG"));
     }
-    let mut check = DataCheck { document: &document, strokes: 0, others: Vec::new(), points: HashMap::new() };
+    let mut check = DataCheck { document: &document, strokes: 0, dots: 0, others: Vec::new(), points: HashMap::new() };
     check.all(root)?;
     let total = PointCount::new(&document, &check.points).of(root, 0)?;
     if total > MAX_POINTS as u64 {
@@ -70,7 +72,7 @@ pub(super) fn read(text: &str) -> Result<SvgDocument, AssetProblem> {
             (attribute.range_value(), format!("0 0 {} {}", max.x - min.x, max.y - min.y))
         }));
     }
-    Ok(SvgDocument { text: edited(text, edits), origin, is_moved, view_box, others: check.others })
+    Ok(SvgDocument { text: edited(text, edits), origin, is_moved, view_box, others: check.others, dots: check.dots })
 }
 
 /// Rejects tags of so many attributes that comparing each with all others would take seconds.
@@ -112,6 +114,7 @@ struct DataCheck<'a, 'd> {
     document: &'a Document<'d>,
     /// Strokes before the element.
     strokes: usize,
+    dots: usize,
     others: Vec<&'static str>,
     /// Points of each element.
     points: HashMap<NodeId, u64>,
@@ -134,6 +137,9 @@ impl<'a> DataCheck<'a, '_> {
                 "line" => Ok(2),
                 _ => continue,
             }?;
+            self.dots += usize::from(
+                name == "path" && !is_hidden(node) && moved::is_dot(node.attribute("d").unwrap_or_default()),
+            );
             self.points.insert(node.id(), points);
             self.strokes += 1;
         }

@@ -9,7 +9,11 @@ mod moved;
 mod strokes;
 mod text;
 
-use bansho_base::{geometry::strokes::Drawing, host::assets::AssetProblem, math::DVec2};
+use bansho_base::{
+    geometry::strokes::{Drawing, DrawingRemark},
+    host::assets::AssetProblem,
+    math::DVec2,
+};
 
 /// Largest number of points in all strokes.
 const MAX_POINTS: usize = 1_000_000;
@@ -53,7 +57,11 @@ pub fn decode_drawing(file: &[u8]) -> Result<Drawing, AssetProblem> {
         check_precision(bounds())?;
     }
     let [min, max] = document.view_box.unwrap_or_else(bounds);
-    Ok(Drawing { strokes, min, max })
+    // What a `use` shows is among the strokes, or another element that is named.
+    let names: Vec<&'static str> = document.others.into_iter().filter(|name| *name != "use").collect();
+    let others = (!names.is_empty()).then_some(DrawingRemark::OtherElements { names });
+    let dots = (document.dots > 0).then_some(DrawingRemark::Dots { paths: document.dots });
+    Ok(Drawing { strokes, min, max, remarks: others.into_iter().chain(dots).collect() })
 }
 
 /// Largest distance from 0 in multiples of the extent at which single precision is exact to 1e-4 of the extent.

@@ -124,6 +124,27 @@ fn end(segment: &PathSegment, pen: DVec2) -> DVec2 {
     }
 }
 
+/// Whether path data lead nowhere: to a single point, by lines.
+pub(super) fn is_dot(data: &str) -> bool {
+    let mut points = Vec::new();
+    for segment in PathParser::from(data) {
+        match segment {
+            Ok(
+                segment @ (PathSegment::MoveTo { .. }
+                | PathSegment::LineTo { .. }
+                | PathSegment::HorizontalLineTo { .. }
+                | PathSegment::VerticalLineTo { .. }
+                | PathSegment::ClosePath { .. }),
+            ) => points.push(end(&segment, points.last().copied().unwrap_or(DVec2::ZERO))),
+            _ => return false,
+        }
+        if points.last() != points.first() {
+            return false;
+        }
+    }
+    !points.is_empty()
+}
+
 /// The text of an element's coordinates without `offset`.
 fn edits(node: Node, coordinates: &Coordinates, offset: DVec2) -> Vec<(Range<usize>, String)> {
     let range = |name: &str| node.attribute_node(name).map(|attribute| attribute.range_value());

@@ -92,6 +92,20 @@ fn a_path_that_is_a_dot_is_left_out_and_the_rest_drawn() {
 }
 
 #[test]
+fn what_is_left_out_is_told_once() {
+    use bansho_base::geometry::strokes::DrawingRemark::{Dots, OtherElements};
+    let defs = "<defs><circle r='1'/><path d='M1 1'/></defs>";
+    let drawing = decoded(&format!(
+        "<svg>{defs}<rect/><path d='M1 1'/><path d='m2 2h0z'/><text/><rect/><path d='M3 3H4'/></svg>"
+    ));
+    assert_eq!(drawing.remarks, [OtherElements { names: vec!["rect", "text"] }, Dots { paths: 2 }]);
+    assert_eq!(drawing.remarks[1].to_string(), "2 paths are each a single point, and are left out");
+    let plain =
+        decoded("<svg><defs><path id='a' d='M0 0H1'/></defs><use href='#a'/><path d='M0 0c1 1 2 2 0 0'/></svg>");
+    assert_eq!((plain.remarks.len(), plain.strokes.len()), (0, 2));
+}
+
+#[test]
 fn faults_name_their_path_and_their_line() {
     assert!(error("<svg>\n<path id='arc' d='M0 0L1'/></svg>").contains("path `arc` in line 2: its path data: "));
     assert!(error("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes in line 1: "));
