@@ -27,7 +27,10 @@ fn assets() -> MemoryAssets {
         |id: &str, points: [[f64; 2]; 2]| Stroke { id: Some(id.into()), points: points.map(DVec2::from).to_vec() };
     let strokes = vec![stroke("left", [[10.0, 50.0], [40.0, 50.0]]), stroke("right", [[60.0, 50.0], [90.0, 50.0]])];
     let mut assets = MemoryAssets::default();
-    assets.insert_drawing("shapes.svg", Drawing { strokes, min: DVec2::ZERO, max: DVec2::splat(100.0) });
+    assets.insert_drawing(
+        "shapes.svg",
+        Drawing { strokes, min: DVec2::ZERO, max: DVec2::splat(100.0), remarks: Vec::new() },
+    );
     assets
 }
 

@@ -151,15 +151,47 @@ fn near(found: &[f64], expected: &[f64], tolerance: f64) -> Result<(), String> {
     Ok(())
 }
 
-#[test]
-fn files_of_other_programs_are_read_as_other_readers_read_them() {
+/// All cases.
+fn cases() -> Vec<Case> {
     let text = fs::read_to_string(folder().join("expected.json")).unwrap();
     let entries: Vec<Value> = serde_json::from_str(&text).unwrap();
-    assert!(entries.len() >= 150, "{} files", entries.len());
-    let mut faults = Vec::new();
-    for expected in entries {
+    let case = |expected: Value| {
         let name = expected["file"].as_str().unwrap().to_owned();
-        let case = Case { bytes: fs::read(folder().join(&name)).unwrap(), name, expected };
+        Case { bytes: fs::read(folder().join(&name)).unwrap(), name, expected }
+    };
+    entries.into_iter().map(case).collect()
+}
+
+#[test]
+fn damaged_files_of_other_programs_never_panic() {
+    let mut state = 7_u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    for mut case in cases() {
+        let whole = case.bytes.clone();
+        for _ in 0..40 {
+            case.bytes.clone_from(&whole);
+            for _ in 0..1 + random() % 4 {
+                let reach = if random() % 3 == 0 { whole.len() } else { whole.len().min(300) };
+                case.bytes[random() % reach] = random() as u8;
+            }
+            if random() % 8 == 0 {
+                case.bytes.truncate(random() % whole.len());
+            }
+            // Any result will do, as long as it returns.
+            let _ = case.differences();
+        }
+    }
+}
+
+#[test]
+fn files_of_other_programs_are_read_as_other_readers_read_them() {
+    let cases = cases();
+    assert!(cases.len() >= 150, "{} files", cases.len());
+    let mut faults = Vec::new();
+    for case in cases {
         if let Err(fault) = case.differences() {
             faults.push(format!("{}: {fault}", case.name));
         }

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     color,
+    geometry::strokes::DrawingRemark,
     host::once::get_or_compute,
     phenomenon::{
         Remark,
@@ -63,6 +64,25 @@ fn of_plate_files(compiled: &CompiledScene) -> Vec<(String, Remark)> {
     pictures.remarks().iter().map(remark).collect()
 }
 
+/// Extensions of drawings.
+const DRAWINGS: [&str; 2] = [".svg", ".svgz"];
+
+/// What users should know about how the drawings of phenomena were read.
+fn of_drawings(compiled: &CompiledScene) -> Vec<(String, Remark)> {
+    let mut remarks = Vec::new();
+    for instance in compiled.scene().instances.iter().filter(|instance| instance.enabled) {
+        let mut paths = instance.parameters.assets();
+        paths.sort();
+        paths.dedup();
+        for path in paths.iter().filter(|path| DRAWINGS.iter().any(|drawing| path.ends_with(drawing))) {
+            let Ok(drawing) = compiled.assets().drawing(path) else { continue };
+            let remark = |remark: &DrawingRemark| (instance.name.clone(), Remark::new(format!("{path}: {remark}")));
+            remarks.extend(drawing.remarks.iter().map(remark));
+        }
+    }
+    remarks
+}
+
 /// What users should know about how phenomena will look: the name of each phenomenon, and the remark.
 ///
 /// Only what holds in the first, the middle and the last frame is reported. That nothing lights a phenomenon is reported only where nothing
@@ -92,6 +112,7 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
     plate
         .into_iter()
         .chain(of_plate_files(compiled))
+        .chain(of_drawings(compiled))
         .chain(of_phenomena)
         .chain(faint_phenomenon_remarks(compiled, plan))
         .collect()

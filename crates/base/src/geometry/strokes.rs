@@ -1,6 +1,6 @@
 //! Line drawings: strokes in the plane, read from a vector graphics file.
 
-use crate::math::DVec2;
+use crate::{host::plural::counted, math::DVec2};
 
 /// A stroke as a polyline.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,6 +9,23 @@ pub struct Stroke {
     pub id: Option<String>,
     /// Its points, x to the right and y down, in the drawing's units; at least two.
     pub points: Vec<DVec2>,
+}
+
+/// What users should know about how a drawing was read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DrawingRemark {
+    /// Elements that are no lines.
+    #[error("its elements {} are no lines, and left out", .names.join(", "))]
+    OtherElements {
+        /// Their names, each once.
+        names: Vec<&'static str>,
+    },
+    /// Paths of a single point.
+    #[error("{} {} a single point, and {} left out", counted(*.paths, "path"), if *.paths == 1 { "is" } else { "are each" }, if *.paths == 1 { "is" } else { "are" })]
+    Dots {
+        /// Their number.
+        paths: usize,
+    },
 }
 
 /// A line drawing.
@@ -20,6 +37,8 @@ pub struct Drawing {
     pub min: DVec2,
     /// Corner of the drawing area with the largest coordinates.
     pub max: DVec2,
+    /// What users should know about how it was read.
+    pub remarks: Vec<DrawingRemark>,
 }
 
 impl Drawing {

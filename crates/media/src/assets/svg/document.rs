@@ -6,7 +6,7 @@ use bansho_base::{host::assets::AssetProblem, math::DVec2};
 use roxmltree::{Attribute, Document, Node, NodeId, ParsingOptions};
 use svgtypes::{NumberListParser, PathParser, PathSegment};
 
-use super::{MAX_POINTS, damaged, strokes::CURVE_SEGMENTS};
+use super::{MAX_POINTS, damaged, moved, strokes::CURVE_SEGMENTS};
 
 /// Elements whose contents are not drawn where they stand.
 const HIDDEN_ELEMENTS: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "pattern", "metadata", "style"];
@@ -27,10 +27,16 @@ const MAX_NODES: u32 = 4_000_000;
 pub(super) struct SvgDocument {
     /// The text, whose sides do not scale its view box.
     pub(super) text: String,
+    /// What is added to resolved coordinates.
+    pub(super) origin: DVec2,
+    /// Whether the text was moved near 0.
+    pub(super) is_moved: bool,
     /// The view box: its corners with the smallest and the largest coordinates.
     pub(super) view_box: Option<[DVec2; 2]>,
     /// Names of elements that are drawn and are no strokes.
     pub(super) others: Vec<&'static str>,
+    /// Number of paths that are a single point.
+    pub(super) dots: usize,
 }
 
 /// Reads the text and checks its data.
@@ -45,7 +51,7 @@ pub(super) fn read(text: &str) -> Result<SvgDocument, AssetProblem> {
     if root.tag_name().name() != "svg" {
         return Err(damaged("it is not an SVG"));
     }
-    let mut check = DataCheck { document: &document, strokes: 0, others: Vec::new(), points: HashMap::new() };
+    let mut check = DataCheck { document: &document, strokes: 0, dots: 0, others: Vec::new(), points: HashMap::new() };
     check.all(root)?;
     let total = PointCount::new(&document, &check.points).of(root, 0)?;
     if total > MAX_POINTS as u64 {
@@ -53,9 +59,20 @@ pub(super) fn read(text: &str) -> Result<SvgDocument, AssetProblem> {
     }
     let view_box = view_box(root)?;
     let sides = if view_box.is_some() { &["width", "height", "preserveAspectRatio", "x", "y"][..] } else { &[] };
-    let cut =
-        root.attributes().filter(|attribute| sides.contains(&attribute.name())).map(|attribute| attribute.range());
-    Ok(SvgDocument { text: without(text, cut.collect()), view_box, others: check.others })
+    let cut = root.attributes().filter(|attribute| sides.contains(&attribute.name()));
+    let mut edits: Vec<(Range<usize>, String)> = cut.map(|attribute| (attribute.range(), String::new())).collect();
+    let moved = moved::of(&document);
+    let is_moved = moved.is_some();
+    let mut origin = view_box.map_or(DVec2::ZERO, |[min, _]| min);
+    if let Some(moved) = moved {
+        origin = moved.offset;
+        edits.extend(moved.edits);
+        let sides = view_box.zip(root.attribute_node("viewBox"));
+        edits.extend(sides.map(|([min, max], attribute)| {
+            (attribute.range_value(), format!("0 0 {} {}", max.x - min.x, max.y - min.y))
+        }));
+    }
+    Ok(SvgDocument { text: edited(text, edits), origin, is_moved, view_box, others: check.others, dots: check.dots })
 }
 
 /// Rejects tags of so many attributes that comparing each with all others would take seconds.
@@ -67,13 +84,17 @@ fn check_attributes(text: &str) -> Result<(), AssetProblem> {
     if crowded { Err(damaged(format!("an element has more than {MAX_ATTRIBUTES} attributes"))) } else { Ok(()) }
 }
 
-/// The text in which these ranges are spaces.
-fn without(text: &str, ranges: Vec<Range<usize>>) -> String {
-    let mut text = text.to_owned();
-    for range in ranges {
-        text.replace_range(range.clone(), &" ".repeat(range.len()));
+/// The text in which these ranges are replaced; none overlaps another.
+fn edited(text: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
+    edits.sort_by_key(|(range, _)| range.start);
+    let mut result = String::with_capacity(text.len());
+    let mut copied = 0;
+    for (range, replacement) in edits {
+        result.push_str(&text[copied..range.start]);
+        result.push_str(&replacement);
+        copied = range.end;
     }
-    text
+    result + &text[copied..]
 }
 
 fn view_box(root: Node) -> Result<Option<[DVec2; 2]>, AssetProblem> {
@@ -93,6 +114,7 @@ struct DataCheck<'a, 'd> {
     document: &'a Document<'d>,
     /// Strokes before the element.
     strokes: usize,
+    dots: usize,
     others: Vec<&'static str>,
     /// Points of each element.
     points: HashMap<NodeId, u64>,
@@ -115,6 +137,9 @@ impl<'a> DataCheck<'a, '_> {
                 "line" => Ok(2),
                 _ => continue,
             }?;
+            self.dots += usize::from(
+                name == "path" && !is_hidden(node) && moved::is_dot(node.attribute("d").unwrap_or_default()),
+            );
             self.points.insert(node.id(), points);
             self.strokes += 1;
         }

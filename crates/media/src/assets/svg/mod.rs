@@ -2,13 +2,18 @@
 //! transforms and encodings.
 //!
 //! [`document`] reads the text first and notes what `usvg` would drop or cut in silence: faulty data, what is no line, the view box, and how many points
-//! all uses have. [`strokes`] turns the resolved tree into polylines. [`text`] unpacks the file.
+//! all uses have. [`moved`] brings what is far from 0 near it. [`strokes`] turns the resolved tree into polylines. [`text`] unpacks the file.
 
 mod document;
+mod moved;
 mod strokes;
 mod text;
 
-use bansho_base::{geometry::strokes::Drawing, host::assets::AssetProblem, math::DVec2};
+use bansho_base::{
+    geometry::strokes::{Drawing, DrawingRemark},
+    host::assets::AssetProblem,
+    math::DVec2,
+};
 
 /// Largest number of points in all strokes.
 const MAX_POINTS: usize = 1_000_000;
@@ -42,16 +47,21 @@ pub fn decode_drawing(file: &[u8]) -> Result<Drawing, AssetProblem> {
         ..usvg::Options::default()
     };
     let tree = usvg::Tree::from_str(&document.text, &options).map_err(damaged)?;
-    let origin = document.view_box.map_or(DVec2::ZERO, |[min, _]| min);
-    let strokes = strokes::of(tree.root(), origin)?;
+    let strokes = strokes::of(tree.root(), document.origin)?;
     if strokes.is_empty() {
         return Err(AssetProblem::NoStrokes { instead: document.others });
     }
     let points = || strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
     let bounds = || [points().fold(DVec2::INFINITY, DVec2::min), points().fold(DVec2::NEG_INFINITY, DVec2::max)];
-    check_precision(bounds())?;
+    if !document.is_moved {
+        check_precision(bounds())?;
+    }
     let [min, max] = document.view_box.unwrap_or_else(bounds);
-    Ok(Drawing { strokes, min, max })
+    // What a `use` shows is among the strokes, or another element that is named.
+    let names: Vec<&'static str> = document.others.into_iter().filter(|name| *name != "use").collect();
+    let others = (!names.is_empty()).then_some(DrawingRemark::OtherElements { names });
+    let dots = (document.dots > 0).then_some(DrawingRemark::Dots { paths: document.dots });
+    Ok(Drawing { strokes, min, max, remarks: others.into_iter().chain(dots).collect() })
 }
 
 /// Largest distance from 0 in multiples of the extent at which single precision is exact to 1e-4 of the extent.
@@ -65,7 +75,7 @@ fn check_precision([min, max]: [DVec2; 2]) -> Result<(), AssetProblem> {
     }
     Err(damaged(format!(
         "its strokes are {distance:.6} from 0 and extend over {extent:.6}; allowed: up to {MAX_DISTANCE} times their extent away. Move \
-         them near 0"
+         them near 0, or remove the transforms, uses and units that keep them from being moved"
     )))
 }
 

@@ -92,6 +92,20 @@ fn a_path_that_is_a_dot_is_left_out_and_the_rest_drawn() {
 }
 
 #[test]
+fn what_is_left_out_is_told_once() {
+    use bansho_base::geometry::strokes::DrawingRemark::{Dots, OtherElements};
+    let defs = "<defs><circle r='1'/><path d='M1 1'/></defs>";
+    let drawing = decoded(&format!(
+        "<svg>{defs}<rect/><path d='M1 1'/><path d='m2 2h0z'/><text/><rect/><path d='M3 3H4'/></svg>"
+    ));
+    assert_eq!(drawing.remarks, [OtherElements { names: vec!["rect", "text"] }, Dots { paths: 2 }]);
+    assert_eq!(drawing.remarks[1].to_string(), "2 paths are each a single point, and are left out");
+    let plain =
+        decoded("<svg><defs><path id='a' d='M0 0H1'/></defs><use href='#a'/><path d='M0 0c1 1 2 2 0 0'/></svg>");
+    assert_eq!((plain.remarks.len(), plain.strokes.len()), (0, 2));
+}
+
+#[test]
 fn faults_name_their_path_and_their_line() {
     assert!(error("<svg>\n<path id='arc' d='M0 0L1'/></svg>").contains("path `arc` in line 2: its path data: "));
     assert!(error("<svg><path d='M0 0L1 1'/><path d='M0 0L1'/></svg>").contains("path after 1 strokes in line 1: "));
@@ -146,9 +160,34 @@ fn what_would_take_too_long_is_refused_before_it_is_resolved() {
 }
 
 #[test]
-fn strokes_far_from_the_page_are_refused_where_single_precision_would_bend_them() {
-    let at = |x: f64| format!("<svg><path d='M{x} 0L{} 0 {} 1'/></svg>", x + 1.0, x + 1.0);
-    let near = decoded(&at(1500.0));
-    assert!((near.max.x - near.min.x - 1.0).abs() < 1e-4);
-    assert!(error(&at(4_500_000.0)).contains("Move them near 0"));
+fn strokes_far_from_the_page_are_moved_and_refused_where_single_precision_would_bend_them() {
+    // Meters of a national grid, to the millimeter.
+    let (x, y) = (512_345.678, 4_712_345.123);
+    let text = format!(
+        "<svg viewBox='{x} {y} 9 9'><path id='a' d='m{x} {y}l1 0 0 1.5H{} v1 q1 1 2 0 A1 2 10 0 1 {} {}z'/>\
+         <polyline points='{x},{y} {} {}'/><line x1='{x}' y1='{y}' x2='{}' y2='{y}'/></svg>",
+        x + 0.25,
+        x + 3.0,
+        y + 0.5,
+        x + 0.125,
+        y + 1.0,
+        x + 7.0
+    );
+    let drawing = decoded(&text);
+    assert!(drawing.min.distance(DVec2::new(x, y)) < 1e-9 && drawing.max.distance(DVec2::new(x + 9.0, y + 9.0)) < 1e-9);
+    let expected = [
+        [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]],
+        [[0.0, 0.0], [0.125, 1.0], [0.125, 1.0]],
+        [[0.0, 0.0], [7.0, 0.0], [7.0, 0.0]],
+    ];
+    for (stroke, expected) in drawing.strokes.iter().zip(expected) {
+        let points = [0, 1, stroke.points.len() - 1].map(|index| stroke.points[index] - drawing.min);
+        for (found, expected) in points.iter().zip(expected) {
+            assert!(found.distance(expected.into()) < 1e-5, "{found} is not {expected:?}");
+        }
+    }
+    let arc_end = DVec2::new(3.0, 0.5);
+    assert!(drawing.strokes[0].points.iter().any(|point| (*point - drawing.min).distance(arc_end) < 1e-5));
+    let turned = format!("<svg><path transform='rotate(1)' d='M{x} 0L{} 0 {} 1'/></svg>", x + 1.0, x + 1.0);
+    assert!(error(&turned).contains("Move them near 0"));
 }
