@@ -10,6 +10,7 @@ and both are disturbed.
 
 import argparse
 import collections
+import errno
 import json
 import os
 import pathlib
@@ -195,9 +196,15 @@ def disturbed(shot: Shot, cluster: Cluster, disk: pathlib.Path) -> None:
 
 def fill(disk: pathlib.Path) -> None:
     """Takes all but a little of the disk."""
-    free = shutil.disk_usage(disk).free
     with open(disk / "filler", "wb") as filler:
-        os.posix_fallocate(filler.fileno(), 0, max(free - LEFT_FREE, 1))
+        while True:
+            try:
+                os.posix_fallocate(filler.fileno(), 0, max(shutil.disk_usage(disk).free - LEFT_FREE, 1))
+                return
+            except OSError as error:
+                # Frames are written at the same time.
+                if error.errno != errno.ENOSPC:
+                    raise
 
 
 def by_openjd(shot: Shot) -> None:

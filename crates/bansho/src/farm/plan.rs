@@ -44,6 +44,8 @@ pub struct FarmPlan {
     pub snapshots: bool,
     /// The film that is made of the frames at the end.
     pub film: Option<PathBuf>,
+    /// Number of frames of the contact sheet that is made at the end.
+    pub contact_sheet: Option<usize>,
     /// For each chunk the digest of the fingerprints of its frames, hexadecimal.
     pub digests: Vec<String>,
     /// What frames cost on the planning machine.
@@ -67,6 +69,8 @@ pub struct PlanOptions {
     pub snapshots: bool,
     /// The film that is made at the end.
     pub film: Option<PathBuf>,
+    /// Number of frames of the contact sheet that is made at the end.
+    pub contact_sheet: Option<usize>,
     /// What frames cost.
     pub costs: ShotCosts,
 }
@@ -80,7 +84,8 @@ impl FarmPlan {
         chunk_frames: u64,
         digests: Vec<String>,
     ) -> Self {
-        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, film, costs } = options;
+        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, film, contact_sheet, costs } =
+            options;
         Self {
             format: FORMAT,
             program: PROGRAM.to_owned(),
@@ -94,6 +99,7 @@ impl FarmPlan {
             tiles,
             snapshots,
             film,
+            contact_sheet,
             digests,
             costs,
         }

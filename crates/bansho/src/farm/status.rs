@@ -1,9 +1,12 @@
 //! The state of all frames of a plan, from files alone: the frames themselves, and the journals of tasks.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 
 use super::{
     error::FarmError,
+    film::contact_sheet_path,
     journal::{self, Attempt, Attempts},
     plan::{FarmFolder, FarmPlan},
     task,
@@ -90,8 +93,8 @@ pub struct FarmStatus {
     pub tasks: Vec<TaskStatus>,
     /// The job after all tasks.
     pub finish: FinishStatus,
-    /// Whether the film exists, where one is made.
-    pub film: Option<bool>,
+    /// What the last job makes and has not made: the film, the contact sheet.
+    pub unmade: Vec<PathBuf>,
     /// Time of a frame within its task, s, from the journals.
     pub seconds_per_frame: Option<f64>,
     /// Number of tasks that began and did not end.
@@ -101,9 +104,9 @@ pub struct FarmStatus {
 }
 
 impl FarmStatus {
-    /// Whether all frames are whole, and the film is made.
+    /// Whether all frames are whole, and the film and the contact sheet are made.
     pub fn is_complete(&self) -> bool {
-        self.frames.unfinished() == 0 && self.film != Some(false)
+        self.frames.unfinished() == 0 && self.unmade.is_empty()
     }
 }
 
@@ -152,13 +155,15 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<FarmSta
         }
     };
     let tasks: Vec<TaskStatus> = states.iter().enumerate().map(task).collect();
-    let film = plan.film.as_ref().map(|film| plan.folder.join(film).is_file());
+    let sheet = plan.contact_sheet.map(|_| contact_sheet_path(&job.output_path()));
+    let made = [plan.film.clone(), sheet].into_iter().flatten().map(|path| plan.folder.join(path));
+    let unmade = made.filter(|path| !path.is_file()).collect();
     let seconds_per_frame = seconds_per_frame(&tasks);
     let running = tasks.iter().filter(|task| is_running(task, plan)).count();
     let left: usize = tasks.iter().map(|task| task.frames.unfinished()).sum();
     let seconds_left = seconds_per_frame.map(|seconds| seconds * left as f64 / running.max(1) as f64);
     let finish = finish_status(&attempts, &tasks, plan);
-    Ok(FarmStatus { frames, tasks, finish, film, seconds_per_frame, running, seconds_left })
+    Ok(FarmStatus { frames, tasks, finish, unmade, seconds_per_frame, running, seconds_left })
 }
 
 fn seconds_per_frame(tasks: &[TaskStatus]) -> Option<f64> {

@@ -70,7 +70,8 @@ fn status(folder: &Folder) -> (Option<i32>, Value) {
 #[test]
 fn an_array_draws_the_bytes_of_one_process_and_is_not_submitted_again() {
     let (folder, alone) = (folder(), Folder::with_scene(FLAME));
-    let planned = plan(&folder, &["--chunk", "2", "--film", "film.apng", "--submit"]);
+    let options = ["--chunk", "2", "--film", "film.apng", "--contact-sheet", "4", "--submit"];
+    let planned = plan(&folder, &options);
     assert_eq!(planned.code, Some(0), "{}", planned.stderr);
     assert!(planned.stdout.contains("check 1\nframes 2\nfinish 3\n"), "{}", planned.stdout);
     let submitted = read(&folder, "sbatch.log");
@@ -90,11 +91,11 @@ fn an_array_draws_the_bytes_of_one_process_and_is_not_submitted_again() {
     assert_eq!((code, &after["complete"], &after["frames"]["whole"]), (Some(0), &true.into(), &6.into()));
     alone.succeed(&["render", "scene.toml"]);
     let frames = |folder: &Folder| -> Vec<_> {
-        folder.files("out/scene").into_iter().filter(|(name, _)| name.ends_with(".png")).collect()
+        folder.files("out/scene").into_iter().filter(|(name, _)| name.starts_with("scene.0")).collect()
     };
     assert!(frames(&folder) == frames(&alone));
-    assert!(folder.path("film.apng").exists());
-    let again = plan(&folder, &["--chunk", "2", "--film", "film.apng", "--submit"]);
+    assert!(folder.path("film.apng").exists() && folder.path("out/scene/scene.sheet.png").exists());
+    let again = plan(&folder, &options);
     assert_eq!((again.code, again.stdout.as_str()), (Some(0), "all frames are whole\n"));
     assert_eq!(read(&folder, "sbatch.log").matches("parsable").count(), 3);
 }
@@ -227,7 +228,6 @@ fn films_streams_and_other_outputs_are_refused() {
     let folder = folder();
     for (arguments, words) in [
         (&["-o", "a.mp4"][..], "one file holds all frames"),
-        (&["--contact-sheet", "4"], "one file holds all frames"),
         (&["--tiles", "100x1"], "at most one for each pixel"),
         (&["--tiles", "2x2", "--crop", "0,0,4,4"], "cannot be used with"),
         (&["--chunk", "0"], "auto, or a number of frames"),

@@ -44,7 +44,8 @@ pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
         return Err(UsageError("tasks read the scene, too; allowed: a file in a shared folder".to_owned()).into());
     }
     set_vector_level(args.render.work.vector_level)?;
-    let job = args.render.job()?;
+    // The last job makes the contact sheet.
+    let job = Job { contact_sheet: None, ..args.render.job()? };
     let folder = folder_of(&job)?;
     if args.submit {
         check_slurm(args)?;
@@ -201,6 +202,7 @@ impl Planning<'_> {
             tiles: self.args.tiles,
             snapshots,
             film: self.args.film.clone(),
+            contact_sheet: self.args.render.contact_sheet,
             costs,
         })
     }
