@@ -109,7 +109,7 @@ fn only_what_is_missing_is_submitted_again() {
     }
     fs::remove_file(folder.path("out/scene/scene.0003.png")).unwrap();
     let again = plan(&folder, &["--submit"]);
-    assert!(again.stdout.starts_with("1 frames in 1 tasks of up to 2 frames"), "{}{}", again.stdout, again.stderr);
+    assert!(again.stdout.starts_with("1 frame in 1 task of up to 2 frames"), "{}{}", again.stdout, again.stderr);
     assert!(read(&folder, "out/scene/scene.farm/frames.sbatch").contains("#SBATCH --array=1\n"));
     let run = batch(&folder, "frames.sbatch", 1);
     assert!(run.stderr.contains("1 frame in") && run.stderr.contains("1 was kept"), "{}", run.stderr);
