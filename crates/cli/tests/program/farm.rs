@@ -116,6 +116,40 @@ fn only_what_is_missing_is_submitted_again() {
 }
 
 #[test]
+fn tiles_are_joined_to_the_bytes_of_whole_pictures() {
+    let (folder, alone) = (folder(), Folder::with_scene(FLAME));
+    let planned = plan(&folder, &["-o", "out/scene/scene.####.exr", "--aovs", "--chunk", "6", "--tiles", "2x2"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.stderr);
+    for task in 0..4 {
+        let run = batch(&folder, "frames.sbatch", task);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    let whole =
+        || -> Vec<_> { folder.files("out/scene").into_keys().filter(|name| name.starts_with("scene.0")).collect() };
+    assert!(whole().is_empty(), "tiles are not frames");
+    let finish = batch(&folder, "finish.sbatch", 0);
+    assert_eq!(finish.code, Some(0), "{}", finish.stderr);
+    alone.succeed(&["render", "scene.toml", "-o", "out/scene/scene.####.exr", "--aovs"]);
+    assert_eq!(whole().len(), 6);
+    for name in whole() {
+        assert!(folder.files("out/scene")[&name] == alone.files("out/scene")[&name], "{name}");
+    }
+    let status = folder.succeed(&["farm", "status", "scene.toml", "-o", "out/scene/scene.####.exr"]);
+    assert!(status.stdout.starts_with("frames: 6 whole, 0 missing"), "{}", status.stdout);
+}
+
+#[test]
+fn finished_frames_become_a_film_without_a_plan() {
+    let folder = folder();
+    folder.succeed(&["render", "scene.toml", "--frames", "0-4"]);
+    let missing = folder.run(&["farm", "finish", "scene.toml", "--film", "a.apng"]);
+    assert_eq!((missing.code, missing.errors()), (Some(1), 1));
+    assert!(missing.stderr.contains("frames 5 are missing"), "{}", missing.stderr);
+    folder.succeed(&["farm", "finish", "scene.toml", "--film", "a.apng", "--frames", "0-4", "--contact-sheet", "3"]);
+    assert!(folder.path("a.apng").exists() && folder.path("out/scene/scene.sheet.png").exists());
+}
+
+#[test]
 fn a_missing_slurm_and_its_own_words_are_told_before_anything_is_drawn() {
     let folder = folder();
     let empty = folder.path("empty");
