@@ -157,12 +157,13 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<FarmSta
     let tasks: Vec<TaskStatus> = states.iter().enumerate().map(task).collect();
     let sheet = plan.contact_sheet.map(|_| contact_sheet_path(&job.output_path()));
     let made = [plan.film.clone(), sheet].into_iter().flatten().map(|path| plan.folder.join(path));
-    let unmade = made.filter(|path| !path.is_file()).collect();
+    let finish = finish_status(&attempts, &tasks, plan);
+    // What is there from before is of other frames, perhaps.
+    let unmade = made.filter(|path| finish != FinishStatus::Done || !path.is_file()).collect();
     let seconds_per_frame = seconds_per_frame(&tasks);
     let running = tasks.iter().filter(|task| is_running(task, plan)).count();
     let left: usize = tasks.iter().map(|task| task.frames.unfinished()).sum();
     let seconds_left = seconds_per_frame.map(|seconds| seconds * left as f64 / running.max(1) as f64);
-    let finish = finish_status(&attempts, &tasks, plan);
     Ok(FarmStatus { frames, tasks, finish, unmade, seconds_per_frame, running, seconds_left })
 }
 
@@ -259,7 +260,16 @@ mod tests {
         assert!(!found.is_complete());
         (0..3).for_each(|index| drop(task::chunk_job(&job, &farm, &plan, index).unwrap().run(&Unobserved).unwrap()));
         assert!(status(&job, &farm, &plan).unwrap().is_complete());
-        assert!(!status(&job, &farm, &FarmPlan { film: Some("a.mp4".into()), ..plan }).unwrap().is_complete());
+        // A film from before is not that of these frames, until the last job has run.
+        let film = FarmPlan { film: Some(folder.path().join("a.mp4")), ..plan };
+        fs::write(folder.path().join("a.mp4"), "an earlier one").unwrap();
+        assert!(!status(&job, &farm, &film).unwrap().is_complete());
+        let journal = journal::Journal::create(&farm.journal(), "finish").unwrap();
+        journal.write(&start(&film)).unwrap();
+        journal.write(&end(0, "")).unwrap();
+        assert!(status(&job, &farm, &film).unwrap().is_complete());
+        fs::remove_file(folder.path().join("a.mp4")).unwrap();
+        assert!(!status(&job, &farm, &film).unwrap().is_complete());
     }
 
     #[test]

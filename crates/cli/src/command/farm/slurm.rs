@@ -256,7 +256,7 @@ impl Planning<'_> {
         let frames: usize = tasks.iter().map(missing).sum();
         let with_snapshots = task::lacks_snapshots(&self.folder, plan, grid, &tasks);
         let snapshots = if with_snapshots { grid.snapshot_count() } else { 0 };
-        let is_complete = tasks.is_empty() && status::status(&self.job, &self.folder, plan)?.is_complete();
+        let is_complete = tasks.is_empty() && self.is_finished(plan)?;
         if !is_complete {
             // Before anything may fail, so that nothing is measured twice.
             self.folder.write_plan(plan)?;
@@ -269,6 +269,16 @@ impl Planning<'_> {
         }
         let summary = summary(plan, tasks.len(), frames, with_snapshots, &self.folder);
         Ok(Planned { summary, is_complete })
+    }
+
+    /// Whether the last job of an equal plan has made everything.
+    fn is_finished(&self, plan: &FarmPlan) -> Result<bool, FarmError> {
+        let is_equal = |earlier: &FarmPlan| {
+            earlier.digests == plan.digests
+                && (&earlier.film, earlier.contact_sheet) == (&plan.film, plan.contact_sheet)
+        };
+        let earlier = self.folder.read_plan().ok().filter(is_equal);
+        Ok(status::status(&self.job, &self.folder, earlier.as_ref().unwrap_or(plan))?.is_complete())
     }
 
     fn slurm_options(&self, memory_bytes: f64) -> Result<SlurmOptions, FarmError> {
