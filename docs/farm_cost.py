@@ -17,17 +17,17 @@ from dataclasses import dataclass
 FRAME_S = 2.6  # 5.0 s of CPU time to prepare, draw and write, and a little that only one core does
 STEP_S = 0.02  # to step over a frame
 PREROLL_S = 3.0  # building the scene and its preroll, where no snapshot is restored
-RESTORE_S = 0.3  # reading and restoring a snapshot
 START_S = 0.3  # starting the program, building the scene, the check of the arithmetic and of the fingerprints of the chunk
 FIRST_FRAME_S = 2.4  # what the first frame of a task takes longer, since it fills caches
 FRAME_BYTES = 58.45e6
 SNAPSHOT_BYTES = 6.7e6
 METADATA_OPERATIONS = 19  # of a frame: 13 stat, 2 readlink, open, mkdir, rename, and a line of the journal; counted by strace
-# Frames of a shot differ: standard deviation of the logarithm of a frame's time.
-SPREAD = 0.1
 # Measured on three nodes of one machine: from the end of a job to the start of the one that depends on it, and from one task of an array to the next.
 DEPENDENCY_S = 3.0
 DISPATCH_S = 0.5
+# Assumed: reading and restoring a snapshot, and how much frames of a shot differ (standard deviation of a frame's time).
+RESTORE_S = 0.3
+SPREAD = 0.1
 # Assumed: a shared file system of an institute.
 BANDWIDTH = 5e9  # bytes/s
 METADATA_RATE = 20_000.0  # operations/s

@@ -2,7 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use bansho_media::{MediaError, output::frame_file::FrameFileError};
+use bansho_media::{MediaError, files::input::InputError, output::frame_file::FrameFileError};
 
 use crate::job::{ErrorCategory, JobError, frames::FrameListError};
 
@@ -23,6 +23,14 @@ pub enum FarmError {
         path: PathBuf,
         /// The message of the system.
         source: io::Error,
+    },
+    /// A file cannot be read, or is no ordinary file.
+    #[error("{path}: {source}", path = .path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: InputError,
     },
     /// There is no plan.
     #[error("{path}: there is no plan of tasks; `bansho farm slurm` writes one", path = .path.display())]

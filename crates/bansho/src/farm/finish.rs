@@ -1,6 +1,6 @@
 //! The last job of a plan: checks that every frame is whole, joins tiles, and makes the film of the frames.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use bansho_base::{
     frame::{DisplayImage, DisplayPixels, Frame},
@@ -9,9 +9,9 @@ use bansho_base::{
 };
 use bansho_media::{
     files::naming::OutputPattern,
-    format::{OutputKind, PictureFormat},
+    format::OutputKind,
     output::{
-        frame_file::{self, FrameFileError, LinearPixels},
+        frame_file::{self, LinearPixels},
         sink::{FrameSlot, Picture},
     },
 };
@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use super::{
     error::FarmError,
+    film::{self, unreadable},
     plan::{FarmFolder, FarmPlan},
     status,
     task::{tile_job, tile_rect},
@@ -36,8 +37,11 @@ pub fn finish(job: &Job, folder: &FarmFolder, plan: &FarmPlan, observer: &dyn Ob
     if plan.tile_count() > 1 {
         join(&whole, job, folder, plan, observer)?;
     }
-    match &plan.film {
-        Some(film) => make_film(&whole, &plan.folder.join(film), observer),
+    if let Some(film) = &plan.film {
+        film::make_film(&whole, &plan.folder.join(film), observer)?;
+    }
+    match plan.contact_sheet {
+        Some(count) => film::make_contact_sheet(&whole, count, observer),
         None => Ok(()),
     }
 }
@@ -71,10 +75,6 @@ fn check_tasks(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<(), Fa
     missing.sort_unstable();
     missing.dedup();
     Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output_path() })
-}
-
-fn unreadable(path: &Path) -> impl Fn(FrameFileError) -> FarmError + '_ {
-    move |source| FarmError::FrameFile { path: path.to_path_buf(), source }
 }
 
 /// Joins the tiles of all frames that are not joined yet.
@@ -179,50 +179,9 @@ fn join_linear(
     Frame { header, beauty, depth, channels, opaque: false, metadata: Vec::new(), content }
 }
 
-/// Makes a film of finished frames.
-///
-/// # Errors
-/// The name is not that of a film, a frame cannot be read, or the film cannot be written.
-pub fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> Result<(), FarmError> {
-    let mut format = whole.format.clone();
-    format.pattern = OutputPattern::parse(path, whole.frames().len()).map_err(JobError::Naming)?;
-    if format.pattern.kind().is_sequence() {
-        return Err(FarmError::NotAFilm { path: path.to_path_buf() });
-    }
-    let window = whole.plan().window();
-    let (opaque, size) = (whole.compiled.has_opaque_plate(), [window.width, window.height]);
-    let sink = format.open(whole.plan(), opaque, whole.frames().len(), size, 1)?;
-    for (index, &number) in whole.frames().iter().enumerate() {
-        check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
-        let slot = FrameSlot { index, number };
-        let picture = display_picture(whole, number, sink.picture_format(), observer)?;
-        sink.write(slot, Picture::Display(&picture, &[0; 32]))?;
-    }
-    Ok(sink.finish()?)
-}
-
-/// The display pixels of a finished frame.
-fn display_picture(
-    whole: &PreparedJob,
-    number: i64,
-    picture_format: PictureFormat,
-    observer: &dyn Observer,
-) -> Result<DisplayImage, FarmError> {
-    let path = whole.format.pattern.path(number);
-    if whole.format.pattern.kind() == OutputKind::Png {
-        return frame_file::read_png(&path).map_err(unreadable(&path));
-    }
-    let LinearPixels { beauty, .. } = frame_file::read_exr(&path).map_err(unreadable(&path))?;
-    let header = whole.plan().header(number, whole.expected_fingerprint(number));
-    let content = Rect::from_size(beauty.width(), beauty.height());
-    let opaque = picture_format == PictureFormat::OpaqueDisplay || whole.plan().scene().has_plate();
-    let frame = Frame { header, beauty, depth: None, channels: Vec::new(), opaque, metadata: Vec::new(), content };
-    Ok(whole.format.to_display(&frame, observer))
-}
-
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, path::Path};
 
     use bansho_base::host::observer::Unobserved;
 
@@ -267,6 +226,21 @@ mod tests {
                 let [expected, found] = [&whole, &tiled].map(|folder| fs::read(folder.path().join(&file)).unwrap());
                 assert!(expected == found, "{file}");
             }
+        }
+    }
+
+    #[test]
+    fn a_contact_sheet_is_made_of_finished_frames() {
+        for name in ["a.####.png", "a.####.exr"] {
+            let folder = tempfile::tempdir().unwrap();
+            let (job, farm, plan) = shot(folder.path(), name, [1, 1]);
+            job.prepare().unwrap().run(&Unobserved).unwrap();
+            finish(&job, &farm, &FarmPlan { contact_sheet: Some(9), ..plan }, &Unobserved).unwrap();
+            let sheet = frame_file::read_png(&folder.path().join("a.sheet.png")).unwrap();
+            // Three frames: two columns and two rows.
+            assert_eq!((sheet.width, sheet.height, sheet.opaque), (2 * 53 + 2, 2 * 37 + 2, true), "{name}");
+            let DisplayPixels::Eight(pixels) = sheet.pixels else { panic!("8 bits") };
+            assert!(pixels.iter().any(|pixel| pixel[0] > 150 && pixel[2] < pixel[0]), "{name}: a flame");
         }
     }
 

@@ -11,6 +11,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+use bansho_media::files::input;
 use serde::{Deserialize, Serialize};
 
 /// What a journal is about: `check`, `snapshots`, `finish`, or a task by its number.
@@ -61,6 +62,8 @@ pub struct Journal {
     file: Mutex<File>,
 }
 
+/// Largest journal that is read, bytes: a million frames.
+const JOURNAL_BYTES: u64 = 128 << 20;
 /// Largest number of attempts at a task.
 const MAX_ATTEMPTS: usize = 10_000;
 
@@ -147,7 +150,7 @@ pub fn read(folder: &Path) -> Attempts {
     found.sort();
     let mut attempts = Attempts::new();
     for (task, _, path) in found {
-        let text = fs::read(&path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        let text = input::read(&path, JOURNAL_BYTES).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
         attempts.entry(task).or_default().extend(text.map(|text| Attempt::read(&text)));
     }
     attempts

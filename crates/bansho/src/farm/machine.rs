@@ -1,9 +1,12 @@
 //! Whether a machine may draw frames of a plan: it sees the same folder, runs the same version, and its processor gives the same bytes.
 
-use std::{fs, io, sync::Arc};
+use std::{io, sync::Arc};
 
 use bansho_base::host::{assets::MemoryAssets, observer::Observer};
-use bansho_media::files::provenance::PROGRAM;
+use bansho_media::files::{
+    input::{self, InputError},
+    provenance::PROGRAM,
+};
 use bansho_render::{Plan, PlanOptions, Shot};
 
 use super::{
@@ -11,6 +14,9 @@ use super::{
     plan::{FarmFolder, FarmPlan},
 };
 use crate::{compile_scene, job::JobError};
+
+/// Largest token file that is read, bytes.
+const TOKEN_BYTES: u64 = 256;
 
 /// A picture that passes through the arithmetic of every kind of phenomenon, small enough to be drawn by every task.
 const PICTURE: &str = "bansho = 2\n[picture]\nsize = [48, 32]\nseed = 11\n";
@@ -62,11 +68,11 @@ impl TaskCheck<'_> {
     /// There is another token, or none.
     pub fn token(&self) -> Result<(), FarmError> {
         let path = self.folder.token();
-        let found = match fs::read_to_string(&path) {
-            Ok(text) if text.trim_end() == self.token => return Ok(()),
-            Ok(text) => format!("`{}`", text.trim_end().chars().take(64).collect::<String>()),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => "no file".to_owned(),
-            Err(source) => return Err(FarmError::Io { path, source }),
+        let found = match input::read(&path, TOKEN_BYTES) {
+            Ok(bytes) if bytes.trim_ascii_end() == self.token.as_bytes() => return Ok(()),
+            Ok(bytes) => format!("`{}`", String::from_utf8_lossy(bytes.trim_ascii_end())),
+            Err(InputError::Io(error)) if error.kind() == io::ErrorKind::NotFound => "no file".to_owned(),
+            Err(source) => return Err(FarmError::Input { path, source }),
         };
         Err(FarmError::Token { path, expected: self.token.to_owned(), found })
     }

@@ -12,11 +12,12 @@
 //! | scripts of Slurm, a template of Open Job Description | [`slurm`], [`openjd`] |
 //! | whether the disk is large enough | [`space`] |
 //! | whether a machine may take part | [`machine`] |
-//! | what a task draws, and what comes after all tasks | [`task`], [`finish`] |
+//! | what a task draws, and what comes after all tasks | [`task`], [`finish`], [`film`] |
 //! | what tasks reported, and the state of all frames | [`journal`], [`status`] |
 
 pub mod chunks;
 mod error;
+pub mod film;
 pub mod finish;
 pub mod journal;
 pub mod machine;

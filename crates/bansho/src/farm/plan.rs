@@ -5,7 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho_media::files::{atomic, provenance::PROGRAM};
+use bansho_media::files::{
+    atomic,
+    input::{self, InputError},
+    provenance::PROGRAM,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -16,6 +20,10 @@ use crate::job::frames;
 
 /// Value of `"format"` in the file of a plan.
 const FORMAT: u32 = 1;
+/// Largest file of a plan that is read, bytes: some ten million frames in as many ranges.
+const PLAN_BYTES: u64 = 256 << 20;
+/// Most columns and rows of tiles.
+const MAX_TILES: usize = 4096;
 
 /// How a shot is cut into tasks. Chunk `c` and tile `t` of `n` tiles are task `c n + t`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +52,8 @@ pub struct FarmPlan {
     pub snapshots: bool,
     /// The film that is made of the frames at the end.
     pub film: Option<PathBuf>,
+    /// Number of frames of the contact sheet that is made at the end.
+    pub contact_sheet: Option<usize>,
     /// For each chunk the digest of the fingerprints of its frames, hexadecimal.
     pub digests: Vec<String>,
     /// What frames cost on the planning machine.
@@ -67,6 +77,8 @@ pub struct PlanOptions {
     pub snapshots: bool,
     /// The film that is made at the end.
     pub film: Option<PathBuf>,
+    /// Number of frames of the contact sheet that is made at the end.
+    pub contact_sheet: Option<usize>,
     /// What frames cost.
     pub costs: ShotCosts,
 }
@@ -80,7 +92,8 @@ impl FarmPlan {
         chunk_frames: u64,
         digests: Vec<String>,
     ) -> Self {
-        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, film, costs } = options;
+        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, film, contact_sheet, costs } =
+            options;
         Self {
             format: FORMAT,
             program: PROGRAM.to_owned(),
@@ -94,6 +107,7 @@ impl FarmPlan {
             tiles,
             snapshots,
             film,
+            contact_sheet,
             digests,
             costs,
         }
@@ -183,15 +197,21 @@ impl FarmFolder {
     /// There is none, or the file is no plan.
     pub fn read_plan(&self) -> Result<FarmPlan, FarmError> {
         let path = self.plan();
-        let bytes = match fs::read(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(FarmError::NoPlan { path }),
-            Err(source) => return Err(FarmError::Io { path, source }),
+        let bytes = match input::read(&path, PLAN_BYTES) {
+            Err(InputError::Io(error)) if error.kind() == io::ErrorKind::NotFound => {
+                return Err(FarmError::NoPlan { path });
+            }
+            Err(source) => return Err(FarmError::Input { path, source }),
             Ok(bytes) => bytes,
         };
         let plan: FarmPlan = serde_json::from_slice(&bytes)
             .map_err(|error| FarmError::PlanFormat { path: path.clone(), reason: error.to_string() })?;
         if plan.format != FORMAT {
             let reason = format!("its format is {}; allowed: {FORMAT}", plan.format);
+            return Err(FarmError::PlanFormat { path, reason });
+        }
+        if plan.tiles.iter().any(|side| !(1..=MAX_TILES).contains(side)) || plan.digests.len() != plan.grid()?.count() {
+            let reason = "its numbers of tiles and chunks do not fit".to_owned();
             return Err(FarmError::PlanFormat { path, reason });
         }
         Ok(plan)
@@ -248,7 +268,13 @@ pub(crate) mod tests {
         let farm = FarmFolder::new(folder.path().to_path_buf());
         farm.write_plan(&plan()).unwrap();
         let whole = fs::read_to_string(farm.plan()).unwrap();
-        for bad in [&whole[..whole.len() / 2], "", "[]", &whole.replace("\"format\": 1", "\"format\": 2")] {
+        for bad in [
+            &whole[..whole.len() / 2],
+            "",
+            "[]",
+            &whole.replace("\"format\": 1", "\"format\": 2"),
+            &whole.replace("\"chunk_frames\": 4", "\"chunk_frames\": 3"),
+        ] {
             fs::write(farm.plan(), bad).unwrap();
             assert!(matches!(farm.read_plan(), Err(FarmError::PlanFormat { .. })), "{bad}");
         }

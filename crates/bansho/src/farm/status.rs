@@ -1,9 +1,12 @@
 //! The state of all frames of a plan, from files alone: the frames themselves, and the journals of tasks.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 
 use super::{
     error::FarmError,
+    film::contact_sheet_path,
     journal::{self, Attempt, Attempts},
     plan::{FarmFolder, FarmPlan},
     task,
@@ -90,8 +93,8 @@ pub struct FarmStatus {
     pub tasks: Vec<TaskStatus>,
     /// The job after all tasks.
     pub finish: FinishStatus,
-    /// Whether the film exists, where one is made.
-    pub film: Option<bool>,
+    /// What the last job makes and has not made: the film, the contact sheet.
+    pub unmade: Vec<PathBuf>,
     /// Time of a frame within its task, s, from the journals.
     pub seconds_per_frame: Option<f64>,
     /// Number of tasks that began and did not end.
@@ -101,9 +104,9 @@ pub struct FarmStatus {
 }
 
 impl FarmStatus {
-    /// Whether all frames are whole, and the film is made.
+    /// Whether all frames are whole, and the film and the contact sheet are made.
     pub fn is_complete(&self) -> bool {
-        self.frames.unfinished() == 0 && self.film != Some(false)
+        self.frames.unfinished() == 0 && self.unmade.is_empty()
     }
 }
 
@@ -152,13 +155,16 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<FarmSta
         }
     };
     let tasks: Vec<TaskStatus> = states.iter().enumerate().map(task).collect();
-    let film = plan.film.as_ref().map(|film| plan.folder.join(film).is_file());
+    let sheet = plan.contact_sheet.map(|_| contact_sheet_path(&job.output_path()));
+    let made = [plan.film.clone(), sheet].into_iter().flatten().map(|path| plan.folder.join(path));
+    let finish = finish_status(&attempts, &tasks, plan);
+    // What is there from before is of other frames, perhaps.
+    let unmade = made.filter(|path| finish != FinishStatus::Done || !path.is_file()).collect();
     let seconds_per_frame = seconds_per_frame(&tasks);
     let running = tasks.iter().filter(|task| is_running(task, plan)).count();
     let left: usize = tasks.iter().map(|task| task.frames.unfinished()).sum();
     let seconds_left = seconds_per_frame.map(|seconds| seconds * left as f64 / running.max(1) as f64);
-    let finish = finish_status(&attempts, &tasks, plan);
-    Ok(FarmStatus { frames, tasks, finish, film, seconds_per_frame, running, seconds_left })
+    Ok(FarmStatus { frames, tasks, finish, unmade, seconds_per_frame, running, seconds_left })
 }
 
 fn seconds_per_frame(tasks: &[TaskStatus]) -> Option<f64> {
@@ -254,7 +260,16 @@ mod tests {
         assert!(!found.is_complete());
         (0..3).for_each(|index| drop(task::chunk_job(&job, &farm, &plan, index).unwrap().run(&Unobserved).unwrap()));
         assert!(status(&job, &farm, &plan).unwrap().is_complete());
-        assert!(!status(&job, &farm, &FarmPlan { film: Some("a.mp4".into()), ..plan }).unwrap().is_complete());
+        // A film from before is not that of these frames, until the last job has run.
+        let film = FarmPlan { film: Some(folder.path().join("a.mp4")), ..plan };
+        fs::write(folder.path().join("a.mp4"), "an earlier one").unwrap();
+        assert!(!status(&job, &farm, &film).unwrap().is_complete());
+        let journal = journal::Journal::create(&farm.journal(), "finish").unwrap();
+        journal.write(&start(&film)).unwrap();
+        journal.write(&end(0, "")).unwrap();
+        assert!(status(&job, &farm, &film).unwrap().is_complete());
+        fs::remove_file(folder.path().join("a.mp4")).unwrap();
+        assert!(!status(&job, &farm, &film).unwrap().is_complete());
     }
 
     #[test]

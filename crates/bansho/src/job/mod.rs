@@ -12,9 +12,9 @@ mod flipbook;
 pub mod frames;
 mod observer;
 mod pipeline;
-mod render;
+pub(crate) mod render;
 mod scene_file;
-mod sheet;
+pub(crate) mod sheet;
 #[cfg(feature = "rain")]
 mod streaks;
 #[cfg(test)]

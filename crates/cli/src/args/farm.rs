@@ -22,7 +22,8 @@ pub(crate) enum FarmCommand {
     /// Write the batch scripts that draw a shot as a job array of Slurm, and submit them.
     #[command(after_help = "\
 A few frames are drawn first, to measure what a frame costs; they are kept. The folder NAME.farm beside the frames then has the plan, the scripts, \
-snapshots of simulations, and what tasks print and report. Every task draws what is missing of its frames. Repeat the command to submit what is \
+snapshots of simulations, and what tasks print and report. Every task draws what is missing of its frames. A last job checks them, and makes the film and \
+the contact sheet (of N frames that are spread over the shot). Repeat the command to submit what is \
 still missing.
 
 Examples:

@@ -63,7 +63,7 @@ pub(crate) struct RenderArgs {
     /// Draw N frames into one .png: the first N of several --frames, or N consecutive ones from a single frame on. The default of --out is then
     /// out/SCENE/SCENE.sheet.png.
     #[arg(long, value_name = "N", help_heading = "Output")]
-    contact_sheet: Option<usize>,
+    pub(crate) contact_sheet: Option<usize>,
     /// Background of the frames of a contact sheet.
     #[arg(
         long,

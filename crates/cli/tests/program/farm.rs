@@ -70,7 +70,8 @@ fn status(folder: &Folder) -> (Option<i32>, Value) {
 #[test]
 fn an_array_draws_the_bytes_of_one_process_and_is_not_submitted_again() {
     let (folder, alone) = (folder(), Folder::with_scene(FLAME));
-    let planned = plan(&folder, &["--chunk", "2", "--film", "film.apng", "--submit"]);
+    let options = ["--chunk", "2", "--film", "film.apng", "--contact-sheet", "4", "--submit"];
+    let planned = plan(&folder, &options);
     assert_eq!(planned.code, Some(0), "{}", planned.stderr);
     assert!(planned.stdout.contains("check 1\nframes 2\nfinish 3\n"), "{}", planned.stdout);
     let submitted = read(&folder, "sbatch.log");
@@ -90,11 +91,11 @@ fn an_array_draws_the_bytes_of_one_process_and_is_not_submitted_again() {
     assert_eq!((code, &after["complete"], &after["frames"]["whole"]), (Some(0), &true.into(), &6.into()));
     alone.succeed(&["render", "scene.toml"]);
     let frames = |folder: &Folder| -> Vec<_> {
-        folder.files("out/scene").into_iter().filter(|(name, _)| name.ends_with(".png")).collect()
+        folder.files("out/scene").into_iter().filter(|(name, _)| name.starts_with("scene.0")).collect()
     };
     assert!(frames(&folder) == frames(&alone));
-    assert!(folder.path("film.apng").exists());
-    let again = plan(&folder, &["--chunk", "2", "--film", "film.apng", "--submit"]);
+    assert!(folder.path("film.apng").exists() && folder.path("out/scene/scene.sheet.png").exists());
+    let again = plan(&folder, &options);
     assert_eq!((again.code, again.stdout.as_str()), (Some(0), "all frames are whole\n"));
     assert_eq!(read(&folder, "sbatch.log").matches("parsable").count(), 3);
 }
@@ -108,10 +109,44 @@ fn only_what_is_missing_is_submitted_again() {
     }
     fs::remove_file(folder.path("out/scene/scene.0003.png")).unwrap();
     let again = plan(&folder, &["--submit"]);
-    assert!(again.stdout.starts_with("1 frames in 1 tasks of up to 2 frames"), "{}{}", again.stdout, again.stderr);
+    assert!(again.stdout.starts_with("1 frame in 1 task of up to 2 frames"), "{}{}", again.stdout, again.stderr);
     assert!(read(&folder, "out/scene/scene.farm/frames.sbatch").contains("#SBATCH --array=1\n"));
     let run = batch(&folder, "frames.sbatch", 1);
     assert!(run.stderr.contains("1 frame in") && run.stderr.contains("1 was kept"), "{}", run.stderr);
+}
+
+#[test]
+fn tiles_are_joined_to_the_bytes_of_whole_pictures() {
+    let (folder, alone) = (folder(), Folder::with_scene(FLAME));
+    let planned = plan(&folder, &["-o", "out/scene/scene.####.exr", "--aovs", "--chunk", "6", "--tiles", "2x2"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.stderr);
+    for task in 0..4 {
+        let run = batch(&folder, "frames.sbatch", task);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    let whole =
+        || -> Vec<_> { folder.files("out/scene").into_keys().filter(|name| name.starts_with("scene.0")).collect() };
+    assert!(whole().is_empty(), "tiles are not frames");
+    let finish = batch(&folder, "finish.sbatch", 0);
+    assert_eq!(finish.code, Some(0), "{}", finish.stderr);
+    alone.succeed(&["render", "scene.toml", "-o", "out/scene/scene.####.exr", "--aovs"]);
+    assert_eq!(whole().len(), 6);
+    for name in whole() {
+        assert!(folder.files("out/scene")[&name] == alone.files("out/scene")[&name], "{name}");
+    }
+    let status = folder.succeed(&["farm", "status", "scene.toml", "-o", "out/scene/scene.####.exr"]);
+    assert!(status.stdout.starts_with("frames: 6 whole, 0 missing"), "{}", status.stdout);
+}
+
+#[test]
+fn finished_frames_become_a_film_without_a_plan() {
+    let folder = folder();
+    folder.succeed(&["render", "scene.toml", "--frames", "0-4"]);
+    let missing = folder.run(&["farm", "finish", "scene.toml", "--film", "a.apng"]);
+    assert_eq!((missing.code, missing.errors()), (Some(1), 1));
+    assert!(missing.stderr.contains("frames 5 are missing"), "{}", missing.stderr);
+    folder.succeed(&["farm", "finish", "scene.toml", "--film", "a.apng", "--frames", "0-4", "--contact-sheet", "3"]);
+    assert!(folder.path("a.apng").exists() && folder.path("out/scene/scene.sheet.png").exists());
 }
 
 #[test]
@@ -227,7 +262,6 @@ fn films_streams_and_other_outputs_are_refused() {
     let folder = folder();
     for (arguments, words) in [
         (&["-o", "a.mp4"][..], "one file holds all frames"),
-        (&["--contact-sheet", "4"], "one file holds all frames"),
         (&["--tiles", "100x1"], "at most one for each pixel"),
         (&["--tiles", "2x2", "--crop", "0,0,4,4"], "cannot be used with"),
         (&["--chunk", "0"], "auto, or a number of frames"),

@@ -14,7 +14,8 @@ use crate::{
 };
 
 /// Options that the plan decides about, or that concern only this process.
-const LEFT_OUT: [&str; 9] = [
+const LEFT_OUT: [&str; 10] = [
+    "contact_sheet",
     "frames",
     "resume",
     "snapshots",

@@ -1,6 +1,9 @@
 //! `bansho farm finish`
 
-use bansho::farm::finish;
+use bansho::{
+    farm::{film, finish},
+    job::Job,
+};
 
 use super::run_in_pool;
 use crate::{args::FinishArgs, progress::ProgressReporter};
@@ -9,11 +12,14 @@ use crate::{args::FinishArgs, progress::ProgressReporter};
 pub(crate) fn run(args: &FinishArgs) -> anyhow::Result<()> {
     let work = &args.render.work;
     run_in_pool(work.threads, ProgressReporter::new(work.progress, work.stats), |reporter| {
-        let job = args.render.job()?.prepare()?;
+        let job = Job { contact_sheet: None, ..args.render.job()? }.prepare()?;
         finish::check_whole(&job)?;
-        match &args.film {
-            Some(film) => finish::make_film(&job, film, reporter).map(|()| None),
-            None => Ok(None),
+        if let Some(film) = &args.film {
+            film::make_film(&job, film, reporter)?;
         }
+        if let Some(count) = args.render.contact_sheet {
+            film::make_contact_sheet(&job, count, reporter)?;
+        }
+        Ok(None)
     })
 }

@@ -13,7 +13,10 @@ use std::{
 
 use bansho::{
     Unobserved,
-    base::{host::printable::printable, math::simd::set_vector_level},
+    base::{
+        host::{plural::counted, printable::printable},
+        math::simd::set_vector_level,
+    },
     farm::{
         FarmError, FarmFolder, FarmPlan,
         chunks::{self, ChunkGrid, ChunkRequest, ShotCosts},
@@ -24,7 +27,7 @@ use bansho::{
         space, status, task,
     },
     job::{Job, PreparedJob},
-    media::files::atomic,
+    media::files::{atomic, input},
 };
 
 use super::{arguments, run_in_pool};
@@ -37,14 +40,19 @@ use crate::{
 
 /// `MaxArraySize` of a cluster that does not state another.
 const MAX_ARRAY_SIZE: usize = 1001;
+/// Largest list of jobs that is read, bytes.
+const JOBS_BYTES: u64 = 64 << 10;
 
 /// Plans the tasks of a shot, writes their scripts, and submits them.
 pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
     if args.render.scene.as_os_str() == "-" {
         return Err(UsageError("tasks read the scene, too; allowed: a file in a shared folder".to_owned()).into());
     }
+    // Before anything is drawn.
+    args.sbatch.iter().chain(&args.partition).try_for_each(|option| task::check_printable(option))?;
     set_vector_level(args.render.work.vector_level)?;
-    let job = args.render.job()?;
+    // The last job makes the contact sheet.
+    let job = Job { contact_sheet: None, ..args.render.job()? };
     let folder = folder_of(&job)?;
     if args.submit {
         check_slurm(args)?;
@@ -103,7 +111,8 @@ fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
 
 /// Refuses to plan again while jobs of the last plan are queued or running: they would find another plan than they were submitted for.
 fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<()> {
-    let Ok(text) = fs::read_to_string(folder.jobs()) else { return Ok(()) };
+    let Ok(text) = input::read(&folder.jobs(), JOBS_BYTES) else { return Ok(()) };
+    let text = String::from_utf8_lossy(&text);
     let submitted: Vec<&str> = text.lines().filter_map(|line| line.split_whitespace().nth(1)).collect();
     let queued = match slurm_output("squeue", &["--me", "--noheader", "--format=%F"]) {
         Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).into_owned(),
@@ -201,6 +210,7 @@ impl Planning<'_> {
             tiles: self.args.tiles,
             snapshots,
             film: self.args.film.clone(),
+            contact_sheet: self.args.render.contact_sheet,
             costs,
         })
     }
@@ -246,7 +256,7 @@ impl Planning<'_> {
         let frames: usize = tasks.iter().map(missing).sum();
         let with_snapshots = task::lacks_snapshots(&self.folder, plan, grid, &tasks);
         let snapshots = if with_snapshots { grid.snapshot_count() } else { 0 };
-        let is_complete = tasks.is_empty() && status::status(&self.job, &self.folder, plan)?.is_complete();
+        let is_complete = tasks.is_empty() && self.is_finished(plan)?;
         if !is_complete {
             // Before anything may fail, so that nothing is measured twice.
             self.folder.write_plan(plan)?;
@@ -259,6 +269,16 @@ impl Planning<'_> {
         }
         let summary = summary(plan, tasks.len(), frames, with_snapshots, &self.folder);
         Ok(Planned { summary, is_complete })
+    }
+
+    /// Whether the last job of an equal plan has made everything.
+    fn is_finished(&self, plan: &FarmPlan) -> Result<bool, FarmError> {
+        let is_equal = |earlier: &FarmPlan| {
+            earlier.digests == plan.digests
+                && (&earlier.film, earlier.contact_sheet) == (&plan.film, plan.contact_sheet)
+        };
+        let earlier = self.folder.read_plan().ok().filter(is_equal);
+        Ok(status::status(&self.job, &self.folder, earlier.as_ref().unwrap_or(plan))?.is_complete())
     }
 
     fn slurm_options(&self, memory_bytes: f64) -> Result<SlurmOptions, FarmError> {
@@ -288,8 +308,10 @@ fn summary(plan: &FarmPlan, tasks: usize, frames: usize, with_snapshots: bool, f
     let stepping = if step_s > 0.0 { format!(", {step_s:.2} s a step") } else { String::new() };
     let snapshots = if with_snapshots { ", after a job that leaves snapshots" } else { "" };
     format!(
-        "{frames} frames in {tasks} tasks of up to {} frames{snapshots}: {}\nmeasured here: {draw_s:.2} s a frame{stepping}, {startup_s:.1} s before the first\n",
-        plan.chunk_frames,
+        "{} in {} of up to {}{snapshots}: {}\nmeasured here: {draw_s:.2} s a frame{stepping}, {startup_s:.1} s before the first\n",
+        counted(frames, "frame"),
+        counted(tasks, "task"),
+        counted(plan.chunk_frames as usize, "frame"),
         shown(folder.root())
     )
 }

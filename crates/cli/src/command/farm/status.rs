@@ -3,6 +3,7 @@
 use std::{env, fmt::Write, path};
 
 use bansho::{
+    base::host::printable::printable,
     farm::{
         FarmFolder,
         status::{self, FarmStatus, FinishStatus, TaskStatus},
@@ -44,8 +45,10 @@ fn as_text(status: &FarmStatus) -> String {
         text += &task_line(task);
     }
     // Writing to a string cannot fail.
-    let _ = match (&status.finish, status.film) {
-        (FinishStatus::Done, Some(false)) => writeln!(text, "last job: done, but the film is missing"),
+    let _ = match (&status.finish, status.unmade.first()) {
+        (FinishStatus::Done, Some(path)) => {
+            writeln!(text, "last job: done, but {} is missing", printable(&path.display().to_string()))
+        }
         (FinishStatus::Done, _) => writeln!(text, "last job: done"),
         (FinishStatus::Failed { message }, _) => writeln!(text, "last job: failed: {message}"),
         (FinishStatus::Waiting, _) => writeln!(text, "last job: waits for the others"),

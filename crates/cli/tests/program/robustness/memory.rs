@@ -31,10 +31,10 @@ fn pictures_larger_than_memory_are_refused_with_the_size_that_would_fit() {
 #[test]
 fn a_scene_larger_than_memory_is_told_at_its_line_by_check_and_render() {
     let large = Folder::with_scene(&FLAME.replace("48, 64", "16384, 16000"));
-    let wide = Folder::with_scene(&FLAME.replace("seed = 7", "overscan = 4096"));
+    let wide = Folder::with_scene(&FLAME.replace("seed = 7", "overscan = 8192"));
     for (folder, expected, out) in [
         (large, "scene.toml:4:8: picture.size: 16384 x 16000 pixels would take ", "big.png"),
-        (wide, "scene.toml:6:12: picture.overscan: 8240 x 8256 pixels with this overscan would take ", "big.exr"),
+        (wide, "scene.toml:6:12: picture.overscan: 16432 x 16448 pixels with this overscan would take ", "big.exr"),
     ] {
         for run in [
             run_within(&folder, 2_000_000, &format!("render scene.toml --frames 0 --out {out}")),
