@@ -31,14 +31,19 @@ fn pictures_larger_than_memory_are_refused_with_the_size_that_would_fit() {
 #[test]
 fn a_scene_larger_than_memory_is_told_at_its_line_by_check_and_render() {
     let large = Folder::with_scene(&FLAME.replace("48, 64", "16384, 16000"));
-    let wide = Folder::with_scene(&FLAME.replace("seed = 7", "overscan = 8192"));
-    for (folder, expected, out) in [
-        (large, "scene.toml:4:8: picture.size: 16384 x 16000 pixels would take ", "big.png"),
-        (wide, "scene.toml:6:12: picture.overscan: 16432 x 16448 pixels with this overscan would take ", "big.exr"),
+    let wide = Folder::with_scene(&FLAME.replace("seed = 7", "overscan = 4096"));
+    for (folder, memory, expected, out) in [
+        (large, 2_000_000, "scene.toml:4:8: picture.size: 16384 x 16000 pixels would take ", "big.png"),
+        (
+            wide,
+            1_000_000,
+            "scene.toml:6:12: picture.overscan: 8240 x 8256 pixels with this overscan would take ",
+            "big.exr",
+        ),
     ] {
         for run in [
-            run_within(&folder, 2_000_000, &format!("render scene.toml --frames 0 --out {out}")),
-            check_within(&folder, 2_000_000, "scene.toml"),
+            run_within(&folder, memory, &format!("render scene.toml --frames 0 --out {out}")),
+            check_within(&folder, memory, "scene.toml"),
         ] {
             assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
             assert!(run.stderr.contains(expected) && run.stderr.contains("allowed: up to "), "{}", run.stderr);
