@@ -1,6 +1,6 @@
 //! Line drawings: strokes in the plane, read from a vector graphics file.
 
-use crate::{host::plural::counted, math::DVec2};
+use crate::math::DVec2;
 
 /// A stroke as a polyline.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub enum DrawingRemark {
         names: Vec<&'static str>,
     },
     /// Paths of a single point.
-    #[error("{} {} a single point, and {} left out", counted(*.paths, "path"), if *.paths == 1 { "is" } else { "are each" }, if *.paths == 1 { "is" } else { "are" })]
+    #[error("{paths} path{} of a single point {} left out", if *.paths == 1 { "" } else { "s" }, if *.paths == 1 { "is" } else { "are" })]
     Dots {
         /// Their number.
         paths: usize,

@@ -99,7 +99,7 @@ fn what_is_left_out_is_told_once() {
         "<svg>{defs}<rect/><path d='M1 1'/><path d='m2 2h0z'/><text/><rect/><path d='M3 3H4'/></svg>"
     ));
     assert_eq!(drawing.remarks, [OtherElements { names: vec!["rect", "text"] }, Dots { paths: 2 }]);
-    assert_eq!(drawing.remarks[1].to_string(), "2 paths are each a single point, and are left out");
+    assert_eq!(drawing.remarks[1].to_string(), "2 paths of a single point are left out");
     let plain =
         decoded("<svg><defs><path id='a' d='M0 0H1'/></defs><use href='#a'/><path d='M0 0c1 1 2 2 0 0'/></svg>");
     assert_eq!((plain.remarks.len(), plain.strokes.len()), (0, 2));
