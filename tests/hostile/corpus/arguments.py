@@ -60,7 +60,6 @@ def _numbers() -> list[Case]:
         *[_render(f"memory for inputs of {text!r}", [f"--max-asset-memory={text}"], words="max-asset-memory") for text in ("0", "-1", "many", "1e400GiB", "99999999999999999999GiB", "nanGiB", "")],
         _render("16384 x 16384", ["--size", "16384x16384", "--frames", "0"], (2, 3), "GiB|allowed", signaled=True),
         _render("16384 x 16384 in 16 bits", ["--size", "16384x16384", "--frames", "0", "--bits", "16"], (2, 3), "GiB|allowed", signaled=True),
-        _render("16384 x 16384 pixels of a flame", ["--size", "16384x16384", "--frames", "0"], 2, "GiB|allowed", signaled=True),
         _render("16384 x 16384 by the scene", ["--frames", "0"], 3, "picture.size.*(GiB|allowed)", FLAME.replace("[32, 24]", "[16384, 16384]"), signaled=True),
         _render("an overscan of 4096 pixels", ["--frames", "0", "-o", "out/a.exr"], 2, "", FLAME.replace("frames = 2", "frames = 2\noverscan = 4096")),
         _render("10,000,000 frames", ["--size", "1x1", "--progress", "none"], 143, "", FLAME.replace("frames = 2", "frames = 10000000"), signaled=True, endless=True),

@@ -1,8 +1,8 @@
 //! Strokes from SVG files: visible paths, polylines, polygons and lines, as `usvg` resolves `use`, nested `svg`, style sheets, `switch`, units,
 //! transforms and encodings.
 //!
-//! [`document`] reads the text first and notes what `usvg` would drop or cut in silence: faulty data, what is no line, the view box, and how many points
-//! all uses have. [`moved`] brings what is far from 0 near it. [`strokes`] turns the resolved tree into polylines. [`text`] unpacks the file.
+//! `document` reads the text first and notes what `usvg` would drop or cut in silence: faulty data, what is no line, the view box, and how many points
+//! all uses have. `moved` brings what is far from 0 near it. `strokes` turns the resolved tree into polylines. `text` unpacks the file.
 
 mod document;
 mod moved;
