@@ -179,7 +179,7 @@ fn join_linear(
     Frame { header, beauty, depth, channels, opaque: false, metadata: Vec::new(), content }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fire"))]
 mod tests {
     use std::{fs, path::Path};
 
