@@ -98,7 +98,7 @@ pub struct DepthFit {
     pub slope: f64,
     /// Root mean square of (found - known) / known over the points.
     pub residual: f64,
-    /// Points that deviate by more than [`MISFIT`]: number from 1, known and found distance, m.
+    /// Points that deviate by more than a tenth: number from 1, known and found distance, m.
     pub misfits: Vec<(usize, f64, f64)>,
 }
 
