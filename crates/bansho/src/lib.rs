@@ -186,7 +186,7 @@ pub use bansho_rain::RainParameters;
 pub use bansho_render::{
     BufferLengthError, BuildErrors, ChannelError, CompiledScene, PhenomenonLight, Plan, PlanError, PlanOptions,
     RenderError, Shot,
-    display::{BitDepth, display},
+    display::{BitDepth, DisplayFrame, DisplayOptions, display},
     f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f, write_rgba32f,
 };
 #[doc(inline)]

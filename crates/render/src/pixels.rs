@@ -19,9 +19,10 @@ pub use bansho_base::color::pixel_formats::f16;
 use bansho_base::host::parallel::prelude::*;
 use bansho_base::{
     color::{AlphaMode, ColorSpace, DisplayCode, LinearTransform, View},
-    frame::Frame,
+    frame::{Frame, FrameHeader},
     image::Rect,
 };
+use fearless_simd::Level;
 
 /// Rows that one parallel task converts.
 const TASK_ROWS: usize = 16;
@@ -191,7 +192,7 @@ fn transform(frame: &Frame, space: ColorSpace) -> LinearTransform {
     LinearTransform::new(space, frame.header.white_balance_k.map(f64::from))
 }
 
-/// Writes display codes. Dither depends on the position in the whole picture, so that a crop has the same pixels.
+/// Writes display codes.
 pub(crate) fn write_codes<C: DisplayCode + Send + Sync>(
     frame: &Frame,
     view: &View,
@@ -199,13 +200,39 @@ pub(crate) fn write_codes<C: DisplayCode + Send + Sync>(
     background: Background<[C; 4]>,
     pixels: &mut [[C; 4]],
 ) {
-    let alpha = (!frame.opaque).then_some(alpha);
-    let (level, view) =
-        (bansho_base::math::simd::level(), view.with_white_balance(frame.header.white_balance_k.map(f64::from)));
-    let ([x0, y0], left) = (frame.header.data_origin, nonzero_rect(frame).x);
-    convert(frame, SERIAL_CODES, background, pixels, |y, light, out| {
-        view.display_row_with_mode(level, light, y0 + y as i64, x0 + left as i64, alpha, out);
-    });
+    let conversion = CodeConversion::new(&frame.header, view, (!frame.opaque).then_some(alpha));
+    let left = nonzero_rect(frame).x;
+    convert(frame, SERIAL_CODES, background, pixels, |y, light, out| conversion.row(y, left, light, out));
+}
+
+/// The conversion of the light of a frame to display codes. Dither depends on the position in the whole picture, so that a crop has the same pixels.
+pub(crate) struct CodeConversion {
+    /// The view with the white balance of the camera.
+    view: View,
+    /// `None` if the picture is opaque.
+    alpha: Option<AlphaMode>,
+    /// Position of the pixels in the whole picture.
+    data_origin: [i64; 2],
+    level: Level,
+}
+
+impl CodeConversion {
+    /// For a frame with this header; without `alpha` it is opaque.
+    pub(crate) fn new(header: &FrameHeader, view: &View, alpha: Option<AlphaMode>) -> Self {
+        let view = view.with_white_balance(header.white_balance_k.map(f64::from));
+        Self { view, alpha, data_origin: header.data_origin, level: bansho_base::math::simd::level() }
+    }
+
+    /// Whether the picture is opaque.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.alpha.is_none()
+    }
+
+    /// Converts pixels of row `y` of the frame from column `x` on.
+    pub(crate) fn row<C: DisplayCode>(&self, y: usize, x: usize, light: &[[f32; 4]], codes: &mut [[C; 4]]) {
+        let [x0, y0] = self.data_origin;
+        self.view.display_row_with_mode(self.level, light, y0 + y as i64, x0 + x as i64, self.alpha, codes);
+    }
 }
 
 /// What becomes of pixels outside of [`nonzero_rect`].

@@ -8,7 +8,7 @@ use bansho_media::imageops::sprite_sheet::SheetLayout;
 use super::{
     error::{JobError, OptionError, SheetKind},
     observer::{FrameDone, JobObserver},
-    pipeline::draw_frames::{FrameSink, RemainingWork},
+    pipeline::draw_frames::FrameSink,
 };
 
 /// Maximum number of tiles of a sheet.
@@ -50,12 +50,7 @@ impl<'a, T, M: Fn(&mut Frame, &dyn Observer) -> T> TileCollector<'a, T, M> {
 }
 
 impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for TileCollector<'_, T, M> {
-    fn finish<'w>(
-        &'w self,
-        index: usize,
-        frame: &mut Frame,
-        observer: &'w dyn Observer,
-    ) -> Result<Option<RemainingWork<'w>>, JobError> {
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
         let number = frame.header.number;
         let tile = (self.make_tile)(frame, observer);
         let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
@@ -63,7 +58,7 @@ impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for TileCo
         let drawn = tiles.iter().flatten().count();
         drop(tiles);
         self.observer.frame_done(&FrameDone { number, path: None, drawn });
-        Ok(None)
+        Ok(())
     }
 
     fn max_in_flight(&self) -> usize {

@@ -20,10 +20,7 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
 use super::{
     error::JobError,
     observer::{JobObserver, Warning},
-    pipeline::{
-        draw_frames::{FrameSink, RemainingWork},
-        frame_source::FrameSource,
-    },
+    pipeline::{draw_frames::FrameSink, frame_source::FrameSource},
 };
 
 /// The plan of an empty picture of one pixel.
@@ -130,14 +127,8 @@ pub(crate) struct FunctionSink<F> {
 }
 
 impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> FrameSink for FunctionSink<F> {
-    fn finish<'a>(
-        &'a self,
-        index: usize,
-        frame: &mut Frame,
-        _observer: &'a dyn Observer,
-    ) -> Result<Option<RemainingWork<'a>>, JobError> {
-        let number = frame.header.number;
-        Ok(Some(Box::new(move || (self.each)(index, number))))
+    fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+        (self.each)(index, frame.header.number)
     }
 
     fn max_in_flight(&self) -> usize {

@@ -165,6 +165,8 @@ pub struct PhenomenonInfo<'a> {
     pub stepping: Option<Stepping>,
     /// The horizontal mirror, if it is one. It then receives a picture of everything else as seen in that mirror.
     pub mirror: Option<LevelMirror>,
+    /// Whether it may refract the light from behind it.
+    pub refracts: bool,
     /// How to make it stronger, as worded in a remark.
     pub strengthened_by: &'static str,
 }
@@ -174,7 +176,7 @@ impl<'a> PhenomenonInfo<'a> {
     #[must_use]
     pub fn new(name: &'a str) -> Self {
         let strengthened_by = "make it larger or brighter";
-        Self { name, aovs: &[], stepping: None, mirror: None, strengthened_by }
+        Self { name, aovs: &[], stepping: None, mirror: None, refracts: false, strengthened_by }
     }
 }
 

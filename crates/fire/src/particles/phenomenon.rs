@@ -105,7 +105,8 @@ impl Phenomenon for FlameParticles {
     fn info(&self) -> PhenomenonInfo<'_> {
         let DerivedConstants { preroll, crossfade, .. } = *self.simulation.constants;
         let stepping = Stepping { step: self.parameters.step_s, preroll, crossfade };
-        PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
+        let refracts = self.parameters.rendering.heat_haze_gain > 0.0;
+        PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), refracts, ..PhenomenonInfo::new(&self.name) }
     }
 
     fn memory_bytes(&self, pixels: f64) -> f64 {

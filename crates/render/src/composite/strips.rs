@@ -1,6 +1,7 @@
 //! From prepared phenomena to a frame: each strip composites its slices from near to far, then adds the background.
 
 use bansho_base::{
+    color::DisplayCode,
     frame::{Channel, Frame, FrameHeader, Precision},
     host::{
         observer::{self, Cancelled, Observer, PartGuard, Stage, StagePart},
@@ -23,7 +24,7 @@ use super::{
     plate::PlateFrame,
     slices::Slice,
 };
-use crate::{compiled::ActiveRun, plan::Plan};
+use crate::{compiled::ActiveRun, pixels::CodeConversion, plan::Plan};
 use bansho_scene::PLATE_LAYER;
 use fearless_simd::{Level, dispatch};
 
@@ -48,6 +49,11 @@ impl Outputs {
     pub(crate) fn of_plan(plan: &Plan) -> Self {
         let depth = plan.depth || plan.layers || plan.aovs;
         Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs, depth }
+    }
+
+    /// Whether more than the color and the alpha of a display picture is needed of the frame.
+    pub(crate) fn needs_light(&self) -> bool {
+        self.layers || self.aovs || self.depth
     }
 
     /// Absolute radiance without layers and AOVs.
@@ -94,6 +100,8 @@ pub(crate) struct StripScratch {
     bent: BentPixels,
     /// A row of refracted colors.
     row: Vec<[f32; 4]>,
+    /// The light of a strip of which only display codes are kept.
+    light: Vec<[f32; 4]>,
 }
 
 impl<'a> Composition<'a> {
@@ -130,6 +138,11 @@ impl<'a> Composition<'a> {
     fn begin_part(&self, phenomenon: Option<&'a str>) -> PartGuard<'a> {
         let part = StagePart { stage: Stage::Draw, phenomenon, is_mirrored: self.is_mirrored };
         PartGuard::begin(self.observer, part)
+    }
+
+    /// Whether a plate fills the picture, so that it is opaque.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.plate.color.is_some() && !self.plate.is_transparent && self.view.overscan == 0
     }
 
     fn layer_count(&self) -> usize {
@@ -213,9 +226,8 @@ pub(crate) fn draw_frame(
             return Ok(Vec::new());
         }
         scratches.with(|scratch| {
-            composition.accumulate(level, rect, scratch);
-            composition.background.trace(rect, &mut scratch.bent);
-            finish_strip(composition, level, scratch, strip, &mut pixels);
+            let StripPixels { beauty, depth, .. } = &mut pixels;
+            draw_strip(composition, level, rect, scratch, StripLight { rect: strip, beauty, depth });
             Ok(if has_channels { channel_planes(composition, scratch) } else { Vec::new() })
         })
     });
@@ -225,29 +237,80 @@ pub(crate) fn draw_frame(
         strips.try_for_each(|planes| planes.map(|_| ()))?;
         Vec::new()
     };
-    let plate = composition.plate;
-    let opaque = plate.color.is_some() && !plate.is_transparent && composition.view.overscan == 0;
-    let content = composition.content();
     Ok(Frame {
         header,
         beauty: memory.beauty,
         depth: memory.depth,
         channels: channels(composition, planes),
-        opaque,
-        content,
+        opaque: composition.is_opaque(),
+        content: composition.content(),
         metadata: Vec::new(),
     })
 }
 
-/// Exposes a strip, computes its alpha, and composites the background behind it.
-fn finish_strip(
+/// Draws and composites the whole window as display codes: each strip is converted while it is in the cache, and its light is not kept.
+///
+/// `codes` are zero, and remain so where nothing is drawn, unless the picture is opaque.
+pub(crate) fn draw_codes<C: DisplayCode + Send + Sync>(
     composition: &Composition,
-    level: Level,
-    scratch: &mut StripScratch,
-    strip: Rect,
-    pixels: &mut StripPixels,
-) {
+    conversion: &CodeConversion,
+    codes: &mut [[C; 4]],
+) -> Result<(), Cancelled> {
+    let window = composition.view.window;
+    let level = bansho_base::math::simd::level();
+    let strips = codes.par_chunks_mut(STRIP_ROWS * window.width.max(1)).enumerate().with_max_len(1);
+    strips.try_for_each(|(index, codes)| {
+        observer::check(composition.observer)?;
+        let _part = composition.begin_part(None);
+        let strip = composition.strip_rect(index);
+        let rect = composition.nonempty_rect(strip);
+        // An opaque pixel without light has a code too.
+        let converted = if conversion.is_opaque() { strip } else { rect };
+        if converted.is_empty() {
+            return Ok(());
+        }
+        composition.scratches.with(|scratch| {
+            let mut light = std::mem::take(&mut scratch.light);
+            light.resize(converted.width * converted.height, [0.0; 4]);
+            if converted != rect {
+                light.fill([0.0; 4]);
+            }
+            if !rect.is_empty() {
+                let pixels = StripLight { rect: converted, beauty: &mut light, depth: &mut [] };
+                draw_strip(composition, level, rect, scratch, pixels);
+            }
+            for (row, light) in light.chunks_exact(converted.width).enumerate() {
+                let y = converted.y + row;
+                let first = (y - strip.y) * strip.width + converted.x - strip.x;
+                conversion.row(y - window.y, converted.x - window.x, light, &mut codes[first..][..converted.width]);
+            }
+            scratch.light = light;
+        });
+        Ok(())
+    })
+}
+
+/// Where the light of a strip goes.
+struct StripLight<'a> {
+    /// The pixels, in pixels of the picture.
+    rect: Rect,
+    /// Color and alpha, row by row.
+    beauty: &'a mut [[f32; 4]],
+    /// Depth, m; empty if it is not kept.
+    depth: &'a mut [f32],
+}
+
+/// Draws and composites the pixels `rect` of a strip.
+fn draw_strip(composition: &Composition, level: Level, rect: Rect, scratch: &mut StripScratch, pixels: StripLight) {
+    composition.accumulate(level, rect, scratch);
+    composition.background.trace(rect, &mut scratch.bent);
+    finish_strip(composition, level, scratch, pixels);
+}
+
+/// Exposes a strip, computes its alpha, and composites the background behind it.
+fn finish_strip(composition: &Composition, level: Level, scratch: &mut StripScratch, pixels: StripLight) {
     let (exposure, background) = (composition.outputs.exposure, &composition.background);
+    let strip = pixels.rect;
     let StripScratch { accumulator, bent, row: buffer, .. } = scratch;
     let rect = accumulator.rect;
     for row in 0..rect.height {

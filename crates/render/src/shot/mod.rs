@@ -9,7 +9,7 @@ pub(crate) mod stepping;
 use std::sync::Arc;
 
 use bansho_base::{
-    frame::{Channel, Frame, PhenomenonMetadata},
+    frame::{Channel, Frame, FrameHeader, PhenomenonMetadata},
     host::{
         observer::{self, Cancelled, Observer, PartGuard, Stage, StageGuard, StagePart},
         parallel::prelude::*,
@@ -38,6 +38,7 @@ use crate::{
         strips::{self, Composition, Outputs, StripScratches},
     },
     context::ShotContext,
+    display::{DisplayFrame, DisplayOptions},
     plan::Plan,
 };
 
@@ -182,13 +183,60 @@ impl Shot {
     /// # Errors
     /// The observer asked to stop, or the plate cannot be read.
     pub fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
+        let recycled = self.recycled.take();
+        let frame = self.draw_with(
+            |composition, header, is_refracted| draw_light(composition, header, is_refracted, recycled),
+            |frame| frame,
+            observer,
+        )?;
+        self.frame = Some(Frame { metadata: frame.metadata, ..frame.picture });
+        Ok(())
+    }
+
+    /// Draws the frame that the shot was advanced to as display pixels, without keeping its light: in less memory than [`draw`](Self::draw), and with the
+    /// bytes of [`display`](crate::display::display).
+    ///
+    /// # Errors
+    /// The observer asked to stop, or the plate cannot be read.
+    pub fn draw_display(
+        &mut self,
+        options: &DisplayOptions,
+        observer: &dyn Observer,
+    ) -> Result<DisplayFrame, RenderError> {
+        let mut memory = self.recycled.take();
+        let drawn = self.draw_with(
+            |composition, header, is_refracted| {
+                if !is_refracted && !composition.outputs.needs_light() {
+                    return DisplayFrame::draw(composition, header, options);
+                }
+                let mut frame = draw_light(composition, header, is_refracted, memory.take())?;
+                let display = DisplayFrame::of_frame(&mut frame, options);
+                memory = Some(frame);
+                Ok(display)
+            },
+            |mut frame| DisplayFrame::of_frame(&mut frame, options),
+            observer,
+        );
+        self.recycled = memory;
+        let Drawn { picture, metadata } = drawn?;
+        Ok(DisplayFrame { metadata, ..picture })
+    }
+
+    /// Draws the frame by `draw`, which is told whether light is refracted, or, where the whole picture must be drawn for its window, makes a
+    /// picture of the window by `of_window`.
+    fn draw_with<T>(
+        &mut self,
+        draw: impl FnOnce(&Composition, FrameHeader, bool) -> Result<T, Cancelled>,
+        of_window: impl FnOnce(Frame) -> T,
+        observer: &dyn Observer,
+    ) -> Result<Drawn<T>, RenderError> {
         let plate = {
             let _stage = StageGuard::begin(observer, Stage::Load);
             let ShotContext { compiled, plan, .. } = &self.context;
             let plate = self.plates.frame(compiled, plan, self.number);
             plate.map_err(|error| RenderError::Plate(Box::new(error)))?
         };
-        let mut view = self.context.plan.view_at(self.time);
+        let view = self.context.plan.view_at(self.time);
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let publications = self.publications(view.shutter, observer);
         let mirrored = match self.mirror(&view, &publications) {
@@ -198,18 +246,17 @@ impl Shot {
             None => Arc::default(),
         };
         drop(preparing);
-        let recycled = self.recycled.take();
-        let frame = match self.compose(&view, &plate, &mirrored, &publications, recycled, observer)? {
-            Some(frame) => frame,
-            None => {
-                let all = Rect::from_size(view.size[0], view.size[1]);
-                view = view.with_window(all);
-                let whole = self.compose(&view, &plate, &mirrored, &publications, None, observer)?;
-                whole.and_then(|whole| crop(whole, self.context.plan.window)).ok_or(Cancelled)?
-            }
-        };
-        self.frame = Some(frame);
-        Ok(())
+        let pictures = FramePictures { plate: &plate, mirrored: &mirrored, publications: &publications };
+        if let Some(drawn) = self.compose(&view, pictures, draw, observer)? {
+            return Ok(drawn);
+        }
+        let whole = Rect::from_size(view.size[0], view.size[1]);
+        let view = view.with_window(whole);
+        let draw_whole =
+            |composition: &Composition, header, is_refracted| draw_light(composition, header, is_refracted, None);
+        let whole = self.compose(&view, pictures, draw_whole, observer)?.ok_or(Cancelled)?;
+        let window = crop(whole.picture, self.context.plan.window).ok_or(Cancelled)?;
+        Ok(Drawn { picture: of_window(window), metadata: whole.metadata })
     }
 
     /// Takes the frame that was drawn; `None` if none was drawn since the last call.
@@ -260,17 +307,15 @@ impl Shot {
         Ok(())
     }
 
-    /// Draws the view. `None` if the window is not the whole picture and light is refracted: it may come from outside the window, so the whole
+    /// Draws the view by `draw`. `None` if the window is not the whole picture and light is refracted: it may come from outside the window, so the whole
     /// picture must be drawn and cropped.
-    fn compose(
+    fn compose<T>(
         &self,
         view: &View,
-        plate: &PlateFrame,
-        mirrored: &PlateFrame,
-        publications: &[Publication],
-        recycled: Option<Frame>,
+        FramePictures { plate, mirrored, publications }: FramePictures,
+        draw: impl FnOnce(&Composition, FrameHeader, bool) -> Result<T, Cancelled>,
         observer: &dyn Observer,
-    ) -> Result<Option<Frame>, RenderError> {
+    ) -> Result<Option<Drawn<T>>, RenderError> {
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let reflection = self.reflection(view, mirrored, publications, observer)?;
         let surroundings = self.surroundings(view, publications, reflection.as_ref());
@@ -303,16 +348,9 @@ impl Shot {
             background: Background::plate(plate),
             scratches: &self.scratches,
         };
-        let header = self.context.header(self.number, self.time);
-        let mut frame = if is_refracted {
-            refraction::draw_frame(&composition, header, recycled)?
-        } else {
-            strips::draw_frame(&composition, header, recycled)?
-        };
-        if self.context.plan.metadata {
-            frame.metadata = self.metadata(&prepared);
-        }
-        Ok(Some(frame))
+        let picture = draw(&composition, self.context.header(self.number, self.time), is_refracted)?;
+        let metadata = if self.context.plan.metadata { self.metadata(&prepared) } else { Vec::new() };
+        Ok(Some(Drawn { picture, metadata }))
     }
 
     /// What each phenomenon publishes during `shutter`.
@@ -374,6 +412,32 @@ impl Shot {
 fn begin_preparation<'a>(run: &'a ActiveRun, is_mirrored: bool, observer: &'a dyn Observer) -> PartGuard<'a> {
     let phenomenon = Some(run.info().name);
     PartGuard::begin(observer, StagePart { stage: Stage::Prepare, phenomenon, is_mirrored })
+}
+
+/// What a frame is drawn from, besides the state of the simulations.
+#[derive(Clone, Copy)]
+struct FramePictures<'a> {
+    plate: &'a PlateFrame,
+    /// The plate as seen in the mirror.
+    mirrored: &'a PlateFrame,
+    publications: &'a [Publication],
+}
+
+/// A picture that was drawn, of light or of display pixels.
+struct Drawn<T> {
+    picture: T,
+    metadata: Vec<PhenomenonMetadata>,
+}
+
+/// Draws a composition as scene-linear light, in the memory of an earlier frame.
+fn draw_light(
+    composition: &Composition,
+    header: FrameHeader,
+    is_refracted: bool,
+    recycled: Option<Frame>,
+) -> Result<Frame, Cancelled> {
+    let draw = if is_refracted { refraction::draw_frame } else { strips::draw_frame };
+    draw(composition, header, recycled)
 }
 
 /// Slices of depth, and the prepared phenomena to which their members refer.

@@ -51,8 +51,11 @@ struct BytesPerPixel {
 impl BytesPerPixel {
     /// The memory of a job whose frames have `channels` channels of layers and AOVs.
     fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize) -> Self {
-        let depth = if request.display.is_none() { DEPTH_BYTES } else { 0.0 };
-        let frame = FRAME_BYTES + depth + 4.0 * channels as f64;
+        let refracts = refracts(compiled, plan);
+        let depth = if request.display.is_none() || refracts { DEPTH_BYTES } else { 0.0 };
+        // Where only display pixels are kept, there is no light of a whole picture.
+        let has_light = request.display.is_none() || request.tiles > 0 || refracts;
+        let frame = if has_light { FRAME_BYTES + depth + 4.0 * channels as f64 } else { 0.0 };
         // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
         let written = match request.display {
             Some(BitDepth::Eight) => 4.0 + 3.0 + 2.0,
@@ -89,6 +92,12 @@ pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: Me
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
     let phenomena: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
     per_pixel.total(drawn, whole) + phenomena + PROCESS_BYTES
+}
+
+/// Whether a phenomenon may refract the light of what is behind it.
+fn refracts(compiled: &CompiledScene, plan: &Plan) -> bool {
+    let has_background = plan.scene().has_plate() || compiled.phenomena().count() > 1;
+    has_background && compiled.phenomena().any(|phenomenon| phenomenon.info().refracts)
 }
 
 /// Number of channels of the layers and AOVs of a plan.

@@ -18,7 +18,7 @@ use crate::job::{
     error::JobError,
     observer::JobObserver,
     pipeline::{
-        draw_frames::{FrameSink, RemainingWork, draw_frames},
+        draw_frames::{FrameSink, draw_frames},
         snapshots::Snapshots,
     },
 };
@@ -132,16 +132,11 @@ struct LitRegionProbe {
 }
 
 impl FrameSink for LitRegionProbe {
-    fn finish<'a>(
-        &'a self,
-        _index: usize,
-        frame: &mut Frame,
-        _observer: &'a dyn Observer,
-    ) -> Result<Option<RemainingWork<'a>>, JobError> {
+    fn finish(&self, _index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         let frame_bounds = bounds(frame, &self.view, self.min_alpha);
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);
         *lit = lit.union(&frame_bounds);
-        Ok(None)
+        Ok(())
     }
 
     fn max_in_flight(&self) -> usize {

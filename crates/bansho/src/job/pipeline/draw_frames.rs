@@ -4,6 +4,7 @@ use bansho_base::{
     frame::Frame,
     host::observer::{Observer, check},
 };
+use bansho_render::display::{DisplayFrame, DisplayOptions};
 
 use super::{
     frame_source::FrameSource,
@@ -12,19 +13,10 @@ use super::{
 };
 use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observer::JobObserver};
 
-/// What remains to be done for a frame without its pixels, such as compressing its display image.
-pub(crate) type RemainingWork<'a> = Box<dyn FnOnce() -> Result<(), JobError> + Send + 'a>;
-
 /// What drawn frames go to.
 pub(crate) trait FrameSink: Sync {
-    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight). Its memory is free
-    /// for the next frame while the work that is returned is done.
-    fn finish<'a>(
-        &'a self,
-        index: usize,
-        frame: &mut Frame,
-        observer: &'a dyn Observer,
-    ) -> Result<Option<RemainingWork<'a>>, JobError>;
+    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError>;
 
     /// How many frames may be in flight at once.
     fn max_in_flight(&self) -> usize;
@@ -33,6 +25,15 @@ pub(crate) trait FrameSink: Sync {
     fn writes_pixels(&self) -> bool {
         false
     }
+}
+
+/// What frames go to of which only the display pixels are kept.
+pub(crate) trait DisplaySink: Sync {
+    /// Writes the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
+    fn write(&self, index: usize, frame: DisplayFrame, observer: &dyn Observer) -> Result<(), JobError>;
+
+    /// How many frames may be in flight at once.
+    fn max_in_flight(&self) -> usize;
 }
 
 /// Bytes of frames that may be in flight at once, unless two frames alone are larger.
@@ -60,10 +61,12 @@ pub(crate) fn draw_frames(
             if let Some(recycled) = in_flight.take_recycled() {
                 shot.recycle(recycled);
             }
-            let frame = draw(shot, last, number, snapshots, &stop_on_failure, observer)?;
+            advance(shot, last, number, snapshots, &stop_on_failure, observer)?;
             last = Some(number);
+            shot.draw(&stop_on_failure)?;
+            let frame = shot.read().ok_or(JobError::Cancelled)?;
             max_with_pixels = max_frames_with_pixels(bytes_of(&frame), sink.writes_pixels());
-            in_flight.submit(index, in_flight_limit(&frame, sink));
+            in_flight.submit(index, in_flight_limit(bytes_of(&frame), sink.max_in_flight()));
             spawn_finish(scope, sink, &stop_on_failure, index, frame);
         }
         Ok(())
@@ -73,7 +76,57 @@ pub(crate) fn draw_frames(
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
-/// Finishes a drawn frame: first what needs its pixels, then what remains, in a task of its own.
+/// Draws the frames `numbers` in order as display pixels, strip by strip: the light of a whole frame is in memory only where it is refracted. A frame is
+/// drawn while earlier ones are still being compressed and written.
+///
+/// Runs in the caller's rayon pool, and uses no other thread.
+///
+/// # Errors
+/// The first failure of a frame, or the observer canceled the job. Finished frames are kept.
+pub(crate) fn draw_display_frames(
+    shot: &mut dyn FrameSource,
+    numbers: &[i64],
+    snapshots: &Snapshots,
+    options: &DisplayOptions,
+    sink: &dyn DisplaySink,
+    observer: &dyn JobObserver,
+) -> Result<(), JobError> {
+    let in_flight = InFlightFrames::default();
+    let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
+    let mut last = None;
+    let drawn = rayon::in_place_scope_fifo(|scope| {
+        for (index, &number) in numbers.iter().enumerate() {
+            advance(shot, last, number, snapshots, &stop_on_failure, observer)?;
+            last = Some(number);
+            let frame = shot.draw_display(options, &stop_on_failure)?;
+            let pixels = frame.image.width * frame.image.height;
+            in_flight.submit(index, in_flight_limit(pixels * LIGHT_BYTES, sink.max_in_flight()));
+            spawn_write(scope, sink, &stop_on_failure, index, frame);
+        }
+        Ok(())
+    });
+    in_flight.take_error().map_or(drawn, Err)?;
+    check(observer).map_err(|_| JobError::Cancelled)
+}
+
+/// Writes a drawn frame.
+fn spawn_write<'scope>(
+    scope: &rayon::ScopeFifo<'scope>,
+    sink: &'scope dyn DisplaySink,
+    stop_on_failure: &'scope StopOnFailure,
+    index: usize,
+    frame: DisplayFrame,
+) {
+    let in_flight = stop_on_failure.in_flight;
+    scope.spawn_fifo(move |_| {
+        let _completion = CompletionGuard { in_flight, index };
+        if !stop_on_failure.cancelled() {
+            sink.write(index, frame, stop_on_failure).unwrap_or_else(|error| in_flight.fail(error));
+        }
+    });
+}
+
+/// Finishes a drawn frame.
 fn spawn_finish<'scope>(
     scope: &rayon::ScopeFifo<'scope>,
     sink: &'scope dyn FrameSink,
@@ -82,46 +135,36 @@ fn spawn_finish<'scope>(
     mut frame: Frame,
 ) {
     let in_flight = stop_on_failure.in_flight;
-    scope.spawn_fifo(move |scope| {
-        let completion = CompletionGuard { in_flight, index };
+    scope.spawn_fifo(move |_| {
+        let _completion = CompletionGuard { in_flight, index };
         if stop_on_failure.cancelled() {
             return;
         }
-        let remaining = sink.finish(index, &mut frame, stop_on_failure);
+        sink.finish(index, &mut frame, stop_on_failure).unwrap_or_else(|error| in_flight.fail(error));
         in_flight.recycle(index, frame);
-        match remaining {
-            Ok(None) => {}
-            Ok(Some(remaining)) => scope.spawn_fifo(move |_| {
-                let _completion = completion;
-                remaining().unwrap_or_else(|error| in_flight.fail(error));
-            }),
-            Err(error) => in_flight.fail(error),
-        }
     });
 }
 
-/// Draws frame `number` after frame `last`. Where it is not the next one, `snapshots` shorten the way to it.
-fn draw(
+/// Advances to frame `number` after frame `last`. Where it is not the next one, `snapshots` shorten the way to it.
+fn advance(
     shot: &mut dyn FrameSource,
     last: Option<i64>,
     number: i64,
     snapshots: &Snapshots,
     stop_on_failure: &StopOnFailure,
     observer: &dyn JobObserver,
-) -> Result<Frame, JobError> {
+) -> Result<(), JobError> {
     if last.is_none_or(|last| number != last + 1) {
         snapshots.warm_up(shot, last, number, stop_on_failure, observer)?;
     }
     shot.advance(number, stop_on_failure)?;
-    snapshots.save(shot, number, stop_on_failure)?;
-    shot.draw(stop_on_failure)?;
-    shot.read().ok_or(JobError::Cancelled)
+    snapshots.save(shot, number, stop_on_failure)
 }
 
-/// How many frames of this size may be in flight: one for each thread and one more, as far as memory allows.
-fn in_flight_limit(frame: &Frame, sink: &dyn FrameSink) -> usize {
-    let max = (rayon::current_num_threads() + 1).min(sink.max_in_flight()).max(2);
-    (MAX_BYTES_IN_FLIGHT / bytes_of(frame).max(1)).clamp(2, max)
+/// How many frames whose light takes this many bytes may be in flight: one for each thread and one more, as far as memory and the sink allow.
+fn in_flight_limit(bytes: usize, max: usize) -> usize {
+    let max = (rayon::current_num_threads() + 1).min(max).max(2);
+    (MAX_BYTES_IN_FLIGHT / bytes.max(1)).clamp(2, max)
 }
 
 /// Bytes of the pixels of a frame: color, alpha, depth and channels in single precision.
@@ -129,6 +172,9 @@ fn bytes_of(frame: &Frame) -> usize {
     let planes = 4 + usize::from(frame.depth.is_some()) + frame.channels.len();
     frame.beauty.width() * frame.beauty.height() * size_of::<f32>() * planes
 }
+
+/// Bytes of the color and the alpha of a pixel in single precision.
+const LIGHT_BYTES: usize = 4 * size_of::<f32>();
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho_base::frame::{Frame, MetadataEntry, PhenomenonMetadata};
+use bansho_base::frame::{FrameHeader, MetadataEntry, PhenomenonMetadata};
 use bansho_media::{
     MediaError,
     files::{atomic, overwrite_policy::OverwritePolicy, provenance},
@@ -24,8 +24,14 @@ pub(crate) fn path(picture: &Path) -> PathBuf {
 ///
 /// # Errors
 /// The file cannot be written, or would replace one that must not be overwritten.
-pub(crate) fn write(frame: &Frame, picture: &Path, overwrite: &OverwritePolicy) -> Result<(), MediaError> {
-    atomic::write_bytes_with(&path(picture), format!("{:#}\n", describe(frame, picture)).as_bytes(), overwrite)
+pub(crate) fn write(
+    header: &FrameHeader,
+    phenomena: &[PhenomenonMetadata],
+    picture: &Path,
+    overwrite: &OverwritePolicy,
+) -> Result<(), MediaError> {
+    let text = format!("{:#}\n", describe(header, phenomena, picture));
+    atomic::write_bytes_with(&path(picture), text.as_bytes(), overwrite)
 }
 
 /// Whether the complete metadata of a picture with this fingerprint exists.
@@ -38,8 +44,7 @@ fn hex(fingerprint: [u8; 32]) -> String {
     blake3::Hash::from_bytes(fingerprint).to_hex().to_string()
 }
 
-fn describe(frame: &Frame, picture: &Path) -> Value {
-    let header = &frame.header;
+fn describe(header: &FrameHeader, phenomena: &[PhenomenonMetadata], picture: &Path) -> Value {
     let [frames, seconds] = header.fps;
     json!({
         "format": 1,
@@ -51,7 +56,7 @@ fn describe(frame: &Frame, picture: &Path) -> Value {
         "exposure_ev100": header.exposure_ev100,
         "white_balance_k": header.white_balance_k,
         FINGERPRINT: hex(header.fingerprint),
-        "phenomena": frame.metadata.iter().map(describe_phenomenon).collect::<Map<_, _>>(),
+        "phenomena": phenomena.iter().map(describe_phenomenon).collect::<Map<_, _>>(),
     })
 }
 
@@ -74,11 +79,11 @@ mod tests {
             MetadataEntry { name: "rate", unit: "mm/h", value: 20.0 },
             MetadataEntry { name: "visibility", unit: "m", value: f64::INFINITY },
         ];
-        let mut frame = testing::frame(7);
-        frame.metadata = vec![PhenomenonMetadata { phenomenon: "shower".to_owned(), entries }];
-        let fingerprint = frame.header.fingerprint;
+        let header = testing::frame(7).header;
+        let phenomena = [PhenomenonMetadata { phenomenon: "shower".to_owned(), entries }];
+        let fingerprint = header.fingerprint;
         assert!(!exists(&picture, fingerprint));
-        write(&frame, &picture, &OverwritePolicy::default()).unwrap();
+        write(&header, &phenomena, &picture, &OverwritePolicy::default()).unwrap();
         assert!(provenance::is_bansho_file(&path(&picture)));
         let value: Value = serde_json::from_slice(&fs::read(folder.path().join("rain.0007.json")).unwrap()).unwrap();
         assert_eq!(value["phenomena"]["shower"]["rate"], json!({ "value": 20.0, "unit": "mm/h" }));

@@ -22,7 +22,7 @@ use super::{
     checks::{finished_files::FinishedFiles, plates},
     error::JobError,
     observer::{JobObserver, JobStarted},
-    pipeline::draw_frames::draw_frames,
+    pipeline::draw_frames::{draw_display_frames, draw_frames},
     sheet::TileCollector,
 };
 use output::FileWriter;
@@ -82,7 +82,12 @@ impl PreparedJob {
         let drawn = AtomicUsize::new(0);
         let files = FileWriter { format: &self.format, sink, max_in_flight, observer, drawn, finished };
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
-        draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
+        match self.format.display_options(&files.sink) {
+            Some(options) => {
+                draw_display_frames(&mut shot, numbers, &self.snapshots, &options, &files, observer)?;
+            }
+            None => draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?,
+        }
         Ok(files.sink.finish()?)
     }
 

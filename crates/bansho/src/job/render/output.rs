@@ -7,7 +7,7 @@ use std::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
-    frame::{DisplayImage, Frame},
+    frame::{DisplayImage, Frame, FrameHeader, PhenomenonMetadata},
     host::observer::{Observer, Stage, StageGuard},
 };
 use bansho_media::{
@@ -17,7 +17,7 @@ use bansho_media::{
 };
 use bansho_render::{
     Plan,
-    display::{BitDepth, display},
+    display::{BitDepth, DisplayFrame, DisplayOptions, display},
     fingerprint,
 };
 
@@ -26,7 +26,7 @@ use crate::job::{
     checks::finished_files::FinishedFiles,
     error::JobError,
     observer::{FrameDone, JobObserver},
-    pipeline::draw_frames::{FrameSink, RemainingWork},
+    pipeline::draw_frames::{DisplaySink, FrameSink},
 };
 
 /// How the pictures of a job are written.
@@ -84,38 +84,57 @@ impl Format {
         Ok(Sink::open(self.pattern.clone(), options)?)
     }
 
-    /// Converts a frame to what the sink takes, display values or scene-linear light. Returns the writing of the former, which needs no frame.
-    pub(crate) fn write<'a>(
-        &'a self,
-        sink: &'a Sink,
+    /// Writes the scene-linear light of a frame.
+    fn write_light(
+        &self,
+        sink: &Sink,
         index: usize,
         frame: &mut Frame,
-        observer: &'a dyn Observer,
-    ) -> Result<Option<RemainingWork<'a>>, JobError> {
+        observer: &dyn Observer,
+    ) -> Result<(), JobError> {
         frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
-        if self.metadata {
-            // Before the picture, so that every existing picture has its metadata.
-            metadata::write(frame, &sink.path(frame.header.number), &self.overwrite)?;
-        }
+        self.write_metadata(sink, &frame.header, &frame.metadata)?;
         let slot = FrameSlot { index, number: frame.header.number };
-        let display = match sink.picture_format() {
-            PictureFormat::Frame => {
-                let _stage = StageGuard::begin(observer, Stage::Write);
-                sink.write(slot, Picture::Linear(frame))?;
-                return Ok(None);
-            }
-            PictureFormat::Display => self.to_display(frame, observer),
-            PictureFormat::OpaqueDisplay => {
-                // Over black, premultiplied light is unchanged.
-                frame.opaque = true;
-                self.to_display(frame, observer)
-            }
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        Ok(sink.write(slot, Picture::Linear(frame))?)
+    }
+
+    /// Writes the display pixels of a frame.
+    fn write_display(
+        &self,
+        sink: &Sink,
+        index: usize,
+        mut frame: DisplayFrame,
+        observer: &dyn Observer,
+    ) -> Result<(), JobError> {
+        frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
+        self.write_metadata(sink, &frame.header, &frame.metadata)?;
+        let slot = FrameSlot { index, number: frame.header.number };
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        Ok(sink.write(slot, Picture::Display(&frame.image, &frame.header.fingerprint))?)
+    }
+
+    /// Writes the metadata of a frame if requested: before the picture, so that every existing picture has its metadata.
+    fn write_metadata(
+        &self,
+        sink: &Sink,
+        header: &FrameHeader,
+        phenomena: &[PhenomenonMetadata],
+    ) -> Result<(), JobError> {
+        if self.metadata {
+            metadata::write(header, phenomena, &sink.path(header.number), &self.overwrite)?;
+        }
+        Ok(())
+    }
+
+    /// How light becomes the display pixels that the sink takes; `None` if it takes light.
+    pub(crate) fn display_options(&self, sink: &Sink) -> Option<DisplayOptions> {
+        let over_black = match sink.picture_format() {
+            PictureFormat::Frame => return None,
+            PictureFormat::Display => false,
+            PictureFormat::OpaqueDisplay => true,
         };
-        let fingerprint = frame.header.fingerprint;
-        Ok(Some(Box::new(move || {
-            let _stage = StageGuard::begin(observer, Stage::Write);
-            Ok(sink.write(slot, Picture::Display(&display, &fingerprint))?)
-        })))
+        Some(DisplayOptions { view: self.view, depth: self.bits, alpha: self.alpha, over_black })
     }
 
     /// The view transform.
@@ -135,23 +154,21 @@ pub(crate) struct FileWriter<'a> {
     pub(crate) finished: &'a FinishedFiles,
 }
 
+impl FileWriter<'_> {
+    /// Frame `number` is written.
+    fn written(&self, number: i64) {
+        let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
+        let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
+        path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
+        self.observer.frame_done(&FrameDone { number, path, drawn });
+    }
+}
+
 impl FrameSink for FileWriter<'_> {
-    fn finish<'w>(
-        &'w self,
-        index: usize,
-        frame: &mut Frame,
-        observer: &'w dyn Observer,
-    ) -> Result<Option<RemainingWork<'w>>, JobError> {
-        let number = frame.header.number;
-        let writing = self.format.write(&self.sink, index, frame, observer)?;
-        Ok(Some(Box::new(move || {
-            writing.map_or(Ok(()), |writing| writing())?;
-            let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
-            let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
-            path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
-            self.observer.frame_done(&FrameDone { number, path, drawn });
-            Ok(())
-        })))
+    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
+        self.format.write_light(&self.sink, index, frame, observer)?;
+        self.written(frame.header.number);
+        Ok(())
     }
 
     fn max_in_flight(&self) -> usize {
@@ -159,6 +176,19 @@ impl FrameSink for FileWriter<'_> {
     }
 
     fn writes_pixels(&self) -> bool {
-        matches!(self.sink.picture_format(), PictureFormat::Frame)
+        true
+    }
+}
+
+impl DisplaySink for FileWriter<'_> {
+    fn write(&self, index: usize, frame: DisplayFrame, observer: &dyn Observer) -> Result<(), JobError> {
+        let number = frame.header.number;
+        self.format.write_display(&self.sink, index, frame, observer)?;
+        self.written(number);
+        Ok(())
+    }
+
+    fn max_in_flight(&self) -> usize {
+        self.max_in_flight
     }
 }
