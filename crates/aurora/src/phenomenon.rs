@@ -70,9 +70,9 @@ impl Phenomenon for Aurora {
         PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 
-    fn memory_bytes(&self, _pixels: f64) -> f64 {
-        // Measured: charts and tables, and the state and the sources of each particle.
-        4e7 + 480.0 * self.parameters.particles.count as f64
+    fn memory_bytes(&self, pixels: f64) -> f64 {
+        // Measured: tables, the state and the sources of each particle, and the chart, which has up to a cell of 16 bytes for each pixel of the sky.
+        4e7 + 480.0 * self.parameters.particles.count as f64 + 8.0 * pixels
     }
 
     fn luminance(&self) -> f64 {
