@@ -82,7 +82,7 @@ pub struct PictureLayers {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PictureRemark {
     /// Some of its pixels are not opaque.
-    #[error("its alpha is used: where it is transparent, so is the picture ({})", blending(*.0))]
+    #[error("its alpha is used: where it is transparent, what is behind it is seen, or the picture is transparent ({})", blending(*.0))]
     AlphaUsed(PictureAlpha),
     /// Its color profile is damaged or of a kind that is not supported.
     #[error("its ICC profile cannot be used ({0}), so its values are taken as sRGB")]
