@@ -173,3 +173,133 @@ fn a_plate_without_alpha_stays_opaque() {
     let frame = over(Picture::opaque(Image::filled(24, 16, [0.5, 0.4, 0.3, 1.0]), Encoding::DisplaySrgb), "");
     assert!(frame.opaque && frame.beauty.pixels().iter().all(|[.., alpha]| *alpha == 1.0));
 }
+
+/// A camera at the origin that looks along -z, with a field of view of 90 degrees.
+const VIEW: &str = "bansho = 2\n[picture]\nsize = [24, 16]\nframes = 1\nexposure_ev100 = 0\n[camera]\nposition = [0, 0, 0]\ntarget = [0, 0, -1]\n\
+    vertical_fov_deg = 90\n";
+/// Fog before a plate 3 m away, fog and a lamp behind it.
+const BEFORE_AND_BEHIND: &str = "[[absorber]]\nname = \"mist\"\nnear = 1\nfar = 2\nextinction = [0.5, 0.5, 0.5]\n[[absorber]]\nname = \"fog\"\nnear = 4\nfar = 5\n\
+    extinction = [1, 1, 1]\n[[emitter]]\nname = \"lamp\"\nposition = [0, 0, -6]\nradius = 100\nluminance = 100\n";
+const SKY: &str = "[sky]\nkind = \"uniform\"\nluminance = 50\n";
+const COVERAGE: f32 = 0.25;
+
+/// The scene `text` with a plate of this color over black and coverage, which is 3 m away if it has a depth.
+fn covered(text: &str, color: [f32; 4], depth: Option<f32>, options: &PlanOptions) -> Frame {
+    let alpha = if color[3] < 1.0 { PictureAlpha::Associated } else { PictureAlpha::Opaque };
+    let depth = depth.map(|meters| vec![meters; 24 * 16]);
+    let opaque = Picture::opaque(Image::filled(24, 16, color), Encoding::LinearAcescg);
+    let mut assets = MemoryAssets::default();
+    assets.insert_picture("plate", Picture { alpha, depth, ..opaque });
+    let text = format!("{VIEW}[plate]\nimage = \"plate\"\n{text}");
+    draw(&mut plan_with(&text, options, Arc::new(assets)).open(), 0)
+}
+
+fn is_close(found: f32, expected: f32) -> bool {
+    (found - expected).abs() <= 2e-5 * expected.abs().max(1.0)
+}
+
+#[test]
+fn what_a_depth_hides_is_seen_through_the_transparency_of_the_plate() {
+    let frame = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, COVERAGE], Some(3.0), &PlanOptions::default());
+    let scale = bansho_base::color::exposure_scale(0.0) as f32;
+    let [mist, fog] = [(-0.5_f32).exp(), (-1.0_f32).exp()];
+    // The plate through the mist; the lamp through mist, three quarters of the plate, and fog.
+    let behind = (1.0 - COVERAGE) * mist * fog * 100.0 * scale;
+    let expected = [0.05, 0.1, 0.15].map(|color| mist * color + behind);
+    for pixel in frame.beauty.pixels() {
+        assert!((0..3).all(|c| is_close(pixel[c], expected[c])), "{pixel:?} {expected:?}");
+        assert!(is_close(pixel[3], 1.0 - mist * fog * (1.0 - COVERAGE)), "{pixel:?}");
+    }
+    // An opaque plate hides it.
+    let opaque = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, 1.0], Some(3.0), &PlanOptions::default());
+    assert!(opaque.beauty.pixels().iter().all(|pixel| is_close(pixel[2], mist * 0.15) && pixel[3] == 1.0));
+    // Without a depth, all are before the plate.
+    let far = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, COVERAGE], None, &PlanOptions::default());
+    let in_front = mist * fog * 0.05 + mist * fog * 100.0 * scale;
+    assert!(far.beauty.pixels().iter().all(|pixel| is_close(pixel[0], in_front)), "{:?}", far.beauty.at(0, 0));
+}
+
+#[test]
+fn the_sky_is_seen_through_the_transparency_of_the_plate() {
+    let text = format!("{BEFORE_AND_BEHIND}{SKY}");
+    let options = PlanOptions { layers: true, ..PlanOptions::default() };
+    let without_plate =
+        draw(&mut plan_with(&format!("{VIEW}{text}"), &options, Arc::new(MemoryAssets::default())).open(), 0);
+    for depth in [Some(3.0), None] {
+        let frame = covered(&text, [0.05, 0.1, 0.15, COVERAGE], depth, &options);
+        let opaque = covered(&text, [0.2, 0.4, 0.6, 1.0], depth, &options);
+        for ((found, opaque), clear) in
+            frame.beauty.pixels().iter().zip(opaque.beauty.pixels()).zip(without_plate.beauty.pixels())
+        {
+            let expected = [0, 1, 2, 3].map(|c| COVERAGE * opaque[c] + (1.0 - COVERAGE) * clear[c]);
+            assert!((0..4).all(|c| is_close(found[c], expected[c])), "{depth:?}: {found:?} {expected:?}");
+            assert!(clear[0] > 0.1 && is_close(found[3], 1.0), "{found:?}");
+        }
+        // What the layers add is the picture.
+        for (c, suffix) in ["R", "G", "B", "A"].iter().enumerate() {
+            let layers: Vec<_> =
+                frame.channels.iter().filter(|channel| channel.name.ends_with(&format!(".{suffix}"))).collect();
+            assert_eq!(layers.len(), 5, "mist, fog, lamp, sky and plate");
+            let sum: f32 = layers.iter().map(|layer| layer.values[100]).sum();
+            assert!(is_close(sum, frame.beauty.pixels()[100][c]), "{suffix}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn an_opaque_plate_hides_the_sky_to_the_bit() {
+    let text = format!("{BEFORE_AND_BEHIND}{SKY}");
+    let [shown, hidden] = [text.clone(), format!("{text}visible = false\n")].map(|text| {
+        let options = PlanOptions { layers: true, ..PlanOptions::default() };
+        covered(&text, [0.2, 0.4, 0.6, 1.0], Some(3.0), &options)
+    });
+    assert!(shown.beauty == hidden.beauty && shown.channels.len() == hidden.channels.len() && shown.opaque);
+}
+
+#[test]
+fn scale_and_shift_of_an_inverse_depth_are_found_from_the_ground() {
+    let above = |row: usize| (row as f64 - 7.5) / 8.0;
+    // The camera is 1.6 m above the ground; a wall 4 m away covers a third of the width. The inverse depth is 0.05 + 0.01 value.
+    let values: Vec<f32> = (0..24 * 16)
+        .map(|index| {
+            let ground = above(index / 24).max(0.0) / 1.6;
+            let inverse = if index % 24 < 8 { f64::max(ground, 0.25) } else { ground };
+            ((inverse - 0.05) / 0.01) as f32
+        })
+        .collect();
+    let black = Picture::opaque(Image::filled(24, 16, [0.0, 0.0, 0.0, 1.0]), Encoding::LinearAcescg);
+    let scene = |values: Vec<f32>, more: &str| {
+        let mut assets = MemoryAssets::default();
+        assets.insert_picture("plate", Picture { depth: Some(values), ..black.clone() });
+        let text = format!(
+            "{VIEW}[plate]\nimage = \"plate\"\ndepth_kind = \"inverse\"\n{more}[ground]\nheight = -1.6\nkind = \"plate\"\n"
+        );
+        support::compiled("a.toml", &text, &support::kinds(), assets).map(Arc::new)
+    };
+    let compiled = scene(values.clone(), "").unwrap_or_else(|error| panic!("{error}"));
+    let plan = Arc::new(Plan::new(&compiled, &PlanOptions { layers: true, ..PlanOptions::default() }).unwrap());
+    let told =
+        remarks::remarks(&compiled, &plan).into_iter().map(|(_, remark)| remark.message).collect::<Vec<_>>().join("\n");
+    for words in [
+        "`depth_scale = 100.000000`",
+        "`depth_shift = 0.050000`",
+        "of the pixels below the horizon agree",
+        "deviate by",
+    ] {
+        assert!(told.contains(words), "{words}: {told}");
+    }
+    let depth = draw(&mut bansho_render::Shot::open(compiled, plan), 0).depth.unwrap();
+    for row in 9..16 {
+        let found = f64::from(depth[row * 24 + 20]);
+        assert!((found * above(row) / 1.6 - 1.0).abs() < 0.01, "{row}: {found}");
+    }
+    assert!((depth[2 * 24 + 3] - 4.0).abs() < 0.04, "the wall: {}", depth[2 * 24 + 3]);
+    // A depth that shows no ground is refused, unless scale or shift is stated.
+    let flat = || vec![7.0_f32; 24 * 16];
+    let error = scene(flat(), "").err().expect("no ground is refused").to_string();
+    assert!(
+        error.contains("depth_kind") && error.contains("the ground at -1.6 m") && error.contains("`depth_known`"),
+        "{error}"
+    );
+    assert!(scene(flat(), "depth_scale = 2.0\n").is_ok() && scene(flat(), "depth_shift = 0.0\n").is_ok());
+}

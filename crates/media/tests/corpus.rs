@@ -1,6 +1,6 @@
 //! Small files by independent writers are read as independent readers read them. `python/make_corpus.py` writes them, and `expected.json` beside them.
 
-use std::{fs, path::PathBuf};
+use std::{fs, io::Read, path::PathBuf, sync::LazyLock};
 
 use bansho_base::{
     geometry::strokes::Drawing,
@@ -12,6 +12,14 @@ use serde_json::Value;
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/corpus")
 }
+
+/// Codes of red, green, blue and alpha of the pictures of PngSuite, one picture after the other.
+static PNG_SUITE: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let packed = fs::read(folder().join("pngsuite/values.zz")).unwrap();
+    let mut codes = Vec::new();
+    flate2::read::ZlibDecoder::new(&packed[..]).read_to_end(&mut codes).unwrap();
+    codes
+});
 
 /// A file, and what is expected of it.
 struct Case {
@@ -32,6 +40,14 @@ impl Case {
             None => value.as_f64().unwrap(),
         };
         Some(self.expected.get(key)?.as_array()?.iter().map(number).collect())
+    }
+
+    /// The values of a picture of PngSuite.
+    fn values_of_suite(&self) -> Option<Vec<f64>> {
+        let start = self.expected.get("values_from")?.as_u64()? as usize;
+        let [width, height] = self.numbers("size")?[..] else { return None };
+        let codes = &PNG_SUITE[start..][..4 * (width * height) as usize];
+        Some(codes.iter().map(|code| f64::from(*code) / 255.0).collect())
     }
 
     fn extension(&self) -> &str {
@@ -86,7 +102,7 @@ impl Case {
             equal("encoding", is_linear, encoding == "linear")?;
         }
         let values: Vec<f64> = picture.color.pixels().as_flattened().iter().map(|value| f64::from(*value)).collect();
-        if let Some(expected) = self.numbers("values") {
+        if let Some(expected) = self.numbers("values").or_else(|| self.values_of_suite()) {
             near(&values, &expected, self.expected["tolerance"].as_f64().unwrap())?;
         }
         if self.text("alpha").as_deref() == Some("associated") {
@@ -162,13 +178,65 @@ fn cases() -> Vec<Case> {
     entries.into_iter().map(case).collect()
 }
 
-#[test]
-fn damaged_files_of_other_programs_never_panic() {
+/// Numbers that look random.
+fn random_numbers() -> impl FnMut() -> usize {
     let mut state = 7_u64;
-    let mut random = move || {
+    move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize
-    };
+    }
+}
+
+/// Whether a changed JPEG is refused, or told to be corrupt.
+fn is_told(bytes: &[u8]) -> bool {
+    let read = decode_picture(bytes, "jpg", &PictureLayers::default(), MemoryLimit::default());
+    read.is_err() || read.is_ok_and(|picture| matches!(picture.remarks[..], [PictureRemark::Corrupt(_)]))
+}
+
+#[test]
+fn corrupt_data_of_a_jpeg_are_told() {
+    let mut random = random_numbers();
+    let (mut changed, mut told) = (0, 0);
+    for name in ["detailed.jpg", "detailed_restarts.jpg", "detailed_progressive.jpg", "detailed_full.jpg"] {
+        let whole = fs::read(folder().join(name)).unwrap();
+        assert!(!is_told(&whole), "{name}");
+        let start = whole.windows(2).position(|pair| pair == [0xff, 0xda]).unwrap() + 14;
+        let replaced =
+            |range: std::ops::Range<usize>, by: &[u8]| [&whole[..range.start], by, &whole[range.end..]].concat();
+        // The structure: the marker of the end is missing, half of the data are, a marker is inserted.
+        let middle = usize::midpoint(start, whole.len());
+        for bad in [
+            whole[..whole.len() - 2].to_vec(),
+            whole[..middle].to_vec(),
+            replaced(middle..middle, &[0xff, 0xd5]),
+            replaced(middle..middle, &[0xff, 0x5a]),
+        ] {
+            assert!(is_told(&bad), "{name}: {} of {} bytes", bad.len(), whole.len());
+        }
+        for _ in 0..200 {
+            let at = start + random() % (whole.len() - start - 2);
+            let bad = replaced(at..at + 1, &[whole[at] ^ (1 + random() % 255) as u8]);
+            (changed, told) = (changed + 1, told + usize::from(is_told(&bad)));
+        }
+    }
+    println!("{told} of {changed} changed bytes are told");
+    // A change within a number stays a picture; nothing in a JPEG says what it was.
+    assert!(10 * told > 3 * changed, "{told} of {changed} changed bytes are told");
+}
+
+#[test]
+fn restart_markers_out_of_order_are_told() {
+    let mut bytes = fs::read(folder().join("detailed_restarts.jpg")).unwrap();
+    let markers: Vec<usize> =
+        (0..bytes.len() - 1).filter(|at| bytes[*at] == 0xff && (0xd0..=0xd7).contains(&bytes[at + 1])).collect();
+    assert!(markers.len() >= 7, "{markers:?}");
+    bytes.swap(markers[2] + 1, markers[3] + 1);
+    assert!(is_told(&bytes));
+}
+
+#[test]
+fn damaged_files_of_other_programs_never_panic() {
+    let mut random = random_numbers();
     for mut case in cases() {
         let whole = case.bytes.clone();
         for _ in 0..40 {
@@ -189,7 +257,7 @@ fn damaged_files_of_other_programs_never_panic() {
 #[test]
 fn files_of_other_programs_are_read_as_other_readers_read_them() {
     let cases = cases();
-    assert!(cases.len() >= 150, "{} files", cases.len());
+    assert!(cases.len() >= 400, "{} files", cases.len());
     let mut faults = Vec::new();
     for case in cases {
         if let Err(fault) = case.differences() {

@@ -84,10 +84,14 @@ impl CompiledScene {
         let mut errors = Vec::new();
         let previous = previous.filter(|previous| Arc::ptr_eq(&previous.assets, &assets));
         let frame = scene.picture.first_frame;
-        let same_plate =
-            |previous: &Self| previous.scene.plate == scene.plate && previous.scene.picture.first_frame == frame;
+        let view = scene.plate_view(frame);
+        let same_view = |previous: &Scene| !scene.plate.fits_ground() || previous.plate_view(frame) == view;
+        let same_plate = |previous: &Self| {
+            let before = &previous.scene;
+            before.plate == scene.plate && before.picture.first_frame == frame && same_view(before)
+        };
         if !previous.is_some_and(same_plate)
-            && let Err(error) = scene.plate.read_frame(assets.as_ref(), frame)
+            && let Err(error) = scene.plate.read_frame(assets.as_ref(), frame, &view)
         {
             errors.push(("plate".to_owned(), error));
         }
@@ -99,19 +103,19 @@ impl CompiledScene {
         let phenomena = fingerprints.into_iter().filter_map(|fingerprint| {
             Some(BuiltPhenomenon { fingerprint, phenomenon: built.get(&fingerprint)?.clone() })
         });
-        let enabled = phenomena.chain(backdrop(&scene, &obstacles, previous)).collect();
+        let enabled = phenomena.chain(backdrop(&scene, assets.as_ref(), &obstacles, previous)).collect();
         let wind = Wind::new(scene.wind.clone(), scene.seed, scene.loop_s);
         Ok(Self { wind, obstacles, built, enabled, scene, assets })
     }
 
     /// The image of the plate in the first frame; `None` without a plate, or if it cannot be read.
     pub fn plate_image(&self) -> Option<Arc<Picture>> {
-        self.scene.plate.read_image(self.assets.as_ref(), self.scene.picture.first_frame).ok()?
+        plate_image(&self.scene, self.assets.as_ref())
     }
 
     /// Whether the plate covers the picture: it has one, whose image is opaque in the first frame.
     pub fn has_opaque_plate(&self) -> bool {
-        self.plate_image().is_some_and(|picture| picture.alpha == PictureAlpha::Opaque)
+        self.plate_image().is_some_and(is_opaque)
     }
 
     /// The same scene with another instance at `index`, as a program changes parameters while a shot runs: only that phenomenon is built, and may
@@ -318,9 +322,19 @@ fn build_instance(
     instance.parameters.build(&context)
 }
 
-/// The scene's visible lamps and obstacles, its ground, and its visible sky unless there is a plate.
+/// The image of the plate in the first frame; `None` without a plate, or if it cannot be read.
+fn plate_image(scene: &Scene, assets: &dyn Assets) -> Option<Arc<Picture>> {
+    scene.plate.read_image(assets, scene.picture.first_frame).ok()?
+}
+
+fn is_opaque(picture: Arc<Picture>) -> bool {
+    picture.alpha == PictureAlpha::Opaque
+}
+
+/// The scene's visible lamps and obstacles, its ground, and its visible sky unless there is a plate that is opaque in the first frame.
 fn backdrop(
     scene: &Scene,
+    assets: &dyn Assets,
     obstacles: &[(Fingerprint, Obstacle)],
     previous: Option<&CompiledScene>,
 ) -> Vec<BuiltPhenomenon> {
@@ -348,7 +362,8 @@ fn backdrop(
     if let Some(ground) = &scene.ground {
         add(fingerprint::of_ground(ground, scene), &|| Arc::new(Ground::new(ground.clone(), scene.seed, scene.loop_s)));
     }
-    if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && !scene.has_plate()) {
+    let is_seen = || !scene.has_plate() || !plate_image(scene, assets).is_none_or(is_opaque);
+    if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && is_seen()) {
         add(fingerprint::of_sky(sky, scene), &|| Arc::new(SkyBackdrop::new(sky.clone(), scene.seed)));
     }
     backdrop

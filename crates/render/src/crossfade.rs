@@ -6,7 +6,7 @@ use bansho_base::{
     host::observer::{Cancelled, Observer},
     image::{Image, Rect},
     phenomenon::{
-        Deflection, Prepared, Run, SnapshotError, Stepped, Stepping,
+        Deflection, PlateRole, Prepared, Run, SnapshotError, Stepped, Stepping,
         strip::{AovDescriptor, DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },
@@ -290,6 +290,10 @@ impl Prepared for PreparedCrossfade<'_> {
 
     fn may_refract(&self) -> bool {
         self.current.may_refract() || self.adjacent.may_refract()
+    }
+
+    fn plate_role(&self) -> PlateRole {
+        self.current.plate_role()
     }
 
     fn deflection(&self) -> Option<Deflection<'_>> {

@@ -13,7 +13,7 @@ use bansho_base::{
 };
 
 use crate::fingerprint::{self, Fingerprint};
-use bansho_scene::{FrameRate, Scene};
+use bansho_scene::{FrameRate, PlateView, Scene};
 
 /// Options of a shot that its scene does not state.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -235,6 +235,13 @@ impl Plan {
             Some(seconds) => view.in_loop(seconds),
             None => view,
         }
+    }
+
+    /// Whence the plate of frame `number` was taken.
+    pub(crate) fn plate_view(&self, number: i64) -> PlateView {
+        let camera = self.camera.at(self.shutter(number).middle(), self.size);
+        let ground_height = self.scene.ground.as_ref().map(|ground| ground.height);
+        PlateView { camera, size: self.size, ground_height }
     }
 
     /// A fingerprint of all that the pixels of frame `number` depend on, files in `assets` included.

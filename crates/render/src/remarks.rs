@@ -58,7 +58,8 @@ impl<'a> ExposedScene<'a> {
 /// What users should know about how the files of the plate were read, in the first frame.
 fn of_plate_files(compiled: &CompiledScene) -> Vec<(String, Remark)> {
     let scene = compiled.scene();
-    let read = scene.plate.read_frame(compiled.assets().as_ref(), scene.picture.first_frame);
+    let frame = scene.picture.first_frame;
+    let read = scene.plate.read_frame(compiled.assets().as_ref(), frame, &scene.plate_view(frame));
     let Ok(Some(pictures)) = read else { return Vec::new() };
     let remark = |remark: &PlateRemark| (PLATE_LAYER.to_owned(), Remark::new(remark.to_string()));
     pictures.remarks().iter().map(remark).collect()

@@ -32,6 +32,7 @@ pub use self::{
     tables::{
         defaults::ImpliedBackdrop,
         depth::{DepthFit, DepthScale},
+        ground_fit::{GroundFit, PlateView},
         picture::{self, DepthKind, FrameRate, LightParameters, PictureParameters, PlateAlpha, PlateParameters},
         plate::{PlateDepth, PlatePictures, PlateRemark},
     },
@@ -281,6 +282,16 @@ impl Scene {
                 instance.parameters.check_values(reader);
             });
         }
+    }
+
+    /// Whence the plate of frame `frame` was taken: by the camera at the middle of the exposure, above the ground.
+    pub fn plate_view(&self, frame: i64) -> PlateView {
+        let size = self.picture.size.map(|side| side as usize);
+        let frame_s = self.picture.fps.frame_s();
+        let exposed_s = self.camera.shutter_s.unwrap_or(0.5 * frame_s);
+        let time = (frame - self.picture.first_frame) as f64 * frame_s + self.camera.shutter_offset_s + 0.5 * exposed_s;
+        let ground_height = self.ground.as_ref().map(|ground| ground.height);
+        PlateView { camera: self.camera.at(time, size), size, ground_height }
     }
 
     /// Applies the options: replaces the seed, closes the loop, hides the implied backdrop.

@@ -82,7 +82,7 @@ pub struct PictureLayers {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PictureRemark {
     /// Some of its pixels are not opaque.
-    #[error("its alpha is used: where it is transparent, so is the picture ({})", blending(*.0))]
+    #[error("its alpha is used: where it is transparent, what is behind it is seen, or the picture is transparent ({})", blending(*.0))]
     AlphaUsed(PictureAlpha),
     /// Its color profile is damaged or of a kind that is not supported.
     #[error("its ICC profile cannot be used ({0}), so its values are taken as sRGB")]
@@ -99,8 +99,16 @@ pub enum PictureRemark {
         white: f32,
     },
     /// Its Exif data are damaged.
-    #[error("its Exif data are damaged ({0}); orientation and exposure may be missing")]
-    Exif(String),
+    #[error(
+        "its Exif data are damaged{} ({reason}); orientation and exposure may be missing",
+        at.map(|at| format!(" at their byte {at}")).unwrap_or_default()
+    )]
+    Exif {
+        /// Where: bytes from the beginning of their TIFF header, which Exif data count offsets from; `None` if unknown.
+        at: Option<usize>,
+        /// What is wrong.
+        reason: String,
+    },
     /// Its orientation has no meaning.
     #[error("its orientation is {0} (allowed: 1 to 8), so it is not turned")]
     Orientation(u32),

@@ -326,6 +326,23 @@ pub trait Prepared: Send + Sync {
     fn deflection(&self) -> Option<Deflection<'_>> {
         None
     }
+
+    /// What it is to a plate.
+    fn plate_role(&self) -> PlateRole {
+        PlateRole::Before
+    }
+}
+
+/// What a phenomenon is to a plate, which matters where the plate is transparent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PlateRole {
+    /// It is before the plate, unless the plate's depth hides it; what the depth hides is seen through the plate's transparency.
+    #[default]
+    Before,
+    /// It changes what the plate shows, as a film of water on the plate's own ground does: where the plate is transparent, so is it.
+    Part,
+    /// It is behind every plate, as the sky is, and seen only through the plate's transparency.
+    Behind,
 }
 
 /// Opaque surfaces over the whole picture.

@@ -8,7 +8,7 @@ use bansho_base::{
         simd::{LANES, Lanes, Real},
     },
     phenomenon::{
-        Prepared,
+        PlateRole, Prepared,
         strip::{DepthInterval, Strip},
     },
 };
@@ -289,5 +289,9 @@ impl Prepared for PreparedGround<'_> {
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         dispatch!(bansho_base::math::simd::level(), simd => self.draw_rows(simd, slice, strip));
+    }
+
+    fn plate_role(&self) -> PlateRole {
+        if self.parameters.kind == GroundKind::Plate { PlateRole::Part } else { PlateRole::Before }
     }
 }

@@ -7,7 +7,7 @@ use bansho_base::{
     image::Rect,
     math::{DVec2, DVec3, MulAdd, approximations, simd::LANES},
     phenomenon::{
-        Prepared,
+        PlateRole, Prepared,
         strip::{DepthInterval, Strip, View},
     },
     world::sky::Sky,
@@ -259,5 +259,9 @@ impl Prepared for PreparedSky<'_> {
         if slice.overlaps(&FAR) {
             dispatch!(level, simd => self.draw_sky(simd, strip));
         }
+    }
+
+    fn plate_role(&self) -> PlateRole {
+        PlateRole::Behind
     }
 }

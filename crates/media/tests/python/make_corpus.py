@@ -4,7 +4,7 @@
     python crates/media/tests/python/make_corpus.py crates/media/tests/corpus
 
 Pictures are read back by Pillow (with LittleCMS for profiles), OpenCV, tifffile and OpenEXR, strokes by svgelements, meshes by trimesh. Colors of
-chunks that none of them reads are computed with NumPy from the standards.
+chunks that none of them reads are computed with NumPy from the standards. `pngsuite` holds the files of PngSuite, which are kept.
 """
 
 import gzip
@@ -27,8 +27,13 @@ from PIL import Image, ImageCms, ImageOps
 OUT = pathlib.Path(sys.argv[1])
 ENTRIES: list[dict] = []
 WIDTH, HEIGHT = 6, 4
-# Decoders may differ by 1 in the inverse cosine transform (ITU-T T.83), which blue, 1.772 Cb, makes 2 codes.
+# Decoders may differ by 1 in the inverse cosine transform (ITU-T T.83), which blue, 1.772 Cb, makes 2 codes. Beside a transform in double precision, Pillow and
+# zune-jpeg are both off by up to 1.31 codes; zune-jpeg has no setting for that.
 JPEG = 2 / 255
+# Matrices and curves: LittleCMS rounds to codes, which is half of one.
+PROFILE = 0.6 / 255
+# LittleCMS interpolates within tetrahedra, moxcms linearly. Between the two, the table below makes 1.7 codes.
+CMYK = 1.5 / 255
 
 
 def add(name: str, data: bytes, **expected) -> None:
@@ -249,11 +254,16 @@ def srgb_curve() -> bytes:
     return b"curv\0\0\0\0" + struct.pack(">I", 1024) + table
 
 
+def undated(profile: bytes) -> bytes:
+    """Without the time of its creation, so that the same files are written again."""
+    return profile[:24] + struct.pack(">6H", 2020, 1, 1, 0, 0, 0) + profile[36:]
+
+
 def profiles() -> None:
     prophoto_white = D50
     every = {
         "p3": icc(P3, D65, srgb_curve()), "adobe": icc(ADOBE, D65, gamma_curve(563 / 256)), "prophoto": icc(PROPHOTO, prophoto_white, gamma_curve(1.8)),
-        "rec2020": icc(REC2020, D65, gamma_curve(2.4)), "srgb": ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes(),
+        "rec2020": icc(REC2020, D65, gamma_curve(2.4)), "srgb": undated(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()),
     }
     srgb = ImageCms.createProfile("sRGB")
     for name, profile in every.items():
@@ -263,16 +273,59 @@ def profiles() -> None:
             data = saved(Image.fromarray(ramp()), kind, icc_profile=profile, **options)
             stored = Image.open(io.BytesIO(data)).convert("RGB")
             seen = ImageCms.profileToProfile(stored, ImageCms.ImageCmsProfile(io.BytesIO(profile)), srgb)
-            picture(f"profile_{name}.{extension}", data, opaque(np.asarray(seen) / 255), tolerance=1.6 * JPEG if extension == "jpg" else 1.6 / 255)
+            picture(f"profile_{name}.{extension}", data, opaque(np.asarray(seen) / 255), tolerance=JPEG + PROFILE if extension == "jpg" else PROFILE)
     gray = icc(None, None, gamma_curve(1.8), gray=True)
     data = saved(Image.fromarray(ramp()[..., 0]), "PNG", icc_profile=gray)
     light = (ramp()[..., :1] / 255) ** 1.8
-    picture("profile_gray.png", data, opaque(np.repeat(encode_srgb(light), 3, -1)), tolerance=1.6 / 255)
+    picture("profile_gray.png", data, opaque(np.repeat(encode_srgb(light), 3, -1)), tolerance=PROFILE)
     for name, profile, words in [
         ("damaged", every["p3"][:200], "ICC profile"), ("for_cmyk", every["p3"].replace(b"RGB ", b"CMYK"), "ICC profile"), ("of_zeros", bytes(500), "ICC profile"),
     ]:
         data = saved(Image.fromarray(ramp()), "PNG", icc_profile=profile)
         picture(f"profile_{name}.png", data, opaque(ramp() / 255), remark=words)
+
+
+def cmyk_profile(grid: int = 6) -> bytes:
+    """A profile of a press with curves and a table (ICC.1:2001-04, lut16Type): inks multiply the light of the paper, and no other way leads back."""
+    inks = np.array([[0.10, 0.45, 0.75], [0.75, 0.12, 0.30], [0.90, 0.80, 0.08], [0.07, 0.07, 0.07]])
+    paper = np.array([0.86, 0.88, 0.80])
+    steps = np.linspace(0, 1, grid)
+    amounts = np.stack(np.meshgrid(steps, steps, steps, steps, indexing="ij"), -1)
+    light = paper * np.prod(1 - amounts[..., None] * (1 - inks), axis=-2)
+    xyz = light @ (bradford(D65, D50) @ xyz_from_rgb(SRGB, D65)).T / np.array([0.9642, 1.0, 0.8249])
+    cube = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz * (29 / 6) ** 2 / 3 + 4 / 29)
+    lab = np.stack([116 * cube[..., 1] - 16, 500 * (cube[..., 0] - cube[..., 1]), 200 * (cube[..., 1] - cube[..., 2])], -1)
+    table = np.round(np.clip([652.80, 256, 256] * (lab + [0, 128, 128]), 0, 65535)).astype(">u2")
+    curve = np.round((np.arange(256) / 255) ** 1.25 * 65535).astype(">u2")
+    identity = b"".join(map(s15, np.eye(3).reshape(-1)))
+    lut = b"mft2\0\0\0\0" + bytes([4, 3, grid, 0]) + identity + struct.pack(">HH", 256, 2) + 4 * curve.tobytes() + table.tobytes() + 3 * b"\0\0\xff\xff"
+    tags = {
+        b"desc": b"desc\0\0\0\0\0\0\0\x05test\0" + bytes(79), b"cprt": b"text\0\0\0\0none\0", b"A2B0": lut,
+        b"wtpt": b"XYZ \0\0\0\0" + b"".join(map(s15, (0.9642, 1.0, 0.8249))),
+    }
+    listed, body, at = b"", b"", 128 + 4 + 12 * len(tags)
+    for name, data in tags.items():
+        data += bytes(-len(data) % 4)
+        listed += name + struct.pack(">II", at + len(body), len(data))
+        body += data
+    head = struct.pack(">I4sI4s4s4s", 0, b"none", 0x02100000, b"prtr", b"CMYK", b"Lab ") + struct.pack(">6H", 2020, 1, 1, 0, 0, 0)
+    head += b"acsp" + bytes(28) + s15(0.9642) + s15(1.0) + s15(0.8249) + bytes(48)
+    profile = head + struct.pack(">I", len(tags)) + listed + body
+    return struct.pack(">I", len(profile)) + profile[4:]
+
+
+def cmyk() -> None:
+    profile, srgb = cmyk_profile(), ImageCms.createProfile("sRGB")
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] / [[[HEIGHT - 1]], [[WIDTH - 1]]]
+    inks = np.stack([0.1 + 0.8 * x, 0.9 - 0.7 * y, 0.5 * x + 0.4 * y, 0.6 * x * y], -1)
+    stored = Image.fromarray(np.round(inks * 255).astype(np.uint8), "CMYK")
+    for extension, kind, options in [("jpg", "JPEG", {"quality": 100, "subsampling": 0}), ("tif", "TIFF", {})]:
+        data = saved(stored, kind, icc_profile=profile, **options)
+        read = Image.open(io.BytesIO(data))
+        # Optimized, LittleCMS interpolates between codes of a table of its own.
+        exact = ImageCms.Flags.NOOPTIMIZE
+        seen = ImageCms.profileToProfile(read, ImageCms.ImageCmsProfile(io.BytesIO(profile)), srgb, outputMode="RGB", flags=exact)
+        picture(f"cmyk_profile.{extension}", data, opaque(np.asarray(seen) / 255), tolerance=CMYK)
 
 
 def with_chunks(*chunks: tuple[bytes, bytes]) -> bytes:
@@ -532,6 +585,130 @@ def meshes() -> None:
             mesh(f"{name}.gltf", data, box.bounds, len(box.faces))
 
 
+def sparse_meshes() -> None:
+    """Accessors whose elements are partly replaced, as Blender writes shape keys. trimesh leaves them out, so NumPy replaces them."""
+    base = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 2]], np.float32)
+    faces = np.array([[0, 1, 2], [2, 1, 3], [0, 1, 4]], np.uint16)
+    replaced, values = np.array([1, 3]), np.array([[3, 0, -1], [4, 5, 0]], np.float32)
+    shown = base.copy()
+    shown[replaced] = values
+    moved = base.copy()
+    moved[replaced] += 0.5 * values
+    alone = np.zeros_like(base)
+    alone[[0, 2, 3, 4]] = [[0, 0, 1], [1, 0, 2], [0, 6, 0], [3, 3, 0]]
+    order = faces.reshape(-1).copy()
+    order[[5, 8]] = [4, 2]
+    skinned = base.copy()
+    skinned[3] += [0, 0, 9]
+
+    def document(name: str, accessors: list, primitive: dict, result: np.ndarray, shown_faces=faces, **more) -> None:
+        binary, views = bytearray(), []
+
+        def view(array: np.ndarray) -> int:
+            binary.extend(bytes(-len(binary) % 4))
+            views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
+            binary.extend(array.tobytes())
+            return len(views) - 1
+
+        listed = []
+        for kind, shape, count, dense, sparse in accessors:
+            entry = {"componentType": kind, "type": shape, "count": count}
+            if dense is not None:
+                entry["bufferView"] = view(dense)
+            if sparse is not None:
+                indices, replacements = sparse
+                component = {1: 5121, 2: 5123, 4: 5125}[indices.itemsize]
+                entry["sparse"] = {"count": len(indices), "indices": {"bufferView": view(indices), "componentType": component}, "values": {"bufferView": view(replacements)}}
+            listed.append(entry)
+        scene = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "meshes": [{"primitives": [primitive]}]}
+        scene.update(accessors=listed, bufferViews=views, buffers=[{"byteLength": len(binary)}])
+        for key, value in more.items():
+            scene[key] = value
+        text = json.dumps(scene).encode()
+        text += b" " * (-len(text) % 4)
+        binary.extend(bytes(-len(binary) % 4))
+        body = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + bytes(binary)
+        used = result[np.unique(shown_faces)]
+        bounds = [[float(v) for v in used.min(0)], [float(v) for v in used.max(0)]]
+        add(f"sparse_{name}.glb", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body, kind="mesh", bounds=bounds, triangles=len(shown_faces))
+
+    f32, u16, u8 = 5126, 5123, 5121
+    indices = (u16, "SCALAR", 9, faces, None)
+    whole = (f32, "VEC3", 5, base, None)
+    plain = {"attributes": {"POSITION": 0}, "indices": 1}
+    for width in (np.uint8, np.uint16, np.uint32):
+        sparse = (replaced.astype(width), values)
+        document(f"positions_{np.dtype(width).name}", [(f32, "VEC3", 5, base, sparse), indices], plain, shown)
+    document("zeros", [(f32, "VEC3", 5, None, (np.array([0, 2, 3, 4], np.uint8), alone[[0, 2, 3, 4]])), indices], plain, alone)
+    document("indices", [whole, (u16, "SCALAR", 9, faces, (np.array([5, 8], np.uint8), order[[5, 8]]))], plain, base, order.reshape(-1, 3))
+    morphed = {**plain, "targets": [{"POSITION": 2}, {"POSITION": 3}]}
+    targets = [(f32, "VEC3", 5, None, (replaced.astype(np.uint16), values)), (f32, "VEC3", 5, None, None)]
+    document("morph_target", [whole, indices, *targets], morphed, moved, meshes=[{"primitives": [morphed], "weights": [0.5, 1]}])
+    joints = (u8, "VEC4", 5, None, (np.array([3], np.uint8), np.array([[1, 0, 0, 0]], np.uint8)))
+    weights = (f32, "VEC4", 5, np.tile(np.array([1, 0, 0, 0], np.float32), (5, 1)), None)
+    raised = np.eye(4, dtype=np.float32)
+    raised[3, 2] = 9
+    matrices = (f32, "MAT4", 2, np.tile(np.eye(4, dtype=np.float32), (2, 1, 1)), (np.array([1], np.uint8), raised[None]))
+    bound = {"attributes": {"POSITION": 0, "JOINTS_0": 2, "WEIGHTS_0": 3}, "indices": 1}
+    nodes = [{"mesh": 0, "skin": 0}, {}, {}]
+    document("skin", [whole, indices, joints, weights, matrices], bound, skinned, nodes=nodes, scenes=[{"nodes": [0, 1, 2]}], skins=[{"joints": [1, 2], "inverseBindMatrices": 4}])
+
+
+# --- PngSuite ----------------------------------------------------------------------------------------------------------------------------------------------
+
+
+def png_chunks(data: bytes) -> dict[bytes, bytes]:
+    found, at = {}, 8
+    while at + 8 <= len(data):
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
+        found.setdefault(kind, data[at + 8 : at + 8 + length])
+        at += 12 + length
+    return found
+
+
+def stored_codes(data: bytes, chunks: dict[bytes, bytes]) -> np.ndarray:
+    """Red, green, blue and alpha as stored, 0 to 1: by Pillow or, since that has no colors of 16 bits, by OpenCV."""
+    bits, color_type = chunks[b"IHDR"][8:10]
+    if bits < 16:
+        codes = np.asarray(Image.open(io.BytesIO(data)).convert("RGBA")) / 255
+        if color_type == 0 and (key := chunks.get(b"tRNS")):
+            # Pillow compares codes of 8 bits with one of fewer.
+            codes[..., 3] = np.round(codes[..., 0] * (2**bits - 1)) != int.from_bytes(key, "big")
+        return codes
+    wide = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert wide.dtype == np.uint16, wide.dtype
+    planes = wide.reshape(*wide.shape[:2], -1)
+    rgb = np.repeat(planes, 3, -1) if planes.shape[-1] == 1 else planes[..., 2::-1]
+    alpha = planes[..., 3:] / 65535 if planes.shape[-1] == 4 else np.ones((*rgb.shape[:2], 1))
+    if key := chunks.get(b"tRNS"):
+        alpha = 1.0 - np.all(rgb == np.frombuffer(key, ">u2"), -1, keepdims=True)
+    return np.dstack([rgb / 65535, alpha])
+
+
+def png_suite() -> None:
+    """The files of Willem van Schaik's PngSuite, which are there and not written. Their values are in one file, as codes of 8 bits."""
+    suite, blob = OUT / "pngsuite", bytearray()
+    for path in sorted(suite.glob("*.png")):
+        data = path.read_bytes()
+        name = f"pngsuite/{path.name}"
+        if path.name.startswith("x"):
+            ENTRIES.append({"file": name, "kind": "picture", "error": "is damaged"})
+            continue
+        chunks = png_chunks(data)
+        codes = stored_codes(data, chunks)
+        gamma = struct.unpack(">I", chunks.get(b"gAMA", b"\0\0\xb1\x8f"))[0]
+        # Chromaticities, where there are any, are those of sRGB.
+        if scale := chunks.get(b"cHRM"):
+            assert np.allclose(np.frombuffer(scale, ">u4") / 100000, np.array([D65, *SRGB]).reshape(-1), atol=1e-3), name
+        if abs(gamma - 45455) > 60 and gamma != 100000:
+            codes[..., :3] = encode_srgb(codes[..., :3] ** (100000 / gamma))
+        height, width = codes.shape[:2]
+        encoding = "linear" if gamma == 100000 else "display"
+        ENTRIES.append({"file": name, "kind": "picture", "size": [width, height], "values_from": len(blob), "tolerance": 1 / 255, "encoding": encoding})
+        blob += np.round(codes * 255).astype(np.uint8).tobytes()
+    (suite / "values.zz").write_bytes(zlib.compress(bytes(blob), 9))
+
+
 # --- what is refused -----------------------------------------------------------------------------------------------------------------------------------
 
 
@@ -547,6 +724,12 @@ def refused() -> None:
     add("cut.jpg", photo[: len(photo) - 60], kind="picture", size=[16 * WIDTH, 16 * HEIGHT], remark="a part of its data is corrupt")
     junk = saved(Image.fromarray(ramp()), "JPEG", quality=100, subsampling=0)
     picture("junk_between_segments.jpg", junk[:2] + b"\xff\xfe\0\4ab" + b"\7" * 9 + junk[2:], rgba_of(Image.open(io.BytesIO(junk))), tolerance=JPEG)
+    # Details that take many codes, for tests that change them.
+    y, x = np.mgrid[0:120, 0:160]
+    waves = [127 + 60 * np.sin(x / a) * np.cos(y / b) + 40 * np.sin(x * y / c) for a, b, c in ((7, 11, 300), (13, 5, 500), (4, 9, 700))]
+    detailed = Image.fromarray(np.round(np.stack(waves, -1)).astype(np.uint8))
+    for name, options in [("", {}), ("_restarts", {"restart_marker_rows": 1}), ("_progressive", {"progressive": True}), ("_full", {"subsampling": 0, "optimize": True})]:
+        add(f"detailed{name}.jpg", saved(detailed, "JPEG", quality=75, **options), kind="picture", size=[160, 120])
     gray = saved(Image.fromarray(ramp()[..., 0]), "JPEG", quality=100)
     picture("gray.jpg", gray, rgba_of(Image.open(io.BytesIO(gray))))
     progressive = saved(Image.fromarray(ramp()), "JPEG", quality=100, subsampling=0, progressive=True)
@@ -556,8 +739,9 @@ def refused() -> None:
 def main() -> None:
     OUT.mkdir(parents=True, exist_ok=True)
     for old in OUT.iterdir():
-        old.unlink()
-    for part in (orientations, png_kinds, webp_kinds, tiff_kinds, profiles, chunks, exrs, depths, drawings, meshes, refused):
+        if old.is_file():
+            old.unlink()
+    for part in (orientations, png_kinds, webp_kinds, tiff_kinds, profiles, cmyk, chunks, exrs, depths, drawings, meshes, sparse_meshes, png_suite, refused):
         part()
     lines = ",\n".join(json.dumps(entry, separators=(",", ":")) for entry in ENTRIES)
     (OUT / "expected.json").write_text(f"[\n{lines}\n]\n")

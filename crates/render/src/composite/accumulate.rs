@@ -16,6 +16,8 @@ pub(crate) struct Accumulator {
     /// Tacc: fraction of the light from behind that still reaches the camera. Valid only if `absorbs`; otherwise it is 1 everywhere.
     transmittance: [Vec<f32>; 3],
     absorbs: bool,
+    /// Alpha of what is seen through the transparency of a plate; empty if nothing is.
+    hidden_alpha: Vec<f32>,
     /// Depth of the nearest sample, m.
     pub(crate) depth: Vec<f32>,
     /// Red, green, blue and alpha that each phenomenon adds to the picture; empty unless layers are requested.
@@ -36,6 +38,7 @@ impl Accumulator {
         self.rect = rect;
         self.color.iter_mut().for_each(|plane| refill(plane, pixels, 0.0));
         self.absorbs = false;
+        self.hidden_alpha.clear();
         refill(&mut self.depth, pixels, f32::INFINITY);
         self.layers.resize_with(layers, Default::default);
         self.layers.iter_mut().flatten().for_each(|plane| refill(plane, pixels, 0.0));
@@ -80,6 +83,37 @@ impl Accumulator {
         if let Some(planes) = self.aovs.get_mut(phenomenon) {
             let each = planes.iter_mut().zip(&strip.aovs).zip(aovs);
             each.for_each(|((sum, plane), aov)| sum.add_plane(plane, aov.rule));
+        }
+    }
+
+    /// Alpha of what is seen through the transparency of a plate, in a range of pixels; `None` if nothing is.
+    pub(crate) fn hidden_alpha(&self, pixels: std::ops::Range<usize>) -> Option<&[f32]> {
+        self.hidden_alpha.get(pixels).filter(|alpha| !alpha.is_empty())
+    }
+
+    /// Adds what is seen through the transparency of a plate: `other` is the composite of some of its pixels without the plate, `transparency` the fraction of
+    /// a pixel (column and row in the picture) that it fills. The transmittance stays that of what is before the plate: `C a + C' (1 - a) + T P`,
+    /// with C and T before a plate P of coverage a, and C' without it. AOVs stay.
+    pub(crate) fn add_through(&mut self, other: &Self, transparency: impl Fn(usize, usize) -> f32) {
+        refill(&mut self.hidden_alpha, self.depth.len(), 0.0);
+        let rect = other.rect;
+        for from in 0..rect.width * rect.height {
+            let [x, y] = [rect.x + from % rect.width, rect.y + from / rect.width];
+            let (to, weight) = ((y - self.rect.y) * self.rect.width + x - self.rect.x, transparency(x, y));
+            if weight <= 0.0 {
+                continue;
+            }
+            let mix = |own: &mut f32, other: f32| *own = weight.fma(other - *own, *own);
+            for c in 0..3 {
+                mix(&mut self.color[c][to], other.color[c][from]);
+            }
+            for (own, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
+                mix(&mut own[to], other[from]);
+            }
+            let [before, without] = [self.transmittance_at(to), other.transmittance_at(from)];
+            let absorbed = (0..3).map(|c| before[c] - without[c]).sum::<f32>() / 3.0;
+            self.hidden_alpha[to] = weight * absorbed;
+            self.depth[to] = self.depth[to].min(other.depth[from]);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     image::{Image, Rect},
-    phenomenon::{OpaqueSurfaces, Prepared},
+    phenomenon::{OpaqueSurfaces, PlateRole, Prepared},
 };
 
 use super::plate::PlateFrame;
@@ -20,6 +20,13 @@ pub(crate) struct HidingDepth {
 }
 
 impl HidingDepth {
+    /// That of the prepared phenomena through the transparency of a plate; `None` where nothing can be seen through it.
+    pub(crate) fn through(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame) -> Option<Self> {
+        let is_behind = |each: &dyn Prepared| plate.depth.is_some() || each.plate_role() == PlateRole::Behind;
+        let is_seen = plate.is_transparent && prepared.iter().any(|each| is_behind(each.as_ref()));
+        is_seen.then(|| Self::new(prepared, &PlateFrame::default()))
+    }
+
     /// That of the prepared phenomena in front of a plate.
     pub(crate) fn new(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame) -> Self {
         let mut hiding = Self::default();
@@ -40,15 +47,15 @@ impl HidingDepth {
         hiding
     }
 
-    /// What hides a phenomenon, with the opaque surfaces of others or without them; `None` if nothing does.
+    /// What hides a phenomenon, with the opaque surfaces of others or without them, before a plate of this depth; `None` if nothing does.
     pub(crate) fn depth_for<'a>(
         &'a self,
         member: usize,
         with_opaque: bool,
-        plate: &'a PlateFrame,
+        plate_depth: Option<&'a Image<1>>,
     ) -> Option<&'a Image<1>> {
         let surfaces = self.nearest.as_ref().filter(|_| with_opaque && !self.is_opaque(member));
-        surfaces.map(|surfaces| &surfaces.depth).or(plate.depth.as_ref())
+        surfaces.map(|surfaces| &surfaces.depth).or(plate_depth)
     }
 
     /// Whether a phenomenon has opaque surfaces.

@@ -31,7 +31,8 @@ pub(crate) struct PlateFrame {
 /// # Errors
 /// The picture or its depth cannot be read.
 pub(crate) fn load(plan: &Plan, assets: &dyn Assets, number: i64, camera: &Camera) -> Result<PlateFrame, BuildError> {
-    let Some(PlatePictures { image, alpha, depth, .. }) = plan.scene.plate.read_frame(assets, number)? else {
+    let read = plan.scene.plate.read_frame(assets, number, &plan.plate_view(number))?;
+    let Some(PlatePictures { image, alpha, depth, .. }) = read else {
         return Ok(PlateFrame::default());
     };
     let mapping = PlateMapping::new(plan, [image.color.width(), image.color.height()]);

@@ -8,10 +8,10 @@ use bansho_base::{
         parallel::prelude::*,
         scratch_pool::ScratchPool,
     },
-    image::Rect,
+    image::{Image, Rect},
     math::MulAdd,
     phenomenon::{
-        Prepared,
+        PlateRole, Prepared,
         strip::{AovDescriptor, AovRule, Strip, View},
     },
 };
@@ -75,6 +75,8 @@ pub(crate) struct Composition<'a> {
     pub(crate) plate: &'a PlateFrame,
     /// What hides phenomena.
     pub(crate) hiding: &'a HidingDepth,
+    /// What hides those that are seen through the plate's transparency; `None` where there are none.
+    pub(crate) through: Option<&'a HidingDepth>,
     /// What is behind the slices.
     pub(crate) background: Background<'a>,
     /// Scratch memory, which frames reuse.
@@ -96,6 +98,8 @@ pub(crate) struct StripScratch {
     accumulator: Accumulator,
     /// What partly covered pixels show without the opaque surfaces.
     uncovered: Accumulator,
+    /// What transparent pixels of the plate show without the plate.
+    unplated: Accumulator,
     /// The refracted pixels of the background.
     bent: BentPixels,
     /// A row of refracted colors.
@@ -156,34 +160,46 @@ impl<'a> Composition<'a> {
         self.runs.iter().map(|run| run.info().aovs.len()).collect()
     }
 
-    /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first. Where opaque surfaces cover pixels partly, what those show
-    /// without the surfaces is mixed in.
+    /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first. Where the plate is transparent, what those pixels show without the
+    /// plate is mixed in.
     fn accumulate(&self, level: Level, rect: Rect, scratch: &mut StripScratch) {
-        let StripScratch { strip, accumulator, uncovered, .. } = scratch;
-        self.accumulate_with(level, rect, true, strip, accumulator);
-        for edge in self.hiding.edges(rect) {
-            self.accumulate_with(level, edge, false, strip, uncovered);
-            accumulator.mix(uncovered, |x, y| self.hiding.coverage(x, y));
-        }
+        let StripScratch { strip, accumulator, uncovered, unplated, .. } = scratch;
+        self.accumulate_covered(level, rect, Pass::before_plate(self), strip, uncovered, accumulator);
+        let (Some(hiding), Some(color)) = (self.through, &self.plate.color) else { return };
+        let transparency = |x: usize, y: usize| 1.0 - color.at(x, y)[3];
+        let Some(clear) = transparent_rect(rect, transparency) else { return };
+        self.accumulate_covered(level, clear, Pass::without_plate(hiding), strip, uncovered, unplated);
+        accumulator.add_through(unplated, transparency);
     }
 
-    /// Draws the slices within `rect` into an accumulator, with opaque surfaces or without them.
-    fn accumulate_with(
+    /// Draws the slices within `rect` into an accumulator. Where opaque surfaces cover pixels partly, what those show without the surfaces is mixed in.
+    fn accumulate_covered(
         &self,
         level: Level,
         rect: Rect,
-        with_opaque: bool,
+        pass: Pass,
         strip: &mut Strip,
+        uncovered: &mut Accumulator,
         accumulator: &mut Accumulator,
     ) {
-        let aovs = if with_opaque { self.aov_counts() } else { Vec::new() };
+        self.accumulate_with(level, rect, pass, strip, accumulator);
+        for edge in pass.hiding.edges(rect) {
+            self.accumulate_with(level, edge, Pass { with_opaque: false, ..pass }, strip, uncovered);
+            accumulator.mix(uncovered, |x, y| pass.hiding.coverage(x, y));
+        }
+    }
+
+    /// Draws the slices within `rect` into an accumulator, in one pass.
+    fn accumulate_with(&self, level: Level, rect: Rect, pass: Pass, strip: &mut Strip, accumulator: &mut Accumulator) {
+        let aovs = if pass.with_aovs && pass.with_opaque { self.aov_counts() } else { Vec::new() };
         accumulator.reset(rect, self.layer_count(), &aovs);
         for slice in self.slices {
             for &member in &slice.members {
-                if !with_opaque && self.hiding.is_opaque(member) {
+                let prepared = &self.prepared[member];
+                let is_left_out = !pass.with_opaque && pass.hiding.is_opaque(member);
+                if is_left_out || Some(prepared.plate_role()) == pass.skipped {
                     continue;
                 }
-                let prepared = &self.prepared[member];
                 let aov_count = aovs.get(member).copied().unwrap_or(0);
                 let touched = prepared.bounds(&slice.interval).intersection(&rect);
                 if touched.is_empty() {
@@ -191,7 +207,7 @@ impl<'a> Composition<'a> {
                 }
                 // AOV planes are added as a whole, so strips with AOVs have the full size.
                 let drawn = if aov_count > 0 { rect } else { touched };
-                match self.hiding.depth_for(member, with_opaque, self.plate) {
+                match pass.hiding.depth_for(member, pass.with_opaque, pass.plate_depth) {
                     Some(image) => strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
                     None => strip.reset(drawn, None, aov_count),
                 }
@@ -203,6 +219,41 @@ impl<'a> Composition<'a> {
             }
         }
     }
+}
+
+/// Which phenomena are drawn, and what hides them.
+#[derive(Clone, Copy)]
+struct Pass<'a> {
+    hiding: &'a HidingDepth,
+    plate_depth: Option<&'a Image<1>>,
+    /// Phenomena of this role are left out.
+    skipped: Option<PlateRole>,
+    /// Whether there are opaque surfaces.
+    with_opaque: bool,
+    /// Whether AOVs are measured.
+    with_aovs: bool,
+}
+
+impl<'a> Pass<'a> {
+    /// What is before the plate, or before its depth.
+    fn before_plate(composition: &Composition<'a>) -> Self {
+        let (hiding, plate) = (composition.hiding, composition.plate);
+        let skipped = plate.color.as_ref().map(|_| PlateRole::Behind);
+        Self { hiding, plate_depth: plate.depth.as_ref(), skipped, with_opaque: true, with_aovs: true }
+    }
+
+    /// What is seen without the plate.
+    fn without_plate(hiding: &'a HidingDepth) -> Self {
+        Self { hiding, plate_depth: None, skipped: Some(PlateRole::Part), with_opaque: true, with_aovs: false }
+    }
+}
+
+/// The columns of `rect` from the first to the last that are transparent somewhere.
+fn transparent_rect(rect: Rect, transparency: impl Fn(usize, usize) -> f32) -> Option<Rect> {
+    let is_transparent = |x: &usize| (rect.y..rect.bottom()).any(|y| transparency(*x, y) > 0.0);
+    let first = (rect.x..rect.right()).find(is_transparent)?;
+    let last = (first..rect.right()).rfind(is_transparent)?;
+    Some(Rect { x: first, width: last + 1 - first, ..rect })
 }
 
 /// Draws and composites the whole window.
@@ -333,6 +384,9 @@ fn finish_strip(composition: &Composition, level: Level, scratch: &mut StripScra
                     dispatch!(level, _simd => composite_absorbed_background(transmittance, colors, out));
                 }
             }
+        }
+        if let Some(hidden) = accumulator.hidden_alpha(accumulated.clone()) {
+            out.iter_mut().zip(hidden).for_each(|(out, alpha)| out[3] += alpha);
         }
         if let Some(depth) = pixels.depth.get_mut(first..first + rect.width) {
             depth.copy_from_slice(&accumulator.depth[accumulated]);

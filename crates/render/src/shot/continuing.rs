@@ -51,7 +51,8 @@ impl Shot {
         self.runs = compiled.enabled().iter().zip(kept).map(kept_or_restored).collect();
         let has_stepped = self.runs.iter().any(|run| run.steps_taken > 0);
         self.has_earlier_state = has_stepped && (self.has_earlier_state || !is_same_scene);
-        if self.context.plan.scene.plate != plan.scene.plate {
+        let height = |plan: &Plan| plan.scene.ground.as_ref().map(|ground| ground.height);
+        if self.context.plan.scene.plate != plan.scene.plate || height(&self.context.plan) != height(&plan) {
             self.plates = PlateCache::default();
         }
         let wind = self.wind_after_edit(&compiled);

@@ -334,6 +334,7 @@ impl Shot {
         }
         let is_refracted = has_background && prepared.iter().any(|prepared| prepared.deflection().is_some());
         let outputs = Outputs::of_plan(&self.context.plan);
+        let through = HidingDepth::through(&prepared, plate);
         let composition = Composition {
             // What is nearer than refracting air is not refracted.
             outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
@@ -345,6 +346,7 @@ impl Shot {
             slices: &slices,
             plate,
             hiding: &HidingDepth::new(&prepared, plate),
+            through: through.as_ref(),
             background: Background::plate(plate),
             scratches: &self.scratches,
         };

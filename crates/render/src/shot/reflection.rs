@@ -100,6 +100,8 @@ impl Shot {
             slices: &slices,
             plate: mirrored,
             hiding: &HidingDepth::new(&prepared, mirrored),
+            // The sky is composited behind it.
+            through: None,
             background: Background::plate(mirrored),
             scratches: &self.scratches,
         };

@@ -2,5 +2,6 @@
 
 pub(crate) mod defaults;
 pub(crate) mod depth;
+pub(crate) mod ground_fit;
 pub mod picture;
 pub(crate) mod plate;

@@ -156,10 +156,12 @@ bansho_base::parameters! {
         depth_layer: Option<String> = None;
         /// What the depth measures.
         depth_kind: DepthKind = DepthKind::Axis;
-        /// Meters for each unit of the depth; for integers, each code: 0.001 for millimeters. An inverse depth is 1 / (`depth_shift` + value / `depth_scale`).
-        depth_scale: f64 = 1.0, limits(Range::new(1e-6, 1e6)), unit("m");
-        /// Inverse distance where an inverse depth is 0.
-        depth_shift: f64 = 0.0, limits(Range::new(-1e6, 1e6)), unit("1/m");
+        /// Meters for each unit of the depth; for integers, each code: 0.001 for millimeters. An inverse depth is 1 / (`depth_shift` + value / `depth_scale`). The
+        /// default is 1; but where neither scale nor shift of an inverse depth nor `depth_known` is stated, both are found from the ground plane of `[ground]`, if
+        /// the scene has one: at least a tenth of the plate below the horizon must be ground.
+        depth_scale: Option<f64> = None, limits(Range::new(1e-6, 1e6)), unit("m");
+        /// Inverse distance where an inverse depth is 0. The default is 0, or found with the scale.
+        depth_shift: Option<f64> = None, limits(Range::new(-1e6, 1e6)), unit("1/m");
         /// Points whose distance along the camera's axis is known, as [x, y, meters], in pixels of the image from its upper left corner. From two or more of them,
         /// scale and shift of an inverse depth are found by least squares.
         depth_known: Vec<[f64; 3]> = Vec::new(), limits(Length { min: 0, max: 1000, item: KNOWN_DEPTH });

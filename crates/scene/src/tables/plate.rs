@@ -9,8 +9,9 @@ use bansho_base::{
 };
 
 use super::{
-    depth::{DepthFit, DepthScale, KnownDepthError, fit},
-    picture::{PlateAlpha, PlateParameters},
+    depth::{self, DepthFit, DepthScale, KnownDepthError},
+    ground_fit::{self, GroundFit, PlateView},
+    picture::{DepthKind, PlateAlpha, PlateParameters},
 };
 
 /// The pictures of a plate in one frame.
@@ -84,6 +85,9 @@ pub enum PlateRemark {
     /// Scale and shift were found from known depths.
     #[error("`depth_known`: {0}")]
     DepthFit(DepthFit),
+    /// Scale and shift were found from the ground of the scene.
+    #[error("`depth_kind`: {0}")]
+    GroundFit(GroundFit),
 }
 
 fn size(picture: &Picture) -> [usize; 2] {
@@ -133,11 +137,23 @@ impl PlateParameters {
         }
     }
 
-    /// Reads the plate of frame `frame`; `None` where the scene has none.
+    /// Whether scale and shift of its depth, if it has one, are found from the ground of the scene, if it has one.
+    pub fn fits_ground(&self) -> bool {
+        let is_stated = self.depth_scale.is_some() || self.depth_shift.is_some() || !self.depth_known.is_empty();
+        self.depth_kind == DepthKind::Inverse && !is_stated
+    }
+
+    /// Reads the plate of frame `frame`, taken from `view`; `None` where the scene has none.
     ///
     /// # Errors
-    /// A picture cannot be read, the depth picture has no depth, it has another shape than the image, or the known depths contradict it.
-    pub fn read_frame(&self, assets: &dyn Assets, frame: i64) -> Result<Option<PlatePictures>, BuildError> {
+    /// A picture cannot be read, the depth picture has no depth, it has another shape than the image, the known depths contradict it, or scale and shift
+    /// would have to be found from ground that the plate does not show.
+    pub fn read_frame(
+        &self,
+        assets: &dyn Assets,
+        frame: i64,
+        view: &PlateView,
+    ) -> Result<Option<PlatePictures>, BuildError> {
         let image = self.read_image(assets, frame).map_err(|error| build_error(image_key(&error), error))?;
         let Some(image) = image else { return Ok(None) };
         let alpha = self.alpha_of(&image);
@@ -145,7 +161,7 @@ impl PlateParameters {
         if alpha != PictureAlpha::Opaque {
             remarks.extend(file_remarks("image", &[PictureRemark::AlphaUsed(alpha)]));
         }
-        let depth = self.read_depth(assets, frame, &image, &mut remarks)?;
+        let depth = self.read_depth(assets, frame, &image, view, &mut remarks)?;
         if depth.is_none() && !self.depth_known.is_empty() {
             return Err(conflict("depth_known", KnownDepthError::NoDepth));
         }
@@ -158,9 +174,11 @@ impl PlateParameters {
         assets: &dyn Assets,
         frame: i64,
         image: &Arc<Picture>,
+        view: &PlateView,
         remarks: &mut Vec<PlateRemark>,
     ) -> Result<Option<PlateDepth>, BuildError> {
-        let scale = DepthScale { kind: self.depth_kind, meters: self.depth_scale, shift: self.depth_shift };
+        let (meters, shift) = (self.depth_scale.unwrap_or(1.0), self.depth_shift.unwrap_or(0.0));
+        let scale = DepthScale { kind: self.depth_kind, meters, shift };
         let (source, depth_size) = match &self.depth {
             None if image.depth.is_none() => return Ok(None),
             None => (DepthSource::Image(image.clone()), size(image)),
@@ -179,10 +197,16 @@ impl PlateParameters {
         let mut depth = PlateDepth { source, size: depth_size, scale };
         if !self.depth_known.is_empty() {
             let value_at = |position| depth.value_at(position, size(image));
-            let found = fit(&self.depth_known, self.depth_kind, size(image), value_at);
+            let found = depth::fit(&self.depth_known, self.depth_kind, size(image), value_at);
             let found = found.map_err(|error| conflict("depth_known", error))?;
             depth.scale = found.scale();
             remarks.push(PlateRemark::DepthFit(found));
+        }
+        if let Some(height) = view.ground_height.filter(|_| self.fits_ground()) {
+            let found = ground_fit::fit(depth.values(), depth.size, size(image), view, height);
+            let found = found.map_err(|error| conflict("depth_kind", error))?;
+            depth.scale = found.scale();
+            remarks.push(PlateRemark::GroundFit(found));
         }
         Ok(Some(depth))
     }

@@ -37,7 +37,7 @@ crate::choice! {
 }
 
 crate::parameters! {
-    /// The sky behind everything. It lights the scene. In pictures with a plate, the plate is visible instead. A scene that states neither a
+    /// The sky behind everything. It lights the scene. In pictures with a plate, the plate is visible instead, and the sky through its alpha. A scene that states neither a
     /// sky nor a light has a default sky if all its phenomena are of one kind that needs it: night for auroras, dusk for rain. A default sky is visible
     /// unless the picture is transparent; a stated sky is always opaque.
     pub struct SkyParameters {

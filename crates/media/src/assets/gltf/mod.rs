@@ -1,14 +1,16 @@
 //! Meshes from glTF 2.0 files, as `.glb` or as `.gltf` with its buffers inside it or in external files.
 //!
-//! `glb` splits a binary file, `json` reads values and knows their paths for error messages, `buffers` reads each file once, and
-//! `nodes` finds the meshes of a scene and their transforms. The total memory is computed before the first vertex is read.
+//! `glb` splits a binary file, `json` reads values and knows their paths for error messages, `buffers` reads each file once, `accessor` reads
+//! dense and sparse elements, and `nodes` finds the meshes of a scene and their transforms. The total memory is computed before the first vertex is read.
 
 mod accessor;
 mod buffers;
+mod elements;
 mod glb;
 mod json;
 mod nodes;
 mod skins;
+mod sparse;
 
 use std::collections::{BTreeMap, btree_map::Entry};
 
@@ -44,7 +46,7 @@ fn damaged(reason: impl std::fmt::Display) -> AssetProblem {
 /// scenes, all nodes.
 ///
 /// `file` are the bytes of a file with this `extension`; `read_resource` reads external buffers. Skins and morph targets are in their rest pose.
-/// Sparse or compressed accessors are not supported, nor required extensions that change geometry.
+/// Compressed accessors are not supported, nor required extensions that change geometry.
 ///
 /// # Errors
 /// Another extension, damage, an unsupported feature, more memory than `limit`, or no triangles. Never panics.

@@ -27,8 +27,8 @@ impl Skin {
         let matrices: Vec<DMat4> = match inverse {
             None => vec![DMat4::IDENTITY; joints.len()],
             Some(accessor) => {
-                let matrices = Accessor::matrices(root, accessor, buffers)?;
-                matrices.floats::<16>().map(|columns| DMat4::from_cols_array(&columns.map(f64::from))).collect()
+                let matrices = Accessor::matrices(root, accessor, buffers)?.floats::<16>().take(joints.len());
+                matrices.map(|columns| DMat4::from_cols_array(&columns.map(f64::from))).collect()
             }
         };
         if matrices.len() < joints.len() {
@@ -113,7 +113,7 @@ impl<'b> MorphTargets<'b> {
         let accessors = root.list("accessors")?.len();
         let read = |(index, target): (usize, Result<Object, AssetProblem>)| {
             let position = target?.index("POSITION", accessors)?.filter(|_| is_used(index));
-            position.map(|position| Accessor::positions(root, position, buffers)).transpose()
+            position.map(|position| Accessor::displacements(root, position, buffers)).transpose()
         };
         let targets = primitive.items("targets")?.enumerate().map(read).collect::<Result<_, _>>()?;
         Ok(Self { targets })

@@ -126,7 +126,7 @@ fn a_fault_says_where_it_is_and_what_is_allowed() {
         (
             r#""count":3,"type":"SCALAR""#,
             r#""count":3,"type":"SCALAR","sparse":{}"#,
-            "accessors[1].sparse is not supported",
+            "accessors[1].sparse.indices is missing; allowed: an object",
         ),
         (
             r#""byteOffset":36,"byteLength":6"#,
@@ -341,4 +341,99 @@ fn a_skin_in_its_rest_pose_moves_its_vertices_and_its_node_does_not() {
     for (found, wanted) in corners.iter().zip(expected) {
         assert!((*found - DVec3::from(wanted)).length() < 1e-6, "{corners:?}");
     }
+}
+
+/// The triangle of [`document`] as a part of a square of 5 vertices, whose accessors have these `positions` and `displacements`. Three bytes of
+/// indices and three vectors are behind the indices.
+fn sparse_document(positions: &str, displacements: &str) -> Vec<u8> {
+    let json = document("", 3, "")
+        .replace(r#""indices":1}]"#, r#""indices":1,"targets":[{"POSITION":2}]}],"weights":[1]"#)
+        .replace(r#"{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}"#, positions)
+        .replace(r#""type":"SCALAR"}]"#, &format!(r#""type":"SCALAR"}},{displacements}]"#))
+        .replace(
+            r#""byteLength":6}"#,
+            r#""byteLength":6},{"buffer":0,"byteOffset":42,"byteLength":4},{"buffer":0,"byteOffset":46,"byteLength":36}"#,
+        )
+        .replace(r#""byteLength":42"#, r#""byteLength":82"#);
+    let mut binary = bytes();
+    binary.extend([0, 1, 2, 7]);
+    let vectors = [5.0_f32, 0.0, 0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 7.0];
+    binary.extend(vectors.iter().flat_map(|value| value.to_le_bytes()));
+    glb(&json, &binary)
+}
+
+/// An accessor of three vectors with these keys before and within `sparse`.
+fn sparse_vectors(keys: &str, count: usize, offset: usize) -> String {
+    format!(
+        r#"{{{keys}"componentType":5126,"count":3,"type":"VEC3","sparse":{{"count":{count},
+        "indices":{{"bufferView":2,"byteOffset":{offset},"componentType":5121}},"values":{{"bufferView":3}}}}}}"#
+    )
+}
+
+const ZERO_VECTORS: &str = r#"{"componentType":5126,"count":3,"type":"VEC3"}"#;
+
+#[test]
+fn sparse_elements_replace_others() {
+    let corners = |positions: &str, displacements: &str| -> Vec<[f64; 3]> {
+        let mesh = decode_mesh(&sparse_document(positions, displacements), "glb", &no_resources, LIMIT).unwrap();
+        // The node doubles, and moves by (0, 5, 0).
+        mesh.triangles().flatten().map(|corner| ((corner - DVec3::new(0.0, 5.0, 0.0)) / 2.0).to_array()).collect()
+    };
+    let dense = sparse_vectors(r#""bufferView":0,"#, 0, 0);
+    assert_eq!(corners(&dense, ZERO_VECTORS), [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    // Vertices 1 and 2 of the base.
+    let replaced = sparse_vectors(r#""bufferView":0,"#, 2, 1);
+    assert_eq!(corners(&replaced, ZERO_VECTORS), [[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 6.0, 0.0]]);
+    // All vertices of zeros.
+    let alone = sparse_vectors("", 3, 0);
+    assert_eq!(corners(&alone, ZERO_VECTORS), [[5.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 7.0]]);
+    // A target that moves vertices 1 and 2.
+    let moved = sparse_vectors("", 2, 1);
+    assert_eq!(corners(&dense, &moved), [[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [0.0, 7.0, 0.0]]);
+}
+
+#[test]
+fn faults_of_sparse_elements_are_located() {
+    let told = |positions: &str| reason(&sparse_document(positions, ZERO_VECTORS), "glb");
+    let good = sparse_vectors(r#""bufferView":0,"#, 2, 1);
+    for (from, to, message) in [
+        (
+            r#""byteOffset":1"#,
+            r#""byteOffset":2"#,
+            "accessors[0].sparse.indices.bufferView contain 7 at position 1; the accessor has 3",
+        ),
+        (
+            r#""sparse":{"count":2"#,
+            r#""sparse":{"count":4"#,
+            "accessors[0].sparse.count reaches beyond its buffer view, bufferViews[2]",
+        ),
+        (
+            r#""values":{"bufferView":3}"#,
+            r#""values":{"bufferView":3,"byteOffset":13}"#,
+            "sparse.count reaches beyond its buffer view, bufferViews[3]",
+        ),
+        (r#""values":{"bufferView":3}"#, r#""values":{}"#, "accessors[0].sparse.values.bufferView is missing"),
+        (
+            r#""values":{"bufferView":3}"#,
+            r#""values":{"bufferView":9}"#,
+            "accessors[0].sparse.values.bufferView is 9; allowed: 0 to 3",
+        ),
+        ("5121", "5126", "accessors[0].sparse.indices.componentType is not that of indices"),
+        (r#""sparse":{"count":2,"#, r#""sparse":{"#, "accessors[0].sparse.count is missing"),
+        // 7 after 2, then the bytes of 5.0: 0.
+        (
+            r#""bufferView":2,"byteOffset":1"#,
+            r#""bufferView":1,"byteOffset":2"#,
+            "contain 0 at position 1 after 1; allowed: rising indices",
+        ),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let found = told(&good.replace(from, to));
+        assert!(found.contains(message), "{to}: {found}");
+    }
+    // Without data and sparse elements, vertices are missing.
+    assert!(told(ZERO_VECTORS).contains("accessors[0].bufferView is missing, perhaps because the mesh is compressed"));
+    // A count without data takes no memory before it is refused.
+    let endless = sparse_vectors("", 2, 1).replace(r#""count":3"#, r#""count":4000000000"#);
+    assert!(told(&endless).contains("it has 4000000000 vertices"));
 }

@@ -1,5 +1,7 @@
 //! Orientation and exposure value of a photograph from its Exif data.
 
+mod structure;
+
 use bansho_base::{color::ev100_of_camera, host::assets::PictureRemark, math};
 use exif::{Exif, In, Reader, Tag, Value};
 
@@ -26,13 +28,17 @@ pub(crate) fn read(block: &[u8]) -> ExifData {
     let mut data = ExifData::default();
     match exif {
         Ok(exif) => {
-            data.remarks.extend(damage.map(PictureRemark::Exif));
+            data.remarks.extend(damage.map(|reason| damaged(block, reason)));
             data.ev100 = ev100(&exif);
             data.set_orientation(orientation_tag(&exif));
         }
-        Err(error) => data.remarks.push(PictureRemark::Exif(error.to_string())),
+        Err(error) => data.remarks.push(damaged(block, error.to_string())),
     }
     data
+}
+
+fn damaged(block: &[u8], reason: String) -> PictureRemark {
+    PictureRemark::Exif { at: structure::first_fault(block), reason }
 }
 
 impl ExifData {
@@ -120,11 +126,13 @@ mod tests {
         assert_eq!(read(&block(&[time, iso.clone()])).ev100, None);
         assert_eq!(read(&block(&[(Tag::ExposureTime, rational(1, 0)), f_number, iso])).ev100, None);
         for end in 0..whole.len() {
-            // Truncated anywhere, it gives an exposure or none.
-            let _ = read(&whole[..end]);
+            // Truncated anywhere, it gives an exposure or none. What is wrong begins before its end.
+            let found = read(&whole[..end]);
+            let PictureRemark::Exif { at: Some(at), .. } = &found.remarks[0] else { panic!("{end}: {found:?}") };
+            assert!(*at <= end.max(4), "{end}: {at}");
         }
         let none = read(b"no Exif at all");
-        assert!(none.ev100.is_none() && matches!(none.remarks[..], [PictureRemark::Exif(_)]));
+        assert!(none.ev100.is_none() && matches!(none.remarks[..], [PictureRemark::Exif { at: Some(0), .. }]));
     }
 
     #[test]
@@ -148,6 +156,8 @@ mod tests {
         bad[entry + 8..entry + 12].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff]);
         let found = read(&bad);
         assert_eq!(found.orientation, Orientation::Turned90);
-        assert!(matches!(found.remarks[..], [PictureRemark::Exif(_)]), "{found:?}");
+        let [PictureRemark::Exif { at, .. }] = &found.remarks[..] else { panic!("{found:?}") };
+        assert_eq!(*at, Some(entry + 8));
+        assert!(found.remarks[0].to_string().contains(&format!("damaged at their byte {} (", entry + 8)), "{found:?}");
     }
 }

@@ -1,4 +1,7 @@
-//! JPEG plates.
+//! JPEG plates: decoded by `zune-jpeg`, whose silence about corrupt data [`scans`] breaks.
+
+mod huffman;
+mod scans;
 
 use bansho_base::host::assets::{AssetProblem, Picture, PictureRemark};
 use zune_jpeg::{
@@ -59,16 +62,12 @@ fn decode_once(file: &[u8], strict: bool, limit: MemoryLimit) -> Result<Picture,
         remarks.push(PictureRemark::Profile("its segments are incomplete".to_owned()));
     }
     let (pixels, color) = decode_pixels(file, strict, &mut decoder, profile, &mut remarks)?;
-    if strict && !ends(file) {
-        remarks.push(PictureRemark::Corrupt("it has no end-of-image marker".to_owned()));
+    // What the decoder refuses in strict mode is told by its own words.
+    if let Some(fault) = strict.then(|| scans::fault(file)).flatten() {
+        remarks.push(PictureRemark::Corrupt(fault.to_string()));
     }
     let [width, height] = [width as usize, height as usize];
     DecodedPicture { width, height, pixels, max_code: 255, color, exif, alpha: None, remarks }.finish()
-}
-
-/// Whether it ends as it must, also where other bytes follow.
-fn ends(file: &[u8]) -> bool {
-    file.windows(2).rev().any(|pair| pair == [0xff, 0xd9])
 }
 
 /// Whether there is a segment of an ICC profile.

@@ -1,0 +1,397 @@
+//! Scale and shift of an inverse depth from the ground plane of the scene.
+//!
+//! Where a plate shows the ground, the distance of each pixel is known from the camera. Scale and shift are those for which most pixels below the
+//! horizon lie on the ground (random sample consensus: Fischler & Bolles 1981, here with fixed pairs instead of random ones), refined by least squares with
+//! Tukey's weights, which leave out what stands on the ground.
+
+use std::fmt;
+
+use bansho_base::{camera::Camera, math::DVec2};
+
+use super::{depth::DepthScale, picture::DepthKind};
+
+/// Whence a plate was taken, as the scene says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlateView {
+    /// The camera, for a picture without overscan.
+    pub camera: Camera,
+    /// Size of that picture, which the plate covers, pixels.
+    pub size: [usize; 2],
+    /// Height of the ground, m; `None` in a scene without ground.
+    pub ground_height: Option<f64>,
+}
+
+impl PlateView {
+    /// The position in the picture of a position in an image of `image_size` pixels, which covers the picture, centered.
+    fn picture_position(&self, position: [f64; 2], image_size: [usize; 2]) -> DVec2 {
+        let scale = [0, 1].map(|axis| image_size[axis] as f64 / self.size[axis] as f64);
+        let scale = scale[0].min(scale[1]);
+        let center =
+            |axis: usize| (position[axis] - 0.5 * image_size[axis] as f64) / scale + 0.5 * self.size[axis] as f64;
+        DVec2::new(center(0), center(1))
+    }
+
+    /// The inverse of the ground's depth at a position in the picture, 1/m; `None` from the horizon up.
+    fn inverse_ground_depth(&self, height: f64, pixel: DVec2) -> Option<f64> {
+        let above = self.camera.position.y - height;
+        // The position plus depth times direction is the point at that depth.
+        let inverse = -self.camera.direction(pixel)?.y / above;
+        (above > 0.0 && inverse > 0.0 && inverse.is_finite()).then_some(inverse)
+    }
+}
+
+/// Samples along the longer side of a depth.
+const SAMPLES: usize = 256;
+/// Pairs of samples that are tried.
+const PAIRS: usize = 1000;
+/// Samples that judge a pair.
+const JUDGES: usize = 2000;
+/// Largest deviation of a pixel that agrees with the ground: of its distance, and of the nearest ground's inverse distance, which stands for the noise of estimators.
+const RELATIVE_TOLERANCE: f64 = 0.1;
+const NOISE_TOLERANCE: f64 = 0.005;
+/// Smallest difference of two samples that make a pair, of the nearest ground's inverse distance.
+const PAIR_DISTANCE: f64 = 0.05;
+/// Smallest share of pixels below the horizon that must agree with the ground.
+const LEAST_SHARE: f64 = 0.1;
+/// Least number of pixels below the horizon.
+const LEAST_SAMPLES: usize = 16;
+/// Least share of the variance of the inverse distance that the values of agreeing pixels explain.
+const LEAST_EXPLAINED: f64 = 0.9;
+/// Steps of refinement, and where Tukey's weights become 0, standard deviations.
+const REFINEMENTS: usize = 20;
+const TUKEY: f64 = 4.685;
+
+/// Why scale and shift cannot be found from the ground.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub(super) enum GroundFitError {
+    /// The camera sees no ground.
+    #[error(
+        "scale and shift of the depth are not stated, and the camera sees no ground at {height} m from which they could be found; allowed: `depth_known`, \
+         or `depth_scale` and `depth_shift`"
+    )]
+    NotSeen {
+        /// Height of the ground, m.
+        height: f64,
+    },
+    /// Too few pixels are ground.
+    #[error(
+        "scale and shift of the depth are not stated, and {:.1} % of the pixels below the horizon agree with the ground at {height} m, from which they would be \
+         found; allowed: at least {:.0} %, with the camera of the photograph; or `depth_known`, or `depth_scale` and `depth_shift`",
+        100.0 * .share, 100.0 * LEAST_SHARE
+    )]
+    TooFew {
+        /// Share of the pixels below the horizon that agree.
+        share: f64,
+        /// Height of the ground, m.
+        height: f64,
+    },
+    /// The pixels that agree do so by their number alone.
+    #[error(
+        "scale and shift of the depth are not stated, and its values do not follow the distance of the ground at {height} m, from which they would be found; \
+         allowed: `depth_known`, or `depth_scale` and `depth_shift`"
+    )]
+    Flat {
+        /// Height of the ground, m.
+        height: f64,
+    },
+}
+
+/// Scale and shift that were found from the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundFit {
+    /// Inverse distance at 0, 1/m.
+    pub shift: f64,
+    /// Inverse distance for each unit, 1/m.
+    pub slope: f64,
+    /// Share of the pixels below the horizon that agree with the ground.
+    pub share: f64,
+    /// Root mean square of (found - known) / known of the distances of those pixels.
+    pub residual: f64,
+}
+
+impl GroundFit {
+    /// The scale that was found.
+    pub fn scale(&self) -> DepthScale {
+        DepthScale { kind: DepthKind::Inverse, meters: 1.0 / self.slope, shift: self.shift }
+    }
+
+    /// The difference of the inverse distance of a sample to the ground's.
+    fn deviation(&self, sample: &Sample) -> f64 {
+        self.slope.mul_add(sample.value, self.shift) - sample.inverse
+    }
+}
+
+impl fmt::Display for GroundFit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scale = self.scale();
+        write!(
+            f,
+            "`depth_scale = {:.6}` and `depth_shift = {:.6}` fit the ground best; {:.0} % of the pixels below the horizon agree with it, whose distances deviate \
+             by {:.1} %",
+            scale.meters,
+            scale.shift,
+            100.0 * self.share,
+            100.0 * self.residual
+        )
+    }
+}
+
+/// A pixel below the horizon.
+#[derive(Clone, Copy)]
+struct Sample {
+    value: f64,
+    /// Inverse distance of the ground there, 1/m.
+    inverse: f64,
+}
+
+/// What is known of the ground in a plate.
+struct GroundSamples {
+    /// Those with a value, from far to near.
+    samples: Vec<Sample>,
+    /// Number of pixels below the horizon, with those that have no value.
+    below_horizon: usize,
+    /// Inverse distance of the nearest ground.
+    nearest: f64,
+}
+
+impl GroundSamples {
+    /// Those of a depth with these values, which belongs to an image of `image_size` pixels.
+    fn new(values: &[f32], [width, height]: [usize; 2], image_size: [usize; 2], view: &PlateView, ground: f64) -> Self {
+        let step = width.max(height).div_ceil(SAMPLES);
+        let positions = |side: usize| (step.min(side) / 2..side).step_by(step);
+        let per_value = [image_size[0] as f64 / width as f64, image_size[1] as f64 / height as f64];
+        let (mut samples, mut below_horizon) = (Vec::new(), 0);
+        for y in positions(height) {
+            for x in positions(width) {
+                let position = [(x as f64 + 0.5) * per_value[0], (y as f64 + 0.5) * per_value[1]];
+                let pixel = view.picture_position(position, image_size);
+                let Some(inverse) = view.inverse_ground_depth(ground, pixel) else { continue };
+                below_horizon += 1;
+                let value = values[y * width + x];
+                if value.is_finite() && value != 0.0 {
+                    samples.push(Sample { value: f64::from(value), inverse });
+                }
+            }
+        }
+        samples.sort_by(|a, b| a.inverse.total_cmp(&b.inverse));
+        let nearest = samples.last().map_or(0.0, |sample| sample.inverse);
+        Self { samples, below_horizon, nearest }
+    }
+
+    /// Largest deviation of a sample that agrees with the ground, 1/m.
+    fn tolerance(&self, sample: &Sample) -> f64 {
+        RELATIVE_TOLERANCE.mul_add(sample.inverse, NOISE_TOLERANCE * self.nearest)
+    }
+
+    fn agrees(&self, fit: &GroundFit, sample: &Sample) -> bool {
+        fit.deviation(sample).abs() <= self.tolerance(sample)
+    }
+
+    /// The line through the pair of samples with which most others agree.
+    fn consensus(&self) -> Option<GroundFit> {
+        let count = self.samples.len();
+        let judges = || self.samples.iter().step_by(count.div_ceil(JUDGES).max(1));
+        let mut best: Option<(usize, GroundFit)> = None;
+        for pair in 0..PAIRS {
+            // A sequence that fills the plane evenly (Roberts 2018).
+            let at = |step: f64| ((step * pair as f64).fract() * count as f64) as usize;
+            let [a, b] = [at(0.754_877_666_246_692_7), at(0.569_840_290_998_053_2)].map(|index| self.samples[index]);
+            let slope = (a.inverse - b.inverse) / (a.value - b.value);
+            let is_wide = (a.inverse - b.inverse).abs() >= PAIR_DISTANCE * self.nearest;
+            if !(is_wide && slope > 0.0 && slope.is_finite()) {
+                continue;
+            }
+            let fit = GroundFit { slope, shift: a.inverse - slope * a.value, share: 0.0, residual: 0.0 };
+            let agreeing = judges().filter(|sample| self.agrees(&fit, sample)).count();
+            if best.is_none_or(|(most, _)| agreeing > most) {
+                best = Some((agreeing, fit));
+            }
+        }
+        best.map(|(_, fit)| fit)
+    }
+
+    /// One step of least squares with Tukey's weights; `None` if nothing determines a line that rises.
+    fn refined(&self, fit: &GroundFit) -> Option<GroundFit> {
+        let relative = |sample: &Sample| fit.deviation(sample) / self.tolerance(sample);
+        let mut deviations: Vec<f64> =
+            self.samples.iter().map(|sample| relative(sample).abs()).filter(|deviation| *deviation <= 1.0).collect();
+        deviations.sort_by(f64::total_cmp);
+        let median = *deviations.get(deviations.len() / 2)?;
+        // 1.4826 median: a normal distribution's standard deviation. The floor keeps exact data from dividing by 0.
+        let reach = TUKEY * (1.4826 * median).max(1e-6);
+        let weighted: Vec<(f64, Sample)> = self
+            .samples
+            .iter()
+            .map(|sample| {
+                let ratio = (relative(sample) / reach).abs().min(1.0);
+                ((1.0 - ratio * ratio) * (1.0 - ratio * ratio), *sample)
+            })
+            .collect();
+        let total: f64 = weighted.iter().map(|(weight, _)| weight).sum();
+        let mean =
+            |of: fn(&Sample) -> f64| weighted.iter().map(|(weight, sample)| weight * of(sample)).sum::<f64>() / total;
+        let (value, inverse) = (mean(|sample| sample.value), mean(|sample| sample.inverse));
+        let moment = |of: &dyn Fn(&Sample) -> f64| -> f64 {
+            weighted.iter().map(|(weight, sample)| weight * (sample.value - value) * of(sample)).sum()
+        };
+        let slope = moment(&|sample| sample.inverse - inverse) / moment(&|sample| sample.value - value);
+        (slope > 0.0 && slope.is_finite()).then(|| GroundFit { slope, shift: inverse - slope * value, ..*fit })
+    }
+
+    /// The share of `fit` and its residual; and the share of the variance that it explains.
+    fn judged(&self, fit: &GroundFit) -> (GroundFit, f64) {
+        let agreeing: Vec<&Sample> = self.samples.iter().filter(|sample| self.agrees(fit, sample)).collect();
+        let count = agreeing.len().max(1) as f64;
+        let mean = agreeing.iter().map(|sample| sample.inverse).sum::<f64>() / count;
+        let sum = |of: &dyn Fn(&Sample) -> f64| agreeing.iter().map(|sample| of(sample) * of(sample)).sum::<f64>();
+        let explained = 1.0 - sum(&|sample| fit.deviation(sample)) / sum(&|sample| sample.inverse - mean);
+        // Of the distance: 1 / found - 1 / known over 1 / known. What the noise moves beyond infinity deviates by its whole distance.
+        let relative = |sample: &Sample| {
+            let found = sample.inverse + fit.deviation(sample);
+            if found > 0.0 { (sample.inverse / found - 1.0).clamp(-1.0, 1.0) } else { 1.0 }
+        };
+        let (share, residual) =
+            (agreeing.len() as f64 / self.below_horizon.max(1) as f64, (sum(&relative) / count).sqrt());
+        (GroundFit { share, residual, ..*fit }, explained)
+    }
+}
+
+/// Fits `1 / distance = shift + slope value` to the ground at `height`, where a depth shows it. The depth has `values` in rows of its `size`, and belongs to an
+/// image of `image_size` pixels.
+pub(super) fn fit(
+    values: &[f32],
+    size: [usize; 2],
+    image_size: [usize; 2],
+    view: &PlateView,
+    height: f64,
+) -> Result<GroundFit, GroundFitError> {
+    let samples = GroundSamples::new(values, size, image_size, view, height);
+    if samples.below_horizon < LEAST_SAMPLES {
+        return Err(GroundFitError::NotSeen { height });
+    }
+    let too_few = |share| GroundFitError::TooFew { share, height };
+    if samples.samples.len() < LEAST_SAMPLES {
+        return Err(too_few(0.0));
+    }
+    let mut found = samples.consensus().ok_or(GroundFitError::Flat { height })?;
+    for _ in 0..REFINEMENTS {
+        let Some(refined) = samples.refined(&found) else { break };
+        found = refined;
+    }
+    let (fit, explained) = samples.judged(&found);
+    if fit.share < LEAST_SHARE {
+        return Err(too_few(fit.share));
+    }
+    if explained < LEAST_EXPLAINED {
+        return Err(GroundFitError::Flat { height });
+    }
+    Ok(fit)
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::camera::CameraParameters;
+
+    use super::*;
+
+    const SIZE: [usize; 2] = [320, 200];
+
+    fn view() -> PlateView {
+        let camera = CameraParameters {
+            position: [0.3, 1.6, 5.0].into(),
+            target: [0.0, 1.0, 0.0].into(),
+            roll_deg: 3.0.into(),
+            ..CameraParameters::default()
+        };
+        PlateView { camera: camera.at(0.0, SIZE), size: SIZE, ground_height: Some(0.0) }
+    }
+
+    /// Depth along the axis of a ground with boxes (x from, x to, z of the front, height) before a sky, whose depth is infinite.
+    fn scene_depth(view: &PlateView, boxes: &[[f64; 4]], size: [usize; 2]) -> Vec<f64> {
+        let camera = &view.camera;
+        let mut depths = Vec::new();
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let position = [x as f64 + 0.5, y as f64 + 0.5];
+                let direction = camera.direction(view.picture_position(position, size)).unwrap();
+                let ground = if direction.y < 0.0 { -camera.position.y / direction.y } else { f64::INFINITY };
+                let front = boxes.iter().filter_map(|[from, to, z, height]| {
+                    let depth = (z - camera.position.z) / direction.z;
+                    let point = camera.position + depth * direction;
+                    (depth > 0.0 && (*from..*to).contains(&point.x) && (0.0..*height).contains(&point.y))
+                        .then_some(depth)
+                });
+                depths.push(front.fold(ground, f64::min));
+            }
+        }
+        depths
+    }
+
+    fn values(depths: &[f64], shift: f64, slope: f64) -> Vec<f32> {
+        depths.iter().map(|depth| ((1.0 / depth - shift) / slope) as f32).collect()
+    }
+
+    const BOXES: [[f64; 4]; 4] =
+        [[-1.5, -0.6, 2.5, 1.2], [0.4, 1.6, 1.0, 2.0], [-0.4, 0.2, 3.4, 0.3], [-9.0, -2.0, -6.0, 4.0]];
+
+    #[test]
+    fn scale_and_shift_are_found_among_boxes() {
+        let view = view();
+        for (shift, slope, size) in [(0.02, 0.001, SIZE), (-0.1, 0.4, [160, 100]), (0.5, 3e-5, [480, 320])] {
+            let depths = scene_depth(&view, &BOXES, size);
+            let found = fit(&values(&depths, shift, slope), size, size, &view, 0.0).unwrap();
+            assert!(
+                (found.slope / slope - 1.0).abs() < 0.01 && (found.shift - shift).abs() < 0.01 * shift.abs(),
+                "{found:?}"
+            );
+            // The boxes cover more than a quarter of what is below the horizon.
+            assert!((0.4..0.75).contains(&found.share) && found.residual < 0.03, "{found:?}");
+            assert!((found.scale().meters_of(((0.25 - shift) / slope) as f32) - 4.0).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn noise_and_codes_move_the_result_little() {
+        let view = view();
+        let depths = scene_depth(&view, &BOXES, SIZE);
+        // Codes of 8 bits up to 255, with a noise of 2 codes.
+        let exact = values(&depths, 0.01, 0.002);
+        let noisy = exact
+            .iter()
+            .enumerate()
+            .map(|(index, value)| (value + 2.0 * ((index * 7919) % 101) as f32 / 50.0 - 2.0).round().max(1.0));
+        let found = fit(&noisy.collect::<Vec<f32>>(), SIZE, SIZE, &view, 0.0).unwrap();
+        assert!((found.slope / 0.002 - 1.0).abs() < 0.03 && (found.shift - 0.01).abs() < 0.01, "{found:?}");
+    }
+
+    #[test]
+    fn what_shows_no_ground_is_refused() {
+        let view = view();
+        let wall = scene_depth(&view, &[[-90.0, 90.0, 3.0, 90.0]], SIZE);
+        // A wall over the whole view, but for a strip of ground at its foot.
+        let found = fit(&values(&wall, 0.0, 0.01), SIZE, SIZE, &view, 0.0);
+        assert!(matches!(found, Err(GroundFitError::TooFew { .. } | GroundFitError::Flat { .. })), "{found:?}");
+        let message = GroundFitError::TooFew { share: 0.042, height: 0.5 }.to_string();
+        assert!(message.contains("4.2 % of the pixels below the horizon agree with the ground at 0.5 m"), "{message}");
+        // Larger values are farther: it is no inverse depth.
+        let depths = scene_depth(&view, &[], SIZE);
+        let farther: Vec<f32> = depths.iter().map(|depth| *depth as f32).collect();
+        let found = fit(&farther, SIZE, SIZE, &view, 0.0);
+        assert!(matches!(found, Err(GroundFitError::TooFew { .. } | GroundFitError::Flat { .. })), "{found:?}");
+        assert_eq!(fit(&vec![3.0; 64_000], SIZE, SIZE, &view, 0.0), Err(GroundFitError::Flat { height: 0.0 }));
+        assert_eq!(
+            fit(&vec![0.0; 64_000], SIZE, SIZE, &view, 0.0),
+            Err(GroundFitError::TooFew { share: 0.0, height: 0.0 })
+        );
+        // The camera is below it.
+        assert_eq!(fit(&farther, SIZE, SIZE, &view, 2.0), Err(GroundFitError::NotSeen { height: 2.0 }));
+    }
+
+    #[test]
+    fn a_plate_covers_the_picture() {
+        let view = PlateView { size: [200, 100], ..view() };
+        assert_eq!(view.picture_position([150.0, 150.0], [300, 300]), DVec2::new(100.0, 50.0));
+        // Its width fits; 75 of its rows are cropped at the top and at the bottom.
+        assert_eq!(view.picture_position([0.0, 75.0], [300, 300]), DVec2::new(0.0, 0.0));
+    }
+}
