@@ -66,7 +66,7 @@ def simulate(nodes: int, frames: int, scenes: int, task_s: float) -> Cost:
     chunk = chunk_frames(of_scene, task_s)
     # The serial part: one job for each scene steps through all of it; scenes do so at the same time.
     at_once = -(-scenes // nodes)
-    snapshots = (DEPENDENCY_S * 2 + PREROLL_S + of_scene * STEP_S + FRAME_S) * at_once
+    snapshots = (DEPENDENCY_S * 2 + PREROLL_S + of_scene * STEP_S) * at_once
     if of_scene <= 2 * chunk:
         snapshots = DEPENDENCY_S
     writers = min(nodes, -(-of_scene // chunk) * scenes)

@@ -111,6 +111,12 @@ class Cluster:
             except ProcessLookupError:
                 pass
 
+    def kill_program(self, node: str, program: str) -> None:
+        """Ends `program` on a node at once, and nothing else."""
+        for process in self.processes_of(node):
+            if os.readlink(f"/proc/{process}/exe") == program:
+                os.kill(process, signal.SIGKILL)
+
     def processes_of(self, node: str) -> list[int]:
         """Processes of jobs on a node, which know its name; and what supervises them."""
         found = []
@@ -144,6 +150,10 @@ class Cluster:
         """Tasks of arrays that run, each with its node."""
         lines = self.run("squeue", "-h", "-t", "RUNNING", "-o", "%i %N").splitlines()
         return [(job, node) for job, node in map(str.split, lines) if "_" in job]
+
+    def queued(self) -> list[str]:
+        """Jobs and tasks of arrays that are queued, running or about to end."""
+        return self.run("squeue", "-h", "-r", "-o", "%i").split()
 
     def is_empty(self) -> bool:
         """Whether no job is queued or running."""

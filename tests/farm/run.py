@@ -3,9 +3,9 @@
 
     run.py PROGRAM [--long] [--frames AURORA,RAIN] [--report FILE]
 
-An aurora, which is simulated and so needs snapshots, runs undisturbed, and its CPU time is compared with that of one process. Rain loses a node in the
-middle of a chunk, one task is requeued, one node is drained, and the disk is full once. With --long both have at least ten minutes of CPU time each way,
-and both are disturbed.
+An aurora, which is simulated and so needs snapshots, runs undisturbed, and its CPU time is compared with that of one process; then one of its tasks is
+killed. Rain loses a node in the middle of a chunk, one task is requeued, one node is drained, and the disk is full once. With --long both have at least
+ten minutes of CPU time each way, and both are disturbed.
 """
 
 import argparse
@@ -91,10 +91,11 @@ class Shot:
         subprocess.run(line, check=True, env=cluster.environment, stdout=subprocess.DEVNULL)
         return cpu_seconds() - used
 
-    def status(self, out: pathlib.Path) -> tuple[int, dict]:
-        """Exit code and JSON of `farm status`."""
+    def status(self, out: pathlib.Path, cluster: Cluster | None = None) -> tuple[int, dict]:
+        """Exit code and JSON of `farm status`, on a machine of the cluster or on one without Slurm."""
         line = [self.program, "farm", "status", str(self.scene), "-o", str(out / "a.####.png"), "--json"]
-        done = subprocess.run(line, capture_output=True, text=True)
+        environment = cluster.environment if cluster else {**os.environ, "PATH": ""}
+        done = subprocess.run(line, capture_output=True, text=True, env=environment)
         return done.returncode, json.loads(done.stdout or "{}")
 
     def check(self, out: pathlib.Path, probed: int, lost: int) -> None:
@@ -113,12 +114,12 @@ class Shot:
 
 def frames_of(folder: pathlib.Path) -> dict[str, str]:
     """Digests of the frames in a folder."""
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.glob("a.*.png"))}
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.glob("a.[0-9]*.png"))}
 
 
 def count_frames(folder: pathlib.Path) -> int:
     """Number of frames in a folder."""
-    return len(list(folder.glob("a.*.png")))
+    return len(list(folder.glob("a.[0-9]*.png")))
 
 
 def journal(out: pathlib.Path) -> list[dict]:
@@ -188,6 +189,9 @@ def disturbed(shot: Shot, cluster: Cluster, disk: pathlib.Path) -> None:
     lost = tasks.get("n2", "")
     cluster.wait("the lost task leaves its node", lambda: (lost, "n2") not in cluster.running(), 120)
     say(f"{shot.name}: the task of the lost node was queued again after {time.monotonic() - begun:.0f} s")
+    if lost:
+        state = state_of(shot.status(out, cluster)[1], lost)
+        expect(state in ("waiting", "running", "done"), f"{shot.name}: the task that is queued again is not lost, but {state}")
     cluster.start_node("n2")
     fill(disk)
     cluster.wait("the jobs end for want of space", cluster.is_empty, 3600)
@@ -205,6 +209,34 @@ def disturbed(shot: Shot, cluster: Cluster, disk: pathlib.Path) -> None:
     shutil.rmtree(out)
 
 
+def state_of(status: dict, job: str) -> str:
+    """The state of a task in a status, by its job such as `12_3`."""
+    return status["tasks"][int(job.split("_")[1])]["state"]
+
+
+def killed(shot: Shot, cluster: Cluster) -> None:
+    """A task is killed, which writes nothing more: its journal looks like that of one that runs, and only Slurm knows better."""
+    out = shot.folder / "killed"
+    shot.submit(cluster, out)
+    probed = count_frames(out)
+    cluster.wait("frames are drawn", lambda: len(cluster.running()) > 0 and count_frames(out) >= probed + 2, 600)
+    job, node = cluster.running()[0]
+    expect(state_of(shot.status(out, cluster)[1], job) == "running", f"{shot.name}: task {job} runs")
+    # By the system: `scancel` sends a signal first that the program obeys, and says so in its journal.
+    cluster.kill_program(node, shot.program)
+    cluster.wait("the killed task is gone", lambda: job not in cluster.queued(), 60)
+    found = [state_of(shot.status(out, machine)[1], job) for machine in (cluster, None)]
+    expect(found == ["lost", "running"], f"{shot.name}: the killed task is lost, as far as Slurm can be asked: {found}")
+    cluster.wait("the others end", cluster.is_empty, 600)
+    code, status = shot.status(out, cluster)
+    expect(code == 1 and status["finish"]["state"] == "lost", f"{shot.name}: nothing is queued any longer: {status['finish']}")
+    shot.submit(cluster, out)
+    cluster.wait("the jobs end", cluster.is_empty, 3600)
+    shot.check(out, probed, 1)
+    shutil.rmtree(out)
+    say(f"{shot.name}: a task that was killed on {node} is told as lost, and drawn when the command is repeated")
+
+
 def fill(disk: pathlib.Path) -> None:
     """Takes all but a little of the disk."""
     with open(disk / "filler", "wb") as filler:
@@ -218,15 +250,15 @@ def fill(disk: pathlib.Path) -> None:
                     raise
 
 
-def by_openjd(shot: Shot) -> None:
-    """The same shot by the reference implementation of Open Job Description."""
+def by_openjd(shot: Shot, *options: str) -> None:
+    """The same shot by the reference implementation of Open Job Description, with other options of the template."""
     if not shutil.which("openjd"):
         say("openjd: ignored: needs openjd-cli")
         return
     template, out = shot.folder / "template.yaml", shot.folder / "openjd"
-    subprocess.run(
-        [shot.program, "farm", "openjd", str(shot.scene), "-o", str(template), "--frame-name", "a.####.png", "--chunk", str(shot.chunk),
-         "--film", shot.film], check=True, stdout=subprocess.DEVNULL)
+    line = [shot.program, "farm", "openjd", str(shot.scene), "-o", str(template), "--frame-name", "a.####.png", "--chunk", str(shot.chunk)]
+    line += ["--film", shot.film, "--contact-sheet", "4", *options]
+    subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
     subprocess.run(["openjd", "check", str(template)], check=True, stdout=subprocess.DEVNULL)
     begun = time.monotonic()
     line = ["openjd", "run", str(template), "-p", f"OutputFolder={out}", "-p", f"Program={shot.program}"]
@@ -234,7 +266,22 @@ def by_openjd(shot: Shot) -> None:
     expect(done.returncode == 0, f"openjd run: {done.stdout[-500:]}{done.stderr[-500:]}")
     expect(frames_of(out) == shot.expected, f"{shot.name}: the frames of openjd are those of one process")
     expect(plays(out / shot.film, len(shot.expected)), f"{shot.name}: the film of openjd plays")
+    expect((out / "a.sheet.png").is_file(), f"{shot.name}: openjd made the contact sheet")
     say(f"{shot.name}: by openjd run: the same bytes, {time.monotonic() - begun:.1f} s")
+
+
+def in_tiles(program: str, folder: pathlib.Path) -> None:
+    """A small shot by Open Job Description with tiles and a flipbook, which is that of the command."""
+    text = PICTURE.format(width=96, height=64, frames=9) + AURORA.format(particles=300)
+    shot = Shot(program, "tiles", text, 3, folder / "tiles")
+    shot.render_alone()
+    by_openjd(shot, "--tiles", "2x2", "--flipbook", "f.png", "--flipbook-grid", "2x2")
+    if not shutil.which("openjd"):
+        return
+    flipbook = shot.folder / "flipbook/f.png"
+    subprocess.run([program, "flipbook", str(shot.scene), "--grid", "2x2", "-o", str(flipbook), "--progress", "none"], check=True)
+    for path in sorted(flipbook.parent.iterdir()):
+        expect((shot.folder / "openjd" / path.name).read_bytes() == path.read_bytes(), f"{path.name} of openjd is that of `bansho flipbook`")
 
 
 def seen_differently(shot: Shot, cluster: Cluster) -> None:
@@ -311,9 +358,11 @@ def prove(program: str, folder: pathlib.Path, disk: pathlib.Path, cluster: Clust
     refused_by_slurm(shots[0], cluster)
     for shot in shots if is_long else shots[:1]:
         undisturbed(shot, cluster, is_long and not arguments.frames)
+    killed(shots[0], cluster)
     for shot in shots if is_long else shots[1:]:
         disturbed(shot, cluster, disk)
     by_openjd(shots[0])
+    in_tiles(program, folder)
     if is_long:
         seen_differently(shots[0], cluster)
 

@@ -76,6 +76,11 @@ impl ChunkGrid {
         &self.frames
     }
 
+    /// The first frame of the scene.
+    pub fn first_frame(&self) -> i64 {
+        self.first_frame
+    }
+
     /// The frame at which the last snapshot is that a chunk begins with: the first frame of the last chunk. `None` where no chunk needs one: two chunks
     /// are ready as early without snapshots, for as much work, since the second one steps through the first while that is drawn.
     pub fn last_snapshot(&self) -> Option<i64> {

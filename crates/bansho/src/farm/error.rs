@@ -93,6 +93,14 @@ pub enum FarmError {
         /// How many there are.
         count: usize,
     },
+    /// A tile that a picture does not have.
+    #[error("tile {index}; a picture has {count}, from 0 on")]
+    NoSuchTile {
+        /// Its number.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
     /// More tiles than tasks are possible.
     #[error("{tiles} tiles, which are as many tasks; allowed: up to {max}")]
     TooManyTiles {
@@ -186,6 +194,7 @@ impl FarmError {
             | Self::TooManyTasks { .. }
             | Self::NotASequence { .. }
             | Self::NoSuchTask { .. }
+            | Self::NoSuchTile { .. }
             | Self::NoPlan { .. }
             | Self::ControlCharacters { .. }
             | Self::Braces { .. }

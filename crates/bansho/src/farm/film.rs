@@ -1,10 +1,10 @@
-//! What is made of finished frames, from their files: a film, a contact sheet.
+//! What is made when all frames are whole: a film and a contact sheet from their files, and a flipbook.
 
 use std::path::{Path, PathBuf};
 
 use bansho_base::{
     frame::{DisplayImage, Frame},
-    host::observer::{Observer, check},
+    host::observer::{self, Observer},
     image::Rect,
 };
 use bansho_media::{
@@ -18,8 +18,58 @@ use bansho_media::{
     png::{self, PngEffort},
 };
 
-use super::{error::FarmError, plan::FarmFolder};
-use crate::job::{JobError, PreparedJob, render::contact_sheet, sheet::nearly_square_layout};
+use super::{error::FarmError, plan::FarmFolder, products::Products};
+use crate::job::{
+    FlipbookSummary, Job, JobError, JobObserver, PreparedFlipbook, PreparedJob, render::contact_sheet,
+    sheet::nearly_square_layout,
+};
+
+/// Checks that `products` can be made of `job`, with relative paths in `folder`; the flipbook, ready to run.
+///
+/// # Errors
+/// The name of the film is not that of a film, or the flipbook is not possible.
+pub fn check(products: &Products, job: &Job, folder: &Path) -> Result<Option<PreparedFlipbook>, FarmError> {
+    if let Some(film) = &products.film {
+        check_name(film)?;
+    }
+    Ok(products.flipbook.as_ref().map(|request| request.flipbook(job, folder).prepare()).transpose()?)
+}
+
+/// All files of `products` of `job`.
+///
+/// # Errors
+/// The name of the flipbook is not possible.
+pub fn paths(products: &Products, job: &Job, folder: &Path) -> Result<Vec<PathBuf>, FarmError> {
+    let sheet = products.contact_sheet.map(|_| contact_sheet_path(&job.output_path()));
+    let of_frames = [products.film.clone(), sheet].into_iter().flatten();
+    let mut paths: Vec<PathBuf> = of_frames.map(|path| folder.join(path)).collect();
+    if let Some(request) = &products.flipbook {
+        paths.extend(request.flipbook(job, folder).paths()?);
+    }
+    Ok(paths)
+}
+
+/// Makes `products` of the finished frames `whole` of `job`. Tells what the flipbook consists of.
+///
+/// # Errors
+/// A frame cannot be read, or a file cannot be written.
+pub fn make(
+    products: &Products,
+    whole: &PreparedJob,
+    job: &Job,
+    folder: &Path,
+    observer: &dyn JobObserver,
+) -> Result<Option<FlipbookSummary>, FarmError> {
+    // Before the film, which may take long.
+    let flipbook = check(products, job, folder)?;
+    if let Some(film) = &products.film {
+        make_film(whole, &folder.join(film), observer)?;
+    }
+    if let Some(count) = products.contact_sheet {
+        make_contact_sheet(whole, count, observer)?;
+    }
+    Ok(flipbook.map(|flipbook| flipbook.run(observer)).transpose()?)
+}
 
 /// The contact sheet of the frames at `output`: `shot/fire.sheet.png` of `shot/fire.####.exr`.
 pub fn contact_sheet_path(output: &Path) -> PathBuf {
@@ -37,7 +87,7 @@ pub fn make_contact_sheet(whole: &PreparedJob, count: usize, observer: &dyn Obse
         nearly_square_layout(count, [window.width, window.height], contact_sheet::GUTTER).map_err(JobError::from)?;
     let mut tiles = Vec::with_capacity(count);
     for index in 0..count {
-        check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a sheet" })?;
+        observer::check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a sheet" })?;
         let number = frames[index * (frames.len() - 1) / (count - 1).max(1)];
         let mut tile = over_black(&display_picture(whole, number, PictureFormat::OpaqueDisplay, observer)?);
         label::draw_number(&mut tile, number);
@@ -49,21 +99,30 @@ pub fn make_contact_sheet(whole: &PreparedJob, count: usize, observer: &dyn Obse
     Ok(atomic::write_bytes_with(&path, &bytes, &whole.format.overwrite)?)
 }
 
+/// Checks that `path` is the name of a film.
+///
+/// # Errors
+/// It names pictures.
+pub fn check_name(path: &Path) -> Result<OutputPattern, FarmError> {
+    let pattern = OutputPattern::parse(path, 1).map_err(JobError::Naming)?;
+    if pattern.kind().is_sequence() {
+        return Err(FarmError::NotAFilm { path: path.to_path_buf() });
+    }
+    Ok(pattern)
+}
+
 /// Makes a film of finished frames.
 ///
 /// # Errors
 /// The name is not that of a film, a frame cannot be read, or the film cannot be written.
 pub fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> Result<(), FarmError> {
     let mut format = whole.format.clone();
-    format.pattern = OutputPattern::parse(path, whole.frames().len()).map_err(JobError::Naming)?;
-    if format.pattern.kind().is_sequence() {
-        return Err(FarmError::NotAFilm { path: path.to_path_buf() });
-    }
+    format.pattern = check_name(path)?;
     let window = whole.plan().window();
     let (opaque, size) = (whole.compiled.has_opaque_plate(), [window.width, window.height]);
     let sink = format.open(whole.plan(), opaque, whole.frames().len(), size, 1)?;
     for (index, &number) in whole.frames().iter().enumerate() {
-        check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
+        observer::check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
         let slot = FrameSlot { index, number };
         let picture = display_picture(whole, number, sink.picture_format(), observer)?;
         sink.write(slot, Picture::Display(&picture, &[0; 32]))?;

@@ -1,6 +1,6 @@
-//! The last job of a plan: checks that every frame is whole, joins tiles, and makes the film of the frames.
+//! The last job of a shot: checks that every frame is whole, joins tiles, and makes what is asked for.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bansho_base::{
     frame::{DisplayImage, DisplayPixels, Frame},
@@ -21,60 +21,86 @@ use super::{
     error::FarmError,
     film::{self, unreadable},
     plan::{FarmFolder, FarmPlan},
-    status,
+    products::Products,
     task::{tile_job, tile_rect},
 };
-use crate::job::{FrameState, Job, JobError, PreparedJob, frames};
+use crate::job::{FlipbookSummary, FrameState, Job, JobError, JobObserver, PreparedJob, frames};
 
-/// Finishes the shot of a plan.
+/// Finishes the shot of a plan. Tells what the flipbook consists of.
 ///
 /// # Errors
-/// Frames are missing or not complete, the scene has changed, or the film cannot be written.
-pub fn finish(job: &Job, folder: &FarmFolder, plan: &FarmPlan, observer: &dyn Observer) -> Result<(), FarmError> {
-    let grid = plan.grid()?;
-    check_tasks(job, folder, plan)?;
-    let whole = Job { frames: Some(grid.frames().to_vec()), resume: true, ..job.clone() }.prepare()?;
-    if plan.tile_count() > 1 {
-        join(&whole, job, folder, plan, observer)?;
-    }
-    if let Some(film) = &plan.film {
-        film::make_film(&whole, &plan.folder.join(film), observer)?;
-    }
-    match plan.contact_sheet {
-        Some(count) => film::make_contact_sheet(&whole, count, observer),
-        None => Ok(()),
+/// Frames are missing or not complete, the scene has changed, or a product cannot be written.
+pub fn finish(
+    job: &Job,
+    folder: &FarmFolder,
+    plan: &FarmPlan,
+    observer: &dyn JobObserver,
+) -> Result<Option<FlipbookSummary>, FarmError> {
+    let job = Job { frames: Some(plan.grid()?.frames().to_vec()), ..job.clone() };
+    finish_frames(&job, folder, plan.tiles, observer)?.products(&plan.products, &plan.folder, observer)
+}
+
+/// A shot whose frames are whole.
+pub struct FinishedFrames {
+    job: Job,
+    whole: PreparedJob,
+}
+
+impl FinishedFrames {
+    /// Makes `products`, whose relative paths are those of `current`. Tells what the flipbook consists of.
+    ///
+    /// # Errors
+    /// A frame cannot be read, or a file cannot be written.
+    pub fn products(
+        &self,
+        products: &Products,
+        current: &Path,
+        observer: &dyn JobObserver,
+    ) -> Result<Option<FlipbookSummary>, FarmError> {
+        film::make(products, &self.whole, &self.job, current, observer)
     }
 }
 
-/// Checks that all frames of a job are whole.
+/// Checks that all frames of `job` are whole. Where they are drawn as tiles, these must be, and are joined.
 ///
 /// # Errors
-/// Some are not.
-pub fn check_whole(job: &PreparedJob) -> Result<(), FarmError> {
-    let states = job.frame_states().into_iter();
-    let missing = job.frames().iter().zip(states).filter(|(_, state)| *state != FrameState::Whole);
-    let missing: Vec<i64> = missing.map(|(frame, _)| *frame).collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output().template_path() })
-}
-
-/// Checks that all files of all tasks are whole.
-fn check_tasks(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<(), FarmError> {
-    let (grid, tiles) = (plan.grid()?, plan.tile_count());
-    let states = status::task_states(job, folder, plan)?;
-    let of_task = |(task, states): (usize, &Vec<FrameState>)| {
-        let chunk = grid.chunk(task / tiles).to_vec();
-        chunk.into_iter().zip(states.clone()).filter(|(_, state)| *state != FrameState::Whole).map(|(frame, _)| frame)
+/// Frames are missing or not complete, or a joined one cannot be written.
+pub fn finish_frames(
+    job: &Job,
+    folder: &FarmFolder,
+    tiles: [usize; 2],
+    observer: &dyn Observer,
+) -> Result<FinishedFrames, FarmError> {
+    let whole = Job { resume: true, ..job.clone() }.prepare()?;
+    let incomplete = |missing: Vec<i64>| match missing.is_empty() {
+        true => Ok(()),
+        false => Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output_path() }),
     };
-    let mut missing: Vec<i64> = states.iter().enumerate().flat_map(of_task).collect();
-    if missing.is_empty() {
-        return Ok(());
+    if tiles == [1, 1] {
+        incomplete(unfinished(&whole))?;
+    } else {
+        incomplete(unfinished_tiles(job, folder, tiles)?)?;
+        join(&whole, job, folder, tiles, observer)?;
+    }
+    Ok(FinishedFrames { job: job.clone(), whole })
+}
+
+/// The frames of a job that are not whole.
+fn unfinished(job: &PreparedJob) -> Vec<i64> {
+    let states = job.frame_states().into_iter();
+    let unfinished = job.frames().iter().zip(states).filter(|(_, state)| *state != FrameState::Whole);
+    unfinished.map(|(frame, _)| *frame).collect()
+}
+
+/// The frames of which a tile is not whole.
+fn unfinished_tiles(job: &Job, folder: &FarmFolder, tiles: [usize; 2]) -> Result<Vec<i64>, FarmError> {
+    let mut missing = Vec::new();
+    for tile in 0..tiles[0] * tiles[1] {
+        missing.extend(unfinished(&tile_job(job, folder, tiles, tile)?.prepare()?));
     }
     missing.sort_unstable();
     missing.dedup();
-    Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output_path() })
+    Ok(missing)
 }
 
 /// Joins the tiles of all frames that are not joined yet.
@@ -82,20 +108,18 @@ fn join(
     whole: &PreparedJob,
     job: &Job,
     folder: &FarmFolder,
-    plan: &FarmPlan,
+    tiles: [usize; 2],
     observer: &dyn Observer,
 ) -> Result<(), FarmError> {
-    let states = whole.frame_states();
-    let missing = whole.frames().iter().zip(states).filter(|(_, state)| *state != FrameState::Whole);
-    let patterns = (0..plan.tile_count()).map(|tile| {
-        let path = tile_job(job, folder, plan.tiles, tile)?.output_path();
+    let patterns = (0..tiles[0] * tiles[1]).map(|tile| {
+        let path = tile_job(job, folder, tiles, tile)?.output_path();
         Ok(OutputPattern::parse(&path, whole.frames().len()).map_err(JobError::Naming)?)
     });
     let patterns = patterns.collect::<Result<Vec<_>, FarmError>>()?;
-    for (&number, _) in missing {
+    for number in unfinished(whole) {
         check(observer).map_err(|_| JobError::Cancelled)?;
-        let tiles: Vec<PathBuf> = patterns.iter().map(|pattern| pattern.path(number)).collect();
-        join_frame(whole, number, plan.tiles, &tiles)?;
+        let paths: Vec<PathBuf> = patterns.iter().map(|pattern| pattern.path(number)).collect();
+        join_frame(whole, number, tiles, &paths)?;
     }
     Ok(())
 }
@@ -187,8 +211,8 @@ mod tests {
 
     use super::*;
     use crate::{
-        farm::{chunks::ChunkGrid, plan::PlanOptions, task::chunk_job},
-        job::SceneFile,
+        farm::{chunks::ChunkGrid, plan::PlanOptions, products::FlipbookRequest, task::chunk_job},
+        job::{Flipbook, FlipbookCrop, OptionError, SceneFile},
     };
 
     const SCENE: &str = "bansho = 2\n[picture]\nsize = [53, 37]\nframes = 3\n[[flame_sheet]]\n";
@@ -235,7 +259,8 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let (job, farm, plan) = shot(folder.path(), name, [1, 1]);
             job.prepare().unwrap().run(&Unobserved).unwrap();
-            finish(&job, &farm, &FarmPlan { contact_sheet: Some(9), ..plan }, &Unobserved).unwrap();
+            let products = Products { contact_sheet: Some(9), ..Products::default() };
+            finish(&job, &farm, &FarmPlan { products, ..plan }, &Unobserved).unwrap();
             let sheet = frame_file::read_png(&folder.path().join("a.sheet.png")).unwrap();
             // Three frames: two columns and two rows.
             assert_eq!((sheet.width, sheet.height, sheet.opaque), (2 * 53 + 2, 2 * 37 + 2, true), "{name}");
@@ -249,13 +274,59 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (job, farm, plan) = shot(folder.path(), "a.####.png", [1, 1]);
         job.prepare().unwrap().run(&Unobserved).unwrap();
-        let plan = FarmPlan { film: Some("a.apng".into()), ..plan };
+        let with_film = |name: &str| Products { film: Some(name.into()), ..Products::default() };
+        let plan = FarmPlan { products: with_film("a.apng"), ..plan };
         finish(&job, &farm, &plan, &Unobserved).unwrap();
         let direct = Job { out: Some(folder.path().join("b.apng")), ..job.clone() };
         direct.prepare().unwrap().run(&Unobserved).unwrap();
         let [film, direct] = ["a.apng", "b.apng"].map(|name| fs::read(folder.path().join(name)).unwrap());
         assert!(film == direct);
-        let sequence = FarmPlan { film: Some("c.####.png".into()), ..plan };
+        let sequence = FarmPlan { products: with_film("c.####.png"), ..plan };
         assert!(matches!(finish(&job, &farm, &sequence, &Unobserved), Err(FarmError::NotAFilm { .. })));
+    }
+
+    #[test]
+    fn the_flipbook_of_the_last_job_is_that_of_the_command() {
+        for (name, tile) in [("flip.png", None), ("flip.exr", Some([24, 16]))] {
+            let folder = tempfile::tempdir().unwrap();
+            let (job, farm, plan) = shot(folder.path(), "a.####.png", [1, 1]);
+            let job = Job { frames: Some(vec![1, 2]), seed: Some(3), loop_s: Some(0.5), ..job };
+            job.prepare().unwrap().run(&Unobserved).unwrap();
+            let flipbook = Some(FlipbookRequest { path: name.into(), grid: [2, 2], tile });
+            let products = Products { flipbook, ..Products::default() };
+            assert_eq!(products.flipbook.as_ref().unwrap().frame_count(), 4);
+            let finished = finish_frames(&job, &farm, plan.tiles, &Unobserved).unwrap();
+            let summary = finished.products(&products, folder.path(), &Unobserved).unwrap().unwrap();
+            assert_eq!(summary.files, film::paths(&products, &job, folder.path()).unwrap());
+            let alone = tempfile::tempdir().unwrap();
+            let crop = if tile.is_some() { FlipbookCrop::None } else { FlipbookCrop::Auto };
+            let out = Some(alone.path().join(name));
+            let options = Flipbook {
+                tile,
+                crop,
+                out,
+                first_frame: Some(1),
+                seed: Some(3),
+                ..Flipbook::new(job.scene.clone(), [2, 2])
+            };
+            let options = Flipbook { loop_s: Some(0.5), ..options };
+            let expected = options.prepare().unwrap().run(&Unobserved).unwrap();
+            assert_eq!(expected.files.len(), summary.files.len());
+            for (found, expected) in summary.files.iter().zip(&expected.files) {
+                assert!(fs::read(found).unwrap() == fs::read(expected).unwrap(), "{}", found.display());
+            }
+        }
+    }
+
+    #[test]
+    fn a_flipbook_that_is_not_possible_is_refused_before_the_film_is_made() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(folder.path(), "a.####.png", [1, 1]);
+        job.prepare().unwrap().run(&Unobserved).unwrap();
+        let flipbook = Some(FlipbookRequest { path: "flip.gif".into(), grid: [2, 2], tile: None });
+        let products = Products { film: Some("a.apng".into()), contact_sheet: None, flipbook };
+        let refused = finish(&job, &farm, &FarmPlan { products, ..plan }, &Unobserved);
+        assert!(matches!(refused, Err(FarmError::Job(JobError::Option(OptionError::SheetFormat { .. })))));
+        assert!(!folder.path().join("a.apng").exists());
     }
 }

@@ -1,9 +1,10 @@
 //! Whether a machine may draw frames of a plan: it sees the same folder, runs the same version, and its processor gives the same bytes.
 
-use std::{io, sync::Arc};
+use std::{io, path::PathBuf, sync::Arc};
 
 use bansho_base::host::{assets::MemoryAssets, observer::Observer};
 use bansho_media::files::{
+    atomic,
     input::{self, InputError},
     provenance::PROGRAM,
 };
@@ -17,6 +18,8 @@ use crate::{compile_scene, job::JobError};
 
 /// Largest token file that is read, bytes.
 const TOKEN_BYTES: u64 = 256;
+/// Largest record of a machine that is read, bytes.
+const RECORD_BYTES: u64 = 1024;
 
 /// A picture that passes through the arithmetic of every kind of phenomenon, small enough to be drawn by every task.
 const PICTURE: &str = "bansho = 2\n[picture]\nsize = [48, 32]\nseed = 11\n";
@@ -53,28 +56,51 @@ pub fn arithmetic_digest(observer: &dyn Observer) -> Result<String, FarmError> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
+/// Checks that the token file at `path` has the word `expected`. On a shared file system it may become visible some time after it was written.
+///
+/// # Errors
+/// There is another token, or none.
+pub fn check_token(path: PathBuf, expected: &str) -> Result<(), FarmError> {
+    let found = match input::read(&path, TOKEN_BYTES) {
+        Ok(bytes) if bytes.trim_ascii_end() == expected.as_bytes() => return Ok(()),
+        Ok(bytes) => format!("`{}`", String::from_utf8_lossy(bytes.trim_ascii_end())),
+        Err(InputError::Io(error)) if error.kind() == io::ErrorKind::NotFound => "no file".to_owned(),
+        Err(source) => return Err(FarmError::Input { path, source }),
+    };
+    Err(FarmError::Token { path, expected: expected.to_owned(), found })
+}
+
+/// Checks that this program is `program`, and that its arithmetic on this machine has the digest `arithmetic`.
+///
+/// # Errors
+/// It is another version, or draws other bytes.
+pub fn check_bytes(program: &str, arithmetic: &str, observer: &dyn Observer) -> Result<(), FarmError> {
+    if program != PROGRAM {
+        return Err(FarmError::Version { expected: program.to_owned(), found: PROGRAM.to_owned() });
+    }
+    if arithmetic != arithmetic_digest(observer)? {
+        return Err(FarmError::Arithmetic);
+    }
+    Ok(())
+}
+
 /// What a task compares with its plan before it does anything.
 pub struct TaskCheck<'a> {
     /// The folder of the plan.
     pub folder: &'a FarmFolder,
     /// The token that the task was submitted with.
     pub token: &'a str,
+    /// The identity of this machine since it was started, such as the boot id of Linux; `None` where it is unknown.
+    pub machine: Option<&'a str>,
 }
 
 impl TaskCheck<'_> {
-    /// Whether the token that this machine sees is that of the plan. On a shared file system it may become visible some time after it was written.
+    /// Whether the token that this machine sees is that of the plan.
     ///
     /// # Errors
     /// There is another token, or none.
     pub fn token(&self) -> Result<(), FarmError> {
-        let path = self.folder.token();
-        let found = match input::read(&path, TOKEN_BYTES) {
-            Ok(bytes) if bytes.trim_ascii_end() == self.token.as_bytes() => return Ok(()),
-            Ok(bytes) => format!("`{}`", String::from_utf8_lossy(bytes.trim_ascii_end())),
-            Err(InputError::Io(error)) if error.kind() == io::ErrorKind::NotFound => "no file".to_owned(),
-            Err(source) => return Err(FarmError::Input { path, source }),
-        };
-        Err(FarmError::Token { path, expected: self.token.to_owned(), found })
+        check_token(self.folder.token(), self.token)
     }
 
     /// The plan, if this program and this processor may work on it.
@@ -86,20 +112,45 @@ impl TaskCheck<'_> {
         if plan.token != self.token {
             return Err(FarmError::PlanReplaced);
         }
-        if plan.program != PROGRAM {
-            return Err(FarmError::Version { expected: plan.program, found: PROGRAM.to_owned() });
-        }
-        if plan.arithmetic != arithmetic_digest(observer)? {
-            return Err(FarmError::Arithmetic);
+        if !self.is_recorded(&plan) {
+            check_bytes(&plan.program, &plan.arithmetic, observer)?;
+            self.record(&plan);
         }
         Ok(plan)
+    }
+
+    /// The file that tells what this machine was found to be. A name that is not that of a plain file is none.
+    fn record_path(&self) -> Option<PathBuf> {
+        let machine = self.machine?;
+        let is_plain = !machine.is_empty() && machine.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
+        is_plain.then(|| self.folder.machine(machine))
+    }
+
+    fn record_of(plan: &FarmPlan) -> String {
+        format!("{} {} {}\n", plan.token, plan.arithmetic, plan.program)
+    }
+
+    /// Whether a task of this plan has already found that this machine may work on it. The picture takes more time than all else before the first frame.
+    fn is_recorded(&self, plan: &FarmPlan) -> bool {
+        let is_this =
+            |path| input::read(path, RECORD_BYTES).is_ok_and(|found| found == Self::record_of(plan).as_bytes());
+        plan.program == PROGRAM && self.record_path().as_deref().is_some_and(is_this)
+    }
+
+    fn record(&self, plan: &FarmPlan) {
+        if let Some(path) = self.record_path() {
+            // Without it, as on a full disk, the next task draws the picture once more.
+            let _ = atomic::write_bytes(&path, Self::record_of(plan).as_bytes());
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use bansho_base::{
-        host::observer::Unobserved,
+        host::observer::{Stage, Unobserved},
         math::simd::{VectorLevel, set_vector_level},
     };
 
@@ -120,19 +171,58 @@ mod tests {
     fn machines_that_would_mix_frames_are_refused() {
         let root = tempfile::tempdir().unwrap();
         let folder = FarmFolder::new(root.path().to_path_buf());
-        let check = TaskCheck { folder: &folder, token: "0123" };
+        let check = TaskCheck { folder: &folder, token: "0123", machine: None };
         assert!(matches!(check.token(), Err(FarmError::Token { found, .. }) if found == "no file"));
         let arithmetic = arithmetic_digest(&Unobserved).unwrap();
         let good = FarmPlan { arithmetic, ..plan() };
         folder.write_plan(&good).unwrap();
         check.token().unwrap();
         assert_eq!(check.plan(&Unobserved).unwrap(), good);
-        let other = TaskCheck { folder: &folder, token: "4567" };
+        let other = TaskCheck { token: "4567", ..check };
         assert!(matches!(other.token(), Err(FarmError::Token { found, .. }) if found == "`0123`"));
         assert!(matches!(other.plan(&Unobserved), Err(FarmError::PlanReplaced)));
         folder.write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good.clone() }).unwrap();
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Version { .. })));
         folder.write_plan(&FarmPlan { arithmetic: "00".into(), ..good }).unwrap();
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
+    }
+
+    #[test]
+    fn a_machine_draws_the_picture_once_for_a_plan() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = FarmFolder::new(root.path().to_path_buf());
+        let good = FarmPlan { arithmetic: arithmetic_digest(&Unobserved).unwrap(), ..plan() };
+        folder.write_plan(&good).unwrap();
+        let draws = |token: &str, machine: Option<&str>| {
+            let picture = StageCounter::default();
+            TaskCheck { folder: &folder, token, machine }.plan(&picture).unwrap();
+            picture.0.into_inner() > 0
+        };
+        assert!(draws("0123", Some("a-1")));
+        assert!(!draws("0123", Some("a-1")));
+        assert!(draws("0123", Some("b-2")), "another machine");
+        assert!(draws("0123", None) && draws("0123", None), "one that is not known");
+        assert!(draws("0123", Some("../x")) && !root.path().join("x").exists());
+        folder.write_plan(&FarmPlan { token: "4567".into(), ..good.clone() }).unwrap();
+        assert!(draws("4567", Some("a-1")), "another plan");
+        folder.write_plan(&FarmPlan { arithmetic: "00".into(), ..good.clone() }).unwrap();
+        let check = TaskCheck { folder: &folder, token: "0123", machine: Some("b-2") };
+        assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
+        folder.write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good }).unwrap();
+        assert!(matches!(check.plan(&Unobserved), Err(FarmError::Version { .. })));
+    }
+
+    /// Counts the stages that begin.
+    #[derive(Default)]
+    struct StageCounter(AtomicUsize);
+
+    impl Observer for StageCounter {
+        fn begin(&self, _stage: Stage) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+
+        fn cancelled(&self) -> bool {
+            false
+        }
     }
 }

@@ -12,8 +12,8 @@
 //! | scripts of Slurm, a template of Open Job Description | [`slurm`], [`openjd`] |
 //! | whether the disk is large enough | [`space`] |
 //! | whether a machine may take part | [`machine`] |
-//! | what a task draws, and what comes after all tasks | [`task`], [`finish`], [`film`] |
-//! | what tasks reported, and the state of all frames | [`journal`], [`status`] |
+//! | what a task draws, and what comes after all tasks | [`task`], [`finish`], [`products`], [`film`] |
+//! | what tasks reported, what the batch system knows, and the state of all frames | [`journal`], [`queue`], [`status`] |
 
 pub mod chunks;
 mod error;
@@ -24,6 +24,8 @@ pub mod machine;
 pub mod openjd;
 pub mod plan;
 pub mod probe;
+pub mod products;
+pub mod queue;
 pub mod slurm;
 pub mod space;
 pub mod status;

@@ -1,12 +1,12 @@
-//! A job template of Open Job Description (`jobtemplate-2023-09` with the extension `TASK_CHUNKING`) for schedulers such as AWS Deadline Cloud: snapshots,
-//! chunks of frames, and a last step, each after the one before it. Its commands are plain ones of the program, so that whoever submits the template may
-//! choose other frames, sizes and paths.
+//! A job template of Open Job Description (`jobtemplate-2023-09` with the extension `TASK_CHUNKING`) for schedulers such as AWS Deadline Cloud: a check,
+//! snapshots, chunks of frames, and a last step, each after the one before it. There is no plan: whoever submits the template may choose other frames, sizes
+//! and paths, and its commands are told all of them.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
 use serde_json::Value;
 
-use super::error::FarmError;
+use super::{error::FarmError, products::Products, task::script_path};
 
 /// Revision of the specification.
 const SPECIFICATION: &str = "jobtemplate-2023-09";
@@ -34,15 +34,28 @@ pub struct TemplateOptions {
     pub chunk_frames: u64,
     /// Wanted time of a chunk, s, by which schedulers adapt the number of frames.
     pub task_s: u64,
-    /// The first frame of the last chunk, where chunks begin with snapshots.
-    pub snapshot_frame: Option<i64>,
+    /// Columns and rows of tiles of a picture.
+    pub tiles: [usize; 2],
+    /// Whether chunks begin with snapshots.
+    pub snapshots: bool,
     /// Further options of `bansho render`.
     pub options: Vec<String>,
-    /// Name of the film that is made at the end, in the folder of the frames.
-    pub film: Option<String>,
+    /// What is made at the end; relative paths are those of the folder of the frames.
+    pub products: Products,
+    /// A random word, which the first step leaves in the folder of the frames.
+    pub token: String,
+    /// The program and its version.
+    pub program: String,
+    /// Digest of the arithmetic of this machine.
+    pub arithmetic: String,
     /// Estimated peak memory of a chunk, bytes.
     pub memory_bytes: f64,
+    /// Estimated peak memory of the last step, bytes.
+    pub finish_memory_bytes: f64,
 }
+
+/// The option that names the frames.
+const OUT: &str = "--out={{Param.OutputFolder}}/{{Param.FrameName}}";
 
 /// `text` as a string of YAML: every string of JSON is one.
 fn quoted(text: &str) -> String {
@@ -60,7 +73,19 @@ fn literal(text: &str) -> Result<String, FarmError> {
 
 struct Template {
     text: String,
-    memory_mib: u64,
+}
+
+/// A step of the job.
+struct Step<'a> {
+    name: &'a str,
+    /// The step that it waits for.
+    after: Option<&'a str>,
+    memory_bytes: f64,
+    /// Its tasks, where there are many.
+    space: &'a str,
+    /// What each machine runs before its first task.
+    environment: &'a str,
+    arguments: &'a [String],
 }
 
 impl Template {
@@ -78,25 +103,34 @@ impl Template {
         let _ = write!(self.text, "    objectType: {object}\n    dataFlow: {flow}\n");
     }
 
-    fn step(&mut self, name: &str, after: Option<&str>, space: &str, arguments: &[String]) {
-        let _ = writeln!(self.text, "  - name: {name}");
-        if let Some(after) = after {
+    fn step(&mut self, step: &Step<'_>) {
+        let _ = writeln!(self.text, "  - name: {}", step.name);
+        if let Some(after) = step.after {
             let _ = write!(self.text, "    dependencies:\n      - dependsOn: {after}\n");
         }
+        let (factor, extra) = MEMORY_HEADROOM;
         let _ = write!(
             self.text,
-            "    hostRequirements:\n      amounts:\n        - name: amount.worker.memory\n          min: {}\n{space}",
-            self.memory_mib
+            "    hostRequirements:\n      amounts:\n        - name: amount.worker.memory\n          min: {}\n{}{}    script:\n      actions:\n        onRun:\n",
+            (factor * step.memory_bytes / f64::from(1 << 20) + extra).ceil() as u64,
+            step.space,
+            step.environment,
         );
-        self.text +=
-            "    script:\n      actions:\n        onRun:\n          command: \"{{Param.Program}}\"\n          args:\n";
-        for argument in arguments {
-            let _ = writeln!(self.text, "            - {argument}");
-        }
+        self.text += &action("          ", step.arguments);
         // A clean stop, with the frames so far kept.
         self.text +=
             "          cancelation:\n            mode: NOTIFY_THEN_TERMINATE\n            notifyPeriodInSeconds: 30\n";
     }
+}
+
+/// A command of the program, indented by `indent`.
+fn action(indent: &str, arguments: &[String]) -> String {
+    let mut text = format!("{indent}command: \"{{{{Param.Program}}}}\"\n{indent}args:\n");
+    for argument in arguments {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{indent}  - {argument}");
+    }
+    text
 }
 
 /// The text of the template, YAML.
@@ -104,14 +138,12 @@ impl Template {
 /// # Errors
 /// A name or an option has `{{` or `}}`, which Open Job Description takes for an expression, or a control character.
 pub fn template(options: &TemplateOptions) -> Result<String, FarmError> {
-    let (factor, extra) = MEMORY_HEADROOM;
-    let memory_mib = (factor * options.memory_bytes / f64::from(1 << 20) + extra).ceil() as u64;
     let name: String = options.name.chars().take(MAX_NAME).collect();
     let text = format!(
         "specificationVersion: {SPECIFICATION}\nextensions: [TASK_CHUNKING]\nname: {}\nparameterDefinitions:\n",
         literal(&name)?
     );
-    let mut template = Template { text, memory_mib };
+    let mut template = Template { text };
     parameters(&mut template, options)?;
     template.text += "steps:\n";
     steps(&mut template, options)?;
@@ -133,46 +165,106 @@ fn parameters(template: &mut Template, options: &TemplateOptions) -> Result<(), 
     }
     template.parameter("ChunkFrames", "INT", "Frames of a chunk.", Some(options.chunk_frames.to_string()));
     template.text += "    minValue: 1\n";
-    if let Some(frame) = options.snapshot_frame {
-        let description = "The first frame of the last chunk, up to which snapshots are made.";
-        template.parameter("SnapshotFrame", "INT", description, Some(frame.to_string()));
-    }
     Ok(())
 }
 
 fn steps(template: &mut Template, options: &TemplateOptions) -> Result<(), FarmError> {
     let extra = options.options.iter().map(|option| literal(option)).collect::<Result<Vec<_>, _>>()?;
-    let command = |words: &[&str], more: &[&str]| -> Vec<String> {
-        let shared = ["--out={{Param.OutputFolder}}/{{Param.FrameName}}", "--size={{Param.Size}}"];
-        let all = words.iter().chain(&shared).chain(more).map(|word| quoted(word));
+    let command = |words: &[&str], more: &[String]| -> Vec<String> {
+        let shared = [OUT, "--size={{Param.Size}}"];
+        let all = words.iter().chain(&shared).map(|word| quoted(word)).chain(more.iter().map(|word| quoted(word)));
         all.chain(extra.clone()).chain(["--", "{{Param.SceneFile}}"].map(quoted)).collect()
     };
-    let snapshots = "--snapshots={{Param.OutputFolder}}/states";
-    let mut frames = vec!["--frames={{Task.Param.Frame}}", "--resume"];
-    let never = format!("--snapshot-every={NO_MORE_SNAPSHOTS}");
-    if options.snapshot_frame.is_some() {
-        frames.extend([snapshots, &never]);
-        let more = ["--frames={{Param.SnapshotFrame}}", snapshots, "--snapshot-every={{Param.ChunkFrames}}"];
-        template.step("Snapshots", None, "", &command(&["render"], &more));
+    let check = check_arguments(options)?;
+    let environment = format!(
+        "    stepEnvironments:\n      - name: Machine\n        description: \"Checks that this machine sees the same folder and draws the same bytes.\"\n        \
+         script:\n          actions:\n            onEnter:\n{}",
+        action("              ", &check)
+    );
+    let memory_bytes = options.memory_bytes;
+    let leave: Vec<String> = check.iter().cloned().chain([quoted("--leave-token")]).collect();
+    let step = Step { name: "Check", after: None, memory_bytes, space: "", environment: "", arguments: &leave };
+    template.step(&step);
+    let step = Step { environment: &environment, ..step };
+    let [columns, rows] = options.tiles;
+    let tiles = (options.tiles != [1, 1]).then(|| format!("--tiles={columns}x{rows}"));
+    let (all, states) = ("--frames={{Param.Frames}}", "--snapshots={{Param.OutputFolder}}/states");
+    if options.snapshots {
+        let more = [all, states, "--chunk={{Param.ChunkFrames}}"].map(str::to_owned);
+        let more: Vec<String> = more.into_iter().chain(tiles.clone()).collect();
+        let arguments = &command(&["farm", "snapshots"], &more);
+        template.step(&Step { name: "Snapshots", after: Some("Check"), arguments, ..step });
     }
-    let space = format!(
+    let mut more = vec!["--frames={{Task.Param.Frame}}".to_owned(), "--resume".to_owned()];
+    if options.snapshots {
+        more.extend([states.to_owned(), format!("--snapshot-every={NO_MORE_SNAPSHOTS}")]);
+    }
+    let words: &[&str] = if tiles.is_some() { &["farm", "tile"] } else { &["render"] };
+    if let Some(tiles) = &tiles {
+        more.extend([tiles.clone(), "--tile={{Task.Param.Tile}}".to_owned()]);
+    }
+    let after = Some(if options.snapshots { "Snapshots" } else { "Check" });
+    let (space, arguments) = (&parameter_space(options), &command(words, &more));
+    template.step(&Step { name: "Frames", after, space, arguments, ..step });
+    let more: Vec<String> =
+        [all.to_owned()].into_iter().chain(tiles).chain(product_arguments(&options.products)?).collect();
+    let arguments = &command(&["farm", "finish"], &more);
+    let memory_bytes = options.finish_memory_bytes;
+    template.step(&Step { name: "Finish", after: Some("Frames"), memory_bytes, arguments, ..step });
+    Ok(())
+}
+
+/// The tasks of the step that draws: chunks of frames, and each tile of them.
+fn parameter_space(options: &TemplateOptions) -> String {
+    let mut space = format!(
         "    parameterSpace:\n      taskParameterDefinitions:\n        - name: Frame\n          type: CHUNK[INT]\n          range: \"{{{{Param.Frames}}}}\"\n          \
          chunks:\n            defaultTaskCount: \"{{{{Param.ChunkFrames}}}}\"\n            targetRuntimeSeconds: {}\n            rangeConstraint: CONTIGUOUS\n",
         options.task_s
     );
-    let after = options.snapshot_frame.map(|_| "Snapshots");
-    template.step("Frames", after, &space, &command(&["render"], &frames));
-    options.film.as_deref().map(literal).transpose()?;
-    let film = options.film.as_ref().map(|film| format!("--film={{{{Param.OutputFolder}}}}/{film}"));
-    let mut more = vec!["--frames={{Param.Frames}}"];
-    more.extend(film.as_deref());
-    template.step("Finish", Some("Frames"), "", &command(&["farm", "finish"], &more));
-    Ok(())
+    if options.tiles != [1, 1] {
+        let last = options.tiles[0] * options.tiles[1] - 1;
+        let _ = write!(
+            space,
+            "        - name: Tile\n          type: INT\n          range: \"0-{last}\"\n      combination: \"Frame * Tile\"\n"
+        );
+    }
+    space
+}
+
+/// What checks a machine.
+fn check_arguments(options: &TemplateOptions) -> Result<Vec<String>, FarmError> {
+    let words = ["farm", "check", OUT].map(quoted);
+    let expected = [("token", &options.token), ("made-by", &options.program), ("arithmetic", &options.arithmetic)];
+    let expected = expected.map(|(name, value)| literal(&format!("--{name}={value}")));
+    words.into_iter().map(Ok).chain(expected).collect()
+}
+
+/// What the last step is asked to make.
+fn product_arguments(products: &Products) -> Result<Vec<String>, FarmError> {
+    let mut arguments = Vec::new();
+    if let Some(film) = &products.film {
+        arguments.push(format!("--film={}", in_output_folder(film)?));
+    }
+    arguments.extend(products.contact_sheet.map(|count| format!("--contact-sheet={count}")));
+    if let Some(flipbook) = &products.flipbook {
+        let ([columns, rows], path) = (flipbook.grid, in_output_folder(&flipbook.path)?);
+        arguments.extend([format!("--flipbook={path}"), format!("--flipbook-grid={columns}x{rows}")]);
+        arguments.extend(flipbook.tile.map(|[width, height]| format!("--flipbook-size={width}x{height}")));
+    }
+    Ok(arguments)
+}
+
+/// `path` as seen from the folder of the frames.
+fn in_output_folder(path: &Path) -> Result<String, FarmError> {
+    let text = script_path(path)?;
+    literal(&text)?;
+    Ok(if path.is_absolute() { text } else { format!("{{{{Param.OutputFolder}}}}/{text}") })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::farm::products::FlipbookRequest;
 
     fn options() -> TemplateOptions {
         TemplateOptions {
@@ -183,10 +275,15 @@ mod tests {
             size: [96, 64],
             chunk_frames: 10,
             task_s: 1800,
-            snapshot_frame: Some(50),
+            tiles: [1, 1],
+            snapshots: true,
             options: vec!["--set=a.b=\"c\"".into()],
-            film: Some("a.apng".into()),
+            products: Products { film: Some("a.apng".into()), ..Products::default() },
+            token: "0123".into(),
+            program: "Bansho 1".into(),
+            arithmetic: "ab".into(),
             memory_bytes: 1e9,
+            finish_memory_bytes: 2e9,
         }
     }
 
@@ -196,24 +293,67 @@ mod tests {
         for lines in [
             "specificationVersion: jobtemplate-2023-09\nextensions: [TASK_CHUNKING]\nname: \"wet street\"\n",
             "    default: \"a \\\"b\\\".toml\"\n",
+            "  - name: Snapshots\n    dependencies:\n      - dependsOn: Check\n",
             "  - name: Frames\n    dependencies:\n      - dependsOn: Snapshots\n",
             "  - name: Finish\n    dependencies:\n      - dependsOn: Frames\n",
             "          type: CHUNK[INT]\n          range: \"{{Param.Frames}}\"\n",
             "            - \"--set=a.b=\\\"c\\\"\"\n",
             "            - \"--film={{Param.OutputFolder}}/a.apng\"\n",
             "          min: 1687\n",
+            "          min: 3118\n",
         ] {
             assert!(text.contains(lines), "{lines}\n{text}");
         }
-        let alone = template(&TemplateOptions { snapshot_frame: None, scene: None, film: None, ..options() }).unwrap();
+        assert!(!text.contains("Tile") && !text.contains("tile"), "{text}");
+        let products = Products::default();
+        let alone = template(&TemplateOptions { snapshots: false, scene: None, products, ..options() }).unwrap();
         assert!(!alone.contains("Snapshot") && !alone.contains("states") && !alone.contains("--film"), "{alone}");
+        assert!(alone.contains("  - name: Frames\n    dependencies:\n      - dependsOn: Check\n"), "{alone}");
+    }
+
+    #[test]
+    fn each_machine_is_checked_before_it_draws() {
+        let text = template(&options()).unwrap();
+        assert_eq!(text.matches("name: Machine").count(), 3, "{text}");
+        for argument in ["--token=0123", "--made-by=Bansho 1", "--arithmetic=ab"] {
+            assert_eq!(text.matches(&format!("- \"{argument}\"\n")).count(), 4, "{text}");
+        }
+        let (check, others) = text.split_once("  - name: Snapshots\n").unwrap();
+        assert!(check.contains("--leave-token") && !others.contains("--leave-token"), "{text}");
+    }
+
+    #[test]
+    fn tiles_are_a_parameter_of_the_tasks() {
+        let text = template(&TemplateOptions { tiles: [3, 2], ..options() }).unwrap();
+        let lines = "        - name: Tile\n          type: INT\n          range: \"0-5\"\n      combination: \"Frame * Tile\"\n";
+        assert!(text.contains(lines), "{text}");
+        assert_eq!(text.matches("\"--tiles=3x2\"").count(), 3, "snapshots, frames and the last step: {text}");
+        assert_eq!(text.matches("\"--tile={{Task.Param.Tile}}\"").count(), 1, "{text}");
+    }
+
+    #[test]
+    fn products_are_beside_the_frames() {
+        let flipbook = Some(FlipbookRequest { path: "game/a.png".into(), grid: [8, 4], tile: Some([64, 32]) });
+        let products = Products { film: Some("/films/a.mp4".into()), contact_sheet: Some(9), flipbook };
+        let text = template(&TemplateOptions { products, ..options() }).unwrap();
+        for argument in [
+            "--film=/films/a.mp4",
+            "--contact-sheet=9",
+            "--flipbook={{Param.OutputFolder}}/game/a.png",
+            "--flipbook-grid=8x4",
+            "--flipbook-size=64x32",
+        ] {
+            assert!(text.contains(&format!("            - \"{argument}\"\n")), "{argument}\n{text}");
+        }
     }
 
     #[test]
     fn what_would_be_an_expression_is_refused() {
+        let film = Products { film: Some("{{a}}.mp4".into()), ..Products::default() };
         for bad in [
             TemplateOptions { frame_name: "{{Param.Size}}.png".into(), ..options() },
             TemplateOptions { options: vec!["--set=a={{b}}".into()], ..options() },
+            TemplateOptions { products: film, ..options() },
         ] {
             assert!(matches!(template(&bad), Err(FarmError::Braces { .. })));
         }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     chunks::{ChunkGrid, ShotCosts},
     error::FarmError,
+    products::Products,
 };
 use crate::job::frames;
 
@@ -50,10 +51,8 @@ pub struct FarmPlan {
     pub tiles: [usize; 2],
     /// Whether chunks begin with snapshots.
     pub snapshots: bool,
-    /// The film that is made of the frames at the end.
-    pub film: Option<PathBuf>,
-    /// Number of frames of the contact sheet that is made at the end.
-    pub contact_sheet: Option<usize>,
+    /// What is made at the end.
+    pub products: Products,
     /// For each chunk the digest of the fingerprints of its frames, hexadecimal.
     pub digests: Vec<String>,
     /// What frames cost on the planning machine.
@@ -75,10 +74,8 @@ pub struct PlanOptions {
     pub tiles: [usize; 2],
     /// Whether chunks begin with snapshots.
     pub snapshots: bool,
-    /// The film that is made at the end.
-    pub film: Option<PathBuf>,
-    /// Number of frames of the contact sheet that is made at the end.
-    pub contact_sheet: Option<usize>,
+    /// What is made at the end.
+    pub products: Products,
     /// What frames cost.
     pub costs: ShotCosts,
 }
@@ -92,8 +89,7 @@ impl FarmPlan {
         chunk_frames: u64,
         digests: Vec<String>,
     ) -> Self {
-        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, film, contact_sheet, costs } =
-            options;
+        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, products, costs } = options;
         Self {
             format: FORMAT,
             program: PROGRAM.to_owned(),
@@ -106,8 +102,7 @@ impl FarmPlan {
             chunk_frames,
             tiles,
             snapshots,
-            film,
-            contact_sheet,
+            products,
             digests,
             costs,
         }
@@ -164,6 +159,16 @@ impl FarmFolder {
     /// The file by which machines recognize the folder.
     pub fn token(&self) -> PathBuf {
         self.root.join("token")
+    }
+
+    /// The file by which machines recognize the folder of a template of Open Job Description.
+    pub fn template_token(&self) -> PathBuf {
+        self.root.join("template")
+    }
+
+    /// What the machine `identity` was found to be.
+    pub fn machine(&self, identity: &str) -> PathBuf {
+        self.root.join("machines").join(identity)
     }
 
     /// Snapshots of simulations.

@@ -23,6 +23,8 @@ pub struct SlurmOptions {
     pub cpus: usize,
     /// Estimated peak memory of a task, bytes.
     pub memory_bytes: f64,
+    /// Estimated peak memory of the last job, bytes.
+    pub finish_memory_bytes: f64,
     /// Further options of `sbatch` for all jobs, such as `--account=films`.
     pub sbatch: Vec<String>,
 }
@@ -83,6 +85,7 @@ struct ScriptRequest<'a> {
     /// Pattern of the log's name.
     log: &'a str,
     time_s: f64,
+    memory_bytes: f64,
     cpus: usize,
     /// Further options, one a line.
     options: &'a [String],
@@ -94,9 +97,9 @@ struct ScriptRequest<'a> {
 
 impl Writer<'_> {
     fn script(&self, request: &ScriptRequest<'_>) -> Result<String, FarmError> {
-        let ScriptRequest { job, log, time_s, cpus, options, command, launcher } = *request;
+        let ScriptRequest { job, log, time_s, memory_bytes, cpus, options, command, launcher } = *request;
         let logs = escaped(&script_path(&self.folder.logs())?);
-        let memory = (self.options.memory_bytes / f64::from(1 << 20) * MEMORY_HEADROOM + MEMORY_EXTRA_MIB).ceil();
+        let memory = (memory_bytes / f64::from(1 << 20) * MEMORY_HEADROOM + MEMORY_EXTRA_MIB).ceil();
         let mut directives = vec![
             format!("--job-name={}-{job}", job_name(&self.options.name)),
             format!("--output=\"{logs}/{log}\""),
@@ -127,6 +130,7 @@ impl Writer<'_> {
             job: "check",
             log: "check-%j.log",
             time_s: CHECK_S,
+            memory_bytes: self.options.memory_bytes,
             cpus: 1,
             options: &options,
             command: "check",
@@ -134,17 +138,18 @@ impl Writer<'_> {
         })
     }
 
-    fn snapshots(&self, grid: &ChunkGrid) -> Result<String, FarmError> {
-        let steps = grid.last_snapshot().map_or(0, |last| last.abs_diff(self.plan.first_frame)) as f64;
+    /// Snapshots up to frame `last`.
+    fn snapshots(&self, last: i64) -> Result<String, FarmError> {
         let costs = &self.plan.costs;
-        let time_s = costs.startup_s + steps * costs.step_s + costs.draw_s;
+        let time_s = costs.startup_s + last.abs_diff(self.plan.first_frame) as f64 * costs.step_s;
         self.script(&ScriptRequest {
             job: "snapshots",
             log: "snapshots-%j.log",
             time_s: TIME_EXTRA_S + TIME_HEADROOM * time_s,
+            memory_bytes: self.options.memory_bytes,
             cpus: self.options.cpus,
             options: &["--requeue".to_owned(), "--signal=B:TERM@60".to_owned()],
-            command: "snapshots --threads \"${SLURM_CPUS_PER_TASK:-1}\"",
+            command: &format!("snapshots --last={last} --threads \"${{SLURM_CPUS_PER_TASK:-1}}\""),
             launcher: "",
         })
     }
@@ -169,11 +174,20 @@ impl Writer<'_> {
             job: "frames",
             log: "frames-%A_%a.log",
             time_s: TIME_EXTRA_S + TIME_HEADROOM * time_s,
+            memory_bytes: self.options.memory_bytes,
             cpus: self.options.cpus,
             options: &options,
             command: "frames --index \"$SLURM_ARRAY_TASK_ID\" --threads \"${SLURM_CPUS_PER_TASK:-1}\"",
             launcher: "",
         })
+    }
+
+    /// Time of the flipbook: its frames are drawn twice at most, the first time to find what is lit.
+    fn flipbook_s(&self, grid: &ChunkGrid) -> f64 {
+        let Some(flipbook) = &self.plan.products.flipbook else { return 0.0 };
+        let (costs, count) = (&self.plan.costs, flipbook.frame_count() as f64);
+        let before = grid.frames().first().map_or(0, |first| first.abs_diff(self.plan.first_frame)) as f64;
+        2.0 * (costs.startup_s + before * costs.step_s + count * costs.frame_s())
     }
 
     fn finish(&self, grid: &ChunkGrid) -> Result<String, FarmError> {
@@ -183,7 +197,8 @@ impl Writer<'_> {
         self.script(&ScriptRequest {
             job: "finish",
             log: "finish-%j.log",
-            time_s: TIME_EXTRA_S + TIME_HEADROOM * time_s,
+            time_s: TIME_EXTRA_S + TIME_HEADROOM * (time_s + self.flipbook_s(grid)),
+            memory_bytes: self.options.finish_memory_bytes,
             cpus: self.options.cpus,
             options: &["--requeue".to_owned(), "--signal=B:TERM@60".to_owned()],
             command: "finish --threads \"${SLURM_CPUS_PER_TASK:-1}\"",
@@ -192,8 +207,8 @@ impl Writer<'_> {
     }
 }
 
-/// The scripts of a plan whose tasks `tasks`, ascending, are not complete; the last one, `submit.sh`, submits the others. `with_snapshots` says whether
-/// snapshots must be made first.
+/// The scripts of a plan whose tasks `tasks`, ascending, are not complete; the last one, `submit.sh`, submits the others. Snapshots are made first, up to
+/// frame `last_snapshot`, or none.
 ///
 /// # Errors
 /// A path or an option cannot stand in a script.
@@ -201,14 +216,14 @@ pub fn scripts(
     plan: &FarmPlan,
     folder: &FarmFolder,
     tasks: &[usize],
-    with_snapshots: bool,
+    last_snapshot: Option<i64>,
     options: &SlurmOptions,
 ) -> Result<Vec<Script>, FarmError> {
     let writer = Writer { options, plan, folder };
     let grid = plan.grid()?;
     let mut jobs = vec![("check", Script { name: "check.sbatch", text: writer.check(tasks.len())? })];
-    if with_snapshots && !tasks.is_empty() {
-        jobs.push(("snapshots", Script { name: "snapshots.sbatch", text: writer.snapshots(&grid)? }));
+    if let Some(last) = last_snapshot.filter(|_| !tasks.is_empty()) {
+        jobs.push(("snapshots", Script { name: "snapshots.sbatch", text: writer.snapshots(last)? }));
     }
     if !tasks.is_empty() {
         jobs.push(("frames", Script { name: "frames.sbatch", text: writer.frames(&grid, tasks)? }));
@@ -251,7 +266,10 @@ fn submit_script(jobs: &[(&str, Script)], root: &Path) -> Result<Script, FarmErr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::farm::plan::tests::plan;
+    use crate::farm::{
+        plan::tests::plan,
+        products::{FlipbookRequest, Products},
+    };
 
     fn options() -> SlurmOptions {
         SlurmOptions {
@@ -260,6 +278,7 @@ mod tests {
             partition: Some("night".into()),
             cpus: 8,
             memory_bytes: 1e9,
+            finish_memory_bytes: 2e9,
             sbatch: vec!["--account=films".into()],
         }
     }
@@ -274,7 +293,7 @@ mod tests {
 
     #[test]
     fn the_array_has_the_tasks_that_are_not_complete() {
-        let scripts = scripts(&plan(), &folder(), &[0, 2], false, &options()).unwrap();
+        let scripts = scripts(&plan(), &folder(), &[0, 2], None, &options()).unwrap();
         let frames = text(&scripts, "frames.sbatch");
         for line in [
             "#SBATCH --array=0,2",
@@ -301,7 +320,7 @@ mod tests {
     #[test]
     fn each_job_depends_on_the_one_before_it() {
         let plan = FarmPlan { snapshots: true, ..plan() };
-        let all = scripts(&plan, &folder(), &[0, 1, 2], true, &options()).unwrap();
+        let all = scripts(&plan, &folder(), &[0, 1, 2], Some(8), &options()).unwrap();
         let names: Vec<&str> = all.iter().map(|script| script.name).collect();
         assert_eq!(names, ["check.sbatch", "snapshots.sbatch", "frames.sbatch", "finish.sbatch", "submit.sh"]);
         let submit = text(&all, "submit.sh");
@@ -314,7 +333,7 @@ mod tests {
             assert!(submit.lines().any(|found| found == line), "{line}\n{submit}");
         }
         // Where all frames are whole, only the last job is left.
-        let none = scripts(&plan, &folder(), &[], true, &options()).unwrap();
+        let none = scripts(&plan, &folder(), &[], Some(8), &options()).unwrap();
         assert_eq!(none.len(), 3);
     }
 
@@ -322,19 +341,38 @@ mod tests {
     fn times_are_whole_minutes_with_headroom() {
         let costs = crate::farm::chunks::ShotCosts { startup_s: 30.0, step_s: 5.0, draw_s: 10.0, ..Default::default() };
         let plan = FarmPlan { costs, snapshots: true, ..plan() };
-        let scripts = scripts(&plan, &folder(), &[0, 1, 2], true, &options()).unwrap();
+        let scripts = scripts(&plan, &folder(), &[0, 1, 2], Some(8), &options()).unwrap();
         // 600 s + 2 (30 + 4 (5 + 10)) s
         assert!(text(&scripts, "frames.sbatch").contains("#SBATCH --time=13\n"));
-        // 600 s + 2 (30 + 8 * 5 + 10) s
-        assert!(text(&scripts, "snapshots.sbatch").contains("#SBATCH --time=13\n"));
+        // 600 s + 2 (30 + 8 * 5) s
+        let snapshots = text(&scripts, "snapshots.sbatch");
+        assert!(
+            snapshots.contains("#SBATCH --time=13\n") && snapshots.contains(" snapshots --last=8 --threads"),
+            "{snapshots}"
+        );
+        // 600 s + 2 (30 + 10 * 2) s; 2e9 / 2^20 * 1.5 + 256, rounded up
+        let finish = text(&scripts, "finish.sbatch");
+        assert!(finish.contains("#SBATCH --time=12\n") && finish.contains("#SBATCH --mem=3118M\n"), "{finish}");
         assert_eq!([0.0, 60.0, 61.0, f64::INFINITY].map(minutes), [1, 1, 2, 525_600]);
+    }
+
+    #[test]
+    fn a_flipbook_takes_time_of_the_last_job() {
+        let costs = crate::farm::chunks::ShotCosts { startup_s: 30.0, step_s: 5.0, draw_s: 10.0, ..Default::default() };
+        let flipbook = Some(FlipbookRequest { path: "a.png".into(), grid: [4, 2], tile: None });
+        let plan = FarmPlan { costs, products: Products { flipbook, ..Products::default() }, ..plan() };
+        // 600 s + 2 (30 + 10 * 2 + 2 (30 + 8 * 15)) s
+        assert!(
+            text(&scripts(&plan, &folder(), &[], None, &options()).unwrap(), "finish.sbatch")
+                .contains("#SBATCH --time=22\n")
+        );
     }
 
     #[test]
     fn line_breaks_never_get_into_a_script() {
         let bad = SlurmOptions { partition: Some("a\n#SBATCH --uid=0".into()), ..options() };
-        assert!(matches!(scripts(&plan(), &folder(), &[0], false, &bad), Err(FarmError::ControlCharacters { .. })));
+        assert!(matches!(scripts(&plan(), &folder(), &[0], None, &bad), Err(FarmError::ControlCharacters { .. })));
         let folder = FarmFolder::new("/shots/a\nb".into());
-        assert!(matches!(scripts(&plan(), &folder, &[0], false, &options()), Err(FarmError::ControlCharacters { .. })));
+        assert!(matches!(scripts(&plan(), &folder, &[0], None, &options()), Err(FarmError::ControlCharacters { .. })));
     }
 }

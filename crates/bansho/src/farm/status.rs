@@ -1,14 +1,17 @@
-//! The state of all frames of a plan, from files alone: the frames themselves, and the journals of tasks.
+//! The state of all frames of a plan: from the frames themselves and the journals of tasks, and where it can be asked from the batch system, which alone
+//! knows that a task was killed.
 
 use std::path::PathBuf;
 
 use serde::Serialize;
 
 use super::{
+    chunks::ChunkGrid,
     error::FarmError,
-    film::contact_sheet_path,
+    film,
     journal::{self, Attempt, Attempts},
     plan::{FarmFolder, FarmPlan},
+    queue::{Queue, QueueState},
     task,
 };
 use crate::job::{FrameState, Job};
@@ -46,6 +49,22 @@ impl FrameCounts {
     }
 }
 
+/// What became of a task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TaskState {
+    /// All its frames are whole.
+    Done,
+    /// It has not begun, or waits to begin once more.
+    Waiting,
+    /// It began and did not end. Unless the batch system was asked, it may have been killed.
+    Running,
+    /// It ended by itself, and frames are missing.
+    Ended,
+    /// It began and did not end, and the batch system knows it no longer: it was killed or canceled.
+    Lost,
+}
+
 /// The state of a task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskStatus {
@@ -57,6 +76,8 @@ pub struct TaskStatus {
     pub last: i64,
     /// The tile that it draws.
     pub tile: usize,
+    /// What became of it.
+    pub state: TaskState,
     /// Its frames.
     #[serde(flatten)]
     pub frames: FrameCounts,
@@ -82,6 +103,8 @@ pub enum FinishStatus {
     },
     /// It waits for tasks.
     Waiting,
+    /// The batch system knows no job of the plan any longer: they were killed or canceled.
+    Lost,
 }
 
 /// The state of a plan.
@@ -93,18 +116,20 @@ pub struct FarmStatus {
     pub tasks: Vec<TaskStatus>,
     /// The job after all tasks.
     pub finish: FinishStatus,
-    /// What the last job makes and has not made: the film, the contact sheet.
+    /// Whether the batch system was asked.
+    pub asked: bool,
+    /// What the last job makes and has not made: the film, the contact sheet, the files of the flipbook.
     pub unmade: Vec<PathBuf>,
     /// Time of a frame within its task, s, from the journals.
     pub seconds_per_frame: Option<f64>,
-    /// Number of tasks that began and did not end.
+    /// Number of tasks that run.
     pub running: usize,
     /// Time until all frames are drawn, s, if as many tasks run as now; of one task where none runs.
     pub seconds_left: Option<f64>,
 }
 
 impl FarmStatus {
-    /// Whether all frames are whole, and the film and the contact sheet are made.
+    /// Whether all frames are whole, and the film, the contact sheet and the flipbook are made.
     pub fn is_complete(&self) -> bool {
         self.frames.unfinished() == 0 && self.unmade.is_empty()
     }
@@ -127,44 +152,66 @@ pub fn task_states(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<Ve
     Ok(of_tasks)
 }
 
-/// The state of the frames of a plan, whose job is `job`.
+/// The chunks of `grid` with frames of `job` that are not whole in all their tiles.
+///
+/// # Errors
+/// The job cannot be prepared.
+pub fn unfinished_chunks(
+    job: &Job,
+    folder: &FarmFolder,
+    grid: &ChunkGrid,
+    tiles: [usize; 2],
+) -> Result<Vec<usize>, FarmError> {
+    let mut unfinished = vec![false; grid.count()];
+    for tile in 0..tiles[0] * tiles[1] {
+        let job = Job { frames: Some(grid.frames().to_vec()), ..task::tile_job(job, folder, tiles, tile)? };
+        let mut states = job.prepare()?.frame_states().into_iter();
+        for (chunk, unfinished) in unfinished.iter_mut().enumerate() {
+            let of_chunk = states.by_ref().take(grid.chunk(chunk).len());
+            *unfinished |= of_chunk.filter(|state| *state != FrameState::Whole).count() > 0;
+        }
+    }
+    Ok((0..grid.count()).filter(|&chunk| unfinished[chunk]).collect())
+}
+
+/// The state of the frames of a plan, whose job is `job`. `queue` is what the batch system knew before this is called, so that a task that ends meanwhile has
+/// written so.
 ///
 /// # Errors
 /// The job cannot be prepared, or the plan is damaged.
-pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<FarmStatus, FarmError> {
+pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan, queue: Option<&Queue>) -> Result<FarmStatus, FarmError> {
     let (grid, tiles) = (plan.grid()?, plan.tile_count());
     let attempts = journal::read(&folder.journal());
     let states = task_states(job, folder, plan)?;
+    let whole_job = Job { frames: Some(grid.frames().to_vec()), ..job.clone() };
     let frames = match tiles {
         1 => FrameCounts::of(&states.concat()),
         // Tiles count only when they are joined.
-        _ => {
-            let job = Job { frames: Some(grid.frames().to_vec()), ..job.clone() };
-            FrameCounts::of(&job.prepare()?.frame_states())
-        }
+        _ => FrameCounts::of(&whole_job.prepare()?.frame_states()),
     };
     let task = |(task, states): (usize, &Vec<FrameState>)| {
-        let chunk = grid.chunk(task / tiles);
+        let (chunk, frames) = (grid.chunk(task / tiles), FrameCounts::of(states));
+        let attempts = attempts.get(&journal::task_name(task)).cloned().unwrap_or_default();
         TaskStatus {
             task,
             first: chunk.first().copied().unwrap_or(0),
             last: chunk.last().copied().unwrap_or(0),
             tile: task % tiles,
-            frames: FrameCounts::of(states),
-            attempts: attempts.get(&journal::task_name(task)).cloned().unwrap_or_default(),
+            state: task_state(&frames, attempts.last(), plan, queue.map(|queue| queue.task(task))),
+            frames,
+            attempts,
         }
     };
     let tasks: Vec<TaskStatus> = states.iter().enumerate().map(task).collect();
-    let sheet = plan.contact_sheet.map(|_| contact_sheet_path(&job.output_path()));
-    let made = [plan.film.clone(), sheet].into_iter().flatten().map(|path| plan.folder.join(path));
-    let finish = finish_status(&attempts, &tasks, plan);
+    let finish = finish_status(&attempts, &tasks, plan, queue);
+    let made = film::paths(&plan.products, &whole_job, &plan.folder)?.into_iter();
     // What is there from before is of other frames, perhaps.
     let unmade = made.filter(|path| finish != FinishStatus::Done || !path.is_file()).collect();
     let seconds_per_frame = seconds_per_frame(&tasks);
-    let running = tasks.iter().filter(|task| is_running(task, plan)).count();
+    let running = tasks.iter().filter(|task| task.state == TaskState::Running).count();
     let left: usize = tasks.iter().map(|task| task.frames.unfinished()).sum();
     let seconds_left = seconds_per_frame.map(|seconds| seconds * left as f64 / running.max(1) as f64);
-    Ok(FarmStatus { frames, tasks, finish, unmade, seconds_per_frame, running, seconds_left })
+    Ok(FarmStatus { frames, tasks, finish, asked: queue.is_some(), unmade, seconds_per_frame, running, seconds_left })
 }
 
 fn seconds_per_frame(tasks: &[TaskStatus]) -> Option<f64> {
@@ -174,9 +221,23 @@ fn seconds_per_frame(tasks: &[TaskStatus]) -> Option<f64> {
     (drawn > 0).then(|| seconds / drawn as f64)
 }
 
-fn is_running(task: &TaskStatus, plan: &FarmPlan) -> bool {
-    let last = task.attempts.last();
-    task.frames.unfinished() > 0 && last.is_some_and(|last| last.code.is_none() && last.token == plan.token)
+/// What became of a task whose last attempt is `attempt`. `queued` is what the batch system says of it, if it was asked.
+fn task_state(
+    frames: &FrameCounts,
+    attempt: Option<&Attempt>,
+    plan: &FarmPlan,
+    queued: Option<Option<QueueState>>,
+) -> TaskState {
+    let attempt = attempt.filter(|attempt| attempt.token == plan.token);
+    let has_ended = attempt.map(|attempt| attempt.code.is_some());
+    match (frames.unfinished(), queued, has_ended) {
+        (0, ..) => TaskState::Done,
+        (_, Some(Some(QueueState::Running)), _) => TaskState::Running,
+        (_, Some(Some(QueueState::Waiting)), _) | (_, _, None) => TaskState::Waiting,
+        (_, _, Some(true)) => TaskState::Ended,
+        (_, Some(None), Some(false)) => TaskState::Lost,
+        (_, None, Some(false)) => TaskState::Running,
+    }
 }
 
 /// Why an attempt failed; `None` if it did not, or belongs to an earlier plan.
@@ -186,7 +247,7 @@ fn failure(attempt: Option<&Attempt>, plan: &FarmPlan) -> Option<String> {
     Some(format!("exit code {code} on {}: {}", attempt.node, attempt.message.as_deref().unwrap_or("no message")))
 }
 
-fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan) -> FinishStatus {
+fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan, queue: Option<&Queue>) -> FinishStatus {
     let last = |name: &str| attempts.get(name).and_then(|attempts| attempts.last());
     let finish = last("finish").filter(|attempt| attempt.token == plan.token);
     match (finish.and_then(|finish| finish.code), failure(finish, plan)) {
@@ -203,7 +264,11 @@ fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan) -> 
         .filter(|task| task.frames.unfinished() > 0)
         .map(|task| (journal::task_name(task.task), failure(task.attempts.last(), plan)));
     let by: Vec<_> = before.into_iter().chain(of_tasks).filter_map(|(name, why)| Some((name, why?))).collect();
-    if by.is_empty() { FinishStatus::Waiting } else { FinishStatus::Blocked { by } }
+    match (by.is_empty(), queue) {
+        (false, _) => FinishStatus::Blocked { by },
+        (true, Some(queue)) if queue.is_empty() => FinishStatus::Lost,
+        (true, _) => FinishStatus::Waiting,
+    }
 }
 
 #[cfg(test)]
@@ -212,7 +277,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        farm::{journal::Event, plan::tests::plan},
+        farm::{
+            journal::Event,
+            plan::tests::plan,
+            products::{FlipbookRequest, Products},
+        },
         job::SceneFile,
     };
 
@@ -245,7 +314,10 @@ mod tests {
         use bansho_base::host::observer::Unobserved;
         let folder = tempfile::tempdir().unwrap();
         let (job, farm, plan) = shot(&folder, SCENE);
-        assert_eq!(status(&job, &farm, &plan).unwrap().frames, FrameCounts { missing: 10, ..FrameCounts::default() });
+        assert_eq!(
+            status(&job, &farm, &plan, None).unwrap().frames,
+            FrameCounts { missing: 10, ..FrameCounts::default() }
+        );
         task::chunk_job(&job, &farm, &plan, 1).unwrap().run(&Unobserved).unwrap();
         let path = |number: u32| folder.path().join(format!("a.{number:04}.png"));
         // Another seed, which an empty picture does not show, and a truncated file.
@@ -253,23 +325,24 @@ mod tests {
         other.prepare().unwrap().run(&Unobserved).unwrap();
         let whole = fs::read(path(5)).unwrap();
         fs::write(path(5), &whole[..whole.len() - 3]).unwrap();
-        let found = status(&job, &farm, &plan).unwrap();
+        let found = status(&job, &farm, &plan, None).unwrap();
         assert_eq!(found.frames, FrameCounts { whole: 3, missing: 5, stale: 1, damaged: 1 });
         assert_eq!(found.tasks[1].frames, FrameCounts { whole: 3, damaged: 1, ..FrameCounts::default() });
         assert_eq!((found.tasks[2].first, found.tasks[2].last), (8, 9));
         assert!(!found.is_complete());
         (0..3).for_each(|index| drop(task::chunk_job(&job, &farm, &plan, index).unwrap().run(&Unobserved).unwrap()));
-        assert!(status(&job, &farm, &plan).unwrap().is_complete());
+        assert!(status(&job, &farm, &plan, None).unwrap().is_complete());
         // A film from before is not that of these frames, until the last job has run.
-        let film = FarmPlan { film: Some(folder.path().join("a.mp4")), ..plan };
+        let products = Products { film: Some(folder.path().join("a.mp4")), ..Products::default() };
+        let film = FarmPlan { products, ..plan };
         fs::write(folder.path().join("a.mp4"), "an earlier one").unwrap();
-        assert!(!status(&job, &farm, &film).unwrap().is_complete());
+        assert!(!status(&job, &farm, &film, None).unwrap().is_complete());
         let journal = journal::Journal::create(&farm.journal(), "finish").unwrap();
         journal.write(&start(&film)).unwrap();
         journal.write(&end(0, "")).unwrap();
-        assert!(status(&job, &farm, &film).unwrap().is_complete());
+        assert!(status(&job, &farm, &film, None).unwrap().is_complete());
         fs::remove_file(folder.path().join("a.mp4")).unwrap();
-        assert!(!status(&job, &farm, &film).unwrap().is_complete());
+        assert!(!status(&job, &farm, &film, None).unwrap().is_complete());
     }
 
     #[test]
@@ -300,7 +373,7 @@ mod tests {
             journal.write(&start(&plan)).unwrap();
             journal.write(&Event::Frame { number: 0, seconds: 6.0 }).unwrap();
         }
-        let found = status(&job, &farm, &plan).unwrap();
+        let found = status(&job, &farm, &plan, None).unwrap();
         // 10 frames of 6 s by two tasks.
         assert_eq!((found.running, found.seconds_left), (2, Some(30.0)));
         assert_eq!(found.finish, FinishStatus::Waiting);
@@ -318,12 +391,63 @@ mod tests {
         write("task-2", end(143, "stopped"));
         write("task-1", end(1, "disk full"));
         write("task-1", Event::Frame { number: 4, seconds: 1.0 });
-        let FinishStatus::Blocked { by } = status(&job, &farm, &plan).unwrap().finish else { panic!("a task failed") };
+        let FinishStatus::Blocked { by } = status(&job, &farm, &plan, None).unwrap().finish else {
+            panic!("a task failed")
+        };
         assert_eq!(by, [("task-2".to_owned(), "exit code 143 on n1: stopped".to_owned())], "task 1 was begun again");
         // A plan that was submitted again knows nothing of it.
         let again = FarmPlan { token: "new".into(), ..plan.clone() };
-        assert_eq!(status(&job, &farm, &again).unwrap().finish, FinishStatus::Waiting);
+        assert_eq!(status(&job, &farm, &again, None).unwrap().finish, FinishStatus::Waiting);
         write("finish", end(0, ""));
-        assert_eq!(status(&job, &farm, &plan).unwrap().finish, FinishStatus::Done);
+        assert_eq!(status(&job, &farm, &plan, None).unwrap().finish, FinishStatus::Done);
+    }
+
+    #[test]
+    fn a_task_that_the_batch_system_does_not_know_is_lost() {
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        for task in 0..2 {
+            let journal = journal::Journal::create(&farm.journal(), &journal::task_name(task)).unwrap();
+            journal.write(&start(&plan)).unwrap();
+        }
+        let found = |listed: Option<&str>| {
+            let queue = listed.map(|listed| Queue::of_slurm("frames 5\nfinish 6\n", listed));
+            let found = status(&job, &farm, &plan, queue.as_ref()).unwrap();
+            let states: Vec<TaskState> = found.tasks.iter().map(|task| task.state).collect();
+            (states, found.running, found.finish)
+        };
+        use TaskState::{Lost, Running, Waiting};
+        assert_eq!(found(None), (vec![Running, Running, Waiting], 2, FinishStatus::Waiting));
+        let listed = "5 0 RUNNING\n5 2 PENDING\n6 N/A PENDING\n";
+        assert_eq!(found(Some(listed)), (vec![Running, Lost, Waiting], 1, FinishStatus::Waiting));
+        assert_eq!(found(Some("5 0 PENDING\n5 1 RUNNING\n")).0, [Waiting, Running, Waiting], "task 0 was requeued");
+        assert_eq!(found(Some("")), (vec![Lost, Lost, Waiting], 0, FinishStatus::Lost));
+        // One that failed says so, whatever the batch system has forgotten.
+        let journal = journal::Journal::create(&farm.journal(), "task-1").unwrap();
+        journal.write(&start(&plan)).unwrap();
+        journal.write(&end(1, "disk full")).unwrap();
+        let (states, _, finish) = found(Some(""));
+        assert_eq!(states[1], TaskState::Ended);
+        assert!(matches!(finish, FinishStatus::Blocked { .. }));
+    }
+
+    #[test]
+    fn all_files_of_a_flipbook_must_be_there() {
+        use bansho_base::host::observer::Unobserved;
+        let folder = tempfile::tempdir().unwrap();
+        let (job, farm, plan) = shot(&folder, SCENE);
+        (0..3).for_each(|index| drop(task::chunk_job(&job, &farm, &plan, index).unwrap().run(&Unobserved).unwrap()));
+        let flipbook = Some(FlipbookRequest { path: folder.path().join("flip.png"), grid: [3, 2], tile: None });
+        let plan = FarmPlan { products: Products { flipbook, ..Products::default() }, ..plan };
+        let journal = journal::Journal::create(&farm.journal(), "finish").unwrap();
+        journal.write(&start(&plan)).unwrap();
+        crate::farm::finish::finish(&job, &farm, &plan, &Unobserved).unwrap();
+        let unmade = || status(&job, &farm, &plan, None).unwrap().unmade.len();
+        assert_eq!(unmade(), 4, "until the last job says that these are of this plan");
+        journal.write(&end(0, "")).unwrap();
+        assert_eq!(unmade(), 0);
+        fs::remove_file(folder.path().join("flip_motion.png")).unwrap();
+        assert_eq!(unmade(), 1);
+        assert!(!status(&job, &farm, &plan, None).unwrap().is_complete());
     }
 }

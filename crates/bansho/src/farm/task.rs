@@ -10,7 +10,7 @@ use super::{
     error::FarmError,
     plan::{FarmFolder, FarmPlan},
 };
-use crate::job::{Job, PreparedJob};
+use crate::job::{Job, JobObserver, PreparedJob};
 
 /// Snapshots at chunk starts only: this interval is never reached after the first frame.
 const NO_MORE_SNAPSHOTS: u64 = i64::MAX as u64;
@@ -86,29 +86,43 @@ pub fn chunk_job(job: &Job, folder: &FarmFolder, plan: &FarmPlan, index: usize) 
     Ok(prepared)
 }
 
-/// The job that leaves a snapshot at the beginning of every chunk: it draws the first frame of the last one. `None` where no chunk needs any.
+/// Leaves snapshots for the tasks of a plan at the beginning of every chunk, up to the one that is cut at frame `last`. Nothing is drawn, and what exists is
+/// kept. Tells how many were written.
 ///
 /// # Errors
-/// The job cannot run.
-pub fn snapshot_job(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<Option<PreparedJob>, FarmError> {
+/// The job cannot run, the scene is not that of the plan, or a snapshot cannot be written.
+pub fn plan_snapshots(
+    job: &Job,
+    folder: &FarmFolder,
+    plan: &FarmPlan,
+    last: i64,
+    observer: &dyn JobObserver,
+) -> Result<usize, FarmError> {
     let grid = plan.grid()?;
-    let Some(last) = grid.last_snapshot().filter(|_| plan.snapshots) else { return Ok(None) };
-    let job = Job {
-        frames: Some(vec![last]),
+    let chunk = (0..grid.count()).find(|chunk| grid.start(*chunk) == Some(last)).unwrap_or(0);
+    let prepared = Job {
+        frames: Some(grid.chunk(chunk).to_vec()),
         resume: false,
         snapshots: Some(folder.snapshots()),
         snapshot_every: Some(plan.chunk_frames),
         ..tile_job(job, folder, plan.tiles, 0)?
     };
-    Ok(Some(job.prepare()?))
+    let prepared = prepared.prepare()?;
+    if plan.digests.get(chunk) != Some(&prepared.shot_digest(grid.chunk(chunk))) {
+        return Err(FarmError::SceneChanged);
+    }
+    Ok(prepared.write_snapshots(last, observer)?)
 }
 
-/// Whether a chunk of one of `tasks` has no snapshot to begin with.
-pub fn lacks_snapshots(folder: &FarmFolder, plan: &FarmPlan, grid: &ChunkGrid, tasks: &[usize]) -> bool {
-    let starts = tasks.iter().filter_map(|task| grid.start(task / plan.tile_count()));
-    let lacks =
-        |start: i64| start > plan.first_frame && !folder.snapshots().join(format!("state.{start}.bansho")).exists();
-    plan.snapshots && starts.into_iter().any(lacks)
+/// The last frame at which one of `chunks` begins without a snapshot in the folder `snapshots`; `None` where all have what they need.
+pub fn last_missing_snapshot(
+    snapshots: &Path,
+    grid: &ChunkGrid,
+    chunks: impl IntoIterator<Item = usize>,
+) -> Option<i64> {
+    grid.last_snapshot()?;
+    let starts = chunks.into_iter().filter_map(|chunk| grid.start(chunk)).filter(|start| *start > grid.first_frame());
+    starts.filter(|start| !snapshots.join(format!("state.{start}.bansho")).exists()).max()
 }
 
 /// Checks that a path or an argument can stand in a script.

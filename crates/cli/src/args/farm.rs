@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bansho::farm::products::{FlipbookRequest, Products};
 use clap::{Args, Subcommand};
 
 use super::{
@@ -22,17 +23,18 @@ pub(crate) enum FarmCommand {
     /// Write the batch scripts that draw a shot as a job array of Slurm, and submit them.
     #[command(after_help = "\
 A few frames are drawn first, to measure what a frame costs; they are kept. The folder NAME.farm beside the frames then has the plan, the scripts, \
-snapshots of simulations, and what tasks print and report. Every task draws what is missing of its frames. A last job checks them, and makes the film and \
-the contact sheet (of N frames that are spread over the shot). Repeat the command to submit what is \
+snapshots of simulations, and what tasks print and report. Every task draws what is missing of its frames. A last job checks them, and makes the film, \
+the contact sheet (of N frames that are spread over the shot) and the flipbook. Repeat the command to submit what is \
 still missing.
 
 Examples:
   bansho farm slurm shot.toml -o /shots/a/a.####.exr --submit
   bansho farm slurm shot.toml --partition night --threads 16 --submit
   bansho farm slurm dome.toml --size 16384x16384 --tiles 2x2 --chunk 1
-  bansho farm slurm shot.toml --film shot.mp4 --sbatch=--account=films")]
+  bansho farm slurm shot.toml --film shot.mp4 --sbatch=--account=films
+  bansho farm slurm shot.toml --flipbook game/a.png --flipbook-grid 8x8")]
     Slurm(Box<SlurmArgs>),
-    /// Print which frames of a shot are whole, missing or stale. The exit code is 0 only if all is whole.
+    /// Print which frames of a shot are whole, missing or stale, and what became of its tasks. The exit code is 0 only if all is whole.
     Status(FarmStatusArgs),
     /// Write a job template of Open Job Description, for AWS Deadline Cloud and other schedulers.
     #[command(after_help = "\
@@ -43,8 +45,14 @@ Examples:
   bansho farm openjd shot.toml -o shot.yaml --film shot.mp4 -- --seed 7
   openjd run shot.yaml -p OutputFolder=/shots/a")]
     Openjd(OpenjdArgs),
-    /// Check that every frame of a shot is whole, and make a film of the frames. Nothing is drawn.
+    /// Check that every frame of a shot is whole, join tiles, and make a film and a contact sheet of the frames. Only a flipbook is drawn.
     Finish(Box<FinishArgs>),
+    /// Leave snapshots at the beginning of chunks that have frames to draw. Nothing is drawn. Templates of `farm openjd` do this.
+    Snapshots(Box<SnapshotsArgs>),
+    /// Draw one tile of each frame. Templates of `farm openjd` do this.
+    Tile(Box<TileArgs>),
+    /// Check that this machine sees the folder of the frames and draws the same bytes. Templates of `farm openjd` do this.
+    Check(CheckMachineArgs),
     /// Run a task of a plan. The scripts of `farm slurm` do this.
     Task(TaskArgs),
 }
@@ -63,9 +71,8 @@ pub(crate) struct SlurmArgs {
     /// Split each picture into so many tiles, a task each, which the last job joins.
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
     pub(crate) tiles: [usize; 2],
-    /// Film that the last job makes of the frames (.mp4 .mov .webm .apng .gif; of .png frames).
-    #[arg(long, value_name = "PATH", help_heading = "Farm")]
-    pub(crate) film: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) products: ProductArgs,
     /// Partition of Slurm. [default: that of the cluster]
     #[arg(long, value_name = "NAME", help_heading = "Farm")]
     pub(crate) partition: Option<String>,
@@ -119,12 +126,43 @@ pub(crate) struct OpenjdArgs {
     /// Wanted time of a chunk, minutes.
     #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_080))]
     pub(crate) task_minutes: u32,
-    /// Film that the last step makes of the frames, beside them (.mp4 .mov .webm .apng .gif).
-    #[arg(long, value_name = "NAME")]
-    pub(crate) film: Option<String>,
+    /// Split each picture into so many tiles, a task each, which the last step joins.
+    #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid)]
+    pub(crate) tiles: [usize; 2],
+    #[command(flatten)]
+    pub(crate) products: ProductArgs,
+    /// Contact sheet of N frames that are spread over the shot.
+    #[arg(long, value_name = "N", help_heading = "At the end")]
+    pub(crate) contact_sheet: Option<usize>,
     /// Options of `bansho render` for all frames.
     #[arg(last = true, value_name = "OPTIONS")]
     pub(crate) options: Vec<String>,
+}
+
+/// What is made when all frames are whole.
+#[derive(Args, Debug)]
+pub(crate) struct ProductArgs {
+    /// Film of the frames (.mp4 .mov .webm .apng .gif).
+    #[arg(long, value_name = "PATH", help_heading = "At the end")]
+    film: Option<PathBuf>,
+    /// Flipbook of the shot, as `bansho flipbook` makes it with the same seed, loop, view, bits and alpha: NAME.png or NAME.exr.
+    #[arg(long, value_name = "PATH", requires = "flipbook_grid", help_heading = "At the end")]
+    flipbook: Option<PathBuf>,
+    /// Columns and rows of the flipbook, whose product is the number of its frames.
+    #[arg(long, value_name = "COLUMNSxROWS", requires = "flipbook", value_parser = values::parse_grid, help_heading = "At the end")]
+    flipbook_grid: Option<[usize; 2]>,
+    /// Size of one frame of the flipbook. [default: cropped to what is lit; the sheet is up to 2048 pixels wide or high]
+    #[arg(long, value_name = "WIDTHxHEIGHT", requires = "flipbook", value_parser = values::parse_size, help_heading = "At the end")]
+    flipbook_size: Option<[usize; 2]>,
+}
+
+impl ProductArgs {
+    /// What is made, with a contact sheet of `contact_sheet` frames.
+    pub(crate) fn products(&self, contact_sheet: Option<usize>) -> Products {
+        let flipbook = self.flipbook.clone().zip(self.flipbook_grid);
+        let flipbook = flipbook.map(|(path, grid)| FlipbookRequest { path, grid, tile: self.flipbook_size });
+        Products { film: self.film.clone(), contact_sheet, flipbook }
+    }
 }
 
 /// `bansho farm finish`
@@ -132,9 +170,57 @@ pub(crate) struct OpenjdArgs {
 pub(crate) struct FinishArgs {
     #[command(flatten)]
     pub(crate) render: RenderArgs,
-    /// Film to make of the frames (.mp4 .mov .webm .apng .gif).
-    #[arg(long, value_name = "PATH", help_heading = "Farm")]
-    pub(crate) film: Option<PathBuf>,
+    /// Join so many tiles of each picture.
+    #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
+    pub(crate) tiles: [usize; 2],
+    #[command(flatten)]
+    pub(crate) products: ProductArgs,
+}
+
+/// `bansho farm snapshots`
+#[derive(Args, Debug)]
+pub(crate) struct SnapshotsArgs {
+    #[command(flatten)]
+    pub(crate) render: RenderArgs,
+    /// Frames of a chunk, counted from the first frame of the scene.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), requires = "snapshots", help_heading = "Farm")]
+    pub(crate) chunk: u32,
+    /// The pictures are drawn as so many tiles.
+    #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
+    pub(crate) tiles: [usize; 2],
+}
+
+/// `bansho farm tile`
+#[derive(Args, Debug)]
+pub(crate) struct TileArgs {
+    #[command(flatten)]
+    pub(crate) render: RenderArgs,
+    /// Columns and rows of the tiles of a picture.
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
+    pub(crate) tiles: [usize; 2],
+    /// Number of the tile, row by row from 0 on.
+    #[arg(long, value_name = "N", help_heading = "Farm")]
+    pub(crate) tile: usize,
+}
+
+/// `bansho farm check`
+#[derive(Args, Debug)]
+pub(crate) struct CheckMachineArgs {
+    /// The output of the frames.
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) out: PathBuf,
+    /// The word by which machines recognize the folder of the frames.
+    #[arg(long, value_name = "WORD")]
+    pub(crate) token: String,
+    /// The program and its version.
+    #[arg(long, value_name = "PROGRAM")]
+    pub(crate) made_by: String,
+    /// Digest of what the arithmetic of the machine gives that made the template.
+    #[arg(long, value_name = "DIGEST")]
+    pub(crate) arithmetic: String,
+    /// Leave the word, for the other machines.
+    #[arg(long)]
+    pub(crate) leave_token: bool,
 }
 
 /// `bansho farm task`
@@ -154,8 +240,11 @@ pub(crate) struct TaskArgs {
 pub(crate) enum TaskCommand {
     /// Check that this machine may take part: it sees the same folder, runs the same version, and gives the same bytes.
     Check,
-    /// Leave a snapshot at the beginning of every chunk.
+    /// Leave snapshots at the beginning of chunks.
     Snapshots {
+        /// The frame at which the last of these chunks is cut.
+        #[arg(long, value_name = "FRAME", allow_hyphen_values = true)]
+        last: i64,
         #[command(flatten)]
         threads: ThreadArgs,
     },
@@ -167,7 +256,7 @@ pub(crate) enum TaskCommand {
         #[command(flatten)]
         threads: ThreadArgs,
     },
-    /// Check that all frames are whole, join tiles and make the film.
+    /// Check that all frames are whole, join tiles, and make what was asked for.
     Finish {
         #[command(flatten)]
         threads: ThreadArgs,

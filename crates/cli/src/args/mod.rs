@@ -16,7 +16,8 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::{
     farm::{
-        FarmArgs, FarmCommand, FarmStatusArgs, FinishArgs, OpenjdArgs, SlurmArgs, TaskArgs, TaskCommand, ThreadArgs,
+        CheckMachineArgs, FarmArgs, FarmCommand, FarmStatusArgs, FinishArgs, OpenjdArgs, SlurmArgs, SnapshotsArgs,
+        TaskArgs, TaskCommand, ThreadArgs, TileArgs,
     },
     flipbook::FlipbookArgs,
     input::InputArgs,

@@ -13,7 +13,9 @@ use crate::support::{FLAME, Folder, Run, wait_until};
 
 /// Notes its arguments, and gives jobs ascending numbers.
 const SBATCH: &str = "#!/bin/sh\necho \"$@\" >>\"$FAKE/sbatch.log\"\ncase \"$*\" in *--test-only*) exit 0;; esac\ngrep -c parsable \"$FAKE/sbatch.log\"\n";
-const SQUEUE: &str = "#!/bin/sh\ncat \"$FAKE/queue\" 2>/dev/null; exit 0\n";
+/// Lists jobs, or with `%K` the tasks of arrays.
+const SQUEUE: &str =
+    "#!/bin/sh\ncase \"$*\" in *%K*) cat \"$FAKE/queue.tasks\";; *) cat \"$FAKE/queue\";; esac 2>/dev/null; exit 0\n";
 const SCONTROL: &str = "#!/bin/sh\necho 'MaxArraySize            = 4'\n";
 const SCANCEL: &str = "#!/bin/sh\necho \"$@\" >>\"$FAKE/scancel.log\"\n";
 /// Runs the program on one machine.
@@ -59,12 +61,21 @@ fn batch(folder: &Folder, script: &str, task: usize) -> Run {
     Run::of(with_slurm(folder, &mut shell).current_dir("/").stdin(Stdio::null()).output().unwrap())
 }
 
+/// `bansho farm status` on a machine without Slurm.
 fn status(folder: &Folder) -> (Option<i32>, Value) {
-    let run = folder.run(&["farm", "status", "scene.toml", "--json"]);
-    (
-        run.code,
-        serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {}{}", run.stdout, run.stderr)),
-    )
+    json_of(folder.command(&["farm", "status", "scene.toml", "--json"]).env("PATH", folder.path("empty")))
+}
+
+/// `bansho farm status` on a machine whose `squeue` lists `tasks`.
+fn asked_status(folder: &Folder, tasks: &str) -> Value {
+    folder.write("queue.tasks", tasks);
+    json_of(with_slurm(folder, &mut folder.command(&["farm", "status", "scene.toml", "--json"]))).1
+}
+
+fn json_of(command: &mut Command) -> (Option<i32>, Value) {
+    let run = Run::of(command.output().unwrap());
+    let json = serde_json::from_str(&run.stdout);
+    (run.code, json.unwrap_or_else(|error| panic!("{error}: {}{}", run.stdout, run.stderr)))
 }
 
 #[test]
@@ -98,6 +109,89 @@ fn an_array_draws_the_bytes_of_one_process_and_is_not_submitted_again() {
     let again = plan(&folder, &options);
     assert_eq!((again.code, again.stdout.as_str()), (Some(0), "all frames are whole\n"));
     assert_eq!(read(&folder, "sbatch.log").matches("parsable").count(), 3);
+}
+
+#[test]
+fn a_killed_task_is_lost_where_slurm_can_be_asked() {
+    let folder = folder();
+    plan(&folder, &["--chunk", "2", "--submit"]);
+    // Killed: its journal has no last line.
+    let journal = "out/scene/scene.farm/journal/task-1.0.jsonl";
+    batch(&folder, "frames.sbatch", 1);
+    let text = read(&folder, journal);
+    folder.write(journal, &text[..text.rfind("{\"event\":\"end\"").unwrap()]);
+    // Of the first task, whose frames were drawn to measure them, one is missing, too.
+    for number in ["0000", "0003"] {
+        fs::remove_file(folder.path(&format!("out/scene/scene.{number}.png"))).unwrap();
+    }
+    let states = |found: &Value| -> Vec<String> {
+        found["tasks"].as_array().unwrap().iter().map(|task| task["state"].as_str().unwrap().to_owned()).collect()
+    };
+    let blind = status(&folder).1;
+    assert_eq!(
+        (states(&blind), &blind["asked"]),
+        (["waiting", "running", "waiting"].map(str::to_owned).to_vec(), &false.into())
+    );
+    let asked = asked_status(&folder, "2 0 RUNNING\n2 2 PENDING\n3 N/A PENDING\n77 1 RUNNING\n");
+    assert_eq!(
+        (states(&asked), &asked["asked"]),
+        (["running", "lost", "waiting"].map(str::to_owned).to_vec(), &true.into())
+    );
+    assert_eq!((&asked["running"], &asked["finish"]["state"]), (&1.into(), &"waiting".into()));
+    assert_eq!(asked_status(&folder, "77 1 RUNNING\n")["finish"]["state"], "lost");
+    let text = Run::of(with_slurm(&folder, &mut folder.command(&["farm", "status", "scene.toml"])).output().unwrap());
+    assert!(
+        text.stdout.contains("lost: begun on") && text.stdout.contains("neither ended nor queued"),
+        "{}",
+        text.stdout
+    );
+    assert!(text.stdout.contains("last job: not queued"), "{}", text.stdout);
+}
+
+#[test]
+fn the_last_job_makes_the_flipbook_of_the_command() {
+    let (folder, alone) = (folder(), Folder::with_scene(FLAME));
+    let options = ["--seed", "5", "--chunk", "6", "--flipbook", "game/a.png", "--flipbook-grid", "2x2"];
+    let planned = plan(&folder, &options);
+    assert_eq!(planned.code, Some(0), "{}", planned.stderr);
+    batch(&folder, "frames.sbatch", 0);
+    assert_eq!(status(&folder).0, Some(1));
+    let finish = batch(&folder, "finish.sbatch", 0);
+    assert_eq!(finish.code, Some(0), "{}", finish.stderr);
+    let alone_line = ["flipbook", "scene.toml", "--seed", "5", "--grid", "2x2", "-o", "game/a.png"];
+    alone.succeed(&alone_line);
+    assert!(folder.files("game").len() == 4 && folder.files("game") == alone.files("game"));
+    assert_eq!(status(&folder).0, Some(0));
+    assert_eq!(plan(&folder, &options).stdout, "all frames are whole\n");
+    fs::remove_file(folder.path("game/a_motion.png")).unwrap();
+    let (code, found) = status(&folder);
+    assert_eq!((code, found["unmade"].as_array().unwrap().len()), (Some(1), 1));
+    // Without a plan, and with another cell size.
+    let finish = [
+        "farm",
+        "finish",
+        "scene.toml",
+        "--seed",
+        "5",
+        "--flipbook",
+        "b/a.exr",
+        "--flipbook-grid",
+        "2x1",
+        "--flipbook-size",
+        "24x32",
+    ];
+    folder.succeed(&finish);
+    alone.succeed(&["flipbook", "scene.toml", "--seed", "5", "--grid", "2x1", "--size", "24x32", "-o", "b/a.exr"]);
+    assert!(folder.files("b").len() == 3 && folder.files("b") == alone.files("b"));
+    for (options, words) in [
+        (&["--flipbook", "a.png"][..], "--flipbook-grid"),
+        (&["--flipbook", "a.gif", "--flipbook-grid", "2x2"], "NAME.png or NAME.exr"),
+        (&["--film", "a.png"], "no film"),
+    ] {
+        let refused = plan(&folder, options);
+        assert_eq!(refused.code, Some(2), "{options:?}: {}", refused.stderr);
+        assert!(refused.stderr.contains(words), "{options:?}: {}", refused.stderr);
+    }
 }
 
 #[test]
@@ -293,4 +387,123 @@ fn a_template_replaces_only_templates() {
     let twice = folder.run(&["farm", "openjd", "scene.toml", "-o", "b.yaml", "--", "--size", "9x9"]);
     assert_eq!((twice.code, twice.errors()), (Some(2), 1), "{}", twice.stderr);
     assert!(!Path::new(&folder.path("b.yaml")).exists());
+}
+
+/// A simulated scene of nine frames, small enough for tests.
+const SIMULATED: &str =
+    "bansho = 2\n[picture]\nsize = [24, 32]\nframes = 9\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.05\n";
+
+#[test]
+fn snapshots_are_made_without_drawing_as_far_as_frames_are_missing() {
+    let (folder, alone) = (folder(), Folder::with_scene(SIMULATED));
+    folder.write("scene.toml", SIMULATED);
+    let planned = plan(&folder, &["--chunk", "3", "--submit"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.stderr);
+    assert!(planned.stdout.contains("snapshots 2\n"), "{}", planned.stdout);
+    let drawn = || folder.files("out/scene").into_keys().filter(|name| name.starts_with("scene.0")).count();
+    let probed = drawn();
+    let states = || folder.files("out/scene/scene.farm/states").into_keys().collect::<Vec<_>>();
+    let snapshots = batch(&folder, "snapshots.sbatch", 0);
+    assert_eq!(snapshots.code, Some(0), "{}", snapshots.stderr);
+    assert_eq!(states(), ["state.0.bansho", "state.3.bansho", "state.6.bansho"]);
+    assert_eq!(drawn(), probed, "nothing is drawn");
+    for task in 0..3 {
+        assert_eq!(batch(&folder, "frames.sbatch", task).code, Some(0));
+    }
+    alone.succeed(&["render", "scene.toml"]);
+    let frames = |folder: &Folder| -> Vec<_> {
+        folder.files("out/scene").into_iter().filter(|(name, _)| name.starts_with("scene.0")).collect()
+    };
+    assert!(frames(&folder) == frames(&alone));
+    // Only the second chunk has a frame to draw: snapshots up to its beginning, and no frame is drawn again.
+    fs::remove_dir_all(folder.path("out/scene/scene.farm/states")).unwrap();
+    fs::remove_file(folder.path("out/scene/scene.0004.png")).unwrap();
+    let again = plan(&folder, &["--submit"]);
+    assert!(again.stdout.contains("1 frame in 1 task"), "{}{}", again.stdout, again.stderr);
+    assert!(read(&folder, "out/scene/scene.farm/snapshots.sbatch").contains(" snapshots --last=3 "));
+    let before = fs::metadata(folder.path("out/scene/scene.0006.png")).unwrap().modified().unwrap();
+    assert_eq!(batch(&folder, "snapshots.sbatch", 0).code, Some(0));
+    assert_eq!(states(), ["state.0.bansho", "state.3.bansho"]);
+    let run = batch(&folder, "frames.sbatch", 1);
+    assert!(run.stderr.contains("1 frame in") && run.stderr.contains("2 were kept"), "{}", run.stderr);
+    assert_eq!(fs::metadata(folder.path("out/scene/scene.0006.png")).unwrap().modified().unwrap(), before);
+    assert!(frames(&folder) == frames(&alone));
+    // Of another scene, none are made.
+    folder.write("scene.toml", &SIMULATED.replace("60", "61"));
+    let changed = batch(&folder, "snapshots.sbatch", 0);
+    assert!(changed.stderr.contains("frames of two scenes would be mixed"), "{}", changed.stderr);
+}
+
+#[test]
+fn the_steps_of_a_template_draw_the_bytes_of_one_process() {
+    let (folder, alone) = (folder(), Folder::with_scene(SIMULATED));
+    folder.write("scene.toml", SIMULATED);
+    let out = "-o=out/scene/scene.####.png";
+    let snapshots = |frames: &str, tiles: &str| {
+        let chunks = ["--chunk=3", "--snapshots=out/scene/states", frames, tiles];
+        folder.succeed(&[&["farm", "snapshots", "scene.toml", out][..], &chunks].concat()).stdout
+    };
+    assert_eq!(snapshots("--frames=0-5", "--tiles=1x1"), "0 snapshots written\n", "two chunks need none");
+    assert_eq!(snapshots("--frames=0-8", "--tiles=2x1"), "3 snapshots written\n");
+    assert_eq!(snapshots("--frames=0-8", "--tiles=2x1"), "0 snapshots written\n");
+    let tile = |tile: &str, frames: &str| {
+        let states = ["--snapshots=out/scene/states", "--snapshot-every=9223372036854775807"];
+        folder
+            .run(&[&["farm", "tile", "scene.toml", out, "--resume", "--tiles=2x1", tile, frames][..], &states].concat())
+    };
+    for frames in ["--frames=0-2", "--frames=3-5", "--frames=6-8"] {
+        assert_eq!(tile("--tile=0", frames).code, Some(0));
+        let missing = folder.run(&["farm", "finish", "scene.toml", out, "--tiles=2x1"]);
+        assert!(missing.code == Some(1) && missing.stderr.contains("are missing"), "{}", missing.stderr);
+        assert_eq!(tile("--tile=1", frames).code, Some(0));
+    }
+    let beyond = tile("--tile=2", "--frames=0");
+    assert_eq!(beyond.code, Some(2));
+    assert!(beyond.stderr.contains("tile 2; a picture has 2, from 0 on"), "{}", beyond.stderr);
+    fs::remove_dir_all(folder.path("out/scene/states")).unwrap();
+    assert_eq!(snapshots("--frames=0-8", "--tiles=2x1"), "0 snapshots written\n", "all frames are whole");
+    folder.succeed(&["farm", "finish", "scene.toml", out, "--tiles=2x1", "--film=a.apng", "--contact-sheet=4"]);
+    alone.succeed(&["render", "scene.toml"]);
+    for (name, bytes) in alone.files("out/scene") {
+        assert!(folder.files("out/scene")[&name] == bytes, "{name}");
+    }
+    assert!(folder.path("a.apng").exists() && folder.path("out/scene/scene.sheet.png").exists());
+}
+
+#[test]
+fn a_machine_is_checked_against_a_template() {
+    let folder = folder();
+    let options = [
+        "--tiles",
+        "2x1",
+        "--contact-sheet",
+        "4",
+        "--film",
+        "a.apng",
+        "--flipbook",
+        "game/f.png",
+        "--flipbook-grid",
+        "2x2",
+    ];
+    folder.succeed(&[&["farm", "openjd", "scene.toml", "-o", "a.yaml"][..], &options].concat());
+    let text = read(&folder, "a.yaml");
+    let value = |name: &str| {
+        let (_, rest) = text.split_once(&format!("\"--{name}=")).unwrap();
+        format!("--{name}={}", rest.split_once('"').unwrap().0)
+    };
+    let [token, made_by, arithmetic] = ["token", "made-by", "arithmetic"].map(value);
+    let check = |more: &[&str]| {
+        let line = ["farm", "check", "--out=shot/a.####.png", &token, &made_by, &arithmetic];
+        folder.run(&[&line[..], more].concat())
+    };
+    assert_eq!(check(&["--leave-token"]).code, Some(0));
+    assert_eq!(check(&[]).code, Some(0));
+    let other = folder.run(&["farm", "check", "--out=shot/a.####.png", &token, "--made-by=Bansho 0.0.1", &arithmetic]);
+    assert!(
+        other.code == Some(1) && other.stderr.contains("the tasks were planned by Bansho 0.0.1"),
+        "{}",
+        other.stderr
+    );
+    let other = folder.run(&["farm", "check", "--out=shot/a.####.png", &token, &made_by, "--arithmetic=00"]);
+    assert!(other.code == Some(1) && other.stderr.contains("draws other bytes"), "{}", other.stderr);
 }

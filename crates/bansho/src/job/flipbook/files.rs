@@ -145,7 +145,7 @@ impl Files {
         let text = format!("{:#}\n", self.description(plan, sheet, drawn, scale));
         self.write_file(self.path(".json"), text.as_bytes(), &finished)?;
         match finished.removed_or_changed() {
-            files if files.is_empty() => Ok(FlipbookSummary { files: self.paths() }),
+            files if files.is_empty() => Ok(FlipbookSummary { frames: tiles.len(), files: self.paths() }),
             files => Err(JobError::FilesLost { files }),
         }
     }

@@ -77,6 +77,8 @@ pub struct Flipbook {
 /// The result of a flipbook job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlipbookSummary {
+    /// Number of its frames.
+    pub frames: usize,
     /// Its files, the JSON last.
     pub files: Vec<PathBuf>,
 }
@@ -134,9 +136,19 @@ impl Flipbook {
         memory::check(&self.scene, &compiled, &plan, request)?;
         let overwrite = OverwritePolicy::new(outputs::input_files(&self.scene, &plan, &numbers), self.overwrite);
         let files = self.files(overwrite)?;
+        files.paths().iter().try_for_each(|path| outputs::check_writable(path))?;
         outputs::check_overwriting(&files.overwrite, files.paths())?;
+        let memory_bytes = memory::estimated_bytes(&compiled, &plan, request);
         let (scene, size_is_option, crop) = (self.scene.clone(), self.tile.is_some(), self.crop);
-        Ok(PreparedFlipbook { scene, compiled, plan, sheet, size_is_option, crop, numbers, files })
+        Ok(PreparedFlipbook { scene, compiled, plan, sheet, size_is_option, crop, numbers, files, memory_bytes })
+    }
+
+    /// All its files, the JSON last.
+    ///
+    /// # Errors
+    /// The output is not the name of a picture.
+    pub fn paths(&self) -> Result<Vec<PathBuf>, JobError> {
+        Ok(self.files(OverwritePolicy::default())?.paths())
     }
 
     /// Size of a tile: that of the options, or the scene's, reduced until the sheet is no larger than [`DEFAULT_SHEET_SIDE`].
@@ -163,9 +175,7 @@ impl Flipbook {
         let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
         let base = path.with_extension("");
         let (kind, view, bits, gltf) = (pattern.kind(), self.view, self.bits, self.gltf);
-        let files = Files { base, kind, view, bits, alpha, gltf, overwrite };
-        files.paths().iter().try_for_each(|path| outputs::check_writable(path))?;
-        Ok(files)
+        Ok(Files { base, kind, view, bits, alpha, gltf, overwrite })
     }
 }
 
@@ -179,12 +189,18 @@ pub struct PreparedFlipbook {
     crop: FlipbookCrop,
     numbers: Vec<i64>,
     files: Files,
+    memory_bytes: f64,
 }
 
 impl PreparedFlipbook {
     /// How many frames it has.
     pub fn frame_count(&self) -> usize {
         self.numbers.len()
+    }
+
+    /// Estimated peak memory of the process while it is made, bytes.
+    pub fn memory_bytes(&self) -> f64 {
+        self.memory_bytes
     }
 
     /// Draws all frames in the caller's rayon pool and writes the sheets.

@@ -89,6 +89,31 @@ impl Snapshots {
         Ok(())
     }
 
+    /// Steps through a shot and writes every snapshot that is due up to frame `last` and does not exist. Tells how many that were.
+    ///
+    /// # Errors
+    /// The observer canceled the job, or a snapshot cannot be written.
+    pub(crate) fn write_missing(
+        &self,
+        shot: &mut dyn FrameSource,
+        last: i64,
+        observer: &dyn JobObserver,
+    ) -> Result<usize, JobError> {
+        let Some(folder) = &self.folder else { return Ok(0) };
+        let due =
+            (self.first_frame..=self.wrapped_frame(last)).step_by(usize::try_from(self.interval).unwrap_or(usize::MAX));
+        let missing: Vec<i64> = due.filter(|number| !self.path(folder, *number).exists()).collect();
+        let mut reached = None;
+        for &number in &missing {
+            // From the latest one before it, which may have been written by another job; one that is unusable is replaced.
+            self.warm_up(shot, reached, number, observer, observer)?;
+            shot.advance(number, observer)?;
+            self.save(shot, number, observer)?;
+            reached = Some(number);
+        }
+        Ok(missing.len())
+    }
+
     /// Restores the latest usable snapshot after frame `past` and not after `number`. Warns of those that are damaged or belong to another
     /// scene.
     fn seek(
@@ -215,6 +240,35 @@ mod tests {
         assert_eq!(steps(&snapshots, &[8, 9, 12], &RecordingObserver::default()), 2 + 1 + 1);
         // A state before the frame that was reached is not used.
         assert_eq!(steps(&snapshots, &[9, 11], &RecordingObserver::default()), 3);
+    }
+
+    #[test]
+    fn missing_states_are_written_without_drawing() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        let write = |last: i64, observer: &RecordingObserver| {
+            let mut source = CountingSource::new();
+            (snapshots.write_missing(&mut source, last, observer).unwrap(), source.steps)
+        };
+        // -4, 1 and 6: eleven frames.
+        assert_eq!(write(8, &RecordingObserver::default()), (3, 11));
+        assert_eq!(write(8, &RecordingObserver::default()), (0, 0));
+        let path = |number: i64| snapshots.path(snapshots.folder.as_deref().unwrap(), number);
+        // Only the gap is stepped through: from -4 to 1, and from the state at 6 to 11.
+        fs::remove_file(path(1)).unwrap();
+        assert_eq!(write(11, &RecordingObserver::default()), (2, 5 + 5));
+        assert_eq!([-4, 1, 6, 11].map(|number| fs::read(path(number)).unwrap()), [-4, 1, 6, 11].map(testing::state));
+        // A damaged one before a missing one is replaced on the way.
+        fs::write(path(6), b"").unwrap();
+        fs::remove_file(path(11)).unwrap();
+        let observer = RecordingObserver::default();
+        assert_eq!(write(11, &observer), (1, 10), "from the state at 1");
+        assert_eq!(observer.warnings.lock().unwrap().len(), 1);
+        assert_eq!(fs::read(path(6)).unwrap(), testing::state(6));
+        let stopped = RecordingObserver::default();
+        stopped.stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        fs::remove_file(path(11)).unwrap();
+        assert!(snapshots.write_missing(&mut CountingSource::new(), 11, &stopped).is_err());
     }
 
     #[test]

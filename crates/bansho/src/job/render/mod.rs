@@ -69,6 +69,16 @@ impl PreparedJob {
         Ok(Summary { drawn: numbers.len(), kept, first_file: self.format.pattern.path(self.frames[0]) })
     }
 
+    /// Steps through the shot and writes every snapshot that is due up to frame `last` and does not exist, in the caller's rayon pool. Nothing is
+    /// drawn. Tells how many were written.
+    ///
+    /// # Errors
+    /// The observer canceled the job, or a snapshot cannot be written. Those before it are kept.
+    pub fn write_snapshots(&self, last: i64, observer: &dyn JobObserver) -> Result<usize, JobError> {
+        let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
+        self.snapshots.write_missing(&mut shot, last, observer)
+    }
+
     fn run_files(
         &self,
         numbers: &[i64],

@@ -1,14 +1,21 @@
 //! `bansho farm`
 
 mod arguments;
+mod chunks;
 mod finish;
 mod journal;
 mod openjd;
+mod queue;
 mod slurm;
 mod status;
 mod task;
 
-use bansho::farm::FarmError;
+use std::{
+    collections::hash_map::RandomState,
+    hash::{BuildHasher, Hasher},
+};
+
+use bansho::{farm::FarmError, job::FlipbookSummary};
 
 use crate::{
     args::{FarmArgs, FarmCommand},
@@ -22,8 +29,22 @@ pub(crate) fn run(args: &FarmArgs) -> anyhow::Result<()> {
         FarmCommand::Status(args) => status::run(args),
         FarmCommand::Openjd(args) => openjd::run(args),
         FarmCommand::Finish(args) => finish::run(args),
+        FarmCommand::Snapshots(args) => chunks::snapshots(args),
+        FarmCommand::Tile(args) => chunks::tile(args),
+        FarmCommand::Check(args) => chunks::check(args),
         FarmCommand::Task(args) => task::run(args),
     }
+}
+
+/// A random word.
+fn random_token() -> String {
+    let word = || RandomState::new().build_hasher().finish();
+    format!("{:016x}{:016x}", word(), word())
+}
+
+/// What is reported of a flipbook.
+fn flipbook_result(summary: FlipbookSummary) -> JobResult {
+    JobResult { unit: "frame", drawn: summary.frames, kept: 0, files: summary.files }
 }
 
 /// Runs `work` in a thread pool of its own, and reports what a job in it says and does. Without a result there was nothing to draw.

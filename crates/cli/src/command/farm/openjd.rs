@@ -6,17 +6,21 @@ use std::{
 };
 
 use bansho::{
+    Unobserved,
     base::host::printable::printable,
     farm::{
-        chunks::ChunkGrid,
+        FarmFolder, film, machine,
         openjd::{self, TemplateOptions},
-        task::sequence_name,
+        task::{self, sequence_name},
     },
     job::{Job, frames},
-    media::{MediaError, files::atomic},
+    media::{
+        MediaError,
+        files::{atomic, provenance::PROGRAM},
+    },
 };
 
-use super::arguments;
+use super::{arguments, random_token};
 use crate::{
     args::{Frames, OpenjdArgs},
     output::print,
@@ -25,23 +29,31 @@ use crate::{
 /// Writes the template.
 pub(crate) fn run(args: &OpenjdArgs) -> anyhow::Result<()> {
     let job = job(args)?;
-    sequence_name(&job)?;
-    let prepared = job.prepare()?;
-    let chunk_frames = u64::from(args.chunk);
-    let grid = ChunkGrid::new(prepared.plan().frames().start, chunk_frames, prepared.frames().to_vec());
     let name = sequence_name(&job)?.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let prepared = job.prepare()?;
+    let products = args.products.products(args.contact_sheet);
+    // Which files exist where frames will be drawn is not known here.
+    let anywhere = Job { overwrite: true, ..job.clone() };
+    let folder = FarmFolder::beside(Path::new(&name));
+    let memory_bytes = task::tile_job(&anywhere, &folder, args.tiles, 0)?.prepare()?.memory_bytes();
+    let flipbook = film::check(&products, &anywhere, Path::new("out"))?;
     let template = openjd::template(&TemplateOptions {
         name: job.scene.stem,
         scene: relative_scene(args)?,
         frame_name: name,
         frames: frames::format_list(prepared.frames()),
         size: prepared.plan().size(),
-        chunk_frames,
+        chunk_frames: u64::from(args.chunk),
         task_s: 60 * u64::from(args.task_minutes),
-        snapshot_frame: grid.last_snapshot().filter(|_| prepared.is_stepped()),
+        tiles: args.tiles,
+        snapshots: prepared.is_stepped(),
         options: args.options.clone(),
-        film: args.film.clone(),
-        memory_bytes: prepared.memory_bytes(),
+        products,
+        token: random_token(),
+        program: PROGRAM.to_owned(),
+        arithmetic: machine::arithmetic_digest(&Unobserved)?,
+        memory_bytes,
+        finish_memory_bytes: flipbook.map_or(0.0, |flipbook| flipbook.memory_bytes()).max(prepared.memory_bytes()),
     })?;
     check_replaceable(&args.out)?;
     atomic::write_bytes(&args.out, template.as_bytes())?;

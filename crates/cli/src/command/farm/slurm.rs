@@ -1,10 +1,7 @@
 //! `bansho farm slurm`
 
 use std::{
-    collections::hash_map::RandomState,
-    env, fs,
-    hash::{BuildHasher, Hasher},
-    io,
+    env, fs, io,
     path::{self, Path, PathBuf},
     process::{Command, Stdio},
     thread,
@@ -20,17 +17,22 @@ use bansho::{
     farm::{
         FarmError, FarmFolder, FarmPlan,
         chunks::{self, ChunkGrid, ChunkRequest, ShotCosts},
-        machine,
+        film, machine,
         plan::PlanOptions,
         probe::{self, ProbeObserver},
+        products::Products,
         slurm::{self, SlurmOptions},
         space, status, task,
     },
     job::{Job, PreparedJob},
-    media::files::{atomic, input},
+    media::files::atomic,
 };
 
-use super::{arguments, run_in_pool};
+use super::{
+    arguments,
+    queue::{self, slurm_output},
+    random_token, run_in_pool,
+};
 use crate::{
     args::{ChunkLength, SlurmArgs},
     exit::{ReportedError, UsageError},
@@ -40,8 +42,6 @@ use crate::{
 
 /// `MaxArraySize` of a cluster that does not state another.
 const MAX_ARRAY_SIZE: usize = 1001;
-/// Largest list of jobs that is read, bytes.
-const JOBS_BYTES: u64 = 64 << 10;
 
 /// Plans the tasks of a shot, writes their scripts, and submits them.
 pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
@@ -59,7 +59,9 @@ pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
     }
     check_no_active_jobs(&folder, args.submit)?;
     let arguments = arguments::of_render(env::args_os(), &["farm", "slurm"])?;
-    let planning = Planning { args, job, folder, arguments, current: env::current_dir()?, max_tasks: max_tasks(args) };
+    let products = args.products.products(args.render.contact_sheet);
+    let current = env::current_dir()?;
+    let planning = Planning { args, job, folder, arguments, products, current, max_tasks: max_tasks(args) };
     let reporter = ProgressReporter::new(args.render.work.progress, args.render.work.stats);
     let mut planned = None;
     run_in_pool(args.render.work.threads, reporter, |reporter| {
@@ -84,11 +86,6 @@ fn shown(path: &Path) -> String {
     printable(&path.display().to_string()).into_owned()
 }
 
-/// A program of Slurm with its output.
-fn slurm_output(program: &str, arguments: &[&str]) -> io::Result<std::process::Output> {
-    Command::new(program).args(arguments).stdin(Stdio::null()).output()
-}
-
 /// Checks that `sbatch` is there and takes the partition and all other options, before anything is drawn. What it says against them is passed on.
 fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
     let partition = args.partition.iter().map(|partition| format!("--partition={partition}"));
@@ -111,8 +108,7 @@ fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
 
 /// Refuses to plan again while jobs of the last plan are queued or running: they would find another plan than they were submitted for.
 fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<()> {
-    let Ok(text) = input::read(&folder.jobs(), JOBS_BYTES) else { return Ok(()) };
-    let text = String::from_utf8_lossy(&text);
+    let Some(text) = queue::submitted_jobs(folder) else { return Ok(()) };
     let submitted: Vec<&str> = text.lines().filter_map(|line| line.split_whitespace().nth(1)).collect();
     let queued = match slurm_output("squeue", &["--me", "--noheader", "--format=%F"]) {
         Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).into_owned(),
@@ -152,17 +148,12 @@ fn submit(folder: &FarmFolder) -> anyhow::Result<()> {
     if status.success() { Ok(()) } else { Err(ReportedError::OtherProgram.into()) }
 }
 
-/// A random word.
-fn random_token() -> String {
-    let word = || RandomState::new().build_hasher().finish();
-    format!("{:016x}{:016x}", word(), word())
-}
-
 struct Planning<'a> {
     args: &'a SlurmArgs,
     job: Job,
     folder: FarmFolder,
     arguments: Vec<String>,
+    products: Products,
     current: PathBuf,
     max_tasks: usize,
 }
@@ -182,6 +173,9 @@ impl Planning<'_> {
     fn plan(&self, reporter: &ProgressReporter) -> Result<Planned, FarmError> {
         let tiled = task::tile_job(&self.job, &self.folder, self.args.tiles, self.request().tiles / 2)?;
         let prepared = tiled.prepare()?;
+        let flipbook = film::check(&self.products, &self.job, &self.current)?;
+        let memory_bytes = prepared.memory_bytes();
+        let finish_memory_bytes = flipbook.map_or(0.0, |flipbook| flipbook.memory_bytes()).max(memory_bytes);
         let earlier = self.earlier_plan(&prepared);
         let costs = match &earlier {
             Some(plan) => plan.costs,
@@ -198,7 +192,7 @@ impl Planning<'_> {
         let digests = (0..grid.count()).map(|chunk| prepared.shot_digest(grid.chunk(chunk))).collect();
         let options = self.options(prepared.is_stepped() && grid.last_snapshot().is_some(), costs)?;
         let plan = FarmPlan::new(options, &grid, first_frame, chunk_frames, digests);
-        self.write(&plan, &grid, prepared.memory_bytes())
+        self.write(&plan, &grid, [memory_bytes, finish_memory_bytes])
     }
 
     fn options(&self, snapshots: bool, costs: ShotCosts) -> Result<PlanOptions, FarmError> {
@@ -209,8 +203,7 @@ impl Planning<'_> {
             arguments: self.arguments.clone(),
             tiles: self.args.tiles,
             snapshots,
-            film: self.args.film.clone(),
-            contact_sheet: self.args.render.contact_sheet,
+            products: self.products.clone(),
             costs,
         })
     }
@@ -249,13 +242,16 @@ impl Planning<'_> {
         Ok(ShotCosts { frame_bytes: largest, snapshot_bytes, ..observer.costs(&frames).unwrap_or_default() })
     }
 
-    fn write(&self, plan: &FarmPlan, grid: &ChunkGrid, memory_bytes: f64) -> Result<Planned, FarmError> {
+    /// Writes the plan and its scripts. `memory_bytes` are of a task and of the last job.
+    fn write(&self, plan: &FarmPlan, grid: &ChunkGrid, memory_bytes: [f64; 2]) -> Result<Planned, FarmError> {
         let states = status::task_states(&self.job, &self.folder, plan)?;
         let missing = |task: &usize| status::FrameCounts::of(&states[*task]).unfinished();
         let tasks: Vec<usize> = (0..states.len()).filter(|task| missing(task) > 0).collect();
         let frames: usize = tasks.iter().map(missing).sum();
-        let with_snapshots = task::lacks_snapshots(&self.folder, plan, grid, &tasks);
-        let snapshots = if with_snapshots { grid.snapshot_count() } else { 0 };
+        let chunks = tasks.iter().map(|task| task / plan.tile_count());
+        let states = self.folder.snapshots();
+        let last_snapshot = if plan.snapshots { task::last_missing_snapshot(&states, grid, chunks) } else { None };
+        let snapshots = last_snapshot.map_or(0, |_| grid.snapshot_count());
         let is_complete = tasks.is_empty() && self.is_finished(plan)?;
         if !is_complete {
             // Before anything may fail, so that nothing is measured twice.
@@ -263,25 +259,22 @@ impl Planning<'_> {
             let required = space::required_bytes(&plan.costs, frames as u64, snapshots);
             space::check(self.folder.root(), required, available_bytes(self.folder.root()))?;
             let options = self.slurm_options(memory_bytes)?;
-            for script in slurm::scripts(plan, &self.folder, &tasks, with_snapshots, &options)? {
+            for script in slurm::scripts(plan, &self.folder, &tasks, last_snapshot, &options)? {
                 atomic::write_bytes(&self.folder.root().join(script.name), script.text.as_bytes())?;
             }
         }
-        let summary = summary(plan, tasks.len(), frames, with_snapshots, &self.folder);
+        let summary = summary(plan, tasks.len(), frames, last_snapshot.is_some(), &self.folder);
         Ok(Planned { summary, is_complete })
     }
 
     /// Whether the last job of an equal plan has made everything.
     fn is_finished(&self, plan: &FarmPlan) -> Result<bool, FarmError> {
-        let is_equal = |earlier: &FarmPlan| {
-            earlier.digests == plan.digests
-                && (&earlier.film, earlier.contact_sheet) == (&plan.film, plan.contact_sheet)
-        };
+        let is_equal = |earlier: &FarmPlan| (&earlier.digests, &earlier.products) == (&plan.digests, &plan.products);
         let earlier = self.folder.read_plan().ok().filter(is_equal);
-        Ok(status::status(&self.job, &self.folder, earlier.as_ref().unwrap_or(plan))?.is_complete())
+        Ok(status::status(&self.job, &self.folder, earlier.as_ref().unwrap_or(plan), None)?.is_complete())
     }
 
-    fn slurm_options(&self, memory_bytes: f64) -> Result<SlurmOptions, FarmError> {
+    fn slurm_options(&self, [memory_bytes, finish_memory_bytes]: [f64; 2]) -> Result<SlurmOptions, FarmError> {
         let io = |source| FarmError::Io { path: self.current.clone(), source };
         let cores = || thread::available_parallelism().map_or(1, usize::from);
         Ok(SlurmOptions {
@@ -290,6 +283,7 @@ impl Planning<'_> {
             partition: self.args.partition.clone(),
             cpus: self.args.render.work.threads.map_or_else(cores, usize::from),
             memory_bytes,
+            finish_memory_bytes,
             sbatch: self.args.sbatch.clone(),
         })
     }

@@ -3,17 +3,17 @@
 use std::{env, fmt::Write, path};
 
 use bansho::{
-    base::host::printable::printable,
+    base::host::{plural::counted, printable::printable},
     farm::{
         FarmFolder,
-        status::{self, FarmStatus, FinishStatus, TaskStatus},
+        status::{self, FarmStatus, FinishStatus, TaskState, TaskStatus},
         task,
     },
     job::{Job, SceneFile},
 };
 use serde_json::{Value, json};
 
-use super::arguments;
+use super::{arguments, queue};
 use crate::{args::FarmStatusArgs, exit::ReportedError, output::print};
 
 /// Prints the state of a plan. It is an error if not all is whole, though one without a message.
@@ -23,7 +23,9 @@ pub(crate) fn run(args: &FarmStatusArgs) -> anyhow::Result<()> {
     let plan = folder.read_plan()?;
     env::set_current_dir(&plan.folder)?;
     let job = arguments::render_job(&plan.arguments)?;
-    let status = status::status(&job, &folder, &plan)?;
+    // Before the journals are read: what ends in between has written so.
+    let queue = queue::queue(&folder);
+    let status = status::status(&job, &folder, &plan, queue.as_ref())?;
     print(&if args.json { format!("{}\n", as_json(&status)) } else { as_text(&status) })?;
     if status.is_complete() { Ok(()) } else { Err(ReportedError::Incomplete.into()) }
 }
@@ -42,7 +44,7 @@ fn as_text(status: &FarmStatus) -> String {
         frames.whole, frames.missing, frames.stale, frames.damaged
     );
     for task in status.tasks.iter().filter(|task| task.frames.unfinished() > 0) {
-        text += &task_line(task);
+        text += &task_line(task, status.asked);
     }
     // Writing to a string cannot fail.
     let _ = match (&status.finish, status.unmade.first()) {
@@ -52,6 +54,12 @@ fn as_text(status: &FarmStatus) -> String {
         (FinishStatus::Done, _) => writeln!(text, "last job: done"),
         (FinishStatus::Failed { message }, _) => writeln!(text, "last job: failed: {message}"),
         (FinishStatus::Waiting, _) => writeln!(text, "last job: waits for the others"),
+        (FinishStatus::Lost, _) => {
+            writeln!(
+                text,
+                "last job: not queued, nor is any other: they were killed or canceled; submit the rest again"
+            )
+        }
         (FinishStatus::Blocked { by }, _) => {
             let causes: Vec<String> = by.iter().map(|(name, why)| format!("{name} ({why})")).collect();
             writeln!(text, "last job: did not run, because others failed: {}", causes.join("; "))
@@ -64,14 +72,19 @@ fn as_text(status: &FarmStatus) -> String {
     text
 }
 
-fn task_line(task: &TaskStatus) -> String {
+fn task_line(task: &TaskStatus, asked: bool) -> String {
     let counts = &task.frames;
-    let state = match task.attempts.last() {
-        None => "not begun".to_owned(),
-        Some(last) => match last.code {
-            None => format!("begun on {}", last.node),
-            Some(code) => format!("ended on {} with exit code {code}", last.node),
-        },
+    let last = task.attempts.last();
+    let on_node = last.map(|last| format!(" on {}, {} drawn there", last.node, counted(last.drawn, "frame")));
+    let on_node = on_node.unwrap_or_default();
+    let state = match (task.state, last.and_then(|last| last.code)) {
+        (TaskState::Done, _) => "done".to_owned(),
+        (TaskState::Waiting, _) if last.is_some() => format!("waits to begin once more; begun before{on_node}"),
+        (TaskState::Waiting, _) => "not begun".to_owned(),
+        (TaskState::Running, _) if asked => format!("runs{on_node}"),
+        (TaskState::Running, _) => format!("begun{on_node}"),
+        (TaskState::Lost, _) => format!("lost: begun{on_node}, and neither ended nor queued"),
+        (TaskState::Ended, code) => format!("ended{on_node}, with exit code {}", code.unwrap_or(0)),
     };
     format!(
         "task {}: frames {} to {}: {} whole, {} missing, {} stale, {} damaged; {state}\n",

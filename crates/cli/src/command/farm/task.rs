@@ -1,18 +1,14 @@
 //! `bansho farm task`: what a batch system runs.
 
 use std::{
-    env, thread,
+    env, fs, thread,
     time::{Duration, Instant},
 };
 
-use bansho::{
-    Observer,
-    farm::{FarmError, FarmFolder, FarmPlan, TaskCheck, finish, journal::task_name, task},
-    job::{Job, PreparedJob},
-};
+use bansho::farm::{FarmError, FarmFolder, TaskCheck, finish, journal::task_name, task};
 
 use super::{
-    arguments,
+    arguments, flipbook_result,
     journal::{JournalObserver, TaskJournal},
     run_in_pool,
 };
@@ -29,12 +25,13 @@ const POLL_INTERVAL: Duration = Duration::from_millis(500);
 /// Runs a task and writes its journal.
 pub(crate) fn run(args: &TaskArgs) -> anyhow::Result<()> {
     let folder = FarmFolder::new(args.folder.clone());
-    let check = TaskCheck { folder: &folder, token: &args.token };
+    let machine = machine_identity();
+    let check = TaskCheck { folder: &folder, token: &args.token, machine: machine.as_deref() };
     // Before the journal: a folder that is not the shared one gets no file.
-    wait_for_token(&check)?;
+    wait_for(|| check.token())?;
     let (name, threads) = match args.task {
         TaskCommand::Check => ("check".to_owned(), Some(1)),
-        TaskCommand::Snapshots { threads: ThreadArgs { threads } } => ("snapshots".to_owned(), threads),
+        TaskCommand::Snapshots { threads: ThreadArgs { threads }, .. } => ("snapshots".to_owned(), threads),
         TaskCommand::Frames { index, threads: ThreadArgs { threads } } => (task_name(index), threads),
         TaskCommand::Finish { threads: ThreadArgs { threads } } => ("finish".to_owned(), threads),
     };
@@ -48,10 +45,16 @@ pub(crate) fn run(args: &TaskArgs) -> anyhow::Result<()> {
     done
 }
 
-fn wait_for_token(check: &TaskCheck<'_>) -> Result<(), FarmError> {
+/// What tells this machine from all others, and from itself after it was started again, perhaps as another one of a cloud.
+fn machine_identity() -> Option<String> {
+    fs::read_to_string("/proc/sys/kernel/random/boot_id").ok().map(|id| id.trim().to_owned())
+}
+
+/// Waits until a shared file system shows what `check` looks for.
+pub(super) fn wait_for(check: impl Fn() -> Result<(), FarmError>) -> Result<(), FarmError> {
     let since = Instant::now();
     loop {
-        match check.token() {
+        match check() {
             Err(_) if since.elapsed() < VISIBLE_AFTER => thread::sleep(POLL_INTERVAL),
             seen => return seen,
         }
@@ -73,26 +76,18 @@ fn work(
     run_in_pool(threads, reporter, |reporter| {
         let observer = JournalObserver { reporter, journal };
         let plan = check.plan(&observer)?;
-        let prepared = prepare(command, &job, folder, &plan, &observer)?;
-        let Some(prepared) = prepared else { return Ok(None) };
-        let summary = prepared.run(&observer)?;
-        let files = vec![summary.first_file];
-        Ok(Some(JobResult { unit: "frame", drawn: summary.drawn, kept: summary.kept, files }))
+        match command {
+            TaskCommand::Check => Ok(None),
+            TaskCommand::Snapshots { last, .. } => {
+                task::plan_snapshots(&job, folder, &plan, last, &observer).map(|_| None)
+            }
+            TaskCommand::Frames { index, .. } => {
+                let summary = task::chunk_job(&job, folder, &plan, index)?.run(&observer)?;
+                let files = vec![summary.first_file];
+                Ok(Some(JobResult { unit: "frame", drawn: summary.drawn, kept: summary.kept, files }))
+            }
+            // Frames of a flipbook are not for the journal, which has those of the shot.
+            TaskCommand::Finish { .. } => Ok(finish::finish(&job, folder, &plan, reporter)?.map(flipbook_result)),
+        }
     })
-}
-
-/// What is to be drawn; the rest is done here.
-fn prepare(
-    command: TaskCommand,
-    job: &Job,
-    folder: &FarmFolder,
-    plan: &FarmPlan,
-    observer: &dyn Observer,
-) -> Result<Option<PreparedJob>, FarmError> {
-    match command {
-        TaskCommand::Check => Ok(None),
-        TaskCommand::Snapshots { .. } => task::snapshot_job(job, folder, plan),
-        TaskCommand::Frames { index, .. } => task::chunk_job(job, folder, plan, index).map(Some),
-        TaskCommand::Finish { .. } => finish::finish(job, folder, plan, observer).map(|()| None),
-    }
 }

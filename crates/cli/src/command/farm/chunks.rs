@@ -1,0 +1,69 @@
+//! `bansho farm snapshots`, `bansho farm tile`, `bansho farm check`: what the steps of a template run, which has no plan.
+
+use std::fs;
+
+use bansho::{
+    base::host::plural::counted,
+    farm::{FarmError, FarmFolder, chunks::ChunkGrid, machine, status, task},
+    job::Job,
+    media::files::atomic,
+};
+
+use super::{run_in_pool, task::wait_for};
+use crate::{
+    args::{CheckMachineArgs, ProgressKind, SnapshotsArgs, TileArgs},
+    output::print,
+    progress::{JobResult, ProgressReporter},
+};
+
+/// Leaves snapshots at the beginning of the chunks whose frames are not whole.
+pub(crate) fn snapshots(args: &SnapshotsArgs) -> anyhow::Result<()> {
+    let work = &args.render.work;
+    let mut written = 0;
+    run_in_pool(work.threads, ProgressReporter::new(work.progress, work.stats), |reporter| {
+        let chunk = u64::from(args.chunk);
+        let job = Job { snapshot_every: Some(chunk), ..args.render.job()? };
+        let folder = FarmFolder::beside(&task::sequence_name(&job)?);
+        let prepared = task::tile_job(&job, &folder, args.tiles, 0)?.prepare()?;
+        let grid = ChunkGrid::new(prepared.plan().frames().start, chunk, prepared.frames().to_vec());
+        let unfinished = status::unfinished_chunks(&job, &folder, &grid, args.tiles)?;
+        let states = job.snapshots.as_deref().filter(|_| prepared.is_stepped());
+        if let Some(last) = states.and_then(|states| task::last_missing_snapshot(states, &grid, unfinished)) {
+            written = prepared.write_snapshots(last, reporter)?;
+        }
+        Ok(None)
+    })?;
+    Ok(print(&format!("{} written\n", counted(written, "snapshot")))?)
+}
+
+/// Draws one tile of each frame.
+pub(crate) fn tile(args: &TileArgs) -> anyhow::Result<()> {
+    let work = &args.render.work;
+    run_in_pool(work.threads, ProgressReporter::new(work.progress, work.stats), |reporter| {
+        let count = args.tiles[0] * args.tiles[1];
+        if args.tile >= count {
+            return Err(FarmError::NoSuchTile { index: args.tile, count });
+        }
+        let job = args.render.job()?;
+        let folder = FarmFolder::beside(&task::sequence_name(&job)?);
+        let summary = task::tile_job(&job, &folder, args.tiles, args.tile)?.prepare()?.run(reporter)?;
+        let files = vec![summary.first_file];
+        Ok(Some(JobResult { unit: "frame", drawn: summary.drawn, kept: summary.kept, files }))
+    })
+}
+
+/// Checks this machine.
+pub(crate) fn check(args: &CheckMachineArgs) -> anyhow::Result<()> {
+    let folder = FarmFolder::beside(&args.out);
+    run_in_pool(Some(1), ProgressReporter::new(ProgressKind::None, false), |reporter| {
+        machine::check_bytes(&args.made_by, &args.arithmetic, reporter)?;
+        let token = folder.template_token();
+        if args.leave_token {
+            let path = folder.root().to_path_buf();
+            fs::create_dir_all(&path).map_err(|source| FarmError::Io { path, source })?;
+            atomic::write_bytes(&token, format!("{}\n", args.token).as_bytes())?;
+        }
+        wait_for(|| machine::check_token(token.clone(), &args.token))?;
+        Ok(None)
+    })
+}
