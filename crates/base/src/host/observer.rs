@@ -11,7 +11,8 @@ pub enum Stage {
     Prepare,
     /// Drawing phenomena and compositing them.
     Draw,
-    /// View transform, dither and quantization.
+    /// View transform, dither and quantization of frames whose light is kept. Where it is not, they are done strip by strip, as a part of
+    /// [`Draw`](Self::Draw).
     View,
     /// Compressing and writing files.
     Write,
