@@ -303,3 +303,18 @@ fn scale_and_shift_of_an_inverse_depth_are_found_from_the_ground() {
     );
     assert!(scene(flat(), "depth_scale = 2.0\n").is_ok() && scene(flat(), "depth_shift = 0.0\n").is_ok());
 }
+
+#[test]
+fn hot_air_bends_what_is_seen_through_the_plate_as_well() {
+    // What is behind the air looks the same everywhere, so bending it changes nothing; but it is composited in groups of slices.
+    let air = |bend: f64| {
+        format!(
+            "{BEFORE_AND_BEHIND}{SKY}[[emitter]]\nname = \"air\"\nposition = [0, 0, -0.5]\nluminance = 0\nbend = {bend}\n"
+        )
+    };
+    let [straight, bent] =
+        [0.0, 0.2].map(|bend| covered(&air(bend), [0.05, 0.1, 0.15, COVERAGE], Some(3.0), &PlanOptions::default()));
+    for (straight, bent) in straight.beauty.pixels().iter().zip(bent.beauty.pixels()) {
+        assert!((0..4).all(|c| is_close(straight[c], bent[c])), "{straight:?} {bent:?}");
+    }
+}
