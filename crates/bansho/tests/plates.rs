@@ -202,7 +202,7 @@ fn is_close(found: f32, expected: f32) -> bool {
 fn what_a_depth_hides_is_seen_through_the_transparency_of_the_plate() {
     let frame = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, COVERAGE], Some(3.0), &PlanOptions::default());
     let scale = bansho_base::color::exposure_scale(0.0) as f32;
-    let [mist, fog] = [(-0.5_f32).exp(), (-1.0_f32).exp()];
+    let [mist, fog] = [-0.5, -1.0].map(|depth| bansho_base::math::exp(depth) as f32);
     // The plate through the mist; the lamp through mist, three quarters of the plate, and fog.
     let behind = (1.0 - COVERAGE) * mist * fog * 100.0 * scale;
     let expected = [0.05, 0.1, 0.15].map(|color| mist * color + behind);
@@ -276,7 +276,7 @@ fn scale_and_shift_of_an_inverse_depth_are_found_from_the_ground() {
         );
         support::compiled("a.toml", &text, &support::kinds(), assets).map(Arc::new)
     };
-    let compiled = scene(values.clone(), "").unwrap_or_else(|error| panic!("{error}"));
+    let compiled = scene(values, "").unwrap_or_else(|error| panic!("{error}"));
     let plan = Arc::new(Plan::new(&compiled, &PlanOptions { layers: true, ..PlanOptions::default() }).unwrap());
     let told =
         remarks::remarks(&compiled, &plan).into_iter().map(|(_, remark)| remark.message).collect::<Vec<_>>().join("\n");
