@@ -202,7 +202,7 @@ fn is_close(found: f32, expected: f32) -> bool {
 fn what_a_depth_hides_is_seen_through_the_transparency_of_the_plate() {
     let frame = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, COVERAGE], Some(3.0), &PlanOptions::default());
     let scale = bansho_base::color::exposure_scale(0.0) as f32;
-    let [mist, fog] = [(-0.5_f32).exp(), (-1.0_f32).exp()];
+    let [mist, fog] = [-0.5, -1.0].map(|depth| bansho_base::math::exp(depth) as f32);
     // The plate through the mist; the lamp through mist, three quarters of the plate, and fog.
     let behind = (1.0 - COVERAGE) * mist * fog * 100.0 * scale;
     let expected = [0.05, 0.1, 0.15].map(|color| mist * color + behind);
@@ -276,7 +276,7 @@ fn scale_and_shift_of_an_inverse_depth_are_found_from_the_ground() {
         );
         support::compiled("a.toml", &text, &support::kinds(), assets).map(Arc::new)
     };
-    let compiled = scene(values.clone(), "").unwrap_or_else(|error| panic!("{error}"));
+    let compiled = scene(values, "").unwrap_or_else(|error| panic!("{error}"));
     let plan = Arc::new(Plan::new(&compiled, &PlanOptions { layers: true, ..PlanOptions::default() }).unwrap());
     let told =
         remarks::remarks(&compiled, &plan).into_iter().map(|(_, remark)| remark.message).collect::<Vec<_>>().join("\n");
@@ -302,4 +302,19 @@ fn scale_and_shift_of_an_inverse_depth_are_found_from_the_ground() {
         "{error}"
     );
     assert!(scene(flat(), "depth_scale = 2.0\n").is_ok() && scene(flat(), "depth_shift = 0.0\n").is_ok());
+}
+
+#[test]
+fn hot_air_bends_what_is_seen_through_the_plate_as_well() {
+    // What is behind the air looks the same everywhere, so bending it changes nothing; but it is composited in groups of slices.
+    let air = |bend: f64| {
+        format!(
+            "{BEFORE_AND_BEHIND}{SKY}[[emitter]]\nname = \"air\"\nposition = [0, 0, -0.5]\nluminance = 0\nbend = {bend}\n"
+        )
+    };
+    let [straight, bent] =
+        [0.0, 0.2].map(|bend| covered(&air(bend), [0.05, 0.1, 0.15, COVERAGE], Some(3.0), &PlanOptions::default()));
+    for (straight, bent) in straight.beauty.pixels().iter().zip(bent.beauty.pixels()) {
+        assert!((0..4).all(|c| is_close(straight[c], bent[c])), "{straight:?} {bent:?}");
+    }
 }

@@ -219,7 +219,6 @@ fn corrupt_data_of_a_jpeg_are_told() {
             (changed, told) = (changed + 1, told + usize::from(is_told(&bad)));
         }
     }
-    println!("{told} of {changed} changed bytes are told");
     // A change within a number stays a picture; nothing in a JPEG says what it was.
     assert!(10 * told > 3 * changed, "{told} of {changed} changed bytes are told");
 }
@@ -242,10 +241,10 @@ fn damaged_files_of_other_programs_never_panic() {
         for _ in 0..40 {
             case.bytes.clone_from(&whole);
             for _ in 0..1 + random() % 4 {
-                let reach = if random() % 3 == 0 { whole.len() } else { whole.len().min(300) };
+                let reach = if random().is_multiple_of(3) { whole.len() } else { whole.len().min(300) };
                 case.bytes[random() % reach] = random() as u8;
             }
-            if random() % 8 == 0 {
+            if random().is_multiple_of(8) {
                 case.bytes.truncate(random() % whole.len());
             }
             // Any result will do, as long as it returns.

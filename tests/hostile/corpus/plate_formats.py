@@ -79,6 +79,7 @@ def _depths() -> list[Case]:
         depth("known points that contradict each other", "npy", codes, words="larger values are farther", more=known.format("[3, 3, 1.0], [9, 3, 2.0]")),
         depth("known points beyond the picture", "npy", codes, words="within the image of 32 x 24 pixels", more=known.format("[3, 3, 1.0], [99, 3, 2.0]")),
         depth("a known point where nothing is known", "npy", codes, words="no value at point 1", more=known.format("[0, 3, 1.0], [9, 3, 2.0]")),
+        depth("an inverse depth that shows no ground", "npy", codes, words="depth_kind.*ground at 0 m|ground at 0 m", more="depth_kind = \"inverse\"\n[ground]\nheight = 0\n"),
         depth("known points of an axis depth", "npy", codes, words="depth_kind", more=known.format("[3, 3, 1.0], [9, 3, 0.5]").replace("inverse", "axis")),
     ]
 

@@ -235,7 +235,7 @@ impl GroundSamples {
             weighted.iter().map(|(weight, sample)| weight * (sample.value - value) * of(sample)).sum()
         };
         let slope = moment(&|sample| sample.inverse - inverse) / moment(&|sample| sample.value - value);
-        (slope > 0.0 && slope.is_finite()).then(|| GroundFit { slope, shift: inverse - slope * value, ..*fit })
+        (slope > 0.0 && slope.is_finite()).then_some(GroundFit { slope, shift: inverse - slope * value, ..*fit })
     }
 
     /// The share of `fit` and its residual; and the share of the variance that it explains.

@@ -28,7 +28,7 @@ pub(super) enum JpegFault {
 /// Largest magnitude of a coefficient: an orthonormal cosine transform of 64 values of up to 128, and of 32 more, by which some encoders overshoot white.
 const LARGEST_COEFFICIENT: i64 = 8 * (128 + 32);
 /// Visits of a block: of those that a progressive file may have, more than any encoder makes.
-const VISITS: usize = 256;
+const VISITS: usize = 100;
 
 /// The first fault of the first picture in `file`; `None` also for what is not coded by Huffman's method.
 pub(super) fn fault(file: &[u8]) -> Option<JpegFault> {
