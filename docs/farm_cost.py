@@ -17,7 +17,7 @@ from dataclasses import dataclass
 FRAME_S = 2.6  # 5.0 s of CPU time to prepare, draw and write, and a little that only one core does
 STEP_S = 0.02  # to step over a frame
 PREROLL_S = 3.0  # building the scene and its preroll, where no snapshot is restored
-START_S = 0.3  # starting the program, building the scene, the check of the arithmetic and of the fingerprints of the chunk
+START_S = 0.3  # starting the program, building the scene, the fingerprints of the chunk, and the check of the arithmetic, though only the first task of a machine has it
 FIRST_FRAME_S = 2.4  # what the first frame of a task takes longer, since it fills caches
 FRAME_BYTES = 58.45e6
 SNAPSHOT_BYTES = 6.7e6

@@ -10,7 +10,7 @@ use bansho_base::{
 use bansho_media::{
     files::{atomic, naming::OutputPattern},
     format::{OutputKind, PictureFormat},
-    imageops::{flatten::over_black, label},
+    imageops::{flatten::over_black, label, sprite_sheet::SheetLayout},
     output::{
         frame_file::{self, FrameFileError, LinearPixels},
         sink::{FrameSlot, Picture},
@@ -27,11 +27,18 @@ use crate::job::{
 /// Checks that `products` can be made of `job`, with relative paths in `folder`; the flipbook, ready to run.
 ///
 /// # Errors
-/// The name of the film is not that of a film, or the flipbook is not possible.
+/// The name of the film is not that of a film, the contact sheet would be too large, or the flipbook is not possible.
 pub fn check(products: &Products, job: &Job, folder: &Path) -> Result<Option<PreparedFlipbook>, FarmError> {
     if let Some(film) = &products.film {
         check_name(film)?;
     }
+    if let Some(count) = products.contact_sheet {
+        sheet_layout(&job.prepare()?, count)?;
+    }
+    prepared_flipbook(products, job, folder)
+}
+
+fn prepared_flipbook(products: &Products, job: &Job, folder: &Path) -> Result<Option<PreparedFlipbook>, FarmError> {
     Ok(products.flipbook.as_ref().map(|request| request.flipbook(job, folder).prepare()).transpose()?)
 }
 
@@ -61,7 +68,7 @@ pub fn make(
     observer: &dyn JobObserver,
 ) -> Result<Option<FlipbookSummary>, FarmError> {
     // Before the film, which may take long.
-    let flipbook = check(products, job, folder)?;
+    let flipbook = prepared_flipbook(products, job, folder)?;
     if let Some(film) = &products.film {
         make_film(whole, &folder.join(film), observer)?;
     }
@@ -76,15 +83,20 @@ pub fn contact_sheet_path(output: &Path) -> PathBuf {
     FarmFolder::beside(output).root().with_extension("sheet.png")
 }
 
+/// The layout of a contact sheet of up to `count` frames.
+fn sheet_layout(whole: &PreparedJob, count: usize) -> Result<SheetLayout, FarmError> {
+    let (window, count) = (whole.plan().window(), count.min(whole.frames().len()));
+    let layout = nearly_square_layout(count, [window.width, window.height], contact_sheet::GUTTER);
+    Ok(layout.map_err(JobError::from)?)
+}
+
 /// Makes a contact sheet of `count` finished frames that are spread over the shot, over black, with their numbers.
 ///
 /// # Errors
 /// The sheet would be too large, a frame cannot be read, or the sheet cannot be written.
 pub fn make_contact_sheet(whole: &PreparedJob, count: usize, observer: &dyn Observer) -> Result<(), FarmError> {
-    let (frames, window) = (whole.frames(), whole.plan().window());
-    let count = count.min(frames.len());
-    let layout =
-        nearly_square_layout(count, [window.width, window.height], contact_sheet::GUTTER).map_err(JobError::from)?;
+    let (frames, layout) = (whole.frames(), sheet_layout(whole, count)?);
+    let count = layout.count;
     let mut tiles = Vec::with_capacity(count);
     for index in 0..count {
         observer::check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a sheet" })?;

@@ -56,6 +56,10 @@ pub struct TemplateOptions {
 
 /// The option that names the frames.
 const OUT: &str = "--out={{Param.OutputFolder}}/{{Param.FrameName}}";
+/// The option of all frames of the shot.
+const ALL_FRAMES: &str = "--frames={{Param.Frames}}";
+/// The option of the folder of snapshots.
+const STATES: &str = "--snapshots={{Param.OutputFolder}}/states";
 
 /// `text` as a string of YAML: every string of JSON is one.
 fn quoted(text: &str) -> String {
@@ -78,8 +82,8 @@ struct Template {
 /// A step of the job.
 struct Step<'a> {
     name: &'a str,
-    /// The step that it waits for.
-    after: Option<&'a str>,
+    /// The steps that it waits for. All whose files it reads: where machines share no folder, schedulers bring the files of these steps alone.
+    after: &'a [&'a str],
     memory_bytes: f64,
     /// Its tasks, where there are many.
     space: &'a str,
@@ -105,8 +109,9 @@ impl Template {
 
     fn step(&mut self, step: &Step<'_>) {
         let _ = writeln!(self.text, "  - name: {}", step.name);
-        if let Some(after) = step.after {
-            let _ = write!(self.text, "    dependencies:\n      - dependsOn: {after}\n");
+        for (index, after) in step.after.iter().enumerate() {
+            let key = if index == 0 { "    dependencies:\n" } else { "" };
+            let _ = writeln!(self.text, "{key}      - dependsOn: {after}");
         }
         let (factor, extra) = MEMORY_HEADROOM;
         let _ = write!(
@@ -169,12 +174,6 @@ fn parameters(template: &mut Template, options: &TemplateOptions) -> Result<(), 
 }
 
 fn steps(template: &mut Template, options: &TemplateOptions) -> Result<(), FarmError> {
-    let extra = options.options.iter().map(|option| literal(option)).collect::<Result<Vec<_>, _>>()?;
-    let command = |words: &[&str], more: &[String]| -> Vec<String> {
-        let shared = [OUT, "--size={{Param.Size}}"];
-        let all = words.iter().chain(&shared).map(|word| quoted(word)).chain(more.iter().map(|word| quoted(word)));
-        all.chain(extra.clone()).chain(["--", "{{Param.SceneFile}}"].map(quoted)).collect()
-    };
     let check = check_arguments(options)?;
     let environment = format!(
         "    stepEnvironments:\n      - name: Machine\n        description: \"Checks that this machine sees the same folder and draws the same bytes.\"\n        \
@@ -183,35 +182,52 @@ fn steps(template: &mut Template, options: &TemplateOptions) -> Result<(), FarmE
     );
     let memory_bytes = options.memory_bytes;
     let leave: Vec<String> = check.iter().cloned().chain([quoted("--leave-token")]).collect();
-    let step = Step { name: "Check", after: None, memory_bytes, space: "", environment: "", arguments: &leave };
+    let step = Step { name: "Check", after: &[], memory_bytes, space: "", environment: "", arguments: &leave };
     template.step(&step);
     let step = Step { environment: &environment, ..step };
-    let [columns, rows] = options.tiles;
-    let tiles = (options.tiles != [1, 1]).then(|| format!("--tiles={columns}x{rows}"));
-    let (all, states) = ("--frames={{Param.Frames}}", "--snapshots={{Param.OutputFolder}}/states");
     if options.snapshots {
-        let more = [all, states, "--chunk={{Param.ChunkFrames}}"].map(str::to_owned);
-        let more: Vec<String> = more.into_iter().chain(tiles.clone()).collect();
-        let arguments = &command(&["farm", "snapshots"], &more);
-        template.step(&Step { name: "Snapshots", after: Some("Check"), arguments, ..step });
+        let arguments = &snapshots_command(options)?;
+        template.step(&Step { name: "Snapshots", after: &["Check"], arguments, ..step });
     }
+    let after: &[&str] = if options.snapshots { &["Check", "Snapshots"] } else { &["Check"] };
+    let (space, arguments) = (&parameter_space(options), &frames_command(options)?);
+    template.step(&Step { name: "Frames", after, space, arguments, ..step });
+    let (arguments, memory_bytes) = (&finish_command(options)?, options.finish_memory_bytes);
+    template.step(&Step { name: "Finish", after: &["Check", "Frames"], memory_bytes, arguments, ..step });
+    Ok(())
+}
+
+/// A command on the frames of the shot, with `more` options.
+fn command(options: &TemplateOptions, words: &[&str], more: Vec<String>) -> Result<Vec<String>, FarmError> {
+    let shared = [OUT, "--size={{Param.Size}}"];
+    let all = words.iter().chain(&shared).map(|word| quoted(word)).chain(more.iter().map(|word| quoted(word)));
+    let extra = options.options.iter().map(|option| literal(option)).collect::<Result<Vec<_>, _>>()?;
+    Ok(all.chain(extra).chain(["--", "{{Param.SceneFile}}"].map(quoted)).collect())
+}
+
+fn tiles_option(options: &TemplateOptions) -> Option<String> {
+    let [columns, rows] = options.tiles;
+    (options.tiles != [1, 1]).then(|| format!("--tiles={columns}x{rows}"))
+}
+
+fn snapshots_command(options: &TemplateOptions) -> Result<Vec<String>, FarmError> {
+    let more = [ALL_FRAMES, STATES, "--chunk={{Param.ChunkFrames}}"].map(str::to_owned);
+    command(options, &["farm", "snapshots"], more.into_iter().chain(tiles_option(options)).collect())
+}
+
+fn frames_command(options: &TemplateOptions) -> Result<Vec<String>, FarmError> {
     let mut more = vec!["--frames={{Task.Param.Frame}}".to_owned(), "--resume".to_owned()];
     if options.snapshots {
-        more.extend([states.to_owned(), format!("--snapshot-every={NO_MORE_SNAPSHOTS}")]);
+        more.extend([STATES.to_owned(), format!("--snapshot-every={NO_MORE_SNAPSHOTS}")]);
     }
-    let words: &[&str] = if tiles.is_some() { &["farm", "tile"] } else { &["render"] };
-    if let Some(tiles) = &tiles {
-        more.extend([tiles.clone(), "--tile={{Task.Param.Tile}}".to_owned()]);
-    }
-    let after = Some(if options.snapshots { "Snapshots" } else { "Check" });
-    let (space, arguments) = (&parameter_space(options), &command(words, &more));
-    template.step(&Step { name: "Frames", after, space, arguments, ..step });
-    let more: Vec<String> =
-        [all.to_owned()].into_iter().chain(tiles).chain(product_arguments(&options.products)?).collect();
-    let arguments = &command(&["farm", "finish"], &more);
-    let memory_bytes = options.finish_memory_bytes;
-    template.step(&Step { name: "Finish", after: Some("Frames"), memory_bytes, arguments, ..step });
-    Ok(())
+    let Some(tiles) = tiles_option(options) else { return command(options, &["render"], more) };
+    more.extend([tiles, "--tile={{Task.Param.Tile}}".to_owned()]);
+    command(options, &["farm", "tile"], more)
+}
+
+fn finish_command(options: &TemplateOptions) -> Result<Vec<String>, FarmError> {
+    let more = [ALL_FRAMES.to_owned()].into_iter().chain(tiles_option(options));
+    command(options, &["farm", "finish"], more.chain(product_arguments(&options.products)?).collect())
 }
 
 /// The tasks of the step that draws: chunks of frames, and each tile of them.
@@ -294,8 +310,8 @@ mod tests {
             "specificationVersion: jobtemplate-2023-09\nextensions: [TASK_CHUNKING]\nname: \"wet street\"\n",
             "    default: \"a \\\"b\\\".toml\"\n",
             "  - name: Snapshots\n    dependencies:\n      - dependsOn: Check\n",
-            "  - name: Frames\n    dependencies:\n      - dependsOn: Snapshots\n",
-            "  - name: Finish\n    dependencies:\n      - dependsOn: Frames\n",
+            "  - name: Frames\n    dependencies:\n      - dependsOn: Check\n      - dependsOn: Snapshots\n    host",
+            "  - name: Finish\n    dependencies:\n      - dependsOn: Check\n      - dependsOn: Frames\n    host",
             "          type: CHUNK[INT]\n          range: \"{{Param.Frames}}\"\n",
             "            - \"--set=a.b=\\\"c\\\"\"\n",
             "            - \"--film={{Param.OutputFolder}}/a.apng\"\n",
@@ -308,7 +324,7 @@ mod tests {
         let products = Products::default();
         let alone = template(&TemplateOptions { snapshots: false, scene: None, products, ..options() }).unwrap();
         assert!(!alone.contains("Snapshot") && !alone.contains("states") && !alone.contains("--film"), "{alone}");
-        assert!(alone.contains("  - name: Frames\n    dependencies:\n      - dependsOn: Check\n"), "{alone}");
+        assert!(alone.contains("  - name: Frames\n    dependencies:\n      - dependsOn: Check\n    host"), "{alone}");
     }
 
     #[test]

@@ -187,6 +187,7 @@ fn the_last_job_makes_the_flipbook_of_the_command() {
         (&["--flipbook", "a.png"][..], "--flipbook-grid"),
         (&["--flipbook", "a.gif", "--flipbook-grid", "2x2"], "NAME.png or NAME.exr"),
         (&["--film", "a.png"], "no film"),
+        (&["--size", "16384x64", "--contact-sheet", "4"], "allowed: up to"),
     ] {
         let refused = plan(&folder, options);
         assert_eq!(refused.code, Some(2), "{options:?}: {}", refused.stderr);
