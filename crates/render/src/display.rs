@@ -6,20 +6,12 @@ use bansho_base::{
     host::observer::Cancelled,
 };
 
+pub use bansho_base::color::BitDepth;
+
 use crate::{
     composite::strips::{self, Composition},
     pixels::{Background, CodeConversion, write_codes},
 };
-
-bansho_base::choice! {
-    /// Bits of each channel of a display format.
-    pub enum BitDepth {
-        /// 8 bits, dithered.
-        Eight = "8",
-        /// 16 bits.
-        Sixteen = "16",
-    }
-}
 
 /// How the light of a frame becomes display pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,15 +4,13 @@
 //! [`CompiledScene::state_fingerprint`](crate::CompiledScene::state_fingerprint).
 
 use bansho_base::{
-    color::AlphaConvention,
+    color::{AlphaConvention, BitDepth},
     host::assets::Assets,
     parameters::{Parameters, Table, Value},
     world::obstacle::ObstacleParameters,
     world::sky::SkyParameters,
 };
 use bansho_environment::ground::GroundParameters;
-
-use crate::display::BitDepth;
 use bansho_scene::{Instance, LightParameters, Scene};
 
 /// A hash of everything that something depends on.

@@ -147,10 +147,13 @@ impl TaskCheck<'_> {
 
 #[cfg(test)]
 mod tests {
+    #[cfg(feature = "fire")]
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    #[cfg(feature = "fire")]
+    use bansho_base::host::observer::Stage;
     use bansho_base::{
-        host::observer::{Stage, Unobserved},
+        host::observer::Unobserved,
         math::simd::{VectorLevel, set_vector_level},
     };
 
@@ -187,6 +190,7 @@ mod tests {
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
     }
 
+    #[cfg(feature = "fire")]
     #[test]
     fn a_machine_draws_the_picture_once_for_a_plan() {
         let root = tempfile::tempdir().unwrap();
@@ -213,9 +217,11 @@ mod tests {
     }
 
     /// Counts the stages that begin.
+    #[cfg(feature = "fire")]
     #[derive(Default)]
     struct StageCounter(AtomicUsize);
 
+    #[cfg(feature = "fire")]
     impl Observer for StageCounter {
         fn begin(&self, _stage: Stage) {
             self.0.fetch_add(1, Ordering::Relaxed);

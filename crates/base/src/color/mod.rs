@@ -20,7 +20,7 @@ pub mod white_balance;
 pub use blackbody::{BlackBody, black_body};
 pub use display::{
     alpha::{AlphaConvention, AlphaMode},
-    quantize::DisplayCode,
+    quantize::{BitDepth, DisplayCode},
     transfer::{decode_srgb, decode_srgb8, encode_srgb},
     view::{UnknownView, View},
 };

@@ -203,8 +203,6 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use bansho_base::{host::observer::Unobserved, phenomenon::SnapshotError};
     use bansho_render::RenderError;
 
@@ -330,6 +328,8 @@ mod tests {
     #[test]
     #[cfg(feature = "fire")]
     fn states_of_the_renderer_carry_the_mark() {
+        use std::sync::Arc;
+
         use bansho_base::host::assets::MemoryAssets;
         use bansho_media::files::provenance;
         use bansho_render::{PlanOptions, Shot};

@@ -3,6 +3,16 @@
 use super::transfer::{clamp_unit, encode_srgb};
 use crate::math::{MulAdd, approximations};
 
+crate::choice! {
+    /// Bits of each channel of a display format.
+    pub enum BitDepth {
+        /// 8 bits, dithered.
+        Eight = "8",
+        /// 16 bits.
+        Sixteen = "16",
+    }
+}
+
 /// An integer type for the codes of display components.
 pub trait DisplayCode: Copy + Default + sealed::Sealed {
     /// The code of full light, as a float.
