@@ -96,12 +96,13 @@ pub fn check_scene(scene: &SceneFile) -> Result<(Arc<CompiledScene>, Plan), JobE
         &scene.assets(),
     )?;
     let plan = Plan::new(&compiled, &PlanOptions::default())?;
-    // With the overscan, which EXR files have.
+    // With the overscan, which only EXR files have.
     let with_overscan = PlanOptions { overscan: true, ..PlanOptions::default() };
     let with_overscan =
         Plan::with_exposure_and_loop_start(plan.scene().clone(), &with_overscan, plan.exposure_ev100, plan.loop_start)?;
     let frames = (plan.frames().end - plan.frames().start) as usize;
-    let request = MemoryRequest { frames, tiles: 0, display: Some(BitDepth::Eight), size_is_option: false };
+    let display = (with_overscan.overscan() == 0).then_some(BitDepth::Eight);
+    let request = MemoryRequest { frames, tiles: 0, display, size_is_option: false };
     memory::check(scene, &compiled, &with_overscan, request)?;
     plates::check(scene, &compiled, &plan.frames().collect::<Vec<_>>())?;
     Ok((compiled, plan))
