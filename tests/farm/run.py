@@ -4,8 +4,8 @@
     run.py PROGRAM [--long] [--frames AURORA,RAIN] [--report FILE]
 
 An aurora, which is simulated and so needs snapshots, runs undisturbed, and its CPU time is compared with that of one process; then one of its tasks is
-killed. Rain loses a node in the middle of a chunk, one task is requeued, one node is drained, and the disk is full once. With --long both have at least
-ten minutes of CPU time each way, and both are disturbed.
+killed. Rain loses a node in the middle of a chunk, one task is requeued, one node is drained, and the disk is full once. With --long there are as many
+frames as take one process ten minutes of CPU time, and both shots are disturbed.
 """
 
 import argparse
@@ -13,15 +13,18 @@ import collections
 import errno
 import hashlib
 import json
+import math
 import os
 import pathlib
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
 import time
+import zlib
 
 from cluster import Cluster, why_not
 
@@ -36,7 +39,9 @@ MAX_CPU_RATIO = 1.10
 START_S = 0.3
 # Free space that a full disk is left with, bytes.
 LEFT_FREE = 200_000
-DISK_MIB = {False: 1024, True: 6144}
+DISK_MIB = {False: 1024, True: 10240}
+# CPU time that one process takes for the frames of each shot of a long run, s.
+LONG_SHOT_S = 310.0
 
 failures: list[str] = []
 report: list[str] = []
@@ -140,13 +145,30 @@ def journaled_frames(out: pathlib.Path) -> collections.Counter:
 
 
 def plays(film: pathlib.Path, frames: int) -> bool:
-    """Whether a film can be decoded, with all its frames."""
-    if not shutil.which("ffprobe"):
-        data = film.read_bytes()
-        at = data.find(b"acTL")
-        return at > 0 and int.from_bytes(data[at + 4 : at + 8], "big") == frames
+    """Whether a film is whole, with all its frames: an APNG by its chunks, since ffprobe ends after 2 GiB of one, any other by decoding it."""
+    if film.suffix == ".apng":
+        return apng_frames(film) == frames
     line = ["ffprobe", "-v", "error", "-count_frames", "-select_streams", "v", "-show_entries", "stream=nb_read_frames", "-of", "csv=p=0", str(film)]
     return subprocess.run(line, capture_output=True, text=True).stdout.strip().rstrip(",") == str(frames)
+
+
+def apng_frames(film: pathlib.Path) -> int | None:
+    """Number of frames of an APNG that ends as it should, has as many as it states, and whose chunks have no wrong sums."""
+    stated, found = None, 0
+    with open(film, "rb") as file:
+        if file.read(8) != b"\x89PNG\r\n\x1a\n":
+            return None
+        while header := file.read(8):
+            length, kind = struct.unpack(">I4s", header)
+            data, check = file.read(length), file.read(4)
+            if check != struct.pack(">I", zlib.crc32(data, zlib.crc32(kind))):
+                return None
+            if kind == b"acTL":
+                stated = int.from_bytes(data[:4], "big")
+            found += kind == b"fcTL"
+            if kind == b"IEND":
+                return found if found == stated and not file.read(1) else None
+    return None
 
 
 def undisturbed(shot: Shot, cluster: Cluster, is_strict: bool) -> None:
@@ -343,15 +365,39 @@ def main() -> int:
     return int(bool(failures))
 
 
+def aurora_of(frames: int) -> str:
+    """The scene of an aurora, which is simulated."""
+    return PICTURE.format(width=1280, height=720, frames=frames) + AURORA.format(particles=1500)
+
+
+def rain_of(frames: int) -> str:
+    """The scene of rain, which is not."""
+    return RAIN.read_text().replace(RAIN_FRAMES, f"frames = {frames}\n")
+
+
+def frames_worth(program: str, folder: pathlib.Path, scene, seconds: float) -> int:
+    """How many frames of a scene take one process that much CPU time, by the cost of a few."""
+    measured = 60
+    folder.mkdir()
+    (folder / "scene.toml").write_text(scene(measured))
+    used = cpu_seconds()
+    line = [program, "render", str(folder / "scene.toml"), "-o", str(folder / "a.####.png"), "--threads", "1", "--progress", "none"]
+    subprocess.run(line, check=True)
+    frames = math.ceil(measured * seconds / (cpu_seconds() - used))
+    shutil.rmtree(folder)
+    return frames
+
+
 def prove(program: str, folder: pathlib.Path, disk: pathlib.Path, cluster: Cluster, arguments: argparse.Namespace) -> None:
     """All shots."""
     is_long = arguments.long
-    frames = arguments.frames or ((3000, 800) if is_long else (160, 32))
-    aurora = PICTURE.format(width=1280, height=720, frames=frames[0]) + AURORA.format(particles=1500)
-    rain = RAIN.read_text().replace(RAIN_FRAMES, f"frames = {frames[1]}\n")
+    scenes = {"aurora": aurora_of, "rain": rain_of}
+    frames = arguments.frames or (160, 32)
+    if is_long and not arguments.frames:
+        frames = [frames_worth(program, folder / f"measure-{name}", scene, LONG_SHOT_S) for name, scene in scenes.items()]
     shots = [
-        Shot(program, "aurora", aurora, frames[0] // 4, folder / "aurora"),
-        Shot(program, "rain", rain, frames[1] // 8, folder / "rain"),
+        Shot(program, name, scene(count), max(count // chunks, 1), folder / name)
+        for (name, scene), count, chunks in zip(scenes.items(), frames, (4, 8))
     ]
     for shot in shots:
         shot.render_alone()
