@@ -21,9 +21,12 @@ use bansho_base::{
     world::sky::Sky,
 };
 
+mod depth_pyramid;
 mod ray_march;
+mod screen_ray;
 
 use super::plate::PlateFrame;
+use depth_pyramid::DepthPyramid;
 use ray_march::RayMarch;
 
 /// Side of a pixel of the backdrop, pixels of the picture.
@@ -54,7 +57,8 @@ pub(crate) fn mirrored(
     observer: &dyn Observer,
 ) -> Result<PlateFrame, Cancelled> {
     let Some(color) = &plate.color else { return Ok(PlateFrame::default()) };
-    let march = RayMarch { color, depth: plate.depth.as_ref(), camera, mirror, exposure };
+    let pyramid = plate.depth.as_ref().map(DepthPyramid::new);
+    let march = RayMarch { color, depth: plate.depth.as_ref(), pyramid: pyramid.as_ref(), camera, mirror, exposure };
     let [width, rows] = [color.width(), color.height()].map(|side| side.div_ceil(pixel_size));
     let mut radiance = Image::filled(width, rows, [0.0; 4]);
     let mut depth = Image::filled(width, rows, [f32::INFINITY]);
@@ -143,6 +147,7 @@ mod tests {
     use bansho_base::{
         camera::CameraParameters,
         host::observer::Unobserved,
+        math::random::{Key, Purpose},
         phenomenon::{MirrorRoughness, strip::Shutter},
         world::sky::{SkyKind, SkyParameters},
     };
@@ -229,6 +234,46 @@ mod tests {
             assert!(right > 7_000, "{right}");
             let fraction = f64::from(wrong) / f64::from(right);
             assert!(fraction < limit, "{vertical_fov_deg} degrees, roll {roll}: {fraction}");
+        }
+    }
+
+    /// A plate of blocks at random depths, some infinitely far and some unknown.
+    fn blocks(view: &View) -> PlateFrame {
+        let random = Key::new(3, "blocks");
+        let mut plate = plate(view);
+        for (index, depth) in plate.depth.as_mut().unwrap().pixels_mut().iter_mut().enumerate() {
+            let block = index / SIZE[0] / 9 * SIZE[0] + index % SIZE[0] / 7;
+            let [kind, near, ..] = random.uniforms(block as u64, 0, Purpose::named("depth"));
+            depth[0] = match kind {
+                0.0..0.1 => depth[0] * near,
+                0.1..0.15 => f32::INFINITY,
+                0.15..0.2 => f32::NAN,
+                _ => depth[0],
+            };
+        }
+        plate
+    }
+
+    #[test]
+    fn rays_that_pass_whole_tiles_meet_what_those_with_every_sample_meet() {
+        for (roll, vertical_fov_deg) in [(0.0, 32.0), (4.0, 60.0), (90.0, 60.0), (-130.0, 90.0), (180.0, 20.0)] {
+            let view = view(roll, vertical_fov_deg);
+            for plate in [plate(&view), blocks(&view)] {
+                let (color, depth) = (plate.color.as_ref().unwrap(), plate.depth.as_ref());
+                let pyramid = DepthPyramid::new(depth.unwrap());
+                let march =
+                    |pyramid| RayMarch { color, depth, pyramid, camera: &view.camera, mirror: WET, exposure: EXPOSURE };
+                let (every, tiles) = (march(None), march(Some(&pyramid)));
+                let mut reflections = 0;
+                for index in 0..SIZE[0] * SIZE[1] {
+                    let pixel = DVec2::new((index % SIZE[0]) as f64, (index / SIZE[0]) as f64) + 0.5;
+                    let expected = every.reflected(pixel);
+                    reflections += usize::from(expected.is_some());
+                    let found = tiles.reflected(pixel);
+                    assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{roll} {vertical_fov_deg} {pixel}");
+                }
+                assert!(reflections > 2_000, "{reflections}");
+            }
         }
     }
 

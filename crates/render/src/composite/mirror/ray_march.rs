@@ -1,10 +1,17 @@
 //! Reflected rays marched through a plate's own picture until they meet a surface there: screen-space reflections (McGuire & Mara 2014).
+//!
+//! A ray in front of everything in a tile of the picture passes the tile without a sample in it, with the same result.
 
 use bansho_base::{
     camera::{Camera, Lens},
     image::Image,
     math::{DVec2, DVec3},
     phenomenon::LevelMirror,
+};
+
+use super::{
+    depth_pyramid::{DepthPyramid, TileWalk},
+    screen_ray::ScreenRay,
 };
 
 /// Distance between samples of a ray, pixels.
@@ -16,10 +23,13 @@ const SAMPLE_COUNTS: [f64; 2] = [16.0, 4096.0];
 const DEPTH_JUMP: f64 = 0.03;
 /// Distance that stands for infinity, m.
 const FAR_M: f64 = 1e6;
+
 /// A plate through which reflected rays are marched.
 pub(super) struct RayMarch<'a> {
     pub(super) color: &'a Image<4>,
     pub(super) depth: Option<&'a Image<1>>,
+    /// The pyramid of the depth; without it, every sample of a ray is taken.
+    pub(super) pyramid: Option<&'a DepthPyramid>,
     pub(super) camera: &'a Camera,
     pub(super) mirror: LevelMirror,
     pub(super) exposure: f32,
@@ -34,13 +44,6 @@ struct ReflectedRay {
     on_screen: Option<ScreenRay>,
 }
 
-/// A ray in the picture of a perspective camera, where it is straight: its pixel at t is `origin + t * step`, its depth `depth / (1 - t)`.
-struct ScreenRay {
-    origin: DVec2,
-    step: DVec2,
-    depth: f64,
-}
-
 /// The point where a ray meets a surface of the plate.
 struct Hit {
     pixel: DVec2,
@@ -49,6 +52,7 @@ struct Hit {
 }
 
 /// The reflection at one pixel.
+#[derive(Debug)]
 pub(super) struct Reflected {
     /// Radiance and coverage.
     pub(super) radiance: [f32; 4],
@@ -125,12 +129,19 @@ impl RayMarch<'_> {
             Some(screen) => screen.step.length(),
             None => end().map_or(SAMPLE_COUNTS[1] * 0.25, |end| (end.pixel - start).length()),
         };
-        let count = (length / STRIDE).ceil().clamp(SAMPLE_COUNTS[0], SAMPLE_COUNTS[1]);
+        let count = (length / STRIDE).ceil().clamp(SAMPLE_COUNTS[0], SAMPLE_COUNTS[1]) as usize;
         let mut before = self.sample(ray, 0.0)?;
         // The last sample before the ray passed behind a nearer object; `None` while it is in front of the plate.
         let mut hidden_since: Option<RaySample> = None;
-        for step in 1..count as usize {
-            let Some(sample) = self.sample(ray, step as f64 / count) else { break };
+        let mut tiles =
+            self.pyramid.zip(ray.on_screen.as_ref()).map(|(pyramid, ray)| TileWalk::new(pyramid, ray, count));
+        let mut step = 0;
+        while step + 1 < count {
+            step += 1;
+            if let Some(tiles) = tiles.as_mut().filter(|_| hidden_since.is_none()) {
+                step = tiles.last_in_front(step).unwrap_or(step);
+            }
+            let Some(sample) = self.sample(ray, step as f64 / count as f64) else { break };
             if sample.depth > sample.plate_depth && self.is_above_mirror(sample.pixel, sample.plate_depth) {
                 // The tolerance is for the mirror itself, whose depth in the plate may differ a little from its true one.
                 if hidden_since.is_none()
@@ -155,7 +166,7 @@ impl RayMarch<'_> {
     /// The sample of a ray at `t`; `None` outside the picture.
     fn sample(&self, ray: &ReflectedRay, t: f64) -> Option<RaySample> {
         let (pixel, depth) = match &ray.on_screen {
-            Some(screen) => (screen.origin + screen.step * t, screen.depth / (1.0 - t)),
+            Some(screen) => (screen.pixel(t), screen.depth(t)),
             None => {
                 let projected = self.camera.project(ray.at(t))?;
                 (projected.pixel, projected.depth)
