@@ -9,7 +9,7 @@ use bansho_base::{
 pub use bansho_base::color::BitDepth;
 
 use crate::{
-    composite::strips::{self, Composition},
+    composite::{composition::Composition, strips},
     pixels::{Background, CodeConversion, write_codes},
 };
 

@@ -2,6 +2,8 @@
 
 mod accumulate;
 pub(crate) mod background;
+mod channels;
+pub(crate) mod composition;
 mod frame_memory;
 pub(crate) mod hiding;
 pub(crate) mod mirror;

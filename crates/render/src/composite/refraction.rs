@@ -9,10 +9,7 @@ use bansho_base::{
     phenomenon::Deflection,
 };
 
-use super::{
-    background::Background,
-    strips::{self, Composition},
-};
+use super::{background::Background, composition::Composition, strips};
 
 /// Draws and composites the whole window, with refraction.
 pub(crate) fn draw_frame(

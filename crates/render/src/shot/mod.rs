@@ -29,13 +29,14 @@ use crate::{
     compiled::{ActiveRun, CompiledScene},
     composite::{
         background::Background,
+        composition::{self, Composition, Outputs, StripScratches},
         hiding::HidingDepth,
         mirror::Mirror,
         plate::PlateFrame,
         plate_cache::PlateCache,
         refraction,
         slices::{self, Slice},
-        strips::{self, Composition, Outputs, StripScratches},
+        strips,
     },
     context::ShotContext,
     display::{DisplayFrame, DisplayOptions},
@@ -93,7 +94,7 @@ impl Shot {
             has_earlier_state: false,
             frame: None,
             recycled: None,
-            scratches: strips::scratches(),
+            scratches: composition::scratches(),
         }
     }
 

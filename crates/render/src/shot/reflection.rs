@@ -15,10 +15,11 @@ use crate::{
     compiled::ActiveRun,
     composite::{
         background::Background,
+        composition::{Composition, Outputs},
         hiding::HidingDepth,
         mirror::{self, BACKDROP_SAMPLE, Mirror},
         plate::PlateFrame,
-        strips::{self, Composition, Outputs},
+        strips,
     },
 };
 

@@ -1,0 +1,251 @@
+//! A frame that is ready to be composited, and the accumulation of its slices in one strip.
+
+use bansho_base::{
+    host::{
+        observer::{Observer, PartGuard, Stage, StagePart},
+        scratch_pool::ScratchPool,
+    },
+    image::{Image, Rect},
+    phenomenon::{
+        PlateRole, Prepared,
+        strip::{Strip, View},
+    },
+};
+use fearless_simd::Level;
+
+use super::{
+    accumulate::Accumulator,
+    background::{Background, BentPixels},
+    hiding::HidingDepth,
+    plate::PlateFrame,
+    slices::Slice,
+};
+use crate::{compiled::ActiveRun, plan::Plan};
+
+/// Rows of a strip: few enough that the planes of a strip of 1920 pixels fit in the L2 cache of a core.
+pub(crate) const STRIP_ROWS: usize = 8;
+
+/// What a frame contains.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outputs {
+    /// Factor from absolute radiance to exposed values.
+    pub(crate) exposure: f32,
+    /// Whether each phenomenon gets a layer of its own.
+    pub(crate) layers: bool,
+    /// Whether AOVs are written.
+    pub(crate) aovs: bool,
+    /// Whether the depth of each pixel is needed.
+    pub(crate) depth: bool,
+}
+
+impl Outputs {
+    /// As the plan requests.
+    pub(crate) fn of_plan(plan: &Plan) -> Self {
+        let depth = plan.depth || plan.layers || plan.aovs;
+        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs, depth }
+    }
+
+    /// Whether more than the color and the alpha of a display picture is needed of the frame.
+    pub(crate) fn needs_light(&self) -> bool {
+        self.layers || self.aovs || self.depth
+    }
+
+    /// Absolute radiance without layers and AOVs.
+    pub(crate) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false, depth: false };
+}
+
+/// A frame that is ready to be composited.
+#[derive(Clone, Copy)]
+pub(crate) struct Composition<'a> {
+    pub(crate) outputs: Outputs,
+    /// Whether it is the reflection in a mirror.
+    pub(crate) is_mirrored: bool,
+    pub(crate) observer: &'a dyn Observer,
+    pub(crate) view: &'a View,
+    /// The phenomena, to which members of slices refer.
+    pub(crate) runs: &'a [&'a ActiveRun],
+    pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
+    pub(crate) slices: &'a [Slice],
+    pub(crate) plate: &'a PlateFrame,
+    /// What hides phenomena.
+    pub(crate) hiding: &'a HidingDepth,
+    /// What hides those that are seen through the plate's transparency; `None` where there are none.
+    pub(crate) through: Option<&'a HidingDepth>,
+    /// What is behind the slices.
+    pub(crate) background: Background<'a>,
+    /// Scratch memory, which frames reuse.
+    pub(crate) scratches: &'a StripScratches,
+}
+
+/// Scratch memory of all threads.
+pub(crate) type StripScratches = ScratchPool<StripScratch, fn() -> StripScratch>;
+
+/// Scratch memory of all threads, before any is needed.
+pub(crate) fn scratches() -> StripScratches {
+    ScratchPool::new(StripScratch::default)
+}
+
+/// Scratch memory of one thread.
+#[derive(Default)]
+pub(crate) struct StripScratch {
+    strip: Strip,
+    pub(super) accumulator: Accumulator,
+    /// What partly covered pixels show without the opaque surfaces.
+    uncovered: Accumulator,
+    /// What transparent pixels of the plate show without the plate.
+    unplated: Accumulator,
+    /// The refracted pixels of the background.
+    pub(super) bent: BentPixels,
+    /// A row of refracted colors.
+    pub(super) row: Vec<[f32; 4]>,
+    /// The light of a strip of which only display codes are kept.
+    pub(super) light: Vec<[f32; 4]>,
+}
+
+impl<'a> Composition<'a> {
+    /// The rectangle of the strip with this index.
+    pub(super) fn strip_rect(&self, index: usize) -> Rect {
+        let window = self.view.window;
+        let y = index * STRIP_ROWS;
+        Rect { x: window.x, y: window.y + y, width: window.width, height: STRIP_ROWS.min(window.height - y) }
+    }
+
+    /// The rectangle of a strip that must be drawn: the bounds of the phenomena, or the whole strip where there is a background or where layers
+    /// or AOVs are requested.
+    pub(super) fn nonempty_rect(&self, rect: Rect) -> Rect {
+        if self.background.color.is_some() || self.outputs.layers || self.outputs.aovs {
+            return rect;
+        }
+        let touched = |slice: &Slice| {
+            let each = slice.members.iter().map(|&member| self.prepared[member].bounds(&slice.interval));
+            each.fold(Rect::default(), |all, bounds| all.union(&bounds.intersection(&rect)))
+        };
+        self.slices.iter().map(touched).fold(Rect::default(), |all, rect| all.union(&rect))
+    }
+
+    /// The rectangle of the frame outside of which all pixels are empty, in pixels of the frame.
+    pub(super) fn content(&self) -> Rect {
+        let window = self.view.window;
+        let strips = 0..window.height.div_ceil(STRIP_ROWS);
+        let all = strips.map(|index| self.nonempty_rect(self.strip_rect(index)));
+        let bounds = all.fold(Rect::default(), |all, rect| all.union(&rect));
+        Rect { x: bounds.x.saturating_sub(window.x), y: bounds.y.saturating_sub(window.y), ..bounds }
+    }
+
+    /// Begins the drawing of a phenomenon or, without a name, compositing.
+    pub(super) fn begin_part(&self, phenomenon: Option<&'a str>) -> PartGuard<'a> {
+        let part = StagePart { stage: Stage::Draw, phenomenon, is_mirrored: self.is_mirrored };
+        PartGuard::begin(self.observer, part)
+    }
+
+    /// Whether a plate fills the picture, so that it is opaque.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.plate.color.is_some() && !self.plate.is_transparent && self.view.overscan == 0
+    }
+
+    fn layer_count(&self) -> usize {
+        if self.outputs.layers { self.runs.len() } else { 0 }
+    }
+
+    fn aov_counts(&self) -> Vec<usize> {
+        if !self.outputs.aovs {
+            return Vec::new();
+        }
+        self.runs.iter().map(|run| run.info().aovs.len()).collect()
+    }
+
+    /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first. Where the plate is transparent, what those pixels show without the
+    /// plate is mixed in.
+    pub(super) fn accumulate(&self, level: Level, rect: Rect, scratch: &mut StripScratch) {
+        let StripScratch { strip, accumulator, uncovered, unplated, .. } = scratch;
+        self.accumulate_covered(level, rect, Pass::before_plate(self), strip, uncovered, accumulator);
+        let (Some(hiding), Some(color)) = (self.through, &self.plate.color) else { return };
+        let transparency = |x: usize, y: usize| 1.0 - color.at(x, y)[3];
+        let Some(clear) = transparent_rect(rect, transparency) else { return };
+        self.accumulate_covered(level, clear, Pass::without_plate(hiding), strip, uncovered, unplated);
+        accumulator.add_through(unplated, transparency);
+    }
+
+    /// Draws the slices within `rect` into an accumulator. Where opaque surfaces cover pixels partly, what those show without the surfaces is mixed in.
+    fn accumulate_covered(
+        &self,
+        level: Level,
+        rect: Rect,
+        pass: Pass,
+        strip: &mut Strip,
+        uncovered: &mut Accumulator,
+        accumulator: &mut Accumulator,
+    ) {
+        self.accumulate_with(level, rect, pass, strip, accumulator);
+        for edge in pass.hiding.edges(rect) {
+            self.accumulate_with(level, edge, Pass { with_opaque: false, ..pass }, strip, uncovered);
+            accumulator.mix(uncovered, |x, y| pass.hiding.coverage(x, y));
+        }
+    }
+
+    /// Draws the slices within `rect` into an accumulator, in one pass.
+    fn accumulate_with(&self, level: Level, rect: Rect, pass: Pass, strip: &mut Strip, accumulator: &mut Accumulator) {
+        let aovs = if pass.with_aovs && pass.with_opaque { self.aov_counts() } else { Vec::new() };
+        accumulator.reset(rect, self.layer_count(), &aovs);
+        for slice in self.slices {
+            for &member in &slice.members {
+                let prepared = &self.prepared[member];
+                let is_left_out = !pass.with_opaque && pass.hiding.is_opaque(member);
+                if is_left_out || Some(prepared.plate_role()) == pass.skipped {
+                    continue;
+                }
+                let aov_count = aovs.get(member).copied().unwrap_or(0);
+                let touched = prepared.bounds(&slice.interval).intersection(&rect);
+                if touched.is_empty() {
+                    continue;
+                }
+                // AOV planes are added as a whole, so strips with AOVs have the full size.
+                let drawn = if aov_count > 0 { rect } else { touched };
+                match pass.hiding.depth_for(member, pass.with_opaque, pass.plate_depth) {
+                    Some(image) => strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
+                    None => strip.reset(drawn, None, aov_count),
+                }
+                {
+                    let _part = self.begin_part(Some(self.runs[member].info().name));
+                    prepared.draw(&slice.interval, strip);
+                }
+                accumulator.add_behind(level, strip, member, self.runs[member].info().aovs);
+            }
+        }
+    }
+}
+
+/// Which phenomena are drawn, and what hides them.
+#[derive(Clone, Copy)]
+struct Pass<'a> {
+    hiding: &'a HidingDepth,
+    plate_depth: Option<&'a Image<1>>,
+    /// Phenomena of this role are left out.
+    skipped: Option<PlateRole>,
+    /// Whether there are opaque surfaces.
+    with_opaque: bool,
+    /// Whether AOVs are measured.
+    with_aovs: bool,
+}
+
+impl<'a> Pass<'a> {
+    /// What is before the plate, or before its depth.
+    fn before_plate(composition: &Composition<'a>) -> Self {
+        let (hiding, plate) = (composition.hiding, composition.plate);
+        let skipped = plate.color.as_ref().map(|_| PlateRole::Behind);
+        Self { hiding, plate_depth: plate.depth.as_ref(), skipped, with_opaque: true, with_aovs: true }
+    }
+
+    /// What is seen without the plate.
+    fn without_plate(hiding: &'a HidingDepth) -> Self {
+        Self { hiding, plate_depth: None, skipped: Some(PlateRole::Part), with_opaque: true, with_aovs: false }
+    }
+}
+
+/// The columns of `rect` from the first to the last that are transparent somewhere.
+fn transparent_rect(rect: Rect, transparency: impl Fn(usize, usize) -> f32) -> Option<Rect> {
+    let is_transparent = |x: &usize| (rect.y..rect.bottom()).any(|y| transparency(*x, y) > 0.0);
+    let first = (rect.x..rect.right()).find(is_transparent)?;
+    let last = (first..rect.right()).rfind(is_transparent)?;
+    Some(Rect { x: first, width: last + 1 - first, ..rect })
+}
