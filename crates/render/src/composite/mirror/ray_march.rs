@@ -1,6 +1,6 @@
 //! Reflected rays marched through a plate's own picture until they meet a surface there: screen-space reflections (McGuire & Mara 2014).
 //!
-//! A ray in front of everything in a tile of the picture passes the tile without a sample in it, with the same result.
+//! Tiles of the picture in which a ray cannot hit anything are skipped, which changes no result ([`depth_pyramid`](super::depth_pyramid)).
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -10,8 +10,8 @@ use bansho_base::{
 };
 
 use super::{
-    depth_pyramid::{DepthPyramid, TileWalk},
-    screen_ray::ScreenRay,
+    depth_pyramid::{DepthPyramid, TileTraversal},
+    screen_ray::{ScreenRay, parameter},
 };
 
 /// Distance between samples of a ray, pixels.
@@ -28,7 +28,7 @@ const FAR_M: f64 = 1e6;
 pub(super) struct RayMarch<'a> {
     pub(super) color: &'a Image<4>,
     pub(super) depth: Option<&'a Image<1>>,
-    /// The pyramid of the depth; without it, every sample of a ray is taken.
+    /// The pyramid of the depth; without it no tiles are skipped.
     pub(super) pyramid: Option<&'a DepthPyramid>,
     pub(super) camera: &'a Camera,
     pub(super) mirror: LevelMirror,
@@ -134,14 +134,14 @@ impl RayMarch<'_> {
         // The last sample before the ray passed behind a nearer object; `None` while it is in front of the plate.
         let mut hidden_since: Option<RaySample> = None;
         let mut tiles =
-            self.pyramid.zip(ray.on_screen.as_ref()).map(|(pyramid, ray)| TileWalk::new(pyramid, ray, count));
+            self.pyramid.zip(ray.on_screen.as_ref()).map(|(pyramid, ray)| TileTraversal::new(pyramid, ray, count));
         let mut step = 0;
         while step + 1 < count {
             step += 1;
             if let Some(tiles) = tiles.as_mut().filter(|_| hidden_since.is_none()) {
-                step = tiles.last_in_front(step).unwrap_or(step);
+                step = tiles.skip(step).unwrap_or(step);
             }
-            let Some(sample) = self.sample(ray, step as f64 / count as f64) else { break };
+            let Some(sample) = self.sample(ray, parameter(step, count)) else { break };
             if sample.depth > sample.plate_depth && self.is_above_mirror(sample.pixel, sample.plate_depth) {
                 // The tolerance is for the mirror itself, whose depth in the plate may differ a little from its true one.
                 if hidden_since.is_none()
