@@ -147,11 +147,6 @@ impl TaskCheck<'_> {
 
 #[cfg(test)]
 mod tests {
-    #[cfg(feature = "fire")]
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
-    #[cfg(feature = "fire")]
-    use bansho_base::host::observer::Stage;
     use bansho_base::{
         host::observer::Unobserved,
         math::simd::{VectorLevel, set_vector_level},
@@ -190,6 +185,7 @@ mod tests {
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
     }
 
+    // Without a phenomenon there is no picture.
     #[cfg(feature = "fire")]
     #[test]
     fn a_machine_draws_the_picture_once_for_a_plan() {
@@ -198,9 +194,9 @@ mod tests {
         let good = FarmPlan { arithmetic: arithmetic_digest(&Unobserved).unwrap(), ..plan() };
         folder.write_plan(&good).unwrap();
         let draws = |token: &str, machine: Option<&str>| {
-            let picture = StageCounter::default();
-            TaskCheck { folder: &folder, token, machine }.plan(&picture).unwrap();
-            picture.0.into_inner() > 0
+            let observer = crate::job::testing::RecordingObserver::default();
+            TaskCheck { folder: &folder, token, machine }.plan(&observer).unwrap();
+            observer.stages.into_inner() > 0
         };
         assert!(draws("0123", Some("a-1")));
         assert!(!draws("0123", Some("a-1")));
@@ -214,21 +210,5 @@ mod tests {
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
         folder.write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good }).unwrap();
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Version { .. })));
-    }
-
-    /// Counts the stages that begin.
-    #[cfg(feature = "fire")]
-    #[derive(Default)]
-    struct StageCounter(AtomicUsize);
-
-    #[cfg(feature = "fire")]
-    impl Observer for StageCounter {
-        fn begin(&self, _stage: Stage) {
-            self.0.fetch_add(1, Ordering::Relaxed);
-        }
-
-        fn cancelled(&self) -> bool {
-            false
-        }
     }
 }

@@ -18,7 +18,7 @@ pub(crate) mod sheet;
 #[cfg(feature = "rain")]
 mod streaks;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 use std::path::PathBuf;
 

@@ -2,7 +2,7 @@
 
 use std::sync::{
     Arc, Mutex,
-    atomic::{AtomicBool, Ordering},
+    atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
 use bansho_base::{
@@ -104,10 +104,14 @@ pub(crate) fn blank(plan: &Plan, number: i64) -> Frame {
 pub(crate) struct RecordingObserver {
     pub(crate) warnings: Mutex<Vec<Warning>>,
     pub(crate) stop: AtomicBool,
+    /// Number of stages that began.
+    pub(crate) stages: AtomicUsize,
 }
 
 impl Observer for RecordingObserver {
-    fn begin(&self, _stage: Stage) {}
+    fn begin(&self, _stage: Stage) {
+        self.stages.fetch_add(1, Ordering::Relaxed);
+    }
 
     fn cancelled(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
