@@ -10,6 +10,7 @@ frames as take one process ten minutes of CPU time, and both shots are disturbed
 
 import argparse
 import collections
+import collections.abc
 import errno
 import hashlib
 import json
@@ -145,7 +146,7 @@ def journaled_frames(out: pathlib.Path) -> collections.Counter:
 
 
 def plays(film: pathlib.Path, frames: int) -> bool:
-    """Whether a film is whole, with all its frames: an APNG by its chunks, since ffprobe ends after 2 GiB of one, any other by decoding it."""
+    """Whether a film has all its frames: an APNG by its chunks, since ffprobe reads only the first 2 GiB of one; any other film is decoded."""
     if film.suffix == ".apng":
         return apng_frames(film) == frames
     line = ["ffprobe", "-v", "error", "-count_frames", "-select_streams", "v", "-show_entries", "stream=nb_read_frames", "-of", "csv=p=0", str(film)]
@@ -153,12 +154,12 @@ def plays(film: pathlib.Path, frames: int) -> bool:
 
 
 def apng_frames(film: pathlib.Path) -> int | None:
-    """Number of frames of an APNG that ends as it should, has as many as it states, and whose chunks have no wrong sums."""
+    """Number of frames of an APNG; None if it is cut off, a checksum is wrong, or it states another number."""
     stated, found = None, 0
     with open(film, "rb") as file:
         if file.read(8) != b"\x89PNG\r\n\x1a\n":
             return None
-        while header := file.read(8):
+        while len(header := file.read(8)) == 8:
             length, kind = struct.unpack(">I4s", header)
             data, check = file.read(length), file.read(4)
             if check != struct.pack(">I", zlib.crc32(data, zlib.crc32(kind))):
@@ -195,7 +196,7 @@ def disturbed(shot: Shot, cluster: Cluster, disk: pathlib.Path) -> None:
     """A lost node, a requeued task, a drained node, a full disk; then the same command once more."""
     out = disk / shot.name
     out.mkdir()
-    shot.film = "film.mp4" if shutil.which("ffmpeg") else "film.apng"
+    shot.film = "film.mp4" if shutil.which("ffmpeg") and shutil.which("ffprobe") else "film.apng"
     shot.submit(cluster, out)
     probed = count_frames(out)
     cluster.wait("tasks run on all nodes", lambda: len(cluster.running()) == 3, 120)
@@ -375,8 +376,8 @@ def rain_of(frames: int) -> str:
     return RAIN.read_text().replace(RAIN_FRAMES, f"frames = {frames}\n")
 
 
-def frames_worth(program: str, folder: pathlib.Path, scene, seconds: float) -> int:
-    """How many frames of a scene take one process that much CPU time, by the cost of a few."""
+def frames_for_cpu_time(program: str, folder: pathlib.Path, scene: collections.abc.Callable[[int], str], seconds: float) -> int:
+    """How many frames of a scene take one process that much CPU time, extrapolated from a few."""
     measured = 60
     folder.mkdir()
     (folder / "scene.toml").write_text(scene(measured))
@@ -394,7 +395,7 @@ def prove(program: str, folder: pathlib.Path, disk: pathlib.Path, cluster: Clust
     scenes = {"aurora": aurora_of, "rain": rain_of}
     frames = arguments.frames or (160, 32)
     if is_long and not arguments.frames:
-        frames = [frames_worth(program, folder / f"measure-{name}", scene, LONG_SHOT_S) for name, scene in scenes.items()]
+        frames = [frames_for_cpu_time(program, folder / f"measure-{name}", scene, LONG_SHOT_S) for name, scene in scenes.items()]
     shots = [
         Shot(program, name, scene(count), max(count // chunks, 1), folder / name)
         for (name, scene), count, chunks in zip(scenes.items(), frames, (4, 8))
