@@ -8,7 +8,7 @@ use bansho_base::{
     camera::CameraHeader,
     color::AlphaConvention,
     frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
-    host::assets::{AssetProblem, Assets, Encoding, Picture, PictureAlpha, PictureLayers, PictureRemark},
+    host::assets::{AssetProblem, Encoding, Picture, PictureAlpha, PictureLayers, PictureRemark},
     image::{Image, Rect},
 };
 use bansho_media::{

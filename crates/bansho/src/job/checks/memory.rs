@@ -1,6 +1,6 @@
 //! Whether there is enough memory for the pictures of a job, checked before anything is drawn.
 
-use bansho_base::{host::memory, parameters::ProblemKind, phenomenon::MirrorRoughness};
+use bansho_base::{host::memory, parameters::ProblemKind};
 use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
 use crate::job::{
@@ -14,8 +14,10 @@ const MIN_CHECKED_PIXELS: f64 = 4e6;
 const FRAME_BYTES: f64 = 16.0;
 /// Bytes of the depth of a pixel, which only scene-linear files and refracted light need.
 const DEPTH_BYTES: f64 = 4.0;
-/// Bytes of a pixel of a plate as it is decoded, resampled and converted, measured.
-const PLATE_BYTES: f64 = 60.0;
+/// Bytes of a pixel of the file of a plate: color and alpha in single precision. Files are kept for the following frames.
+const PLATE_FILE_BYTES: f64 = 16.0;
+/// Side of the pixels in which a plate is reflected by a mirror that shows no picture, in pixels of the picture.
+const BLURRED_PLATE_PIXEL: usize = 2;
 /// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
 const MAX_BYTES_OF_PIXELS: usize = 1 << 27;
 /// Bytes of the process without a picture.
@@ -57,11 +59,15 @@ impl BytesPerPixel {
         let has_light = request.display.is_none() || request.tiles > 0 || refracts;
         let frame = if has_light { FRAME_BYTES + depth + 4.0 * channels as f64 } else { 0.0 };
         // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
-        let written = match request.display {
-            Some(BitDepth::Eight) => 4.0 + 3.0 + 2.0,
-            Some(BitDepth::Sixteen) => 8.0 + 6.0 + 5.0,
-            None => 12.0 + 3.0 * channels as f64,
+        let [display, file] = match request.display {
+            Some(BitDepth::Eight) => [4.0, 3.0 + 2.0],
+            Some(BitDepth::Sixteen) => [8.0, 6.0 + 5.0],
+            None => [0.0, 12.0 + 3.0 * channels as f64],
         };
+        // The next picture is drawn while one is written. What remains empty in it takes no memory, but a plate fills it.
+        let has_plate = plan.scene().has_plate();
+        let pictures = if has_plate && request.tiles == 0 { request.frames.min(2) as f64 } else { 1.0 };
+        let written = pictures * display + file;
         // One frame is written while another one is drawn, in the memory of the former where it is large and its pixels are no longer needed
         // (`draw_frames`). A sheet keeps the pixels of all, and is laid out and encoded as a whole.
         let window = plan.window();
@@ -69,13 +75,9 @@ impl BytesPerPixel {
             max_frames_with_pixels(window.width * window.height * frame as usize, request.display.is_none());
         let (drawn, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
         let drawn = drawn as f64 * frame + encoded as f64 * written;
-        let [plate, plate_frame] =
-            if plan.scene().has_plate() { [PLATE_BYTES, FRAME_BYTES + DEPTH_BYTES] } else { [0.0; 2] };
-        // The mirrored picture and the plate in it, unless the mirror is too rough to show either.
-        let mut mirrors = compiled.phenomena().filter_map(|phenomenon| phenomenon.info().mirror);
-        let has_picture = mirrors.any(|mirror| mirror.roughness != MirrorRoughness::Rough);
-        let mirror = if has_picture { FRAME_BYTES + plate_frame } else { 0.0 };
-        Self { drawn, whole: plate + mirror }
+        let plate_depth = if plan.scene().plate.depth.is_some() { DEPTH_BYTES } else { 0.0 };
+        let plate = if has_plate { FRAME_BYTES + plate_depth } else { 0.0 };
+        Self { drawn, whole: plate + reflected(compiled, plan, plate) }
     }
 
     fn total(&self, drawn_pixels: f64, whole_pixels: f64) -> f64 {
@@ -83,15 +85,34 @@ impl BytesPerPixel {
     }
 }
 
-/// Memory of a job, bytes: what its pictures take, its phenomena, and the process. Within a quarter of the measured peak for frames that take longer to
-/// draw than to write.
+/// Memory of the reflection in a mirror for each pixel of the picture, bytes: the mirrored scene and, in the same resolution, a plate of `plate` bytes for
+/// each of its pixels.
+fn reflected(compiled: &CompiledScene, plan: &Plan, plate: f64) -> f64 {
+    let Some(mirror) = compiled.phenomena().find_map(|phenomenon| phenomenon.info().mirror) else { return 0.0 };
+    let view = plan.view(plan.frames().start);
+    // Rain is a closed form, whose run is the phenomenon itself.
+    let mut closed_forms = compiled.phenomena().filter(|phenomenon| phenomenon.info().stepping.is_none());
+    let is_raining = closed_forms.any(|phenomenon| phenomenon.clone().start().publish(view.shutter).extinction > 0.0);
+    match mirror.roughness.pixel_size(view.camera.focal_pixels, is_raining) {
+        Some(side) => (FRAME_BYTES + plate) / (side * side) as f64,
+        None => plate / (BLURRED_PLATE_PIXEL * BLURRED_PLATE_PIXEL) as f64,
+    }
+}
+
+/// Memory of a job, bytes: what its pictures take, its phenomena, the file of its plate, and the process. Within a quarter of the measured peak for frames
+/// that take longer to draw than to write.
 pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> f64 {
     let window = plan.window();
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
     let phenomena: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
-    per_pixel.total(drawn, whole) + phenomena + PROCESS_BYTES
+    per_pixel.total(drawn, whole) + phenomena + plate_file_bytes(compiled) + PROCESS_BYTES
+}
+
+/// Memory of the file of a plate, bytes, which does not depend on the size of the picture.
+fn plate_file_bytes(compiled: &CompiledScene) -> f64 {
+    compiled.plate_image().map_or(0.0, |picture| PLATE_FILE_BYTES * picture.color.pixels().len() as f64)
 }
 
 /// Whether a phenomenon may refract the light of what is behind it.
@@ -150,7 +171,9 @@ pub(crate) fn check(
             format!("{width} x {height} pixels with this overscan would take {gib:.1} GiB; allowed: up to {max}");
         return Err(scene.error_at("picture.overscan", ProblemKind::Conflict(message)));
     }
-    let thousandths = memory::largest_fitting_count(1000, |count| memory::can_allocate(0.001 * count as f64 * bytes));
+    let plate_file = plate_file_bytes(compiled);
+    let fits = |thousandths| memory::can_allocate(plate_file + 0.001 * thousandths as f64 * (bytes - plate_file));
+    let thousandths = memory::largest_fitting_count(1000, fits);
     let scale = (0.001 * thousandths as f64).sqrt();
     let size = [window.width, window.height];
     let max_size = size.map(|side| (side as f64 * scale).floor() as usize);
@@ -163,7 +186,36 @@ pub(crate) fn check(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use bansho_base::{
+        host::assets::{Encoding, MemoryAssets, Picture},
+        image::Image,
+    };
+    use bansho_render::PlanOptions;
+
     use super::*;
+
+    /// The estimate for one 8-bit frame of a plate of some pixels.
+    fn of_plate(picture: &str, pixels: [usize; 2]) -> f64 {
+        let mut assets = MemoryAssets::default();
+        let image = Image::filled(pixels[0], pixels[1], [0.5, 0.5, 0.5, 1.0]);
+        assets.insert_picture("plate.png", Picture::opaque(image, Encoding::DisplaySrgb));
+        let text = format!("bansho = 2\n[picture]\nsize = {picture}\n[plate]\nimage = \"plate.png\"\n");
+        let compiled = crate::compile_scene("test", &text, Arc::new(assets)).unwrap();
+        let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
+        let request = MemoryRequest { frames: 1, tiles: 0, display: Some(BitDepth::Eight), size_is_option: false };
+        estimated_bytes(&compiled, &plan, request)
+    }
+
+    #[test]
+    fn plates_take_memory_for_the_pixels_of_their_files_and_of_the_picture() {
+        let small = of_plate("[100, 100]", [100, 100]);
+        let large_file = of_plate("[100, 100]", [1100, 1000]) - small;
+        assert!((large_file / 1.09e6 - PLATE_FILE_BYTES).abs() < 0.01, "{large_file}");
+        let large_picture = of_plate("[1100, 1000]", [100, 100]) - small;
+        assert!((large_picture / 1.09e6 - (FRAME_BYTES + 9.0)).abs() < 0.01, "{large_picture}");
+    }
 
     #[test]
     fn large_frames_are_in_memory_once_or_twice_where_they_are_written_from_their_pixels() {
